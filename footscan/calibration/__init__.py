@@ -1,0 +1,1 @@
+"""Control points in, a pixel-to-world model out."""

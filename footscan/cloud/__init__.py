@@ -1,0 +1,1 @@
+"""Stripe points to world points; fusion of the cameras; outliers."""

@@ -1,0 +1,1 @@
+"""Films in, Zarr out: camera bytes kept as they came."""

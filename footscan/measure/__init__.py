@@ -1,0 +1,1 @@
+"""Landmarks, lengths, girths, sizes."""

@@ -1,0 +1,1 @@
+"""A frame in, sub-pixel stripe points out."""

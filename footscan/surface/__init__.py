@@ -1,0 +1,1 @@
+"""Cloud to mesh; export."""

@@ -1,0 +1,1 @@
+"""Registration and distances against a reference."""

@@ -1,0 +1,1 @@
+"""The dataflow: which step runs after which, what can be skipped, where it runs."""

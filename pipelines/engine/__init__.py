@@ -1,0 +1,1 @@
+"""Keys, store, plan, run: an action cache over a content store."""

@@ -1,0 +1,1 @@
+"""One module a step: bytes in, bytes out, the science called in between."""

@@ -1,0 +1,179 @@
+"""Reading and writing of the project's YAML and JSON documents, as pydantic models, with one clear line per mistake."""
+
+import difflib
+import json
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import yaml
+from pydantic import AfterValidator, BaseModel, ConfigDict, StringConstraints, ValidationError
+
+from schemas.errors import RefusedInput
+
+MAX_BYTES = 8 * 2**20
+MAX_DEPTH = 24
+
+Pseudonym = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,64}\Z")]
+"""A name that may become a folder: letters, digits, '-' and '_', 1 to 64 of them."""
+
+
+def _relative(path: str) -> str:
+    if not path or "\0" in path or path.startswith(("/", "\\", "~")) or ":" in path.split("/", maxsplit=1)[0]:
+        raise ValueError("expected a path relative to this file")
+    return path
+
+
+RelativePath = Annotated[str, AfterValidator(_relative)]
+"""A path relative to the document that names it. `inside` resolves it within an archive."""
+
+
+class Document(BaseModel):
+    """Base of all models: unknown fields are refused (a misspelt option must not be ignored), numbers are finite."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, protected_namespaces=())
+
+
+AnyDocument = TypeVar("AnyDocument", bound=BaseModel)
+
+
+def read_yaml(path: Path, model: type[AnyDocument]) -> AnyDocument:
+    """The YAML file `path` as `model`.
+
+    Raises
+    ------
+    RefusedInput
+        The file is missing, too large, no YAML, or breaks the model; one line names file, field and expectation.
+    """
+    return validate(path, model, _parse_yaml(path, _read_text(path)))
+
+
+def read_json(path: Path, model: type[AnyDocument]) -> AnyDocument:
+    """The JSON file `path` as `model`; errors as in `read_yaml`."""
+    return validate(path, model, parse_json(path, _read_text(path)))
+
+
+def parse_json(source: Path | str, text: str) -> Any:
+    """`text` as JSON without NaN and infinities."""
+    try:
+        return json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise RefusedInput(source, f"expected a JSON document ({error})") from None
+
+
+def canonical_json(value: Any) -> str:
+    """JSON that is the same for equal values: sorted keys, no spaces, no NaN."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+
+
+def validate(source: Path | str, model: type[AnyDocument], value: Any) -> AnyDocument:
+    """`value` as `model`, or one line that names the first wrong field."""
+    if not isinstance(value, dict):
+        raise RefusedInput(source, f"expected a document with named fields, found {_kind(value)}")
+    try:
+        return model.model_validate(value)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = ".".join(str(part) for part in first["loc"]) or None
+        raise RefusedInput(source, _expectation(model, dict(first)), field=field) from None
+
+
+def inside(archive: Path, document: Path, relative: str, field: str) -> Path:
+    """The file that `document` names by `relative`, which may not lie outside `archive`, symbolic links followed."""
+    path = (document.parent / relative).resolve()
+    if not path.is_relative_to(archive.resolve()):
+        raise RefusedInput(document, f"{relative!r} leaves the archive, expected a path inside it", field=field)
+    return path
+
+
+def _expectation(model: type[BaseModel], error: dict[str, Any]) -> str:
+    message = str(error["msg"])
+    if error["type"] == "extra_forbidden":
+        known = sorted({name for name in _field_names(model)})
+        near = difflib.get_close_matches(str(error["loc"][-1]), known, n=1)
+        return "unknown field" + (f", did you mean {near[0]!r}?" if near else "")
+    if error["type"] == "missing":
+        return "is missing, expected a value"
+    found = error.get("input")
+    if isinstance(found, str | int | float | bool) or found is None:
+        return f"{message[0].lower()}{message[1:]}, found {str(found)[:80]!r}"
+    return f"{message[0].lower()}{message[1:]}"
+
+
+def _field_names(model: type[BaseModel], seen: set[type[BaseModel]] | None = None) -> set[str]:
+    """Names of all fields in `model` and in the models that it holds."""
+    seen = set() if seen is None else seen
+    if model in seen:
+        return set()
+    seen.add(model)
+    names: set[str] = set()
+    for name, field in model.model_fields.items():
+        names.add(field.alias or name)
+        for part in _models_in(field.annotation):
+            names |= _field_names(part, seen)
+    return names
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in getattr(annotation, "__args__", ()) for model in _models_in(part)]
+
+
+def _read_text(path: Path) -> str:
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise RefusedInput(path, f"larger than {MAX_BYTES} bytes, expected a small text document")
+        return path.read_bytes().decode("utf-8")
+    except UnicodeDecodeError:
+        raise RefusedInput(path, "expected UTF-8 text") from None
+    except FileNotFoundError:
+        raise RefusedInput(path, "no such file") from None
+    except (OSError, ValueError) as error:
+        raise RefusedInput(path, f"cannot be read ({getattr(error, 'strerror', None) or error})") from None
+
+
+class _TextLoader(yaml.SafeLoader):
+    """Scalars stay the text that was written; the model gives them their type.
+
+    YAML would read `no` as false, `2026-11-20` as a date, `0123` as 83 and `1e3` as text.
+    """
+
+    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 (the base class's own attribute)
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [key.value for key, _ in node.value]
+        for key in keys:
+            if not isinstance(key, str):
+                raise yaml.constructor.ConstructorError(None, None, "expected a name before ':'", node.start_mark)
+            if keys.count(key) > 1:
+                raise yaml.constructor.ConstructorError(None, None, f"{key!r} stands twice", node.start_mark)
+        return super().construct_mapping(node, deep)
+
+
+_TextLoader.add_implicit_resolver("tag:yaml.org,2002:null", __import__("re").compile(r"^(?:~|null|)$"), ["~", "n", ""])
+
+
+def _parse_yaml(path: Path, text: str) -> Any:
+    try:
+        depth = 0
+        for event in yaml.parse(text, Loader=yaml.SafeLoader):
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            if depth > MAX_DEPTH:
+                raise RefusedInput(path, f"nested more than {MAX_DEPTH} levels deep")
+            if isinstance(event, yaml.AliasEvent):
+                raise RefusedInput(path, f"line {event.start_mark.line + 1}: aliases ('*') are not accepted")
+        return yaml.load(text, Loader=_TextLoader)  # a SafeLoader
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        raise RefusedInput(path, f"{where}{error.problem or error.context}, expected YAML") from None
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise RefusedInput(path, f"expected YAML ({error})") from None
+
+
+def _refuse_constant(name: str) -> None:
+    raise ValueError(f"{name} is no JSON number")
+
+
+def _kind(value: Any) -> str:
+    return {list: "a list", str: "text", type(None): "nothing"}.get(type(value), type(value).__name__)

@@ -1,0 +1,47 @@
+"""What can go wrong, each kind with the exit status that it ends the command with.
+
+A message is one line and names the file, the field or value, and what was expected.
+"""
+
+from pathlib import Path
+
+
+class FootscanError(Exception):
+    """Base of all errors that a user is told in one line."""
+
+    exit_status = 3
+
+
+class RefusedInput(FootscanError):
+    """An input that breaks its format, or a wrong use of the command. Nothing was changed."""
+
+    exit_status = 2
+
+    def __init__(self, source: Path | str, problem: str, *, field: str | None = None) -> None:
+        self.source = str(source)
+        self.field = field
+        self.problem = problem
+        super().__init__(": ".join(one_line(part) for part in (self.source, field, problem) if part))
+
+
+class Finding(FootscanError):
+    """A scan that cannot be measured ("no stripe in camera 3"). Cached and reported; other scans go on."""
+
+    exit_status = 1
+
+    def __init__(self, problem: str) -> None:
+        super().__init__(one_line(problem))
+
+
+class Fault(FootscanError):
+    """A fault of the machine: a full disk, a damaged store. Never cached."""
+
+    exit_status = 3
+
+    def __init__(self, problem: str) -> None:
+        super().__init__(one_line(problem))
+
+
+def one_line(text: str) -> str:
+    """`text` without line breaks and control characters, for names that come from outside."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in " ".join(text.split()))

@@ -1,0 +1,63 @@
+"""A recorded scan: `scan.yaml` and the films of its cameras."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from schemas.documents import Document, Pseudonym, RelativePath
+
+Side = Literal["right", "left", "unknown"]
+
+
+class Travel(Document):
+    """X of frame k is `start_mm` + k * `step_mm`."""
+
+    start_mm: Annotated[float, Field(ge=-1e5, le=1e5)]
+    step_mm: Annotated[float, Field(gt=0, le=1000)]
+
+
+class CameraSource(Document):
+    """Where the frames of one camera lie."""
+
+    id: Annotated[int, Field(ge=1, le=64)]
+    file: RelativePath
+    """An AVI film, or a folder of PNG or JPEG frames in name order."""
+
+
+class CameraFilm(CameraSource):
+    """One camera of a scan."""
+
+    travel: Travel | None = None
+    """The camera's own travel; the scan's where absent."""
+    positions: RelativePath | None = None
+    """CSV with columns frame, x_mm for uneven steps; it wins over `travel`."""
+
+
+class Scan(Document):
+    """The content of scan.yaml."""
+
+    format: Literal["footscan.scan/1"]
+    patient: Pseudonym
+    scan: Pseudonym
+    side: Side
+    travel: Travel | None = None
+    calibration: RelativePath | None = None
+    truth: RelativePath | None = None
+    """Reference model in the scanner's own frame, for verification only."""
+    cameras: Annotated[list[CameraFilm], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        unique_ids(self.cameras)
+        for camera in self.cameras:
+            if self.travel is None and camera.travel is None and camera.positions is None:
+                raise ValueError(f"camera {camera.id} has no travel, expected travel or positions")
+        return self
+
+
+def unique_ids(cameras: list[CameraFilm] | list[CameraSource]) -> None:
+    """Refuses two cameras with one id."""
+    ids = [camera.id for camera in cameras]
+    for camera_id in ids:
+        if ids.count(camera_id) > 1:
+            raise ValueError(f"camera {camera_id} stands twice, expected each id once")
