@@ -2,6 +2,7 @@
 
 import difflib
 import json
+import re
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -13,7 +14,7 @@ from schemas.errors import RefusedInput
 MAX_BYTES = 8 * 2**20
 MAX_DEPTH = 24
 
-Pseudonym = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,64}\Z")]
+Pseudonym = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 """A name that may become a folder: letters, digits, '-' and '_', 1 to 64 of them."""
 
 
@@ -88,7 +89,7 @@ def inside(archive: Path, document: Path, relative: str, field: str) -> Path:
 def _expectation(model: type[BaseModel], error: dict[str, Any]) -> str:
     message = str(error["msg"])
     if error["type"] == "extra_forbidden":
-        known = sorted({name for name in _field_names(model)})
+        known = sorted(_field_names(model))
         near = difflib.get_close_matches(str(error["loc"][-1]), known, n=1)
         return "unknown field" + (f", did you mean {near[0]!r}?" if near else "")
     if error["type"] == "missing":
@@ -150,7 +151,7 @@ class _TextLoader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-_TextLoader.add_implicit_resolver("tag:yaml.org,2002:null", __import__("re").compile(r"^(?:~|null|)$"), ["~", "n", ""])
+_TextLoader.add_implicit_resolver("tag:yaml.org,2002:null", re.compile(r"^(?:~|null|)$"), ["~", "n", ""])
 
 
 def _parse_yaml(path: Path, text: str) -> Any:
@@ -164,8 +165,7 @@ def _parse_yaml(path: Path, text: str) -> Any:
                 raise RefusedInput(path, f"line {event.start_mark.line + 1}: aliases ('*') are not accepted")
         return yaml.load(text, Loader=_TextLoader)  # a SafeLoader
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        where = "".join(f"line {m.line + 1}, column {m.column + 1}: " for m in [error.problem_mark] if m is not None)
         raise RefusedInput(path, f"{where}{error.problem or error.context}, expected YAML") from None
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise RefusedInput(path, f"expected YAML ({error})") from None

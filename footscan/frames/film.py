@@ -1,0 +1,225 @@
+"""Films as they come: AVI (Motion-JPEG or raw), a folder of images, a single image.
+
+The packets are taken out of the AVI untouched. A frame that is lost or torn keeps its number, for its number is its X.
+"""
+
+import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from footscan.frames.image import SUFFIXES, Rgb, decode_image, image_size
+from schemas.errors import RefusedInput
+
+if TYPE_CHECKING:
+    from av.container import InputContainer
+    from av.video.stream import VideoStream
+
+_Frame = TypeVar("_Frame", bytes, Rgb)
+
+
+@dataclass(frozen=True)
+class Film:
+    """What a film holds."""
+
+    path: Path
+    kind: str
+    """`mjpeg`: an AVI of JPEG packets; `raw`: an AVI of plain pixels; `images`: a folder of them, or one."""
+    frames: int
+    height: int
+    width: int
+
+
+def open_film(path: Path, size: tuple[int, int] | None = None) -> Film:
+    """Look at a film without reading its frames.
+
+    Parameters
+    ----------
+    path : Path
+        An AVI, a folder of PNG or JPEG images in name order, or one image.
+    size : (rows, columns), optional
+        Expected size of the frames.
+
+    Raises
+    ------
+    RefusedInput
+        Missing, empty, truncated, of another kind or another size.
+    """
+    film = _open_images(path) if path.is_dir() or path.suffix.lower() in SUFFIXES else _open_avi(path)
+    if size is not None and (film.height, film.width) != size:
+        expected = f"expected frames of {size[1]} x {size[0]} pixels, found {film.width} x {film.height}"
+        raise RefusedInput(path, expected, field="frame size")
+    return film
+
+
+def encoded_frames(film: Film) -> Iterator[bytes | None]:
+    """The frames of a film of kind `mjpeg` or `images` as they were encoded, None for each that is lost."""
+    if film.kind == "images":
+        yield from (file.read_bytes() or None for file in image_files(film.path))
+        return
+    yield from _fill_gaps(_packets(film), film.frames)
+
+
+def pixel_frames(film: Film) -> Iterator[Rgb | None]:
+    """The frames of any film as (rows, columns, 3) arrays, each valid until the next; None for a lost or torn one."""
+    if film.kind == "raw":
+        yield from _fill_gaps(_raw_frames(film), film.frames)
+        return
+    buffer = np.empty((film.height, film.width, 3), np.uint8)
+    for data in encoded_frames(film):
+        yield decode_or_none(data, buffer)
+
+
+def decode_or_none(data: bytes | None, buffer: Rgb) -> Rgb | None:
+    """The frame `data` decoded into `buffer`; None where it is lost, torn or of another size."""
+    try:
+        pixels = None if data is None else decode_image(data, buffer)
+    except ValueError:
+        return None
+    return pixels if pixels is not None and pixels.shape == buffer.shape else None
+
+
+def image_files(path: Path) -> list[Path]:
+    """The images in a folder in name order, or the one image that `path` is."""
+    if not path.is_dir():
+        return [path]
+    return sorted(f for f in path.iterdir() if f.suffix.lower() in SUFFIXES and not f.name.startswith("."))
+
+
+def film_files(path: Path) -> list[Path]:
+    """The files that make up a film; RefusedInput where there are none."""
+    try:
+        files = image_files(path)
+        if files and files[0].is_file():
+            return files
+    except OSError as error:
+        raise RefusedInput(path, error.strerror or "cannot be read") from None
+    raise RefusedInput(path, "no PNG or JPEG images in this folder" if path.is_dir() else "no such film")
+
+
+def frame_digest(frame: bytes | Rgb) -> str:
+    """SHA-256 of a frame's bytes."""
+    return hashlib.sha256(frame if isinstance(frame, bytes) else np.ascontiguousarray(frame).data).hexdigest()
+
+
+def _open_images(path: Path) -> Film:
+    files = film_files(path)
+    try:
+        sizes = {file: image_size(file.read_bytes()) for file in files}
+    except OSError as error:
+        raise RefusedInput(path, error.strerror or "cannot be read") from None
+    except ValueError as error:
+        broken = next(file for file in files if not _is_image(file))
+        raise RefusedInput(broken, f"expected a JPEG or PNG image ({error})") from None
+    rows, columns = sizes[files[0]]
+    for file, size in sizes.items():
+        if size != (rows, columns):
+            expected = f"expected {columns} x {rows} pixels as in {files[0].name}, found {size[1]} x {size[0]}"
+            raise RefusedInput(file, expected, field="frame size")
+    return Film(path, "images", len(files), rows, columns)
+
+
+def _is_image(file: Path) -> bool:
+    try:
+        image_size(file.read_bytes())
+    except ValueError:
+        return False
+    return True
+
+
+def _open_avi(path: Path) -> Film:
+    film_files(path)
+    declared = _declared_length(path)
+    with _container(path) as (container, stream):
+        codec = stream.codec_context.name
+        kind = {"mjpeg": "mjpeg", "rawvideo": "raw"}.get(codec)
+        if kind is None:
+            raise RefusedInput(path, f"expected Motion-JPEG or raw video, found {codec}", field="codec")
+        height, width = stream.height, stream.width
+        numbers = [_number(packet.pts, stream) for packet in container.demux(stream) if packet.size]
+    found = max(numbers, default=-1) + 1
+    if not numbers:
+        raise RefusedInput(path, "expected at least one frame, found none", field="frames")
+    if found < declared:
+        problem = f"truncated: expected the {declared} frames that its header declares, found {found}"
+        raise RefusedInput(path, problem, field="frames")
+    return Film(path, kind, found, height, width)
+
+
+def _declared_length(path: Path) -> int:
+    """The number of frames in an AVI's main header, after a check that all its chunks are there.
+
+    RIFF: a chunk is a tag, its length in 4 bytes, and its content, padded to an even length; a long film is several
+    RIFF chunks in a row (OpenDML).
+    """
+    length = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(64)
+        if head[:4] != b"RIFF" or head[8:12] != b"AVI ":
+            raise RefusedInput(path, "expected an AVI film", field="header")
+        if head[24:28] != b"avih" or len(head) < 56:
+            raise RefusedInput(path, "expected an AVI main header, found a torn file", field="header")
+        position = 0
+        while position + 8 <= length:
+            file.seek(position)
+            tag = file.read(4)
+            if tag != b"RIFF":
+                break  # padding behind the film
+            size = int.from_bytes(file.read(4), "little")
+            if size in {0, 0xFFFFFFFF}:
+                raise RefusedInput(path, "never finished by its recorder: its length is not written", field="header")
+            position += 8 + size + size % 2
+            if position - size % 2 > length:
+                missing = position - size % 2 - length
+                raise RefusedInput(path, f"truncated: {missing} of {position} bytes are missing", field="length")
+    return int.from_bytes(head[48:52], "little")
+
+
+@contextmanager
+def _container(path: Path) -> "Iterator[tuple[InputContainer, VideoStream]]":
+    """An AVI opened by PyAV, with its first video stream; its errors as RefusedInput."""
+    import av  # 0.1 s that other commands need not wait for
+
+    try:
+        with av.open(str(path), "r", format="avi") as container:
+            if not container.streams.video:
+                raise RefusedInput(path, "expected a video stream, found none", field="streams")
+            yield container, container.streams.video[0]
+    except av.FFmpegError as error:
+        raise RefusedInput(path, f"expected an AVI film ({error.strerror or error})") from None
+
+
+def _number(pts: int | None, stream: "VideoStream") -> int:
+    """The frame's number from its time stamp: a packet that was lost leaves a gap there."""
+    rate = stream.average_rate or stream.base_rate
+    base = stream.time_base
+    if pts is None or base is None or not rate:
+        raise RefusedInput(stream.container.name, "expected a time stamp at each frame", field="frames")
+    return round(Fraction(pts) * base * rate)
+
+
+def _packets(film: Film) -> Iterator[tuple[int, bytes]]:
+    with _container(film.path) as (container, stream):
+        for packet in container.demux(stream):
+            if packet.size:
+                yield _number(packet.pts, stream), bytes(packet)
+
+
+def _raw_frames(film: Film) -> Iterator[tuple[int, Rgb]]:
+    with _container(film.path) as (container, stream):
+        for frame in container.decode(stream):
+            yield _number(frame.pts, stream), np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
+
+
+def _fill_gaps(numbered: Iterator[tuple[int, _Frame]], frames: int) -> Iterator[_Frame | None]:
+    next_number = 0
+    for number, frame in numbered:
+        yield from (None for _ in range(next_number, number))
+        yield frame
+        next_number = number + 1
+    yield from (None for _ in range(next_number, frames))

@@ -1,0 +1,101 @@
+"""Encoded images to pixels and back: JPEG by libjpeg-turbo, PNG by Pillow.
+
+How chroma is brought up to full size decides the accuracy of a red stripe: libjpeg-turbo interpolates it ("fancy
+upsampling"), where ffmpeg, and so the video readers built on it, repeats samples.
+"""
+
+import io
+import warnings
+from pathlib import Path
+
+import numpy as np
+import simplejpeg
+from numpy.typing import NDArray
+from PIL import Image
+
+from schemas.errors import RefusedInput
+
+Rgb = NDArray[np.uint8]
+"""(rows, columns, 3) uint8: red, green, blue."""
+
+MAX_PIXELS = 200_000_000
+SUFFIXES = (".jpg", ".jpeg", ".png")
+
+
+def decode_image(data: bytes, buffer: Rgb | None = None) -> Rgb:
+    """The pixels of a JPEG or PNG image.
+
+    Parameters
+    ----------
+    data : bytes
+        The encoded image. Huffman tables may be missing, as they do in Motion-JPEG.
+    buffer : (rows, columns, 3) uint8, optional
+        Written to and returned where its shape fits, so that a film is decoded into one place.
+
+    Raises
+    ------
+    ValueError
+        `data` is no such image, or a torn one.
+    """
+    if data[:2] == b"\xff\xd8":
+        return _decode_jpeg(data, buffer)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", Image.DecompressionBombWarning)
+        try:
+            with Image.open(io.BytesIO(data), formats=("PNG",)) as image:
+                if image.width * image.height > MAX_PIXELS:
+                    raise ValueError(f"{image.width} x {image.height} pixels are too many")
+                return np.asarray(_eight_bit(image).convert("RGB"))
+        except (OSError, SyntaxError, Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
+            raise ValueError(f"neither a JPEG nor a PNG image ({error})") from None
+
+
+def image_size(data: bytes) -> tuple[int, int]:
+    """(rows, columns) of an encoded image, without decoding its pixels; ValueError as in `decode_image`."""
+    if data[:2] == b"\xff\xd8":
+        rows, columns, _, _ = simplejpeg.decode_jpeg_header(data, strict=False)
+        return int(rows), int(columns)
+    try:
+        with Image.open(io.BytesIO(data), formats=("PNG",)) as image:
+            return image.height, image.width
+    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
+        raise ValueError(f"neither a JPEG nor a PNG image ({error})") from None
+
+
+def encode_png(pixels: Rgb) -> bytes:
+    """`pixels` as PNG, the lossless counterpart of `decode_image`."""
+    out = io.BytesIO()
+    Image.fromarray(pixels).save(out, format="PNG")
+    return out.getvalue()
+
+
+def read_image(path: Path) -> Rgb:
+    """The pixels of an image file; RefusedInput where it is none."""
+    try:
+        return decode_image(path.read_bytes())
+    except OSError as error:
+        raise RefusedInput(path, error.strerror or "cannot be read") from None
+    except ValueError as error:
+        raise RefusedInput(path, f"expected a JPEG or PNG image ({error})") from None
+
+
+def _decode_jpeg(data: bytes, buffer: Rgb | None) -> Rgb:
+    rows, columns, _, _ = simplejpeg.decode_jpeg_header(data, strict=False)
+    if rows * columns > MAX_PIXELS:
+        raise ValueError(f"{columns} x {rows} pixels are too many")
+    if buffer is not None and buffer.shape != (rows, columns, 3):
+        buffer = None
+    try:
+        return np.asarray(simplejpeg.decode_jpeg(data, buffer=buffer))
+    except ValueError as error:
+        # Webcams pad their entropy-coded data; every pixel is there nevertheless.
+        if "extraneous" not in str(error):
+            raise
+        return np.asarray(simplejpeg.decode_jpeg(data, strict=False, buffer=buffer))
+
+
+def _eight_bit(image: Image.Image) -> Image.Image:
+    """16-bit grey as 8-bit grey; Pillow's own conversion would clip it."""
+    if image.mode in {"I", "I;16", "I;16B"}:
+        return Image.fromarray((np.asarray(image).astype(np.uint32) >> 8).astype(np.uint8))
+    return image

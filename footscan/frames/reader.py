@@ -1,0 +1,61 @@
+"""Frames out of their Zarr array, each checked against the digest under which it was stored."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import zarr
+
+from footscan.frames.film import decode_or_none, frame_digest
+from footscan.frames.image import Rgb
+from footscan.frames.ingest import chunk_name
+from schemas.errors import Fault
+from schemas.frames import FrameManifest
+
+_Reader = Callable[[int], bytes | Rgb | None]
+
+
+def read_frames(array: Path, manifest: FrameManifest) -> Iterator[Rgb | None]:
+    """The frames of a camera in order, (rows, columns, 3) uint8; None for a lost or torn one.
+
+    Each array is valid until the next is asked for: all are decoded into one buffer.
+
+    Raises
+    ------
+    Fault
+        A frame is not the one that was stored.
+    """
+    read = _image_reader(array) if manifest.encoding == "image" else _pixel_reader(array)
+    buffer = np.empty((manifest.height, manifest.width, 3), np.uint8)
+    for number, digest in enumerate(manifest.frames):
+        if digest is None:
+            yield None
+            continue
+        stored = read(number)
+        if stored is None or frame_digest(stored) != digest:
+            raise Fault(f"{array}: frame {number} is damaged, expected the frame that was ingested; ingest it again")
+        yield decode_or_none(stored, buffer) if isinstance(stored, bytes) else stored
+
+
+def _image_reader(array: Path) -> _Reader:
+    """Reads a chunk's file itself: what is in it is the image, and Zarr's own way takes as long as the decoding."""
+
+    def read(number: int) -> bytes | None:
+        try:
+            return (array / chunk_name(number)).read_bytes()
+        except OSError:
+            return None
+
+    return read
+
+
+def _pixel_reader(array: Path) -> _Reader:
+    frames = zarr.open_array(str(array), mode="r")
+
+    def read(number: int) -> Rgb | None:
+        try:
+            return np.asarray(frames[number], np.uint8)
+        except (OSError, ValueError, RuntimeError):  # what the decompressor says of a damaged chunk
+            return None
+
+    return read

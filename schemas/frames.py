@@ -1,0 +1,21 @@
+"""What the frames of one camera are: written with the Zarr array, and the result of ingesting a film."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from schemas.documents import Document
+
+Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+
+
+class FrameManifest(Document):
+    """The frames of one camera, by their digests."""
+
+    format: Literal["footscan.frames/1"] = "footscan.frames/1"
+    encoding: Literal["image", "pixels"]
+    """`image`: a chunk is the camera's own JPEG (or PNG), bit for bit; `pixels`: a raw frame, losslessly compressed."""
+    height: Annotated[int, Field(ge=1)]
+    width: Annotated[int, Field(ge=1)]
+    frames: list[Sha256 | None]
+    """Digest of each frame's bytes (as stored for `image`, as decoded for `pixels`); None for a frame that was lost."""
