@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.documents import Document, parse_json, validate
+from schemas.documents import Document, parse_json, read_text, validate
 from schemas.errors import RefusedInput
 
 LengthUnit = Literal["cm", "mm"]
@@ -94,12 +94,7 @@ class Calibration(Document):
 
 def read_calibration(path: Path) -> Calibration:
     """The calibration file `path`, older versions migrated to the current one."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        problem = "no such file" if isinstance(error, FileNotFoundError) else f"cannot be read ({error})"
-        raise RefusedInput(path, problem) from None
-    return calibration_from_json(text, path)
+    return calibration_from_json(read_text(path), path)
 
 
 def calibration_from_json(text: str, source: Path | str) -> Calibration:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import yaml
-from pydantic import AfterValidator, BaseModel, ConfigDict, StringConstraints, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, StringConstraints, TypeAdapter, ValidationError
 
 from schemas.errors import RefusedInput
 
@@ -45,12 +45,12 @@ def read_yaml(path: Path, model: type[AnyDocument]) -> AnyDocument:
     RefusedInput
         The file is missing, too large, no YAML, or breaks the model; one line names file, field and expectation.
     """
-    return validate(path, model, _parse_yaml(path, _read_text(path)))
+    return validate(path, model, _parse_yaml(path, read_text(path)))
 
 
 def read_json(path: Path, model: type[AnyDocument]) -> AnyDocument:
     """The JSON file `path` as `model`; errors as in `read_yaml`."""
-    return validate(path, model, parse_json(path, _read_text(path)))
+    return validate(path, model, parse_json(path, read_text(path)))
 
 
 def parse_json(source: Path | str, text: str) -> Any:
@@ -76,6 +76,15 @@ def validate(source: Path | str, model: type[AnyDocument], value: Any) -> AnyDoc
         first = error.errors(include_url=False)[0]
         field = ".".join(str(part) for part in first["loc"]) or None
         raise RefusedInput(source, _expectation(model, dict(first)), field=field) from None
+
+
+def pseudonym(name: str, field: str) -> str:
+    """`name`, or a refusal where it could not be a folder."""
+    try:
+        return TypeAdapter(Pseudonym).validate_python(name)
+    except ValidationError:
+        problem = f"expected 1 to 64 letters, digits, '-' and '_', found {name[:80]!r}"
+        raise RefusedInput(field, problem) from None
 
 
 def inside(archive: Path, document: Path, relative: str, field: str) -> Path:
@@ -120,7 +129,8 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
     return [model for part in getattr(annotation, "__args__", ()) for model in _models_in(part)]
 
 
-def _read_text(path: Path) -> str:
+def read_text(path: Path) -> str:
+    """The content of a small UTF-8 file; RefusedInput where it is none."""
     try:
         if path.stat().st_size > MAX_BYTES:
             raise RefusedInput(path, f"larger than {MAX_BYTES} bytes, expected a small text document")
@@ -162,10 +172,11 @@ def _parse_yaml(path: Path, text: str) -> Any:
             if depth > MAX_DEPTH:
                 raise RefusedInput(path, f"nested more than {MAX_DEPTH} levels deep")
             if isinstance(event, yaml.AliasEvent):
-                raise RefusedInput(path, f"line {event.start_mark.line + 1}: aliases ('*') are not accepted")
+                raise RefusedInput(path, f"aliases are not accepted, expected {event.anchor!r} written out")
         return yaml.load(text, Loader=_TextLoader)  # a SafeLoader
     except yaml.MarkedYAMLError as error:
-        where = "".join(f"line {m.line + 1}, column {m.column + 1}: " for m in [error.problem_mark] if m is not None)
+        mark: Any = error.problem_mark
+        where = "" if mark is None else f"line {mark.line + 1}, column {mark.column + 1}: "
         raise RefusedInput(path, f"{where}{error.problem or error.context}, expected YAML") from None
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise RefusedInput(path, f"expected YAML ({error})") from None

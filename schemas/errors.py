@@ -42,6 +42,10 @@ class Fault(FootscanError):
         super().__init__(one_line(problem))
 
 
+class DamagedError(Fault):
+    """Something stored is not what was stored. What is damaged has been set aside: running again makes it anew."""
+
+
 def one_line(text: str) -> str:
     """`text` without line breaks and control characters, for names that come from outside."""
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in " ".join(text.split()))

@@ -101,6 +101,11 @@ def is_complete(array: Path) -> bool:
     return (array / "zarr.json").is_file()
 
 
+def discard(array: Path) -> None:
+    """Take back the completeness of an array that was found damaged."""
+    (array / "zarr.json").unlink(missing_ok=True)
+
+
 def _partial_folder(array: Path) -> Path:
     """Outside of the group, so that no reader of it meets a part."""
     return array.parent.parent / f".{array.name}.partial-{socket.gethostname()}-{os.getpid()}"

@@ -9,7 +9,7 @@ import zarr
 from footscan.frames.film import decode_or_none, frame_digest
 from footscan.frames.image import Rgb
 from footscan.frames.ingest import chunk_name
-from schemas.errors import Fault
+from schemas.errors import DamagedError
 from schemas.frames import FrameManifest
 
 _Reader = Callable[[int], bytes | Rgb | None]
@@ -22,19 +22,33 @@ def read_frames(array: Path, manifest: FrameManifest) -> Iterator[Rgb | None]:
 
     Raises
     ------
-    Fault
+    DamagedError
         A frame is not the one that was stored.
     """
-    read = _image_reader(array) if manifest.encoding == "image" else _pixel_reader(array)
+    read = _chunk_reader(array, manifest)
     buffer = np.empty((manifest.height, manifest.width, 3), np.uint8)
-    for number, digest in enumerate(manifest.frames):
-        if digest is None:
-            yield None
-            continue
-        stored = read(number)
-        if stored is None or frame_digest(stored) != digest:
-            raise Fault(f"{array}: frame {number} is damaged, expected the frame that was ingested; ingest it again")
-        yield decode_or_none(stored, buffer) if isinstance(stored, bytes) else stored
+    for number in range(len(manifest.frames)):
+        yield _frame(array, manifest, number, read, buffer)
+
+
+def read_frame(array: Path, manifest: FrameManifest, number: int) -> Rgb | None:
+    """One frame of a camera, as `read_frames` gives it."""
+    buffer = np.empty((manifest.height, manifest.width, 3), np.uint8)
+    return _frame(array, manifest, number, _chunk_reader(array, manifest), buffer)
+
+
+def _frame(array: Path, manifest: FrameManifest, number: int, read: _Reader, buffer: Rgb) -> Rgb | None:
+    digest = manifest.frames[number]
+    if digest is None:
+        return None
+    stored = read(number)
+    if stored is None or frame_digest(stored) != digest:
+        raise DamagedError(f"{array}: frame {number} is damaged, expected the frame that was ingested")
+    return decode_or_none(stored, buffer) if isinstance(stored, bytes) else stored
+
+
+def _chunk_reader(array: Path, manifest: FrameManifest) -> _Reader:
+    return _image_reader(array) if manifest.encoding == "image" else _pixel_reader(array)
 
 
 def _image_reader(array: Path) -> _Reader:

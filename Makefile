@@ -1,0 +1,30 @@
+# PYTHON=/path/to/python3.12 make setup   chooses the interpreter; otherwise the first of python3, python3.11 .. python3.14 that fits.
+export PYTHON
+BIN := .venv/bin
+
+.PHONY: help setup demo test lint format clean
+
+help:     ## this list
+	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  make \1	\2/p' $(MAKEFILE_LIST)
+
+setup:    ## system libraries, .venv, pinned packages; starts at once when they are there
+	@scripts/setup.sh
+
+demo: setup   ## films, calibrates, scans and measures a foot; the result is in demo/
+	@$(BIN)/footscan demo
+
+test: lint    ## lint, then every test
+	$(BIN)/pytest -n 2
+
+lint: setup   ## style, layout and types
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+format: setup ## puts the sources into the project's layout
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+clean:    ## removes the environment and what the tools left; results stay
+	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -name __pycache__ -prune -exec rm -rf {} +

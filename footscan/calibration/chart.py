@@ -1,0 +1,167 @@
+"""A calibration chart: control points whose world position and pixel are known, one CSV for all cameras."""
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.calibration import LengthUnit
+from schemas.documents import MAX_BYTES
+from schemas.errors import RefusedInput
+
+MAX_MAGNITUDE = 1e6
+"""No coordinate of a foot scanner is larger, in any unit; its powers stay finite."""
+
+_WORLD: dict[LengthUnit, tuple[str, str, str]] = {
+    "cm": ("x_cm", "y_cm", "z_cm"),
+    "mm": ("x_mm", "y_mm", "z_mm"),
+}
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+_CAMERA = re.compile(r"[0-9]{1,9}")
+
+
+@dataclass(frozen=True)
+class Chart:
+    """The control points of one camera."""
+
+    camera: int
+    points: tuple[str, ...]
+    """Their names, each once."""
+    world: NDArray[np.float64]
+    """(N, 3): X, Y, Z in the chart's own `unit`, scanner frame."""
+    unit: LengthUnit
+    pixels: NDArray[np.float64]
+    """(N, 2): column i and row j, px, the centre of the top-left pixel at (0, 0)."""
+
+
+@dataclass(frozen=True)
+class _Row:
+    line: int
+    camera: int
+    point: str
+    world: tuple[float, float, float]
+    pixel: tuple[float, float]
+
+
+def read_chart(path: Path) -> dict[int, Chart]:
+    """The charts of all cameras in the CSV file `path`, by camera.
+
+    Columns `camera,point,x_cm,y_cm,z_cm,i,j`, or the same in `_mm`, in any order, one control point a row.
+
+    Raises
+    ------
+    RefusedInput
+        The file breaks the format; one line names file, line and column and what was expected.
+    """
+    records = _records(path)
+    try:
+        line, header = next(records)
+    except StopIteration:
+        raise RefusedInput(path, f"is empty, expected a header {_header('mm')} and control points") from None
+    unit, columns = _columns(path, line, header)
+    rows: list[_Row] = []
+    seen: dict[tuple[int, str], int] = {}
+    for line, cells in records:
+        row = _row(path, line, cells, unit, columns)
+        first = seen.setdefault((row.camera, row.point), line)
+        if first != line:
+            problem = f"camera {row.camera} has {row.point!r} in line {first} already, expected each point once"
+            raise RefusedInput(path, problem, field=f"line {line}, column point")
+        rows.append(row)
+    if not rows:
+        raise RefusedInput(path, "has a header but no control point, expected at least one row")
+    return {camera: _chart(camera, unit, rows) for camera in sorted({row.camera for row in rows})}
+
+
+def _records(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Number and stripped cells of each line that is not blank."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise RefusedInput(path, f"larger than {MAX_BYTES} bytes, expected a calibration chart")
+        text = path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise RefusedInput(path, "no such file") from None
+    except UnicodeDecodeError:
+        raise RefusedInput(path, "expected a CSV file in UTF-8") from None
+    except (OSError, ValueError) as error:
+        raise RefusedInput(path, f"cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        for cells in reader:
+            stripped = [cell.strip() for cell in cells]
+            if any(stripped):
+                yield reader.line_num, stripped
+    except csv.Error as error:
+        raise RefusedInput(
+            path, f"expected comma-separated values ({error})", field=f"line {reader.line_num}"
+        ) from None
+
+
+def _columns(path: Path, line: int, header: list[str]) -> tuple[LengthUnit, dict[str, int]]:
+    """The unit of the chart, and where each column stands."""
+    where = f"line {line}"
+    names = [name.lower() for name in header]
+    units: list[LengthUnit] = [unit for unit, world in _WORLD.items() if set(world) & set(names)]
+    if len(units) > 1:
+        raise RefusedInput(path, "mixes cm and mm, expected one unit for x, y and z", field=where)
+    unit = units[0] if units else "mm"
+    expected = _header(unit) if units else f"{_header('cm')} or {_header('mm')}"
+    known = {"camera", "point", "i", "j", *_WORLD[unit]}
+    for name in header:
+        if name.lower() not in known:
+            raise RefusedInput(
+                path, f"unknown column, expected {expected}", field=f"{where}, column {name or '(empty)'}"
+            )
+        if names.count(name.lower()) > 1:
+            raise RefusedInput(path, "stands twice, expected each column once", field=f"{where}, column {name}")
+    for name in _header(unit).split(","):
+        if name not in names:
+            raise RefusedInput(path, f"is missing, expected {expected}", field=f"{where}, column {name}")
+    return unit, {name: index for index, name in enumerate(names)}
+
+
+def _header(unit: LengthUnit) -> str:
+    return ",".join(("camera", "point", *_WORLD[unit], "i", "j"))
+
+
+def _row(path: Path, line: int, cells: list[str], unit: LengthUnit, columns: dict[str, int]) -> _Row:
+    if len(cells) != len(columns):
+        problem = f"expected {len(columns)} values as the header has columns, found {len(cells)}"
+        raise RefusedInput(path, problem, field=f"line {line}")
+
+    def refuse(column: str, expected: str) -> RefusedInput:
+        found = cells[columns[column]][:80]
+        return RefusedInput(path, f"expected {expected}, found {found!r}", field=f"line {line}, column {column}")
+
+    def number(column: str) -> float:
+        text = cells[columns[column]]
+        value = float(text) if _NUMBER.fullmatch(text) else math.nan
+        if not abs(value) <= MAX_MAGNITUDE:
+            raise refuse(column, f"a number between -{MAX_MAGNITUDE:.0f} and {MAX_MAGNITUDE:.0f}")
+        return value
+
+    camera = cells[columns["camera"]]
+    if not _CAMERA.fullmatch(camera) or int(camera) < 1:
+        raise refuse("camera", "a whole number from 1")
+    point = cells[columns["point"]]
+    if not point:
+        raise refuse("point", "a name")
+    x, y, z = (number(column) for column in _WORLD[unit])
+    return _Row(line, int(camera), point, (x, y, z), (number("i"), number("j")))
+
+
+def _chart(camera: int, unit: LengthUnit, rows: list[_Row]) -> Chart:
+    own = [row for row in rows if row.camera == camera]
+    return Chart(
+        camera=camera,
+        points=tuple(row.point for row in own),
+        world=np.array([row.world for row in own]),
+        unit=unit,
+        pixels=np.array([row.pixel for row in own]),
+    )

@@ -1,0 +1,41 @@
+"""World points: what a stripe point becomes, and what clouds are made of."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+POINT_DTYPE = np.dtype(
+    [
+        ("x", "<f4"),
+        ("y", "<f4"),
+        ("z", "<f4"),
+        ("source", "<i4"),
+        ("frame", "<i4"),
+        ("camera", "u1"),
+        ("supported", "?"),
+    ]
+)
+"""A world point: x, y, z in mm (scanner frame), the row of the stripe point it came from, its frame, its camera, and
+whether the calibration supports its pixel.
+
+Coordinates are stored as float32: half a metre away their last digit is 0.03 µm, a thousandth of what a stripe
+resolves. Arithmetic on them is done in float64, see `coordinates`.
+"""
+
+
+def make_points(
+    xyz: NDArray[np.floating],
+    camera: int | NDArray[np.integer],
+    frame: int | NDArray[np.integer] = 0,
+    source: int | NDArray[np.integer] = 0,
+    supported: bool | NDArray[np.bool_] = True,
+) -> NDArray[np.void]:
+    """A (N,) array of `POINT_DTYPE` from (N, 3) coordinates in mm and, each, one value or N of them."""
+    points = np.zeros(len(xyz), POINT_DTYPE)
+    points["x"], points["y"], points["z"] = np.asarray(xyz).T
+    points["camera"], points["frame"], points["source"], points["supported"] = camera, frame, source, supported
+    return points
+
+
+def coordinates(points: NDArray[np.void]) -> NDArray[np.float64]:
+    """(N, 3) X, Y, Z of `points` in mm."""
+    return np.column_stack([points[axis].astype(np.float64) for axis in "xyz"])

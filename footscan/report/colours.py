@@ -1,0 +1,51 @@
+"""Colours of signed distances, and the bar that explains them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.report.markup import number
+
+_STOPS = np.array(
+    [[24, 62, 140], [67, 133, 196], [158, 202, 225], [244, 244, 240], [250, 190, 140], [224, 100, 68], [150, 22, 38]],
+    np.float64,
+)
+"""Blue inside, nearly white at zero, red outside: lightness falls to both ends, so colour-blind eyes see it too."""
+_UNKNOWN = np.array([165, 165, 165], np.uint8)
+_LEAST_LIMIT_MM = 0.5
+
+
+def colour_limit(distance: NDArray[np.floating]) -> float:
+    """Where the colours of (V,) signed distances in mm end: in halves of a mm, at or above 98 % of them."""
+    known = np.abs(distance[np.isfinite(distance)])
+    if not known.size:
+        return _LEAST_LIMIT_MM
+    return max(_LEAST_LIMIT_MM, float(np.ceil(np.quantile(known, 0.98) * 2)) / 2)
+
+
+def distance_colours(distance: NDArray[np.floating], limit: float) -> NDArray[np.uint8]:
+    """(V, 3) RGB of (V,) signed distances: blue from -`limit` down, red from +`limit` up, grey where not finite."""
+    position = np.clip((np.asarray(distance, np.float64) / limit + 1) / 2, 0, 1) * (len(_STOPS) - 1)
+    stops = np.arange(len(_STOPS))
+    colours = np.column_stack([np.interp(position, stops, _STOPS[:, channel]) for channel in range(3)])
+    colours[~np.isfinite(distance)] = _UNKNOWN
+    return np.rint(colours).astype(np.uint8)
+
+
+def colour_bar(limit: float) -> str:
+    """The colours from -`limit` to +`limit` mm as SVG, with five figures below them."""
+    steps = 100
+    colours = distance_colours((np.arange(steps) + 0.5) / steps * 2 - 1, 1.0)
+    # Each step reaches below the next, so that no seam shows between them.
+    bars = "".join(
+        f'<rect x="{20 + 3 * k}" y="0" width="{300 - 3 * k}" height="14" fill="#{r:02x}{g:02x}{b:02x}"/>'
+        for k, (r, g, b) in enumerate(colours)
+    )
+    figures = "".join(
+        f'<text x="{20 + 75 * k}" y="30" text-anchor="middle">{sign}{number(abs(share) * limit, 2)}</text>'
+        for k, (share, sign) in enumerate([(-1, "−"), (-0.5, "−"), (0, ""), (0.5, "+"), (1, "+")])
+    )
+    return (
+        '<figure class="bar"><svg viewBox="0 0 340 36" role="img" aria-label="Colour bar">'
+        f'{bars}<rect class="frame" x="20" y="0" width="300" height="14"/>{figures}</svg>'
+        "<figcaption>Distance to the reference model in mm: blue lies inside it, red outside</figcaption></figure>"
+    )

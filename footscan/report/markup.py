@@ -1,0 +1,60 @@
+"""Small pieces of HTML. Whatever comes from a scan passes through `text`, which makes it data and never markup."""
+
+import base64
+from collections.abc import Iterable, Sequence
+from html import escape
+
+NARROW_SPACE = "\N{NARROW NO-BREAK SPACE}"
+
+
+def text(value: object) -> str:
+    """`value` escaped, for use between tags and within quoted attributes; control characters are replaced."""
+    return escape("".join(c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}" for c in str(value)))
+
+
+def number(value: float, decimals: int = 0) -> str:
+    """`value` with a fixed number of decimals, a minus sign and narrow spaces between thousands."""
+    digits = f"{abs(value):,.{decimals}f}".replace(",", NARROW_SPACE)
+    return f"\N{MINUS SIGN}{digits}" if value < 0 and digits.strip("0.") else digits
+
+
+def words(name: str) -> str:
+    """The identifier `name` as a phrase: `ball_girth` becomes "Ball girth"."""
+    phrase = name.replace("_", " ")
+    return phrase[:1].upper() + phrase[1:]
+
+
+def table(
+    headings: Sequence[str], rows: Iterable[Sequence[str]], numeric: Iterable[int] = (), kind: str = "plain"
+) -> str:
+    """A table of cells that are markup already; the columns in `numeric` are set to the right.
+
+    The first cell of every row is its heading. `kind` is what the style sheet knows the table by.
+    It stands in a box of its own that scrolls where a screen is too narrow for it.
+    """
+    right = set(numeric)
+    marks = [' class="n"' if column in right else "" for column in range(len(headings))]
+    head = "".join(f'<th scope="col"{mark}>{cell}</th>' for mark, cell in zip(marks, headings, strict=True))
+    body = "".join(
+        f'<tr><th scope="row"{marks[0]}>{row[0]}</th>'
+        + "".join(f"<td{mark}>{cell}</td>" for mark, cell in zip(marks[1:], row[1:], strict=True))
+        + "</tr>\n"
+        for row in rows
+    )
+    top = f"<thead><tr>{head}</tr></thead>\n" if any(headings) else ""
+    return f'<div class="wide"><table class="{kind}">\n{top}<tbody>\n{body}</tbody></table></div>'
+
+
+def facts(pairs: Iterable[tuple[str, str]]) -> str:
+    """Names and values side by side, as many in a row as fit; both are markup already."""
+    return '<dl class="facts">' + "".join(f"<div><dt>{n}</dt><dd>{v}</dd></div>" for n, v in pairs) + "</dl>"
+
+
+def section(title: str, *parts: str) -> str:
+    """A part of the page under its own heading; `parts` are markup already."""
+    return f"<section>\n<h2>{text(title)}</h2>\n" + "\n".join(parts) + "\n</section>"
+
+
+def data_uri(kind: str, content: bytes) -> str:
+    """`content` of the media type `kind` as an address that needs no network."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"

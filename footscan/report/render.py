@@ -1,0 +1,134 @@
+"""Pictures of a triangle mesh: orthographic, hidden parts removed by depth, smoothly shaded."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+_SAMPLES = 2  # a pixel is the mean of 2 x 2 samples: smooth outlines
+_LIGHT = np.array([-0.35, 0.5, 0.79]) / np.linalg.norm([-0.35, 0.5, 0.79])
+"""Towards the light: from above the viewer's left shoulder."""
+_AMBIENT, _FILL, _KEY = 0.30, 0.24, 0.46
+"""How much light comes from everywhere, from the viewer (it shapes what lies in shadow) and from the lamp."""
+_INNER_SIDE = 0.45
+"""How bright the inner side of a surface is shown beside its outer side, so that a hole is seen as one."""
+
+
+def render_mesh(
+    vertices: NDArray[np.floating],
+    faces: NDArray[np.integer],
+    colours: NDArray[np.uint8],
+    shape: tuple[int, int],
+    pixels_per_mm: float,
+) -> NDArray[np.uint8]:
+    """The mesh as it is seen from +Z, shaded, on a transparent ground.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float, mm, viewer's frame
+        X to the right, Y up, Z towards the viewer; the origin is the upper left corner of the picture, so what is in
+        the picture has X >= 0 and Y <= 0.
+    faces : (F, 3) int
+        Rows of `vertices`, counter-clockwise as seen from outside.
+    colours : (V, 3) uint8
+        RGB of each vertex.
+    shape : (rows, columns) of the picture
+    pixels_per_mm : float
+
+    Returns
+    -------
+    (rows, columns, 4) uint8, RGBA
+    """
+    outward = vertex_normals(vertices, faces)
+    samples_per_mm = pixels_per_mm * _SAMPLES
+    # Sample (0, 0) has its centre half a sample inside the corner.
+    projected = np.asarray(vertices, np.float64) * [samples_per_mm, -samples_per_mm, 1.0] - [0.5, 0.5, 0.0]
+    samples: NDArray[np.float32] = rasterise(
+        projected,
+        np.ascontiguousarray(faces, np.int64),
+        colours * _shade(outward)[:, None],
+        colours * (_INNER_SIDE * _shade(-outward))[:, None],
+        (shape[0] * _SAMPLES, shape[1] * _SAMPLES),
+    )
+    return _mean_of_samples(samples)
+
+
+def _shade(normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(V,) brightness, 0 to 1, of surfaces with (V, 3) unit `normals`."""
+    shade: NDArray[np.float64] = (
+        _AMBIENT + _FILL * np.clip(normals[:, 2], 0, 1) + _KEY * np.clip(normals @ _LIGHT, 0, 1)
+    )
+    return shade
+
+
+def vertex_normals(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> NDArray[np.float64]:
+    """(V, 3) outward unit normals: the sum of the normals of a vertex's triangles, each weighted by its area."""
+    corners = np.asarray(vertices, np.float64)[faces]
+    of_faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = np.column_stack(
+        [
+            np.bincount(faces.ravel(), weights=np.repeat(of_faces[:, axis], 3), minlength=len(vertices))
+            for axis in range(3)
+        ]
+    )
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    normals: NDArray[np.float64] = np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > 0)
+    return normals
+
+
+@njit(cache=True, nogil=True)
+def rasterise(
+    projected: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    outer: NDArray[np.float64],
+    inner: NDArray[np.float64],
+    shape: tuple[int, int],
+) -> NDArray[np.float32]:
+    """Red, green, blue of the nearest triangle at every sample, and 255; zeros where there is none.
+
+    The result has the shape (rows, columns, 4), where `shape` is (rows, columns). `projected` holds (column, row,
+    depth towards the viewer) of each vertex; `outer` and `inner` its (V, 3) colours, 0 to 255, on the side from which
+    the corners of a triangle run counter-clockwise, and on the other. Colours and depth run linearly over a triangle,
+    as the projection is orthographic. Of triangles at one depth the first stays.
+    """
+    rows, columns = shape
+    samples = np.zeros((rows, columns, 4), np.float32)
+    nearest = np.full((rows, columns), -np.inf)
+    for face in range(len(faces)):
+        a, b, c = faces[face]
+        xa, ya, za = projected[a]
+        xb, yb, zb = projected[b]
+        xc, yc, zc = projected[c]
+        # Twice the signed area; rows run down, so counter-clockwise is negative.
+        area = (xb - xa) * (yc - ya) - (xc - xa) * (yb - ya)
+        if area == 0.0:
+            continue
+        colours = outer if area < 0.0 else inner
+        for row in range(max(0, int(np.ceil(min(ya, yb, yc)))), min(rows - 1, int(np.floor(max(ya, yb, yc)))) + 1):
+            for column in range(
+                max(0, int(np.ceil(min(xa, xb, xc)))), min(columns - 1, int(np.floor(max(xa, xb, xc)))) + 1
+            ):
+                at_b = ((column - xa) * (yc - ya) - (xc - xa) * (row - ya)) / area
+                at_c = ((xb - xa) * (row - ya) - (column - xa) * (yb - ya)) / area
+                at_a = 1.0 - at_b - at_c
+                if at_a < 0.0 or at_b < 0.0 or at_c < 0.0:
+                    continue
+                depth = at_a * za + at_b * zb + at_c * zc
+                if depth <= nearest[row, column]:
+                    continue
+                nearest[row, column] = depth
+                for channel in range(3):
+                    samples[row, column, channel] = (
+                        at_a * colours[a, channel] + at_b * colours[b, channel] + at_c * colours[c, channel]
+                    )
+                samples[row, column, 3] = 255.0
+    return samples
+
+
+def _mean_of_samples(samples: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """RGBA pixels of `_SAMPLES` x `_SAMPLES` samples: colour is the mean of those covered, alpha the share of them."""
+    rows, columns = samples.shape[0] // _SAMPLES, samples.shape[1] // _SAMPLES
+    sums = samples.reshape(rows, _SAMPLES, columns, _SAMPLES, 4).sum(axis=(1, 3))
+    covered = np.maximum(sums[..., 3:] / 255, 1)
+    pixels = np.concatenate([sums[..., :3] / covered, sums[..., 3:] / _SAMPLES**2], axis=2)
+    rounded: NDArray[np.uint8] = np.rint(pixels).astype(np.uint8)
+    return rounded

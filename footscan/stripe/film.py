@@ -1,0 +1,28 @@
+"""The stripe in all frames of a film."""
+
+import csv
+import io
+from collections.abc import Iterable
+
+from footscan.frames.image import Rgb
+from footscan.stripe.extract import extract_stripe
+from footscan.stripe.points import STRIPE_DTYPE, StripePoints, film_points
+from schemas.parameters.extraction import ExtractionParameters
+
+
+def extract_film(frames: Iterable[Rgb | None], parameters: ExtractionParameters) -> StripePoints:
+    """The stripe points of all frames of one camera; a lost frame (None) has none."""
+    return film_points(
+        (number, extract_stripe(frame, parameters)) for number, frame in enumerate(frames) if frame is not None
+    )
+
+
+def points_csv(points: StripePoints) -> str:
+    """Stripe points as CSV text: frame,i,j,width,peak,score, three decimals."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = STRIPE_DTYPE.names or ()
+    writer.writerow(names)
+    for point in points.tolist():
+        writer.writerow([point[0], *(f"{value:.3f}" for value in point[1:])])
+    return text.getvalue()

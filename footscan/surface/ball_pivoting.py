@@ -1,0 +1,69 @@
+"""A cloud to a triangle mesh, by ball pivoting (Bernardini et al. 1999, doi:10.1109/2945.817351)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.cloud.cells import cell_means, group_by_cell
+from footscan.surface.holes import close_holes
+from footscan.surface.projection import project
+from footscan.surface.topology import drop_tangles, keep_large_components, used_vertices
+from schemas.errors import Finding
+from schemas.parameters.surface import SurfaceParameters
+
+REPAIRS = (0.0, 0.0)
+"""Slits after the first closing. A patch may meet the surface beside its hole: what is tangled is taken out, and the
+holes that this leaves are closed again."""
+
+
+def mesh_cloud(
+    points: NDArray[np.floating], normals: NDArray[np.floating], parameters: SurfaceParameters
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """The surface through `points`.
+
+    Parameters
+    ----------
+    points : (N, 3) mm
+    normals : (N, 3) unit vectors, outward
+
+    Returns
+    -------
+    vertices : (V, 3) float64, mm, frame of `points`
+    faces : (F, 3) int32, counter-clockwise seen from outside
+
+    Raises
+    ------
+    Finding
+        The points are too few or too far apart for a surface.
+    """
+    import open3d as o3d
+
+    cloud, cloud_normals = np.asarray(points, np.float64), np.asarray(normals, np.float64)
+    spaced, spaced_normals = _space_evenly(cloud, cloud_normals, parameters.spacing_mm)
+    spaced = project(spaced, spaced_normals, cloud, cloud_normals, parameters.smoothing_mm)
+    legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(spaced))
+    legacy.normals = o3d.utility.Vector3dVector(spaced_normals)
+    radii = o3d.utility.DoubleVector(sorted(parameters.ball_radii_mm))
+    pivoted = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(legacy, radii)
+    faces = keep_large_components(drop_tangles(np.asarray(pivoted.triangles, np.int32)), parameters.component_share)
+    if not faces.size:
+        raise Finding(
+            f"no surface through {len(points)} points, expected a cloud as dense as {parameters.spacing_mm} mm"
+        )
+    vertices, faces = used_vertices(np.asarray(pivoted.vertices), faces)
+    for slit in (parameters.slit_mm, *REPAIRS):
+        vertices, faces = close_holes(vertices, faces, parameters.hole_mm, slit, parameters.spacing_mm)
+        faces = drop_tangles(faces)
+    return used_vertices(vertices, faces)
+
+
+def _space_evenly(
+    points: NDArray[np.float64], normals: NDArray[np.float64], spacing: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Means of points and normals within cubes of `spacing`; ball pivoting wants one spacing everywhere."""
+    if not len(points):
+        raise Finding("no points, expected a cloud to mesh")
+    order, starts = group_by_cell(points, np.full(3, spacing))
+    both = cell_means(np.hstack([points, normals]), order, starts, np.ones(len(points)))
+    length = np.linalg.norm(both[:, 3:], axis=1)
+    both = both[length > 0.1]  # else two sides of something thin have met, and there is no outside
+    return both[:, :3], both[:, 3:] / np.linalg.norm(both[:, 3:], axis=1, keepdims=True)

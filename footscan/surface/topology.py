@@ -1,0 +1,53 @@
+"""Edges, components and vertices of triangle meshes."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+Faces = NDArray[np.integer]
+
+
+def directed_edges(faces: Faces) -> NDArray[np.int64]:
+    """(3F, 2) the edges of (F, 3) `faces`, each in the direction in which its face runs through it."""
+    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+
+
+def edge_counts(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(E, 2) the edges of (F, 3) `faces`, smaller vertex first, and (E,) how many faces meet at each."""
+    edges, counts = np.unique(np.sort(directed_edges(faces), axis=1), axis=0, return_counts=True)
+    return edges, counts.astype(np.int64)
+
+
+def drop_tangles(faces: Faces) -> NDArray[np.int32]:
+    """`faces` without those at edges where more than two meet, or where two run the same way."""
+    edges = directed_edges(faces)
+    _, undirected, meeting = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    _, directed, same_way = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    tangled = (meeting[undirected] > 2) | (same_way[directed] > 1)
+    return faces[~tangled.reshape(3, -1).any(axis=0)].astype(np.int32)
+
+
+def face_components(faces: Faces) -> NDArray[np.int32]:
+    """(F,) number of the part, joined by vertices, that each of (F, 3) `faces` belongs to."""
+    if not len(faces):
+        return np.zeros(0, np.int32)
+    size = int(faces.max()) + 1
+    edges = directed_edges(faces)
+    graph = coo_array((np.ones(len(edges), np.int8), (edges[:, 0], edges[:, 1])), shape=(size, size))
+    _, label = connected_components(graph, directed=False)
+    _, component = np.unique(label[faces[:, 0]], return_inverse=True)
+    return component.astype(np.int32)
+
+
+def keep_large_components(faces: Faces, share: float) -> NDArray[np.int32]:
+    """`faces` without the parts that hold less than `share` of them."""
+    component = face_components(faces)
+    keep = np.bincount(component)[component] >= share * len(faces) if len(faces) else np.zeros(0, np.bool_)
+    return faces[keep].astype(np.int32)
+
+
+def used_vertices(vertices: NDArray[np.float64], faces: Faces) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """The vertices that `faces` use, in their order, and the faces renumbered to them."""
+    used, renumbered = np.unique(faces, return_inverse=True)
+    return vertices[used], renumbered.reshape(faces.shape).astype(np.int32)

@@ -1,0 +1,73 @@
+"""The glass plate that the foot stands on: refraction through it and reflection from its faces.
+
+The plate lies between Z = -`THICKNESS_MM` and Z = 0, the face that the foot stands on.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+THICKNESS_MM = 6.0
+REFRACTIVE_INDEX = 1.52
+
+
+def sine_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
+    """Sine of the angle to the vertical at which light runs in air between `source` below the plate and `points` above.
+
+    With s that sine, h the heights in air and t the path in glass, the horizontal distance is
+    r = h s / sqrt(1 - s^2) + t s / sqrt(n^2 - s^2), by Snell's law at plane-parallel faces. It is solved for
+    s / sqrt(1 - s^2) by Newton's method, whose steps converge from the left since r is concave in it.
+
+    Parameters
+    ----------
+    source : (3,) float64, mm; below the plate.
+    points : (N, 3) float64, mm; Z below 0 is taken as 0.
+    passes : how often the plate is crossed; 3 with one reflection at each of its faces.
+
+    Returns
+    -------
+    (N,) float64, 0 <= s < 1.
+    """
+    offset = points[:, :2] - source[:2]
+    distance = np.hypot(offset[:, 0], offset[:, 1])
+    air = np.maximum(points[:, 2], 0.0) - THICKNESS_MM - source[2]
+    glass = passes * THICKNESS_MM
+    n2 = REFRACTIVE_INDEX**2
+    tangent = distance / (air + glass)
+    for _ in range(8):
+        # In glass: s / sqrt(n^2 - s^2) with s^2 = q^2 / (1 + q^2) is q / sqrt(n^2 + (n^2 - 1) q^2).
+        root = np.sqrt(n2 + (n2 - 1.0) * tangent**2)
+        excess = air * tangent + glass * tangent / root - distance
+        tangent = tangent - excess / (air + glass * n2 / root**3)
+    return np.asarray(tangent / np.sqrt(1.0 + tangent**2))
+
+
+def directions_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
+    """Unit directions, (N, 3), in which light leaves `source` below the plate to arrive at `points` above it."""
+    sine = sine_from_below(source, points, passes)
+    offset = points[:, :2] - source[:2]
+    distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-12)
+    return np.column_stack([offset * (sine / distance)[:, None], np.sqrt(1.0 - sine**2)])
+
+
+def exits_above(source: Floats, directions: Floats, passes: int = 1) -> Floats:
+    """Where rays from `source` below the plate leave its upper face, (N, 3) with Z = 0.
+
+    A plane-parallel plate leaves their directions as they are.
+    """
+    sine = np.hypot(directions[:, 0], directions[:, 1])
+    rise = directions[:, 2]
+    # Horizontal way for each unit of sine: in air h / cos, in glass t / (n cos') with n cos' = sqrt(n^2 - s^2).
+    way = (-THICKNESS_MM - source[2]) / rise + passes * THICKNESS_MM / np.sqrt(REFRACTIVE_INDEX**2 - sine**2)
+    exits = np.zeros_like(directions)
+    exits[:, :2] = source[:2] + directions[:, :2] * way[:, None]
+    return exits
+
+
+def reflectance(cosine: Floats) -> Floats:
+    """Fresnel's share of unpolarised light that one face reflects, from the cosine of the angle of incidence in air."""
+    inside = np.sqrt(1.0 - (1.0 - cosine**2) / REFRACTIVE_INDEX**2)
+    across = (cosine - REFRACTIVE_INDEX * inside) / (cosine + REFRACTIVE_INDEX * inside)
+    along = (REFRACTIVE_INDEX * cosine - inside) / (REFRACTIVE_INDEX * cosine + inside)
+    return np.asarray((across**2 + along**2) / 2.0)

@@ -1,0 +1,153 @@
+"""An archive of scans: planned as a whole, run as a whole; one scan's failure is its own."""
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pipelines.deliver import deliver
+from pipelines.engine.digest import FileDigests, sha256
+from pipelines.engine.plan import Plan, make_plan
+from pipelines.engine.run import OnStepEnd, run_plan
+from pipelines.engine.step import Failure, Step, Success
+from pipelines.engine.store import Store
+from pipelines.recorded import RecordedScan, read_scan, scan_folders
+from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
+from schemas.calibration import calibration_from_json
+from schemas.documents import read_text, read_yaml
+from schemas.errors import RefusedInput
+from schemas.workflow import ScanParameters, Workflow
+
+CACHE = ".footscan"
+
+
+@dataclass(frozen=True)
+class Job:
+    """Which scans, with what, to where."""
+
+    folders: list[Path]
+    archive: Path | None
+    """Root that the scans' paths may not leave; without it, two levels above each scan."""
+    calibration: Path | None
+    """Wins over the scans' own where `calibration_wins`, stands in for it otherwise."""
+    calibration_wins: bool
+    results: Path
+    cache: Path
+    parameters: ScanParameters
+    workers: int
+
+
+@dataclass
+class PlannedJob:
+    """What a job has to do."""
+
+    job: Job
+    plan: Plan
+    digests: FileDigests
+    refused: dict[str, RefusedInput] = field(default_factory=dict)
+    """Scans whose input breaks its format, by folder or name."""
+    scans: list[RecordedScan] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class ScanEnd:
+    """What became of one scan."""
+
+    scan: str
+    folder: Path | None
+    """Its results; None where it failed."""
+    problem: str | None
+    kind: str | None
+    """`refused`, `finding`, `fault`, as in `Failure`."""
+
+
+def job_of_workflow(path: Path, workers: int | None = None) -> Job:
+    """The job that a workflow.yaml describes."""
+    workflow = read_yaml(path, Workflow)
+    base = path.resolve().parent
+    archive = base / workflow.archive
+    results = base / workflow.results
+    return Job(
+        folders=list(scan_folders(archive)),
+        archive=archive,
+        calibration=base / workflow.calibration if workflow.calibration else None,
+        calibration_wins=False,
+        results=results,
+        cache=base / workflow.cache if workflow.cache else results / CACHE,
+        parameters=workflow.parameters,
+        workers=workers or workflow.workers or cores(),
+    )
+
+
+def job_of_scan(folder: Path, calibration: Path | None, results: Path, workers: int | None = None) -> Job:
+    """The job of one scan without a workflow."""
+    return Job(
+        folders=[folder],
+        archive=None,
+        calibration=calibration,
+        calibration_wins=True,
+        results=results,
+        cache=results / CACHE,
+        parameters=ScanParameters(),
+        workers=workers or cores(),
+    )
+
+
+def plan_job(job: Job) -> PlannedJob:
+    """Draw the graph of all scans of a job and look every step up in the cache."""
+    digests = FileDigests.load(job.cache / "files.json")
+    steps: list[Step] = []
+    planned = PlannedJob(job, Plan([]), digests)
+    calibrations: dict[Path, CalibrationFile] = {}
+    names: dict[str, Path] = {}
+    for folder in job.folders:
+        try:
+            scan = read_scan(folder, job.archive)
+            if scan.name in names:
+                raise RefusedInput(scan.file, f"{scan.name} is also in {names[scan.name]}, expected each scan once")
+            names[scan.name] = folder
+            calibration = _calibration(scan, job, calibrations)
+            steps += scan_steps(scan, calibration, job.parameters, digests)
+            planned.scans.append(scan)
+        except RefusedInput as error:
+            planned.refused[str(folder)] = error
+    planned.plan = make_plan(steps, Store(job.cache))
+    return planned
+
+
+def run_job(planned: PlannedJob, on_step_end: OnStepEnd) -> Iterable[ScanEnd]:
+    """Run what is left of a planned job and deliver each scan's results; yields what became of each scan."""
+    job, store = planned.job, Store(planned.job.cache)
+    for folder, error in planned.refused.items():
+        yield ScanEnd(folder, None, str(error), "refused")
+    outcomes = run_plan(planned.plan, store, workers=job.workers, on_step_end=on_step_end)
+    if any(isinstance(outcome, Failure) and outcome.kind == "damaged" for outcome in outcomes.values()):
+        # What was damaged has been set aside: a new plan makes it anew.
+        again = make_plan([p.step for p in planned.plan.steps], store)
+        outcomes = run_plan(again, store, workers=job.workers, on_step_end=on_step_end)
+    for scan in planned.scans:
+        ends = {kind: outcomes[f"{scan.name}/{kind}"] for kind in DELIVERED.values()}
+        failure = next((end for end in ends.values() if isinstance(end, Failure)), None)
+        if failure is not None:
+            yield ScanEnd(scan.name, None, failure.problem, failure.kind)
+            continue
+        target = job.results / scan.document.patient / scan.document.scan
+        digests = {kind: end.digest for kind, end in ends.items() if isinstance(end, Success)}
+        problem = deliver({file: digests[kind] for file, kind in DELIVERED.items()}, store, planned.digests, target)
+        yield ScanEnd(scan.name, None if problem else target, problem, "fault" if problem else None)
+    planned.digests.save()
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _calibration(scan: RecordedScan, job: Job, known: dict[Path, CalibrationFile]) -> CalibrationFile:
+    path = job.calibration if job.calibration_wins and job.calibration else scan.calibration or job.calibration
+    if path is None:
+        raise RefusedInput(scan.file, "names no calibration, expected one here or in the workflow", field="calibration")
+    if path not in known:
+        text = read_text(path)
+        known[path] = CalibrationFile(path, calibration_from_json(text, path), sha256(text.encode()))
+    return known[path]

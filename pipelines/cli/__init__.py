@@ -1,0 +1,1 @@
+"""The command `footscan`. Each command imports what it needs when it is called: the command starts at once."""

@@ -1,0 +1,51 @@
+"""`footscan demo`."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from pipelines.cli.output import message, print_table
+from pipelines.cli.results import print_measures
+
+if TYPE_CHECKING:
+    from pipelines.engine.plan import Plan
+    from pipelines.engine.run import OnStepEnd
+
+
+def demo(
+    folder: Annotated[Path, typer.Option(help="Where everything is put.")] = Path("demo"),
+    side: Annotated[Literal["right", "left"], typer.Option(help="Which foot.")] = "right",
+    light: Annotated[Literal["dark", "ambient", "bright"], typer.Option(help="Light in the room.")] = "ambient",
+) -> None:
+    """Film a virtual foot, calibrate, reconstruct and measure it, and compare with what is known of it."""
+    from pipelines.demo import run_demo
+    from schemas.measures import Measures
+    from schemas.parameters.demo import FilmedFoot
+    from schemas.parameters.simulation import SimulationSettings
+    from schemas.quality import Quality
+
+    foot = FilmedFoot(scan=f"demo-{side[0].upper()}", side=side, settings=SimulationSettings(ambient=light))
+    result = run_demo(folder, foot, _watch)
+
+    for part, seconds in result.seconds.items():
+        message(f"{part}: {seconds:.1f} s")
+    measures = Measures.model_validate_json((result.results / "measures.json").read_bytes())
+    print_measures(measures, result.known)
+    quality = Quality.model_validate_json((result.results / "quality.json").read_bytes())
+    if quality.truth is not None:
+        figures = quality.truth.model_dump(include={"mean", "p50", "p95", "p99", "max"})
+        rows = [[name, f"{value:.3f}"] for name, value in figures.items()]
+        print_table("Distance to the true surface", ["figure", "mm"], rows)
+    print(f"Report: {result.results / 'report.html'}")
+
+
+@contextmanager
+def _watch(part: str, plan: "Plan") -> "Iterator[OnStepEnd]":
+    from pipelines.cli.progress import StepProgress
+
+    message(f"{part}: {len(plan.to_run)} of {len(plan.steps)} steps to run")
+    with StepProgress(plan) as progress:
+        yield progress.on_step_end

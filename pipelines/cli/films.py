@@ -1,0 +1,147 @@
+"""`footscan simulate`, `footscan ingest` and `footscan extract`."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from pipelines.cli.output import AsJson, message, print_json, print_table
+from schemas.errors import RefusedInput
+
+if TYPE_CHECKING:
+    from schemas.parameters.simulation import SimulationSettings
+
+simulate = typer.Typer(help="Film with the virtual scanner: a scan, or the reference object.", no_args_is_help=True)
+
+Out = Annotated[Path, typer.Option(help="Folder to write; must not exist, or be empty.")]
+Light = Annotated[Literal["dark", "ambient", "bright"], typer.Option(help="Light in the room.")]
+Seed = Annotated[int, typer.Option(min=0, help="Of noise, speckle and clicks.")]
+ScannerSeed = Annotated[int, typer.Option(min=0, help="Of the scanner's own geometry; capture and scans share it.")]
+
+
+@simulate.command("scan")
+def simulate_scan(
+    out: Out,
+    mesh: Annotated[Path | None, typer.Argument(help="Mesh in mm: STL, PLY or OBJ.")] = None,
+    foot: Annotated[Literal["right", "left"] | None, typer.Option(help="The parametric foot, not a mesh.")] = None,
+    block: Annotated[bool, typer.Option("--block", help="The block of 150 x 100 x 50 mm instead of a mesh.")] = False,
+    patient: Annotated[str, typer.Option(help="Pseudonym.")] = "P0001",
+    scan: Annotated[str, typer.Option(help="Name of the scan; the folder's name where absent.")] = "",
+    side: Annotated[Literal["right", "left", "unknown"], typer.Option(help="Which foot a mesh is.")] = "unknown",
+    calibration: Annotated[str | None, typer.Option(help="Path that scan.yaml shall name, relative to it.")] = None,
+    frames: Annotated[int, typer.Option(min=1, max=10_000)] = 200,
+    step_mm: Annotated[float, typer.Option(min=0.01, max=1000)] = 2.0,
+    light: Light = "ambient",
+    seed: Seed = 1,
+    scanner_seed: ScannerSeed = 1,
+    stripe_truth: Annotated[bool, typer.Option("--stripe-truth", help="Also write the true stripe centres.")] = False,
+) -> None:
+    """Film a mesh that stands on the glass, in the middle of the travel."""
+    from footscan.virtual.record import record_scan
+    from pipelines.virtual_objects import stand_in_the_middle, virtual_object
+    from schemas.documents import pseudonym
+
+    if [mesh is not None, foot is not None, block].count(True) != 1:
+        raise RefusedInput("simulate scan", "expected one of MESH, --foot and --block")
+    _check_empty(out)
+    vertices, faces, known_side = virtual_object(mesh, foot, side)
+    settings = _settings(light, seed, scanner_seed, frames, step_mm)
+    vertices = stand_in_the_middle(vertices, settings)
+    record_scan(
+        vertices,
+        faces,
+        out,
+        patient=pseudonym(patient, "--patient"),
+        scan=pseudonym(scan or out.resolve().name, "--scan"),
+        side=known_side,
+        settings=settings,
+        calibration=calibration,
+        stripe_truth=stripe_truth,
+    )
+    message(f"{out}: filmed {settings.frames} frames by each of 8 cameras")
+
+
+@simulate.command("capture")
+def simulate_capture(
+    out: Out,
+    light: Light = "ambient",
+    seed: Seed = 1,
+    scanner_seed: ScannerSeed = 1,
+) -> None:
+    """Film the reference object in ten placements, and write the chart of its corners as a person would click them."""
+    from footscan.virtual.capture import record_capture
+    from footscan.virtual.reference import standard_reference
+
+    _check_empty(out)
+    record_capture(out, standard_reference(), settings=_settings(light, seed, scanner_seed))
+    message(f"{out}: filmed the reference object, chart in {out / 'chart.csv'}")
+
+
+def ingest(
+    folders: Annotated[list[Path], typer.Argument(help="Scan folders, or an archive of them.")],
+    as_json: AsJson = False,
+) -> int:
+    """Films to Zarr: one array a camera in frames.zarr beside the films, the camera's JPEG bytes as they are."""
+    from pipelines.ingest import ingest_scans
+
+    ends = ingest_scans(folders)
+    if as_json:
+        print_json([end.to_json() for end in ends])
+    else:
+        rows = [
+            [
+                e.scan,
+                str(e.camera or ""),
+                str(e.frames),
+                str(e.lost),
+                f"{e.film_bytes}",
+                f"{e.store_bytes}",
+                e.problem or "ok",
+            ]
+            for e in ends
+        ]
+        print_table("", ["scan", "camera", "frames", "lost", "film bytes", "store bytes", ""], rows)
+    failed = [end for end in ends if end.problem is not None]
+    for end in failed:
+        message(f"footscan: {end.problem}")
+    if not failed:
+        return 0
+    return RefusedInput.exit_status if len(folders) == 1 and len({end.scan for end in ends}) == 1 else 1
+
+
+def extract(
+    file: Annotated[Path, typer.Argument(help="An image, a film (AVI) or a folder of frames.")],
+    out: Annotated[Path | None, typer.Option(help="CSV to write; standard output where absent.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find the laser stripe: one sub-pixel point a row of frame,i,j,width,peak,score."""
+    from footscan.frames.film import open_film, pixel_frames
+    from footscan.stripe.film import extract_film, points_csv
+    from pipelines.engine.atomic import write_atomically
+    from schemas.parameters.extraction import ExtractionParameters
+
+    film = open_film(file)
+    points = extract_film(pixel_frames(film), ExtractionParameters())
+    if out is not None:
+        write_atomically(out, points_csv(points).encode())
+    elif not as_json:
+        sys.stdout.write(points_csv(points))
+    if as_json:
+        print_json(
+            {"file": str(file), "frames": film.frames, "points": len(points), "out": None if out is None else str(out)}
+        )
+    message(f"{file}: {len(points)} stripe points in {film.frames} frames")
+
+
+def _settings(
+    light: Literal["dark", "ambient", "bright"], seed: int, scanner_seed: int, frames: int = 200, step_mm: float = 2.0
+) -> "SimulationSettings":
+    from schemas.parameters.simulation import SimulationSettings
+
+    return SimulationSettings(seed=seed, scanner_seed=scanner_seed, ambient=light, frames=frames, step_mm=step_mm)
+
+
+def _check_empty(folder: Path) -> None:
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise RefusedInput(folder, "is there already, expected a new or an empty folder")

@@ -1,0 +1,65 @@
+"""The command's entry: its sub-commands, and every error as one line with an exit status of its own."""
+
+import logging
+import sys
+
+import click
+import typer
+
+from pipelines.cli import calibration, demo, films, results, runs
+from schemas.errors import Fault, FootscanError, RefusedInput, one_line
+
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="footscan",
+    help="Turn the films of a laser-stripe foot scanner into a measured 3D foot.",
+    epilog="Exit status: 0 done; 1 done, with scans that failed; 2 wrong use or refused input; 3 fault of the machine.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command("demo")(demo.demo)
+app.add_typer(films.simulate, name="simulate")
+app.command("ingest")(films.ingest)
+app.command("extract")(films.extract)
+app.add_typer(calibration.calibrate, name="calibrate")
+app.command("map")(calibration.map_pixels)
+app.command("run")(runs.run)
+app.command("plan")(runs.plan)
+app.command("measure")(results.measure)
+app.command("compare")(results.compare)
+
+
+def main() -> None:
+    """Run the command line and exit with its status."""
+    logging.basicConfig(format="footscan: %(message)s", level=logging.WARNING)
+    sys.exit(run_command(sys.argv[1:]))
+
+
+def run_command(arguments: list[str]) -> int:
+    """The exit status of `footscan ARGUMENTS`; what went wrong stands on standard error in one line."""
+    try:
+        return int(app(arguments, standalone_mode=False, prog_name="footscan") or 0)
+    except click.exceptions.NoArgsIsHelpError as error:
+        print(error.format_message(), file=sys.stderr)
+        return RefusedInput.exit_status
+    except (FootscanError, click.ClickException, click.Abort, KeyboardInterrupt, OSError, MemoryError) as error:
+        problem, status = _explain(error)
+        print(f"footscan: {problem}", file=sys.stderr)
+        return status
+
+
+def _explain(error: BaseException) -> tuple[str, int]:
+    """What to say of an error, and the exit status."""
+    match error:
+        case FootscanError():
+            return str(error), error.exit_status
+        case click.ClickException():
+            return f"{one_line(error.format_message())} (see 'footscan --help')", RefusedInput.exit_status
+        case OSError():
+            return one_line(str(error)), Fault.exit_status
+        case MemoryError():
+            return "out of memory", Fault.exit_status
+        case _:
+            return "interrupted; what is complete is kept", INTERRUPTED

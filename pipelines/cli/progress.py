@@ -1,0 +1,46 @@
+"""A progress bar on standard error, fed by the events of a run."""
+
+import threading
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from pipelines.engine.plan import Plan
+from pipelines.engine.run import StepEnd
+
+
+class StepProgress:
+    """Counts the steps of a plan as they end; draws a bar where standard error is a terminal."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.ran = 0
+        """Steps that ran, those left out that turned out to be known."""
+        self.seconds: dict[str, float] = {}
+        """Time taken by each kind of step, summed over cameras and scans."""
+        self._lock = threading.Lock()
+        self._bar = Progress(
+            TextColumn("{task.description:<24}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            console=Console(stderr=True),
+            transient=True,
+            disable=not plan.to_run,
+        )
+        self._task = self._bar.add_task("", total=len(plan.to_run))
+
+    def __enter__(self) -> Self:
+        self._bar.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._bar.stop()
+
+    def on_step_end(self, end: StepEnd) -> None:
+        """Hears that a step has ended."""
+        with self._lock:
+            self.ran += end.ran
+            self.seconds[end.step.kind] = self.seconds.get(end.step.kind, 0.0) + end.seconds
+            self._bar.update(self._task, advance=1, description=end.step.name.rpartition("/")[2])

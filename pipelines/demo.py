@@ -1,0 +1,112 @@
+"""The whole product on one foot: film, calibrate, reconstruct, measure, and hold the result against what is known."""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pipelines.archive import CACHE, Job, cores, plan_job, run_job
+from pipelines.deliver import deliver
+from pipelines.engine.digest import FileDigests
+from pipelines.engine.plan import Plan, make_plan
+from pipelines.engine.run import OnStepEnd, run_plan
+from pipelines.engine.step import Failure, Output, Step
+from pipelines.engine.store import Store
+from pipelines.recorded import SCAN_FILE, scan_folders
+from pipelines.steps import calibrate_chart, simulate_capture, simulate_scan
+from schemas.errors import Fault
+from schemas.parameters.calibration import ChartCalibrationParameters
+from schemas.parameters.demo import FilmedFoot
+from schemas.workflow import ScanParameters
+
+Watch = Callable[[str, Plan], AbstractContextManager[OnStepEnd]]
+"""Called with the name of a part and its plan; gives what shall hear of its steps."""
+
+
+@dataclass
+class DemoResult:
+    """What the demo came to."""
+
+    results: Path
+    """Folder of the scan's results."""
+    known: dict[str, float]
+    """The foot's true measures by name."""
+    seconds: dict[str, float] = field(default_factory=dict)
+    """Time taken by each part."""
+
+
+def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
+    """Film a parametric foot and the reference object, calibrate, and run the scan; parts that are there are kept.
+
+    Raises
+    ------
+    Fault
+        The demo could not be run to its end.
+    """
+    results = folder / "results"
+    store = Store(results / CACHE)
+    seconds: dict[str, float] = {}
+
+    @contextmanager
+    def timed(part: str, plan: Plan) -> Iterator[OnStepEnd]:
+        start = time.perf_counter()
+        with watch(part, plan) as on_step_end:
+            yield on_step_end
+        seconds[part] = time.perf_counter() - start
+
+    filming = _filming(folder, foot)
+    plan = make_plan(filming, store)
+    with timed("filming and calibration", plan) as on_step_end:
+        outcomes = run_plan(plan, store, workers=1, on_step_end=on_step_end)
+    digests: dict[str, str] = {}
+    for step in filming:
+        outcome = outcomes[step.name]
+        if isinstance(outcome, Failure):
+            raise Fault(f"{step.name}: {outcome.problem}")
+        digests[step.kind] = outcome.digest
+    files = FileDigests.load(store.root / "files.json")
+    if problem := deliver(
+        {"calibration.json": digests["calibrate"], "known.json": digests["film"]}, store, files, folder
+    ):
+        raise Fault(problem)
+
+    planned = plan_job(_job(folder, results))
+    with timed("reconstruction", planned.plan) as on_step_end:
+        ends = list(run_job(planned, on_step_end))
+    for end in ends:
+        if end.problem is not None:
+            raise Fault(f"{end.scan}: {end.problem}")
+    known = json.loads((folder / "known.json").read_bytes())
+    return DemoResult(results / foot.patient / foot.scan, known, seconds)
+
+
+def _filming(folder: Path, foot: FilmedFoot) -> list[Step]:
+    scan = folder / "archive" / foot.patient / foot.scan
+    capture = folder / "capture"
+    film = Step("demo", "film", simulate_scan, foot, places={"folder": scan}, writes=scan / SCAN_FILE)
+    chart = Step(
+        "demo", "capture", simulate_capture, foot.settings,
+        places={"folder": capture}, writes=capture / "capture.yaml",
+    )  # fmt: skip
+    calibrate = Step(
+        "demo", "calibrate", calibrate_chart, ChartCalibrationParameters(), {"chart": Output(chart.name)},
+        places={"chart": capture / "chart.csv"},
+    )  # fmt: skip
+    return [film, chart, calibrate]
+
+
+def _job(folder: Path, results: Path) -> Job:
+    """As the project's workflow.yaml has it."""
+    archive = folder / "archive"
+    return Job(
+        folders=list(scan_folders(archive)),
+        archive=archive,
+        calibration=folder / "calibration.json",
+        calibration_wins=False,
+        results=results,
+        cache=results / CACHE,
+        parameters=ScanParameters(),
+        workers=cores(),
+    )

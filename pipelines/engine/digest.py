@@ -1,0 +1,85 @@
+"""Digests of bytes and of files; a file that has not been touched is not read again."""
+
+import hashlib
+import json
+import os
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+from pipelines.engine.atomic import write_atomically
+from schemas.documents import canonical_json
+from schemas.errors import RefusedInput
+
+SETTLED_NS = 2_000_000_000
+"""A file younger than this may change again within its time stamp's resolution: its digest is not remembered."""
+
+
+class FileState(NamedTuple):
+    """What the file system says of a file; a change of content changes it (ctime cannot be set back)."""
+
+    size: int
+    mtime_ns: int
+    ctime_ns: int
+    inode: int
+
+
+def sha256(data: bytes) -> str:
+    """Hexadecimal SHA-256 of `data`."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def file_state(path: Path) -> FileState:
+    """The present state of a file; OSError where there is none."""
+    status = path.stat()
+    return FileState(status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino)
+
+
+@dataclass
+class FileDigests:
+    """Digests of files by path, remembered in one file of the cache."""
+
+    memory: Path
+    _known: dict[str, tuple[FileState, str]] = field(default_factory=dict)
+    _changed: bool = False
+
+    @classmethod
+    def load(cls, memory: Path) -> "FileDigests":
+        """What was remembered; nothing where the file is missing or damaged."""
+        try:
+            rows = json.loads(memory.read_bytes())
+            return cls(memory, {path: (FileState(*state), str(digest)) for path, state, digest in rows})
+        except (OSError, ValueError, TypeError):
+            return cls(memory)
+
+    def save(self) -> None:
+        """Remember for the next run."""
+        if self._changed:
+            rows = [[path, list(state), digest] for path, (state, digest) in sorted(self._known.items())]
+            write_atomically(self.memory, canonical_json(rows).encode())
+            self._changed = False
+
+    def of(self, path: Path) -> tuple[str, FileState]:
+        """Digest and state of a file; RefusedInput where it cannot be read."""
+        try:
+            state = file_state(path)
+            known = self._known.get(str(path))
+            if known and known[0] == state:
+                return known[1], state
+            with path.open("rb") as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+                if FileState(*_state_of(file.fileno())) != state:
+                    raise RefusedInput(path, "is being written to, expected a finished file")
+        except OSError as error:
+            problem = "no such file" if isinstance(error, FileNotFoundError) else f"cannot be read ({error.strerror})"
+            raise RefusedInput(path, problem) from None
+        if time.time_ns() - max(state.mtime_ns, state.ctime_ns) > SETTLED_NS:
+            self._known[str(path)] = (state, digest)
+            self._changed = True
+        return digest, state
+
+
+def _state_of(descriptor: int) -> tuple[int, int, int, int]:
+    status = os.fstat(descriptor)
+    return status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino

@@ -1,0 +1,91 @@
+"""What would run, and why: a pure function of the graph and the action cache."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from pipelines.engine.key import difference, key_of, pre_image
+from pipelines.engine.step import Failure, Outcome, Output, Step, Success
+from pipelines.engine.store import Row, Store
+
+
+class State(Enum):
+    """What the cache knows of a step."""
+
+    HIT = "hit"
+    MISS = "miss"
+    WAITS = "waits"
+    """An input is still to be made: whether the step runs depends on what comes out."""
+
+
+@dataclass(frozen=True)
+class PlannedStep:
+    """A step, and what is to be done with it."""
+
+    step: Step
+    state: State
+    outcome: Outcome | None
+    """What the cache holds, for a hit."""
+    reason: str
+    """Why the step is no hit."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The steps of a graph in an order in which they can run."""
+
+    steps: list[PlannedStep]
+
+    @property
+    def to_run(self) -> list[PlannedStep]:
+        """All that is no hit."""
+        return [planned for planned in self.steps if planned.state is not State.HIT]
+
+
+def make_plan(steps: Sequence[Step], store: Store) -> Plan:
+    """Look each step up in the action cache.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+        Each after the steps whose results it takes.
+    """
+    planned: dict[str, PlannedStep] = {}
+    for step in steps:
+        planned[step.name] = _plan_step(step, planned, store)
+    return Plan(list(planned.values()))
+
+
+def cached_outcome(step: Step, row: Row | None) -> Outcome | None:
+    """What a row of the action cache says of a step; None where the step must run."""
+    if row is None or (step.writes is not None and not step.writes.exists()):
+        return None
+    if row.failure is not None:
+        return Failure(problem=row.failure[1], kind=row.failure[0], cause=step.name)
+    return None if row.digest is None else Success(row.digest)
+
+
+def _plan_step(step: Step, planned: dict[str, PlannedStep], store: Store) -> PlannedStep:
+    digests: dict[str, str] = {}
+    for name, source in step.inputs.items():
+        if not isinstance(source, Output):
+            digests[name] = source.digest
+            continue
+        before = planned[source.step]
+        if isinstance(before.outcome, Failure):
+            return PlannedStep(step, State.HIT, before.outcome, "")
+        if before.outcome is None:
+            return PlannedStep(step, State.WAITS, None, f"waits for {_label(before.step)}")
+        digests[name] = before.outcome.digest
+    image = pre_image(step, digests)
+    outcome = cached_outcome(step, store.lookup(key_of(image)))
+    if outcome is not None:
+        return PlannedStep(step, State.HIT, outcome, "")
+    if step.writes is not None and not step.writes.exists():
+        return PlannedStep(step, State.MISS, None, f"{step.writes.parent.name} is not there")
+    latest = store.latest(step.name)
+    return PlannedStep(step, State.MISS, None, "never run" if latest is None else difference(latest.image, image))
+
+
+def _label(step: Step) -> str:
+    return step.kind if step.camera is None else f"{step.kind} of camera {step.camera}"

@@ -1,0 +1,121 @@
+"""Carrying out a plan with Dask: only what is no hit becomes a task, and tasks pass digests, never arrays."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pipelines.engine.digest import file_state
+from pipelines.engine.key import key_of, pre_image
+from pipelines.engine.plan import Plan, State, cached_outcome
+from pipelines.engine.step import Failure, Outcome, Output, SourceFile, Step, Success, Value
+from pipelines.engine.store import Row, Store
+from schemas.errors import DamagedError, Fault, Finding, RefusedInput
+
+
+@dataclass(frozen=True)
+class StepEnd:
+    """Told when a step of a run has ended."""
+
+    step: Step
+    outcome: Outcome
+    ran: bool
+    """False where the step's inputs turned out to be those of an earlier run."""
+    seconds: float
+
+
+OnStepEnd = Callable[[StepEnd], None]
+
+
+def run_plan(plan: Plan, store: Store, *, workers: int, on_step_end: OnStepEnd) -> dict[str, Outcome]:
+    """Run what a plan has left to run, on threads of this machine.
+
+    Returns
+    -------
+    outcomes : dict
+        Result or failure of every step by its name, the hits included.
+    """
+    outcomes = {p.step.name: p.outcome for p in plan.steps if p.outcome is not None}
+    if not plan.to_run:
+        return outcomes
+    import dask  # not needed, and not waited for, when all is there
+
+    tasks: dict[str, Any] = {}
+    for planned in plan.steps:
+        if planned.state is State.HIT:
+            continue
+        step = planned.step
+        before = {
+            source.step: tasks[source.step] if source.step in tasks else outcomes[source.step]
+            for source in step.inputs.values()
+            if isinstance(source, Output)
+        }
+        tasks[step.name] = dask.delayed(_run_step, pure=False)(
+            step, before, store, on_step_end, dask_key_name=step.name
+        )
+    results = dask.compute(*tasks.values(), scheduler="threads", num_workers=workers)
+    return outcomes | dict(zip(tasks, results, strict=True))
+
+
+def execute(step: Step, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, bool]:
+    """The outcome of a step with inputs of these digests, from the cache or by running it; whether it ran."""
+    image = pre_image(step, inputs)
+    known = cached_outcome(step, store.lookup(key_of(image)))
+    if known is not None:
+        return known, False
+    try:
+        content = {name: _content(step, source, inputs[name], store) for name, source in step.inputs.items()}
+        result = step.module.run(content, step.parameters, step.places)
+        _check_sources(step)
+        digest = store.put(result)
+        store.record(step.name, Row(image, digest))
+        return Success(digest), True
+    except (RefusedInput, Finding) as error:
+        kind = "finding" if isinstance(error, Finding) else "refused"
+        store.record(step.name, Row(image, None, (kind, str(error))))
+        return Failure(str(error), kind, step.name), True
+    except Fault as error:
+        return Failure(str(error), "damaged" if isinstance(error, DamagedError) else "fault", step.name), True
+    except (OSError, MemoryError) as error:
+        problem = str(error) or type(error).__name__
+        return Failure(f"{step.name}: {problem}", "fault", step.name), True
+
+
+def _run_step(step: Step, before: Mapping[str, Outcome], store: Store, on_step_end: OnStepEnd) -> Outcome:
+    start = time.perf_counter()
+    digests: dict[str, str] = {}
+    outcome: Outcome | None = None
+    for name, source in step.inputs.items():
+        if isinstance(source, Output):
+            result = before[source.step]
+            if isinstance(result, Failure):
+                outcome = result
+                break
+            digests[name] = result.digest
+        else:
+            digests[name] = source.digest
+    ran = False
+    if outcome is None:
+        outcome, ran = execute(step, digests, store)
+    on_step_end(StepEnd(step, outcome, ran, time.perf_counter() - start))
+    return outcome
+
+
+def _content(step: Step, source: Value | Output | SourceFile, digest: str, store: Store) -> bytes:
+    if isinstance(source, Value):
+        return source.content
+    if isinstance(source, SourceFile):
+        return b""  # the step reads it where it lies
+    data = store.get(digest)
+    if data is None:
+        raise DamagedError(f"{step.name}: the result of {source.step} is damaged, expected what was stored")
+    return data
+
+
+def _check_sources(step: Step) -> None:
+    """A film that was exchanged while it was read has given a result that belongs to no digest."""
+    for source in step.inputs.values():
+        if isinstance(source, SourceFile):
+            for path, state in source.states:
+                if file_state(path) != state:
+                    raise Fault(f"{path}: changed while it was read, expected a finished file")

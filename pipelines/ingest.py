@@ -1,0 +1,60 @@
+"""Ingesting scans by hand: films into Zarr, camera by camera."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from footscan.frames.film import film_files
+from footscan.frames.ingest import GROUP, ingest_film
+from pipelines.recorded import SCAN_FILE, read_scan, scan_folders
+from schemas.errors import FootscanError
+
+
+@dataclass(frozen=True)
+class CameraIngest:
+    """What became of one camera's film; of a whole scan where that could not be read."""
+
+    scan: str
+    camera: int | None
+    frames: int = 0
+    lost: int = 0
+    """Frames that the film has a place for, but no picture."""
+    film_bytes: int = 0
+    store_bytes: int = 0
+    problem: str | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Its fields."""
+        return dict(vars(self))
+
+
+def ingest_scans(folders: Sequence[Path]) -> list[CameraIngest]:
+    """Ingest the films of scan folders, and of all scans in archives; what fails costs its own camera."""
+    ends: list[CameraIngest] = []
+    for folder in folders:
+        is_scan = (folder / SCAN_FILE).exists() or not folder.is_dir()
+        for scan_folder in [folder] if is_scan else scan_folders(folder):
+            ends += _ingest_scan(scan_folder, None if is_scan else folder)
+    return ends
+
+
+def _ingest_scan(folder: Path, archive: Path | None) -> list[CameraIngest]:
+    try:
+        scan = read_scan(folder, archive)
+    except FootscanError as error:
+        return [CameraIngest(str(folder), None, problem=str(error))]
+    ends = []
+    for camera in scan.document.cameras:
+        film = scan.film(camera)
+        array = scan.folder / GROUP / f"cam{camera.id}"
+        try:
+            manifest = ingest_film(film, array)
+            size = sum(file.stat().st_size for file in film_files(film))
+        except FootscanError as error:
+            ends.append(CameraIngest(scan.name, camera.id, problem=str(error)))
+            continue
+        store = sum(file.stat().st_size for file in array.iterdir())
+        lost = manifest.frames.count(None)
+        ends.append(CameraIngest(scan.name, camera.id, len(manifest.frames), lost, size, store))
+    return ends

@@ -1,0 +1,83 @@
+"""Recorded scans: finding them in an archive and checking what their scan.yaml promises."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from schemas.documents import inside, read_yaml
+from schemas.errors import RefusedInput
+from schemas.scan import CameraFilm, Scan
+
+SCAN_FILE = "scan.yaml"
+
+
+@dataclass(frozen=True)
+class RecordedScan:
+    """A scan folder that follows its format."""
+
+    folder: Path
+    archive: Path
+    """No path in scan.yaml may leave it."""
+    document: Scan
+
+    @property
+    def name(self) -> str:
+        """`patient/scan`: its place in the results."""
+        return f"{self.document.patient}/{self.document.scan}"
+
+    @property
+    def file(self) -> Path:
+        """Its scan.yaml."""
+        return self.folder / SCAN_FILE
+
+    def film(self, camera: CameraFilm) -> Path:
+        """The film of a camera, which may be missing."""
+        return inside(self.archive, self.file, camera.file, f"cameras.{camera.id}.file")
+
+    def positions(self, camera: CameraFilm) -> Path | None:
+        """The file with the positions of a camera's frames."""
+        if camera.positions is None:
+            return None
+        return inside(self.archive, self.file, camera.positions, f"cameras.{camera.id}.positions")
+
+    @property
+    def calibration(self) -> Path | None:
+        """The calibration that the scan names."""
+        named = self.document.calibration
+        return None if named is None else inside(self.archive, self.file, named, "calibration")
+
+    @property
+    def truth(self) -> Path | None:
+        """The reference model that the scan names."""
+        named = self.document.truth
+        return None if named is None else inside(self.archive, self.file, named, "truth")
+
+
+def read_scan(folder: Path, archive: Path | None = None) -> RecordedScan:
+    """The scan in `folder`; without an archive, that is the folder above the patient's.
+
+    Raises
+    ------
+    RefusedInput
+        No scan.yaml, or one that breaks its format.
+    """
+    if not folder.is_dir():
+        raise RefusedInput(folder, "no such folder, expected a recorded scan")
+    folder = folder.resolve()
+    scan = RecordedScan(folder, (archive or folder.parent.parent).resolve(), read_yaml(folder / SCAN_FILE, Scan))
+    for camera in scan.document.cameras:
+        scan.film(camera)  # refused here, before any work, where they leave the archive
+        scan.positions(camera)
+    return scan
+
+
+def scan_folders(archive: Path) -> Iterator[Path]:
+    """The folders below `archive` that hold a scan.yaml, in order."""
+    if not archive.is_dir():
+        raise RefusedInput(archive, "no such folder, expected an archive of scans")
+    for folder, below, files in os.walk(archive):
+        below.sort()
+        if SCAN_FILE in files:
+            below.clear()  # thousands of frames may lie below
+            yield Path(folder)

@@ -1,0 +1,32 @@
+"""Stripe points to world points of one camera."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from footscan.cloud.mapping import map_stripe
+from footscan.frames.travel import travelled
+from pipelines.arrays import pack, unpack
+from schemas.calibration import PolynomialCamera
+from schemas.errors import RefusedInput
+from schemas.frames import FrameManifest
+from schemas.parameters.mapping import MappingParameters
+from schemas.scan import Travel
+
+
+def run(inputs: Mapping[str, bytes], parameters: MappingParameters, places: Mapping[str, Path]) -> bytes:
+    """`inputs`: `stripe`, `manifest`, the camera's `calibration`, and its `travel` or `positions`."""
+    del places
+    stripe = unpack(inputs["stripe"])["stripe"]
+    camera = PolynomialCamera.model_validate_json(inputs["calibration"])
+    frames = len(FrameManifest.model_validate_json(inputs["manifest"]).frames)
+    if "positions" in inputs:
+        positions = json.loads(inputs["positions"])
+        x_of_frame = np.array(positions["x_mm"], np.float64)  # null becomes NaN
+        if len(x_of_frame) < frames or np.isnan(x_of_frame[:frames]).any():
+            raise RefusedInput(positions["file"], f"expected a position for each of {frames} frames", field="frame")
+    else:
+        x_of_frame = travelled(Travel.model_validate_json(inputs["travel"]), frames)
+    return pack(points=map_stripe(stripe, camera, x_of_frame, parameters))

@@ -1,0 +1,28 @@
+"""The parametric foot, filmed by the virtual scanner; the result is what is known of the foot."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from footscan.virtual.foot import make_foot
+from footscan.virtual.record import record_scan
+from pipelines.virtual_objects import stand_in_the_middle
+from schemas.parameters.demo import FilmedFoot
+
+
+def run(inputs: Mapping[str, bytes], parameters: FilmedFoot, places: Mapping[str, Path]) -> bytes:
+    """`places`: the `folder` of the scan."""
+    del inputs
+    foot = make_foot(side=parameters.side)
+    record_scan(
+        stand_in_the_middle(foot.vertices, parameters.settings),
+        foot.faces.astype(np.int64),
+        places["folder"],
+        patient=parameters.patient,
+        scan=parameters.scan,
+        side=parameters.side,
+        settings=parameters.settings,
+    )
+    return (json.dumps(foot.measures, indent=2, sort_keys=True) + "\n").encode()

@@ -1,0 +1,47 @@
+"""What the virtual scanner can film: a mesh from a file, the parametric foot, the block."""
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.surface.export import read_mesh
+from footscan.virtual.block import make_block
+from footscan.virtual.foot import make_foot
+from schemas.errors import RefusedInput
+from schemas.parameters.simulation import SimulationSettings
+from schemas.scan import Side
+
+Vertices = NDArray[np.float64]
+Faces = NDArray[np.int64]
+
+DIAGONAL_MM = (20.0, 600.0)
+"""A mesh outside of this is in another unit, or no thing for a foot scanner."""
+
+
+def virtual_object(
+    mesh: Path | None, foot: Literal["right", "left"] | None, side: Side
+) -> tuple[Vertices, Faces, Side]:
+    """Vertices (mm), faces and side of a mesh file, of the parametric foot, or else of the block."""
+    if mesh is not None:
+        vertices, faces = read_mesh(mesh)
+        diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+        if not DIAGONAL_MM[0] <= diagonal <= DIAGONAL_MM[1]:
+            low, high = DIAGONAL_MM
+            problem = f"measures {diagonal:.3g} across, expected {low:g} to {high:g} mm: is it in millimetres?"
+            raise RefusedInput(mesh, problem, field="unit")
+        return vertices, faces.astype(np.int64), side
+    if foot is not None:
+        made = make_foot(side=foot)
+        return made.vertices, made.faces.astype(np.int64), foot
+    vertices, faces = make_block()
+    return vertices, faces.astype(np.int64), "unknown"
+
+
+def stand_in_the_middle(vertices: Vertices, settings: SimulationSettings) -> Vertices:
+    """`vertices` shifted onto the glass (Z = 0), to the middle of the travel and to Y = 0."""
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    travel_middle = settings.start_mm + settings.step_mm * (settings.frames - 1) / 2
+    shift = np.array([travel_middle - (low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]])
+    return np.asarray(vertices + shift, np.float64)

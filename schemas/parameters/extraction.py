@@ -1,0 +1,83 @@
+"""What the extraction of the stripe can be told."""
+
+from pydantic import Field
+
+from schemas.documents import Document
+
+
+class ExtractionParameters(Document):
+    """How the laser stripe is told from the rest of a frame, and where its centre is taken."""
+
+    red_threshold: int = Field(
+        default=18,
+        ge=1,
+        le=254,
+        description="grey levels by which a pixel must be redder (R - max(G, B)) than its surroundings",
+    )
+    saturation: int = Field(
+        default=245,
+        ge=1,
+        le=255,
+        description="grey level of red from which a white pixel between two red flanks is the core of the stripe",
+    )
+    smoothing_px: float = Field(
+        default=2.0,
+        ge=0.5,
+        le=8.0,
+        description="standard deviation in px of the Gaussian under which the ridge of the stripe is sought",
+    )
+    smallest_contrast: float = Field(
+        default=12.0,
+        ge=1.0,
+        le=255.0,
+        description="grey levels by which the stripe must stand out from both its sides",
+    )
+    largest_width_px: float = Field(
+        default=28.0,
+        ge=2.0,
+        le=100.0,
+        description="full width at half height in px beyond which a red thing is no stripe",
+    )
+    centre_level: float = Field(
+        default=0.25,
+        ge=0.05,
+        le=0.9,
+        description="part of the stripe's height above which its centre of gravity is taken",
+    )
+    gap_px: float = Field(
+        default=3.0,
+        ge=1.5,
+        le=20.0,
+        description="distance in px that points of one piece of the stripe may have from each other",
+    )
+    shortest_piece_px: int = Field(
+        default=12,
+        ge=1,
+        le=1000,
+        description="points below which a piece is a glint",
+    )
+    group_gap_px: float = Field(
+        default=40.0,
+        ge=1.5,
+        le=1000.0,
+        description="distance in px that pieces of one stripe may have from each other",
+    )
+    smallest_group: float = Field(
+        default=0.15,
+        ge=0.0,
+        le=1.0,
+        description="strength of a group of pieces, relative to the strongest one, below which it is dropped",
+    )
+    ghost_reach_px: float = Field(
+        default=60.0,
+        ge=0.0,
+        le=500.0,
+        description="distance in px across the stripe within which its weaker, parallel image in a glass plate may lie",
+    )
+    ghost_strength: float = Field(
+        default=0.25,
+        ge=0.0,
+        le=1.0,
+        description="contrast, or contrast times width, relative to the stripe beside it below which a piece is a "
+        "ghost",
+    )

@@ -1,0 +1,252 @@
+"""The stripe of whole frames: centres against known lines, and what must not be taken for a stripe."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from footscan.stripe.extract import extract_stripe
+from footscan.stripe.points import STRIPE_DTYPE
+from schemas.parameters.extraction import ExtractionParameters
+
+PARAMETERS = ExtractionParameters()
+J, I = np.mgrid[0:480, 0:640].astype(float)  # noqa: E741 (the names of the axes)
+
+
+def extract(image):
+    points = extract_stripe(image, PARAMETERS)
+    assert points.dtype == STRIPE_DTYPE
+    assert np.all((points["score"] >= 0) & (points["score"] <= 1))
+    return points
+
+
+def inner(points, margin=12):
+    """Without those at the border, where the profile is cut off."""
+    return points[(np.abs(points["i"] - 319.5) < 319.5 - margin) & (np.abs(points["j"] - 239.5) < 239.5 - margin)]
+
+
+@pytest.mark.parametrize("degrees", [0, 90, 5, 30, 45, 60, 85, 120, 135, 170])
+@pytest.mark.parametrize("sigma", [1.5, 2.5, 4.0])
+def test_clean_lines(line, light, frame, degrees, sigma):
+    distance = line(degrees)
+    points = inner(extract(frame(light(distance, sigma))))
+    errors = distance(points["i"], points["j"])
+    assert abs(errors.mean()) < 0.01
+    assert np.abs(errors).max() < 0.05
+    # full width at half height of a Gaussian: 2 sqrt(2 ln 2) sigma
+    np.testing.assert_allclose(points["width"], 2.3548 * sigma, rtol=0.08)
+    # one crossing a column, or a row, whichever the line crosses more of
+    along = np.unique(np.rint(points["i"] if abs(np.cos(np.deg2rad(degrees))) > 0.75 else points["j"]))
+    assert len(along) == pytest.approx(len(points), abs=4 + 0.02 * len(points))
+
+
+@pytest.mark.parametrize("degrees", [0, 30, 90])
+@pytest.mark.parametrize(("sigma", "amplitude"), [(1.5, 150), (2.5, 180), (4.0, 120), (2.5, 1500), (4.0, 2500)])
+def test_noise_and_jpeg(line, light, frame, degrees, sigma, amplitude):
+    distance = line(degrees)
+    points = inner(extract(frame(light(distance, sigma, amplitude), noise=2.0, jpeg=True)))
+    errors = distance(points["i"], points["j"])
+    assert abs(errors.mean()) < 0.05
+    assert np.sqrt(np.mean(errors**2)) < 0.10
+    assert len(points) >= 430
+
+
+@pytest.mark.parametrize("radius", [40.0, 180.0])
+def test_round_a_circle(circle, light, frame, radius):
+    distance = circle(radius)
+    points = extract(frame(light(distance), noise=2.0))
+    errors = distance(points["i"], points["j"])
+    assert abs(errors.mean()) < 0.05
+    assert np.abs(errors).max() < 0.2
+    # one point a column or a row: 8 sin 45 degrees r in all, and nowhere a gap
+    assert len(points) == pytest.approx(4 * np.sqrt(2) * radius, rel=0.04)
+    angles = np.sort(np.arctan2(points["j"] - 240.7, points["i"] - 320.2))
+    assert radius * np.diff(angles, append=angles[0] + 2 * np.pi).max() < 3
+
+
+def test_round_a_corner(frame):
+    # along row 200 from the left to column 300, then down column 300
+    across = np.where(I <= 300, np.abs(J - 200), np.inf)
+    down = np.where(J >= 200, np.abs(I - 300), np.inf)
+    light = 180 * np.exp(-0.5 * (np.minimum(across, down) / 2.0) ** 2)
+    points = inner(extract(frame(light)))
+    on_row = points["i"] < 290
+    on_column = points["j"] > 210
+    assert np.abs(points["j"][on_row] - 200).max() < 0.05
+    assert np.abs(points["i"][on_column] - 300).max() < 0.05
+    assert on_row.sum() == pytest.approx(278, abs=3)
+    assert on_column.sum() == pytest.approx(257, abs=3)
+    corner = points[~on_row & ~on_column]
+    assert 10 <= len(corner) <= 30
+    assert np.minimum(np.abs(corner["j"] - 200), np.abs(corner["i"] - 300)).max() < 3
+
+
+def test_two_pieces_in_one_column(line, light, frame):
+    upper, lower = line(3, (320, 140)), line(-4, (320, 200))
+    points = inner(extract(frame(np.maximum(light(upper), light(lower, amplitude=140)))))
+    near_upper = np.abs(upper(points["i"], points["j"])) < 0.1
+    near_lower = np.abs(lower(points["i"], points["j"])) < 0.1
+    assert np.all(near_upper ^ near_lower)
+    assert near_upper.sum() == pytest.approx(616, abs=5)
+    assert near_lower.sum() == pytest.approx(616, abs=5)
+
+
+def test_saturated_core_is_one_stripe(line, light, frame):
+    distance = line(20)
+    image = frame(light(distance, sigma=4.0, amplitude=3000))
+    core = image[np.abs(distance(I, J)) < 1]
+    assert core.min() > 200  # white, not red
+    points = inner(extract(image))
+    assert np.abs(distance(points["i"], points["j"])).max() < 0.1
+    assert np.all(points["peak"] == 255)
+    assert len(points) == pytest.approx(616, abs=5)
+
+
+def test_white_and_broad_red_things_are_no_stripe(line, light, frame):
+    distance = line(90, (500, 240))
+    ambient = np.full((480, 640, 3), 20.0)
+    ambient[100:104, 50:300] = 250  # a white bar
+    ambient[150:400, 60:110] = 240  # a sheet of paper
+    ambient[300:, 150:400] = [180, 20, 20]  # a red holder
+    points = extract(frame(light(distance), ambient, noise=1.5, jpeg=True))
+    assert np.abs(distance(points["i"], points["j"])).max() < 0.5
+    assert len(points) >= 470
+
+
+def test_stripe_on_skin_in_bright_light(line, light, frame):
+    distance = line(8)
+    ambient = np.where((np.abs(J - 240) < 150)[..., np.newaxis], [190.0, 130, 110], [15.0, 15, 15])
+    points = inner(extract(frame(light(distance, amplitude=120), ambient, noise=2.0, jpeg=True)))
+    assert np.abs(distance(points["i"], points["j"])).max() < 0.8
+    assert len(points) >= 600
+
+
+def test_glints_are_dropped(line, light, frame):
+    stripe = light(line(0))
+    for centre in [(100, 100), (400, 60), (600, 400)]:
+        stripe = np.maximum(stripe, 400 * np.exp(-0.5 * ((I - centre[0]) ** 2 + (J - centre[1]) ** 2) / 3.0**2))
+    points = extract(frame(stripe))
+    assert np.abs(points["j"] - 239.6).max() < 0.1
+
+
+def test_ghost_is_dropped_and_a_weak_stripe_alone_is_not(line, light, frame):
+    stripe, ghost = line(10, (320, 200)), line(10, (320, 225))
+    faint = light(ghost, amplitude=35)
+    points = extract(frame(light(stripe, amplitude=220) + faint))
+    assert np.abs(stripe(points["i"], points["j"])).max() < 0.5
+    alone = inner(extract(frame(faint)))
+    assert np.abs(ghost(alone["i"], alone["j"])).max() < 0.3
+    assert len(alone) == pytest.approx(616, abs=10)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(-40, 40), st.integers(-40, 40))
+def test_moving_the_image_moves_the_points(d_i, d_j):
+    def image(move_i, move_j):
+        distance = np.hypot(I - move_i - 300.3, J - move_j - 230.6) - 80
+        light = 180 * np.exp(-0.5 * (distance / 2.0) ** 2)
+        return np.rint(light[..., np.newaxis] * [1, 0.1, 0.1] + 10).astype(np.uint8)
+
+    still, moved = extract(image(0, 0)), extract(image(d_i, d_j))
+    assert len(still) == len(moved)
+    np.testing.assert_allclose(np.sort(moved["i"]), np.sort(still["i"]) + d_i, atol=1e-6)
+    np.testing.assert_allclose(np.sort(moved["j"]), np.sort(still["j"]) + d_j, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "shape", [(0, 0), (1, 1), (1, 640), (480, 1), (2, 2), (3, 8000), (33, 65), (480, 640)], ids=str
+)
+@pytest.mark.parametrize("kind", ["black", "white", "red", "noise"])
+def test_any_image_gives_a_sane_result(shape, kind):
+    generator = np.random.default_rng(3)
+    image = {
+        "black": np.zeros((*shape, 3)),
+        "white": np.full((*shape, 3), 255),
+        "red": np.broadcast_to([255, 0, 0], (*shape, 3)),
+        "noise": generator.integers(0, 256, (*shape, 3)),
+    }[kind].astype(np.uint8)
+    points = extract(image)
+    assert np.isfinite(points["i"]).all()
+    assert np.all((points["i"] >= -0.5) & (points["i"] < shape[1]) & (points["j"] >= -0.5) & (points["j"] < shape[0]))
+    if kind != "noise":
+        assert len(points) == 0
+
+
+def test_a_very_wide_image():
+    j = np.arange(60)[:, np.newaxis]
+    light = 200 * np.exp(-0.5 * ((j - 30.25) / 2.0) ** 2) * np.ones(8000)
+    image = np.rint(light[..., np.newaxis] * [1, 0.1, 0.1] + 10).astype(np.uint8)
+    points = extract(image)
+    assert len(points) == pytest.approx(8000, abs=4)
+    assert np.abs(points["j"] - 30.25).max() < 0.03
+
+
+def test_a_view_that_is_not_contiguous(line, light, frame):
+    image = frame(light(line(10)))
+    turned = np.ascontiguousarray(image[::-1, ::-1])[::-1, ::-1]
+    np.testing.assert_array_equal(extract(turned), extract(image))
+
+
+def test_two_threads_at_once(line, light, frame):
+    images = [frame(light(line(degrees)), noise=2.0) for degrees in (0, 20, 70, 90)]
+    images.append(images[1][:300, :500])
+    alone = [extract(image) for image in images]
+    with ThreadPoolExecutor(2) as pool:
+        together = list(pool.map(extract, images * 4))
+    for n, points in enumerate(together):
+        np.testing.assert_array_equal(points, alone[n % len(images)])
+
+
+@pytest.fixture
+def photographs() -> Path:
+    if "FOOTSCAN_DATA" not in os.environ:
+        pytest.skip("set FOOTSCAN_DATA to the folder that holds ciclop/")
+    return Path(os.environ["FOOTSCAN_DATA"]) / "ciclop"
+
+
+def photograph(path: Path):
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+def test_photograph_of_a_bust(photographs):
+    """960 x 1280, an office by day: the stripe runs from the crest (588, 54) to the foot of the base (597, 1117)."""
+    points = extract(photograph(photographs / "object" / "laser.png"))
+    assert points["j"].min() < 60
+    assert points["j"].max() > 1105
+    assert len(np.unique(np.rint(points["j"]))) > 0.95 * (1115 - 56)
+    # nowhere beside it: the cube, the holder and the rim of the turntable lie outside these columns
+    assert points["i"].min() > 500
+    assert points["i"].max() < 605
+    # read off the photograph: the middle of the stripe at some rows
+    for row, column in [(100, 556), (420, 559.5), (750, 565), (1060, 575.5)]:
+        assert points["i"][np.argmin(np.abs(points["j"] - row))] == pytest.approx(column, abs=3)
+
+
+@pytest.mark.parametrize(
+    ("name", "ends"),
+    [
+        ("laser-0-255-255-8.png", [((276, 460), (272, 1030)), ((596, 465), (586, 1018))]),
+        ("laser-0-255-255-8-x.png", [((315, 462), (314, 1012)), ((646, 452), (631, 1030))]),
+    ],
+)
+def test_photographs_of_a_board(photographs, name, ends):
+    """Two straight stripes on a checkerboard above a red holder; their ends are read off the photographs.
+
+    These photographs were processed: a glare on one stripe is grey, not saturated, and its core is not found.
+    """
+    points = extract(photograph(photographs / "pattern" / name))
+    taken = np.zeros(len(points), bool)
+    for (top_i, top_j), (bottom_i, bottom_j) in ends:
+        expected = top_i + (points["j"] - top_j) * (bottom_i - top_i) / (bottom_j - top_j)
+        own = np.abs(points["i"] - expected) < 5
+        assert len(np.unique(np.rint(points["j"][own]))) > 0.90 * (bottom_j - top_j)
+        fit = np.polyfit(points["j"][own], points["i"][own], 1)
+        assert np.median(np.abs(points["i"][own] - np.polyval(fit, points["j"][own]))) < 0.4
+        taken |= own
+    assert np.sum(~taken) < 0.08 * len(points)
