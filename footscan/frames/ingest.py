@@ -3,6 +3,7 @@
 An array is written beside its place and renamed when it is whole: what has its name is complete.
 """
 
+import contextlib
 import os
 import shutil
 import socket
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import zarr
 from zarr.codecs import BloscCodec
+from zarr.errors import ContainsGroupError
 
 from footscan.frames.codec import ImageCodec
 from footscan.frames.film import encoded_frames, frame_digest, open_film, pixel_frames
@@ -83,7 +85,8 @@ def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SI
         )
         target.update_attributes({"footscan": manifest.model_dump(mode="json"), "film": film.name})
         _replace(partial, array)
-        zarr.open_group(str(array.parent), mode="a")
+        with contextlib.suppress(ContainsGroupError):  # another camera's thread was first
+            zarr.open_group(str(array.parent), mode="a")
     except OSError as error:
         raise Fault(f"{array}: cannot be written ({error.strerror or error})") from None
     finally:

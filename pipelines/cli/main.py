@@ -1,9 +1,9 @@
 """The command's entry: its sub-commands, and every error as one line with an exit status of its own."""
 
 import logging
+import os
 import sys
 
-import click
 import typer
 
 from pipelines.cli import calibration, demo, films, results, runs
@@ -33,7 +33,8 @@ app.command("compare")(results.compare)
 
 def main() -> None:
     """Run the command line and exit with its status."""
-    logging.basicConfig(format="footscan: %(message)s", level=logging.WARNING)
+    level = logging.DEBUG if os.environ.get("FOOTSCAN_DEBUG") else logging.WARNING
+    logging.basicConfig(format="footscan: %(message)s", level=level)
     sys.exit(run_command(sys.argv[1:]))
 
 
@@ -41,10 +42,7 @@ def run_command(arguments: list[str]) -> int:
     """The exit status of `footscan ARGUMENTS`; what went wrong stands on standard error in one line."""
     try:
         return int(app(arguments, standalone_mode=False, prog_name="footscan") or 0)
-    except click.exceptions.NoArgsIsHelpError as error:
-        print(error.format_message(), file=sys.stderr)
-        return RefusedInput.exit_status
-    except (FootscanError, click.ClickException, click.Abort, KeyboardInterrupt, OSError, MemoryError) as error:
+    except (FootscanError, typer.TyperException, typer.Abort, KeyboardInterrupt, OSError, MemoryError) as error:
         problem, status = _explain(error)
         print(f"footscan: {problem}", file=sys.stderr)
         return status
@@ -55,7 +53,7 @@ def _explain(error: BaseException) -> tuple[str, int]:
     match error:
         case FootscanError():
             return str(error), error.exit_status
-        case click.ClickException():
+        case typer.TyperException():
             return f"{one_line(error.format_message())} (see 'footscan --help')", RefusedInput.exit_status
         case OSError():
             return one_line(str(error)), Fault.exit_status

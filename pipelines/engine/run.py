@@ -1,5 +1,6 @@
 """Carrying out a plan with Dask: only what is no hit becomes a task, and tasks pass digests, never arrays."""
 
+import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,7 +11,9 @@ from pipelines.engine.key import key_of, pre_image
 from pipelines.engine.plan import Plan, State, cached_outcome
 from pipelines.engine.step import Failure, Outcome, Output, SourceFile, Step, Success, Value
 from pipelines.engine.store import Row, Store
-from schemas.errors import DamagedError, Fault, Finding, RefusedInput
+from schemas.errors import DamagedError, Fault, Finding, RefusedInput, one_line
+
+log = logging.getLogger("footscan.run")
 
 
 @dataclass(frozen=True)
@@ -76,9 +79,10 @@ def execute(step: Step, inputs: Mapping[str, str], store: Store) -> tuple[Outcom
         return Failure(str(error), kind, step.name), True
     except Fault as error:
         return Failure(str(error), "damaged" if isinstance(error, DamagedError) else "fault", step.name), True
-    except (OSError, MemoryError) as error:
-        problem = str(error) or type(error).__name__
-        return Failure(f"{step.name}: {problem}", "fault", step.name), True
+    except Exception as error:  # a defect of ours, or of a library, in one scan must not cost the others
+        log.debug("%s", step.name, exc_info=True)
+        problem = one_line(f"{step.name}: {type(error).__name__}: {error}")
+        return Failure(problem, "fault", step.name), True
 
 
 def _run_step(step: Step, before: Mapping[str, Outcome], store: Store, on_step_end: OnStepEnd) -> Outcome:
