@@ -5,6 +5,7 @@ import io
 from collections.abc import Iterable
 
 from footscan.frames.image import Rgb
+from footscan.stripe.clutter import on_glint
 from footscan.stripe.extract import extract_stripe
 from footscan.stripe.points import STRIPE_DTYPE, StripePoints, film_points
 from schemas.parameters.extraction import ExtractionParameters
@@ -12,9 +13,10 @@ from schemas.parameters.extraction import ExtractionParameters
 
 def extract_film(frames: Iterable[Rgb | None], parameters: ExtractionParameters) -> StripePoints:
     """The stripe points of all frames of one camera; a lost frame (None) has none."""
-    return film_points(
+    points = film_points(
         (number, extract_stripe(frame, parameters)) for number, frame in enumerate(frames) if frame is not None
     )
+    return points[~on_glint(points, parameters)]
 
 
 def points_csv(points: StripePoints) -> str:

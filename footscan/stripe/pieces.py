@@ -32,7 +32,7 @@ def keep_stripe(profiles: NDArray[np.float64], parameters: ExtractionParameters)
     keep = np.ones(len(profiles), np.bool_)
     if len(profiles) == 0:
         return keep
-    piece = _connect(profiles, parameters.gap_px)
+    piece = connect(profiles, parameters.gap_px)
     count = np.bincount(piece)
     width = np.bincount(piece, profiles[:, WIDTH]) / np.maximum(count, 1)
     keep &= (count >= np.maximum(parameters.shortest_piece_px, LENGTH_TO_WIDTH * width))[piece]
@@ -58,14 +58,17 @@ def keep_stripe(profiles: NDArray[np.float64], parameters: ExtractionParameters)
 
     members = np.flatnonzero(keep)
     if len(members):
-        group = _connect(profiles[members], parameters.group_gap_px)
+        group = connect(profiles[members], parameters.group_gap_px)
         total = np.bincount(group, strength[members])
         keep[members] = (total >= parameters.smallest_group * total.max())[group]
     return keep
 
 
-def _connect(profiles: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
-    """A number (N,) for each point, the same for points that are linked by steps of at most `distance` px."""
+def connect(profiles: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
+    """A number (N,) for each point, the same for points that are linked by steps of at most `distance` px.
+
+    Of `profiles`, only the first two columns count: i and j of the centre, px.
+    """
     parent = _link(profiles, distance, *_grid(profiles, distance))
     return np.unique(parent, return_inverse=True)[1]
 

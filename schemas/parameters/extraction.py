@@ -68,6 +68,18 @@ class ExtractionParameters(Document):
         le=1.0,
         description="strength of a group of pieces, relative to the strongest one, below which it is dropped",
     )
+    glint_frames: int = Field(
+        default=20,
+        ge=2,
+        le=10_000,
+        description="frames in which a short piece must stand in one place to be a glint: the foot moves, hardware not",
+    )
+    glint_length_px: float = Field(
+        default=40.0,
+        ge=0.0,
+        le=1000.0,
+        description="extent in px from which a piece is no glint, however long it stands still",
+    )
     ghost_reach_px: float = Field(
         default=60.0,
         ge=0.0,

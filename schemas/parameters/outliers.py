@@ -15,8 +15,8 @@ class OutlierParameters(Document):
     x_mm: Range = (-500.0, 500.0)
     """Control volume along the travel; wide, for the travel itself bounds X."""
     y_mm: Range = (-75.0, 75.0)
-    z_mm: Range = (-3.0, 145.0)
-    """The sole rests on the glass at Z = 0."""
+    z_mm: Range = (-0.5, 120.0)
+    """The sole rests on the glass at Z = 0; below it stands the foot's mirror image."""
     drop_unsupported: bool = True
     """Drop points of pixels that no control point of the calibration supports."""
     stripe_step_mm: Annotated[float, Field(gt=0, le=50)] = 2.0
