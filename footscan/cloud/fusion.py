@@ -6,11 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.cells import cell_means, group_by_cell
-from footscan.cloud.points import POINT_DTYPE, coordinates
+from footscan.cloud.points import PLANE_MM, POINT_DTYPE, coordinates
 from schemas.parameters.fusion import FusionParameters
 
-PLANE_MM = 0.25
-"""Stripe planes closer than this are one."""
 UNSUPPORTED_WEIGHT = 1e-9
 """Unsupported points count only in cells that hold no others."""
 

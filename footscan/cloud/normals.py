@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.points import coordinates
+from footscan.cloud.points import coordinates, stripe_step
+from schemas.errors import Finding
 from schemas.parameters.normals import NormalParameters
 
 END_WEIGHT = 0.5
@@ -24,9 +25,11 @@ def estimate_normals(cloud: NDArray[np.void], parameters: NormalParameters) -> N
 
     if not len(cloud):
         return np.zeros((0, 3), np.float32)
+    if stripe_step(cloud) == 0.0:
+        raise Finding(f"{len(cloud)} points in one plane, expected stripes at several places of the travel")
     xyz = coordinates(cloud)
     legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(xyz))
-    search = o3d.geometry.KDTreeSearchParamHybrid(parameters.radius_mm, parameters.neighbours)
+    search = o3d.geometry.KDTreeSearchParamHybrid(parameters.radius_steps * stripe_step(cloud), parameters.neighbours)
     legacy.estimate_normals(search, fast_normal_computation=False)
     normals = np.asarray(legacy.normals)
     backward = np.sum(normals * _outward(cloud, xyz, parameters), axis=1) < 0

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import KDTree
 
-from footscan.cloud.points import coordinates
+from footscan.cloud.points import coordinates, stripe_step
 from schemas.parameters.outliers import OutlierParameters
 
 Removed = dict[int, dict[str, int]]
@@ -59,9 +59,10 @@ def _distant(cloud: NDArray[np.void], parameters: OutlierParameters) -> NDArray[
     X is shrunk until stripe planes stand as close as points within them; else all neighbours would be of the same
     plane, and a glint or a ghost is dense within its plane.
     """
-    if len(cloud) <= parameters.neighbours:
+    step = stripe_step(cloud)
+    if len(cloud) <= parameters.neighbours or step == 0.0:
         return np.zeros(len(cloud), np.bool_)
-    xyz = coordinates(cloud) * [parameters.spacing_mm / parameters.stripe_step_mm, 1.0, 1.0]
+    xyz = coordinates(cloud) * [parameters.spacing_mm / step, 1.0, 1.0]
     distances, _ = KDTree(xyz).query(xyz, k=parameters.neighbours + 1, workers=-1)
     mean = np.mean(np.atleast_2d(distances)[:, 1:], axis=1)
     far: NDArray[np.bool_] = mean > parameters.distance_ratio * np.median(mean)
@@ -91,10 +92,11 @@ def _off_surface(cloud: NDArray[np.void], parameters: OutlierParameters) -> NDAr
 
 def _on_island(cloud: NDArray[np.void], parameters: OutlierParameters) -> NDArray[np.bool_]:
     """Points of small connected parts, found in a grid whose cells join their 26 neighbours."""
-    if not cloud.size:
-        return np.zeros(0, np.bool_)
+    step = stripe_step(cloud)
+    if step == 0.0:
+        return np.zeros(len(cloud), np.bool_)
     xyz = coordinates(cloud)
-    cells = np.floor((xyz - xyz.min(axis=0)) / (parameters.island_gap_mm / 1.5)).astype(np.intp)
+    cells = np.floor((xyz - xyz.min(axis=0)) / (parameters.island_gap_steps * step / 1.5)).astype(np.intp)
     occupied = np.zeros(cells.max(axis=0) + 1, np.bool_)
     occupied[tuple(cells.T)] = True
     labels = np.empty(occupied.shape, np.int32)

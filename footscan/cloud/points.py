@@ -3,6 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+PLANE_MM = 0.25
+"""Stripe planes closer than this are one."""
+
 POINT_DTYPE = np.dtype(
     [
         ("x", "<f4"),
@@ -34,6 +37,24 @@ def make_points(
     points["x"], points["y"], points["z"] = np.asarray(xyz).T
     points["camera"], points["frame"], points["source"], points["supported"] = camera, frame, source, supported
     return points
+
+
+def stripe_step(points: NDArray[np.void]) -> float:
+    """Distance in mm from one stripe plane to the next, as a camera travels; the median over frames and cameras.
+
+    Cameras are looked at one by one, for their planes may lie between each other's. 0 where no camera has two planes.
+    """
+    steps = [
+        _frame_steps(points["frame"][points["camera"] == camera], points["x"][points["camera"] == camera])
+        for camera in np.unique(points["camera"])
+    ]
+    return float(np.median(np.concatenate(steps))) if any(len(step) for step in steps) else 0.0
+
+
+def _frame_steps(frame: NDArray[np.int32], x: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Ways in mm from each frame of one camera to its next one that holds points."""
+    _, number, counts = np.unique(frame, return_inverse=True, return_counts=True)
+    return np.abs(np.diff(np.bincount(number, x.astype(np.float64)) / counts))
 
 
 def coordinates(points: NDArray[np.void]) -> NDArray[np.float64]:

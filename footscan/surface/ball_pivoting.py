@@ -16,7 +16,7 @@ holes that this leaves are closed again."""
 
 
 def mesh_cloud(
-    points: NDArray[np.floating], normals: NDArray[np.floating], parameters: SurfaceParameters
+    points: NDArray[np.floating], normals: NDArray[np.floating], step_mm: float, parameters: SurfaceParameters
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """The surface through `points`.
 
@@ -24,6 +24,7 @@ def mesh_cloud(
     ----------
     points : (N, 3) mm
     normals : (N, 3) unit vectors, outward
+    step_mm : distance from one stripe plane to the next
 
     Returns
     -------
@@ -38,20 +39,19 @@ def mesh_cloud(
     import open3d as o3d
 
     cloud, cloud_normals = np.asarray(points, np.float64), np.asarray(normals, np.float64)
-    spaced, spaced_normals = _space_evenly(cloud, cloud_normals, parameters.spacing_mm)
-    spaced = project(spaced, spaced_normals, cloud, cloud_normals, parameters.smoothing_mm)
+    spacing = parameters.spacing_steps * step_mm
+    spaced, spaced_normals = _space_evenly(cloud, cloud_normals, spacing)
+    spaced = project(spaced, spaced_normals, cloud, cloud_normals, parameters.smoothing_steps * step_mm)
     legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(spaced))
     legacy.normals = o3d.utility.Vector3dVector(spaced_normals)
-    radii = o3d.utility.DoubleVector(sorted(parameters.ball_radii_mm))
+    radii = o3d.utility.DoubleVector([radius * step_mm for radius in sorted(parameters.ball_radii_steps)])
     pivoted = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(legacy, radii)
     faces = keep_large_components(drop_tangles(np.asarray(pivoted.triangles, np.int32)), parameters.component_share)
     if not faces.size:
-        raise Finding(
-            f"no surface through {len(points)} points, expected a cloud as dense as {parameters.spacing_mm} mm"
-        )
+        raise Finding(f"no surface through {len(points)} points, expected a cloud as dense as {spacing:g} mm")
     vertices, faces = used_vertices(np.asarray(pivoted.vertices), faces)
     for slit in (parameters.slit_mm, *REPAIRS):
-        vertices, faces = close_holes(vertices, faces, parameters.hole_mm, slit, parameters.spacing_mm)
+        vertices, faces = close_holes(vertices, faces, parameters.hole_mm, slit, spacing)
         faces = drop_tangles(faces)
     return used_vertices(vertices, faces)
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from footscan.cloud.points import coordinates
+from footscan.cloud.points import coordinates, stripe_step
 from footscan.surface.ball_pivoting import mesh_cloud
 from pipelines.arrays import pack, unpack
 from schemas.parameters.surface import SurfaceParameters
@@ -13,5 +13,6 @@ def run(inputs: Mapping[str, bytes], parameters: SurfaceParameters, places: Mapp
     """`inputs`: `oriented`."""
     del places
     oriented = unpack(inputs["oriented"])
-    vertices, faces = mesh_cloud(coordinates(oriented["cloud"]), oriented["normals"], parameters)
+    cloud = oriented["cloud"]
+    vertices, faces = mesh_cloud(coordinates(cloud), oriented["normals"], stripe_step(cloud), parameters)
     return pack(vertices=vertices, faces=faces)

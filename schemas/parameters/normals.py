@@ -25,8 +25,8 @@ CAMERA_DIRECTIONS: dict[int, Direction] = {
 class NormalParameters(Document):
     """Over which neighbourhood a plane is fitted, and what is outside."""
 
-    radius_mm: Annotated[float, Field(gt=0, le=50)] = 4.5
-    """Radius of the neighbourhood: two stripe planes to either side."""
+    radius_steps: Annotated[float, Field(gt=1, le=25)] = 2.25
+    """Radius of the neighbourhood, in steps from stripe to stripe: two stripe planes to either side."""
     neighbours: Annotated[int, Field(ge=6, le=500)] = 80
     """At most so many nearest points of it."""
     camera_directions: dict[Camera, Direction] = CAMERA_DIRECTIONS

@@ -19,8 +19,6 @@ class OutlierParameters(Document):
     """The sole rests on the glass at Z = 0; below it stands the foot's mirror image."""
     drop_unsupported: bool = True
     """Drop points of pixels that no control point of the calibration supports."""
-    stripe_step_mm: Annotated[float, Field(gt=0, le=50)] = 2.0
-    """Distance of neighbouring stripe planes."""
     spacing_mm: Annotated[float, Field(gt=0, le=50)] = 0.5
     """Distance of neighbouring points within a stripe plane."""
     neighbours: Annotated[int, Field(ge=2, le=200)] = 24
@@ -31,8 +29,8 @@ class OutlierParameters(Document):
     """A point off the surface is farther than this from the plane through its neighbours, and"""
     off_surface_ratio: Annotated[float, Field(gt=1, le=100)] = 4.0
     """farther than this many times their own standard deviation from it."""
-    island_gap_mm: Annotated[float, Field(gt=0, le=100)] = 5.0
-    """Parts of the cloud closer than about this belong together."""
+    island_gap_steps: Annotated[float, Field(gt=0, le=50)] = 2.5
+    """Parts of the cloud closer than about so many steps from stripe to stripe belong together."""
     island_share: Annotated[float, Field(ge=0, lt=1)] = 0.02
     """Parts with less than this share of the cloud's points are dropped."""
 

@@ -6,18 +6,18 @@ from pydantic import Field
 
 from schemas.documents import Document
 
-Radius = Annotated[float, Field(gt=0, le=100)]
+Radius = Annotated[float, Field(gt=0, le=50)]
 
 
 class SurfaceParameters(Document):
-    """How a cloud becomes a triangle mesh."""
+    """How a cloud becomes a triangle mesh. What ends in `_steps` is in steps from stripe to stripe, 2 mm as a rule."""
 
-    spacing_mm: Annotated[float, Field(ge=0.2, le=20)] = 1.5
+    spacing_steps: Annotated[float, Field(ge=0.2, le=5)] = 0.75
     """Spacing that the cloud is thinned to before meshing."""
-    smoothing_mm: Annotated[float, Field(ge=1, le=20)] = 3.5
+    smoothing_steps: Annotated[float, Field(ge=1, le=10)] = 1.75
     """Radius of the neighbourhood that the thinned points are smoothed over; it must reach the next stripe planes."""
-    ball_radii_mm: Annotated[tuple[Radius, ...], Field(min_length=1, max_length=8)] = (1.5, 2.5)
-    """Radii of the balls, the smallest first; the stripe planes stand 2 mm apart."""
+    ball_radii_steps: Annotated[tuple[Radius, ...], Field(min_length=1, max_length=8)] = (0.75, 1.25)
+    """Radii of the balls, the smallest first."""
     component_share: Annotated[float, Field(ge=0, lt=1)] = 0.05
     """Parts of the mesh with less than this share of its triangles are dropped."""
     hole_mm: Annotated[float, Field(ge=0, le=10_000)] = 190.0

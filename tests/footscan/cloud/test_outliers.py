@@ -13,8 +13,14 @@ def sheet(z: float = 10.0) -> np.ndarray:
     return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, z)])
 
 
+def filmed(points: np.ndarray, camera: int, **more: object) -> np.ndarray:
+    """A cloud of one camera whose frame k stands at X = 2 k mm."""
+    frame = np.nan_to_num(np.round(points[:, 0] / 2)).astype(int)
+    return make_points(points, camera=camera, frame=frame, **more)
+
+
 def cleaned(extra: list[list[float]], **more: object) -> tuple[np.ndarray, dict[str, int]]:
-    cloud = np.concatenate([make_points(sheet(), camera=1), make_points(np.array(extra), camera=5, **more)])
+    cloud = np.concatenate([filmed(sheet(), camera=1), filmed(np.array(extra), camera=5, **more)])
     kept, removed = remove_outliers(cloud, OutlierParameters())
     assert removed[1] == dict.fromkeys(removed[1], 0)
     np.testing.assert_array_equal(coordinates(kept), sheet())
@@ -22,7 +28,7 @@ def cleaned(extra: list[list[float]], **more: object) -> tuple[np.ndarray, dict[
 
 
 def test_a_clean_cloud_stays_as_it_is() -> None:
-    cloud = make_points(sheet(), camera=1)
+    cloud = filmed(sheet(), camera=1)
     kept, removed = remove_outliers(cloud, OutlierParameters())
     assert kept.tobytes() == cloud.tobytes()
     assert removed == {1: {"volume": 0, "unsupported": 0, "distant": 0, "off_surface": 0, "island": 0}}
@@ -39,7 +45,7 @@ def test_unsupported_points() -> None:
 
 
 def test_unsupported_points_may_stay() -> None:
-    cloud = make_points(sheet(), camera=1, supported=False)
+    cloud = filmed(sheet(), camera=1, supported=False)
     kept, _ = remove_outliers(cloud, OutlierParameters(drop_unsupported=False))
     assert len(kept) == len(cloud)
 
@@ -68,7 +74,7 @@ def test_a_small_island_is_dropped() -> None:
 
 
 def test_two_large_parts_stay() -> None:
-    cloud = make_points(np.concatenate([sheet(10.0), sheet(60.0)]), camera=1)
+    cloud = filmed(np.concatenate([sheet(10.0), sheet(60.0)]), camera=1)
     assert len(remove_outliers(cloud, OutlierParameters())[0]) == len(cloud)
 
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from footscan.cloud.points import POINT_DTYPE, coordinates, make_points
+from footscan.cloud.points import POINT_DTYPE, coordinates, make_points, stripe_step
 
 
 def test_fields_and_coordinates() -> None:
@@ -20,3 +20,11 @@ def test_layout_is_the_same_on_every_machine() -> None:
 def test_storage_resolves_a_tenth_of_a_micrometre() -> None:
     x = 399.98765
     assert abs(coordinates(make_points(np.array([[x, 0.0, 0.0]]), camera=1))[0, 0] - x) < 1e-4
+
+
+def test_the_step_is_told_camera_by_camera() -> None:
+    xyz = np.array([[0.0, 0, 0], [0, 1, 0], [2, 0, 0], [4, 0, 0], [0.5, 0, 0], [2.5, 0, 0]])
+    points = make_points(xyz, camera=np.array([1, 1, 1, 1, 2, 2]), frame=np.array([0, 0, 1, 2, 0, 1]))
+    assert stripe_step(points) == 2.0
+    assert stripe_step(points[:2]) == 0.0
+    assert stripe_step(points[:0]) == 0.0

@@ -38,13 +38,15 @@ def scan_of_an_ellipsoid(noise: float, offset: float, outliers: int) -> list[np.
                 )
             )
         unit = np.concatenate(points)
+        stripe = np.repeat(np.arange(len(points)), [len(part) for part in points])
         normal = unit / AXES
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         seen = (unit[:, 1] * side > -0.3) & (unit[:, 2] * up > -0.3) & (np.abs(normal[:, 0]) < 0.99)
         unit, normal = unit[seen], normal[seen]
         moved = CENTRE + unit * AXES + normal * (sign * offset + random.normal(0, noise, (len(unit), 1)))
         stray = CENTRE + random.uniform(-1, 1, (outliers, 3)) * AXES * 1.4
-        clouds.append(make_points(np.concatenate([moved, stray]), camera=camera))
+        frame = np.concatenate([stripe[seen], random.integers(0, stripe.max(), outliers)])
+        clouds.append(make_points(np.concatenate([moved, stray]), camera=camera, frame=frame))
     return clouds
 
 
@@ -60,7 +62,7 @@ def test_eight_noisy_partial_clouds_become_one_closed_surface() -> None:
     kept, removed = remove_outliers(cloud, OutlierParameters())
     assert sum(sum(reasons.values()) for reasons in removed.values()) > 200
     normals = estimate_normals(kept, NormalParameters())
-    vertices, faces = mesh_cloud(coordinates(kept), normals, SurfaceParameters())
+    vertices, faces = mesh_cloud(coordinates(kept), normals, 2.0, SurfaceParameters())
 
     quality = mesh_quality(vertices, faces)
     assert (quality.components, quality.open_edges, quality.non_manifold_edges) == (1, 0, 0)
@@ -80,8 +82,8 @@ def test_eight_noisy_partial_clouds_become_one_closed_surface() -> None:
 def test_the_same_bytes_at_every_call() -> None:
     cloud = fuse(scan_of_an_ellipsoid(noise=0.1, offset=0.05, outliers=0), FusionParameters())
     normals = estimate_normals(cloud, NormalParameters())
-    first = mesh_cloud(coordinates(cloud), normals, SurfaceParameters())
-    second = mesh_cloud(coordinates(cloud), normals, SurfaceParameters())
+    first = mesh_cloud(coordinates(cloud), normals, 2.0, SurfaceParameters())
+    second = mesh_cloud(coordinates(cloud), normals, 2.0, SurfaceParameters())
     assert [array.tobytes() for array in first] == [array.tobytes() for array in second]
 
 
@@ -89,4 +91,4 @@ def test_the_same_bytes_at_every_call() -> None:
 def test_too_few_points_are_a_finding(count: int) -> None:
     points = np.arange(count)[:, None] * np.ones(3) * 100
     with pytest.raises(Finding, match="expected a cloud"):
-        mesh_cloud(points, np.tile([0.0, 0.0, 1.0], (count, 1)), SurfaceParameters())
+        mesh_cloud(points, np.tile([0.0, 0.0, 1.0], (count, 1)), 2.0, SurfaceParameters())
