@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 ROUNDS = 7
 
@@ -30,6 +31,6 @@ def print_ratios(title: str, seconds: Mapping[str, list[float]], calls: int, uni
         print(f"  {name:<44}{each}   {'baseline' if number == 0 else ratio_text(np.array(times) / baseline)}")
 
 
-def ratio_text(ratios: np.ndarray) -> str:
+def ratio_text(ratios: NDArray[np.float64]) -> str:
     """Median and range of the ratios of one round each."""
     return f"{np.median(ratios):6.2f} times the baseline ({ratios.min():.2f} to {ratios.max():.2f})"

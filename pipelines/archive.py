@@ -9,13 +9,14 @@ from pipelines.deliver import deliver
 from pipelines.engine.digest import FileDigests, sha256
 from pipelines.engine.plan import Plan, make_plan
 from pipelines.engine.run import OnStepEnd, run_plan
-from pipelines.engine.step import Failure, Step, Success
+from pipelines.engine.step import Failure, Outcome, Step
 from pipelines.engine.store import Store
 from pipelines.recorded import RecordedScan, read_scan, scan_folders
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
 from schemas.calibration import calibration_from_json
 from schemas.documents import read_text, read_yaml
 from schemas.errors import RefusedInput
+from schemas.measures import Measures
 from schemas.workflow import ScanParameters, Workflow
 
 CACHE = ".footscan"
@@ -55,7 +56,7 @@ class ScanEnd:
 
     scan: str
     folder: Path | None
-    """Its results; None where it failed."""
+    """Its results; None where it has none."""
     problem: str | None
     kind: str | None
     """`refused`, `finding`, `fault`, as in `Failure`."""
@@ -67,8 +68,11 @@ def job_of_workflow(path: Path, workers: int | None = None) -> Job:
     base = path.resolve().parent
     archive = base / workflow.archive
     results = base / workflow.results
+    folders = list(scan_folders(archive))
+    if not folders:
+        raise RefusedInput(path, f"expected folders with a scan.yaml below {archive}, found none", field="archive")
     return Job(
-        folders=list(scan_folders(archive)),
+        folders=folders,
         archive=archive,
         calibration=base / workflow.calibration if workflow.calibration else None,
         calibration_wins=False,
@@ -126,21 +130,29 @@ def run_job(planned: PlannedJob, on_step_end: OnStepEnd) -> Iterable[ScanEnd]:
         again = make_plan([p.step for p in planned.plan.steps], store)
         outcomes = run_plan(again, store, workers=job.workers, on_step_end=on_step_end)
     for scan in planned.scans:
-        ends = {kind: outcomes[f"{scan.name}/{kind}"] for kind in DELIVERED.values()}
-        failure = next((end for end in ends.values() if isinstance(end, Failure)), None)
-        if failure is not None:
-            yield ScanEnd(scan.name, None, failure.problem, failure.kind)
-            continue
-        target = job.results / scan.document.patient / scan.document.scan
-        digests = {kind: end.digest for kind, end in ends.items() if isinstance(end, Success)}
-        problem = deliver({file: digests[kind] for file, kind in DELIVERED.items()}, store, planned.digests, target)
-        yield ScanEnd(scan.name, None if problem else target, problem, "fault" if problem else None)
+        yield _end_scan(scan, outcomes, store, planned)
     planned.digests.save()
 
 
 def cores() -> int:
     """How many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _end_scan(scan: RecordedScan, outcomes: dict[str, Outcome], store: Store, planned: PlannedJob) -> ScanEnd:
+    """Deliver a scan's results, if it has them."""
+    digests: dict[str, str] = {}
+    for file, kind in DELIVERED.items():
+        outcome = outcomes[f"{scan.name}/{kind}"]
+        if isinstance(outcome, Failure):
+            return ScanEnd(scan.name, None, outcome.problem, outcome.kind)
+        digests[file] = outcome.digest
+    target = planned.job.results / scan.document.patient / scan.document.scan
+    problem = deliver(digests, store, planned.digests, target)
+    if problem is not None:
+        return ScanEnd(scan.name, None, problem, "fault")
+    finding = Measures.model_validate_json((target / "measures.json").read_bytes()).finding
+    return ScanEnd(scan.name, target, finding, None if finding is None else "finding")
 
 
 def _calibration(scan: RecordedScan, job: Job, known: dict[Path, CalibrationFile]) -> CalibrationFile:

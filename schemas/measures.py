@@ -38,10 +38,12 @@ class Measures(Document):
     format: Literal["footscan.measures/1"] = "footscan.measures/1"
     unit: Literal["mm"] = "mm"
     side: Side
-    axis: Axis
+    axis: Axis | None
     """The foot axis that lengths run along: from the rearmost heel point to the tip of the second toe, or, where toes
-    cannot be told apart, to the middle of the ball."""
+    cannot be told apart, to the middle of the ball; None where nothing could be measured."""
     transform: Annotated[list[list[float]], Field(min_length=4, max_length=4)]
     """4 x 4, from the scanner's frame to the foot's own: mm, +X from heel to toes along the axis, Z up, origin on the
     floor below the rearmost heel point; left feet mirrored into right ones, so that +Y is medial."""
     measures: dict[str, Measure]
+    finding: str | None = None
+    """Why nothing could be measured, where that is so: the surface is no foot."""

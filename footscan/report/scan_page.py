@@ -134,6 +134,8 @@ def _tiles(measures: Measures) -> str:
 
 
 def _measures_table(measures: Measures) -> str:
+    if measures.finding is not None:
+        return f'<p class="note">Not measured: {text(measures.finding)}</p>'
     rows = (
         [
             text(words(name)),
