@@ -91,15 +91,6 @@ def _fit(chart: Chart, model: str) -> PolynomialCamera:
     return calibration.cameras[0]
 
 
-def _five_points(chart: Chart) -> Chart:
-    """Five points over the whole volume, as many as the thesis took: nearest to its four corners and its middle."""
-    places = chart.world[:, 1:]
-    low, high = places.min(axis=0), places.max(axis=0)
-    wanted = low + (high - low) * np.array([[0, 0], [1, 0], [0, 1], [1, 1], [0.5, 0.5]])
-    nearest = np.linalg.norm(places[:, None] - wanted, axis=2).argmin(axis=0)
-    return _subset(chart, np.isin(np.arange(len(places)), nearest))
-
-
 def _subset(chart: Chart, rows: NDArray[np.bool_]) -> Chart:
     names = tuple(name for name, taken in zip(chart.points, rows, strict=True) if taken)
     return Chart(chart.camera, names, chart.world[rows], chart.unit, chart.pixels[rows])
