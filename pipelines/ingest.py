@@ -23,6 +23,8 @@ class CameraIngest:
     film_bytes: int = 0
     store_bytes: int = 0
     problem: str | None = None
+    exit_status: int = 0
+    """Of a command for this camera alone, see `schemas.errors`."""
 
     def to_json(self) -> dict[str, Any]:
         """Its fields."""
@@ -43,7 +45,7 @@ def _ingest_scan(folder: Path, archive: Path | None) -> list[CameraIngest]:
     try:
         scan = read_scan(folder, archive)
     except FootscanError as error:
-        return [CameraIngest(str(folder), None, problem=str(error))]
+        return [CameraIngest(str(folder), None, problem=str(error), exit_status=error.exit_status)]
     ends = []
     for camera in scan.document.cameras:
         film = scan.film(camera)
@@ -52,7 +54,7 @@ def _ingest_scan(folder: Path, archive: Path | None) -> list[CameraIngest]:
             manifest = ingest_film(film, array)
             size = sum(file.stat().st_size for file in film_files(film))
         except FootscanError as error:
-            ends.append(CameraIngest(scan.name, camera.id, problem=str(error)))
+            ends.append(CameraIngest(scan.name, camera.id, problem=str(error), exit_status=error.exit_status))
             continue
         store = sum(file.stat().st_size for file in array.iterdir())
         lost = manifest.frames.count(None)

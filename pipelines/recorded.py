@@ -33,13 +33,13 @@ class RecordedScan:
 
     def film(self, camera: CameraFilm) -> Path:
         """The film of a camera, which may be missing."""
-        return inside(self.archive, self.file, camera.file, f"cameras.{camera.id}.file")
+        return inside(self.archive, self.file, camera.file, f"file of camera {camera.id}")
 
     def positions(self, camera: CameraFilm) -> Path | None:
         """The file with the positions of a camera's frames."""
         if camera.positions is None:
             return None
-        return inside(self.archive, self.file, camera.positions, f"cameras.{camera.id}.positions")
+        return inside(self.archive, self.file, camera.positions, f"positions of camera {camera.id}")
 
     @property
     def calibration(self) -> Path | None:

@@ -33,6 +33,11 @@ class CalibrationV1(Document):
     unit: LengthUnit
     cameras: Annotated[list[QuadraticCamera], Field(min_length=1)]
 
+    @model_validator(mode="after")
+    def _unique(self) -> Self:
+        _refuse_twice([camera.camera for camera in self.cameras])
+        return self
+
 
 class PolynomialCamera(Document):
     """Y and Z in mm as polynomials of u = (i - centre_i) / scale and v = (j - centre_j) / scale.
@@ -78,9 +83,7 @@ class Calibration(Document):
 
     @model_validator(mode="after")
     def _unique(self) -> Self:
-        ids = [camera.camera for camera in self.cameras]
-        if len(set(ids)) != len(ids):
-            raise ValueError(f"expected each camera once, found {ids}")
+        _refuse_twice([camera.camera for camera in self.cameras])
         return self
 
     def camera(self, camera_id: int, source: Path | str = "calibration") -> PolynomialCamera:
@@ -90,6 +93,11 @@ class Calibration(Document):
                 return camera
         known = ", ".join(str(camera.camera) for camera in self.cameras)
         raise RefusedInput(source, f"has no camera {camera_id}, expected one of {known}", field="cameras")
+
+
+def _refuse_twice(ids: list[int]) -> None:
+    if len(set(ids)) != len(ids):
+        raise ValueError(f"expected each camera once, found {ids}")
 
 
 def read_calibration(path: Path) -> Calibration:
@@ -112,21 +120,22 @@ def calibration_from_json(text: str, source: Path | str) -> Calibration:
 def migrate_v1(old: CalibrationV1, source: Path | str) -> Calibration:
     """Version 1 as version 2: the same polynomials, in mm, of coordinates that are not normalised."""
     scale = MILLIMETRES[old.unit]
-    return Calibration(
-        source=str(source),
-        source_sha256="",
-        software="footscan.calibration/1",
-        cameras=[
-            PolynomialCamera(
-                camera=camera.camera,
-                order=2,
-                centre_px=(0.0, 0.0),
-                scale_px=1.0,
-                alpha_y=[scale * a for a in camera.alpha_y],
-                alpha_z=[scale * a for a in camera.alpha_z],
-                region_px=[],
-                points=0,
-            )
+    migrated = {
+        "source": str(source),
+        "source_sha256": "",
+        "software": "footscan.calibration/1",
+        "cameras": [
+            {
+                "camera": camera.camera,
+                "order": 2,
+                "centre_px": (0.0, 0.0),
+                "scale_px": 1.0,
+                "alpha_y": [scale * a for a in camera.alpha_y],
+                "alpha_z": [scale * a for a in camera.alpha_z],
+                "region_px": [],
+                "points": 0,
+            }
             for camera in old.cameras
         ],
-    )
+    }
+    return validate(source, Calibration, migrated)  # a coefficient near the largest number has no counterpart in mm

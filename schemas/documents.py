@@ -3,6 +3,7 @@
 import difflib
 import json
 import re
+import stat
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -54,9 +55,9 @@ def read_json(path: Path, model: type[AnyDocument]) -> AnyDocument:
 
 
 def parse_json(source: Path | str, text: str) -> Any:
-    """`text` as JSON without NaN and infinities."""
+    """`text` as JSON without NaN, infinities and names that stand twice."""
     try:
-        return json.loads(text, parse_constant=_refuse_constant)
+        return _encodable(json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_refuse_twice))
     except (ValueError, RecursionError) as error:
         raise RefusedInput(source, f"expected a JSON document ({error})") from None
 
@@ -73,7 +74,9 @@ def validate(source: Path | str, model: type[AnyDocument], value: Any) -> AnyDoc
     try:
         return model.model_validate(value)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
+        errors = error.errors(include_url=False)
+        # A misspelt field is missing, too: its own name says more.
+        first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
         field = ".".join(str(part) for part in first["loc"]) or None
         raise RefusedInput(source, _expectation(model, dict(first)), field=field) from None
 
@@ -89,14 +92,17 @@ def pseudonym(name: str, field: str) -> str:
 
 def inside(archive: Path, document: Path, relative: str, field: str) -> Path:
     """The file that `document` names by `relative`, which may not lie outside `archive`, symbolic links followed."""
-    path = (document.parent / relative).resolve()
+    try:
+        path = (document.parent / relative).resolve()
+    except (OSError, RuntimeError):  # before Python 3.13 a circle of links is a RuntimeError
+        raise RefusedInput(document, f"{relative[:80]!r} leads nowhere, expected a path", field=field) from None
     if not path.is_relative_to(archive.resolve()):
         raise RefusedInput(document, f"{relative!r} leaves the archive, expected a path inside it", field=field)
     return path
 
 
 def _expectation(model: type[BaseModel], error: dict[str, Any]) -> str:
-    message = str(error["msg"])
+    message = str(error["msg"]).removeprefix("Value error, ")
     if error["type"] == "extra_forbidden":
         known = sorted(_field_names(model))
         near = difflib.get_close_matches(str(error["loc"][-1]), known, n=1)
@@ -132,7 +138,10 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
 def read_text(path: Path) -> str:
     """The content of a small UTF-8 file; RefusedInput where it is none."""
     try:
-        if path.stat().st_size > MAX_BYTES:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise RefusedInput(path, "expected a file")
+        if status.st_size > MAX_BYTES:
             raise RefusedInput(path, f"larger than {MAX_BYTES} bytes, expected a small text document")
         return path.read_bytes().decode("utf-8")
     except UnicodeDecodeError:
@@ -146,19 +155,40 @@ def read_text(path: Path) -> str:
 class _TextLoader(yaml.SafeLoader):
     """Scalars stay the text that was written; the model gives them their type.
 
-    YAML would read `no` as false, `2026-11-20` as a date, `0123` as 83 and `1e3` as text.
+    YAML would read `no` as false, `2026-11-20` as a date, `0123` as 83 and `1e3` as text. What makes YAML more than
+    lists and named values is refused: aliases, tags, deep nesting.
     """
 
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 (the base class's own attribute)
+    depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]  # types-PyYAML leaves it out
+        if isinstance(event, yaml.AliasEvent):
+            raise _refusal(f"alias {str(event.anchor)[:80]!r}, expected it written out", event)
+        if getattr(event, "tag", None) is not None:
+            raise _refusal(f"tag {event.tag[:80]!r}, expected none", event)
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise _refusal(f"expected at most {MAX_DEPTH} levels", event)
+        node = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [key.value for key, _ in node.value]
-        for key in keys:
-            if not isinstance(key, str):
-                raise yaml.constructor.ConstructorError(None, None, "expected a name before ':'", node.start_mark)
-            if keys.count(key) > 1:
-                raise yaml.constructor.ConstructorError(None, None, f"{key!r} stands twice", node.start_mark)
+        names: set[str] = set()
+        for key, _ in node.value:
+            if not isinstance(key.value, str) or key.tag != self.DEFAULT_SCALAR_TAG:
+                raise _refusal("expected a name before ':'", key)
+            if key.value in names:
+                raise _refusal(f"{key.value[:80]!r} stands twice, expected each name once", key)
+            names.add(key.value)
         return super().construct_mapping(node, deep)
+
+
+def _refusal(problem: str, where: Any) -> yaml.MarkedYAMLError:
+    """`where` : the event or node that is refused."""
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=where.start_mark)
 
 
 _TextLoader.add_implicit_resolver("tag:yaml.org,2002:null", re.compile(r"^(?:~|null|)$"), ["~", "n", ""])
@@ -166,24 +196,33 @@ _TextLoader.add_implicit_resolver("tag:yaml.org,2002:null", re.compile(r"^(?:~|n
 
 def _parse_yaml(path: Path, text: str) -> Any:
     try:
-        depth = 0
-        for event in yaml.parse(text, Loader=yaml.SafeLoader):
-            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-            if depth > MAX_DEPTH:
-                raise RefusedInput(path, f"nested more than {MAX_DEPTH} levels deep")
-            if isinstance(event, yaml.AliasEvent):
-                raise RefusedInput(path, f"aliases are not accepted, expected {event.anchor!r} written out")
-        return yaml.load(text, Loader=_TextLoader)  # a SafeLoader
+        return _encodable(yaml.load(text, Loader=_TextLoader))  # a SafeLoader
     except yaml.MarkedYAMLError as error:
         mark: Any = error.problem_mark
         where = "" if mark is None else f"line {mark.line + 1}, column {mark.column + 1}: "
-        raise RefusedInput(path, f"{where}{error.problem or error.context}, expected YAML") from None
+        problem = error.problem or error.context or ""
+        raise RefusedInput(path, f"{where}{problem}{'' if 'expected' in problem else ', expected YAML'}") from None
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise RefusedInput(path, f"expected YAML ({error})") from None
 
 
 def _refuse_constant(name: str) -> None:
     raise ValueError(f"{name} is no JSON number")
+
+
+def _refuse_twice(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    names: set[str] = set()
+    for name, _ in pairs:
+        if name in names:
+            raise ValueError(f"{name[:80]!r} stands twice, expected each name once")
+        names.add(name)
+    return dict(pairs)
+
+
+def _encodable(value: Any) -> Any:
+    """`value`; ValueError where an escape like \\ud800 has made text that is none and could not be written again."""
+    json.dumps(value, ensure_ascii=False).encode()
+    return value
 
 
 def _kind(value: Any) -> str:

@@ -14,6 +14,8 @@ class CameraQuality(Document):
 
     camera: Annotated[int, Field(ge=1)]
     frames: Count
+    frames_lost: Count
+    """Frames that the film has a place for, but no picture that can be decoded."""
     frames_with_stripe: Count
     points: Count
     """Stripe points, before fusion."""

@@ -24,6 +24,9 @@ def read_pixels(path: Path) -> NDArray[np.float64]:
             names = [name.strip() for name in rows.fieldnames or []]
             if not {"i", "j"} <= set(names):
                 raise RefusedInput(path, f"expected columns i and j, found {','.join(names)[:80]!r}")
+            for name in ("i", "j"):
+                if names.count(name) > 1:
+                    raise RefusedInput(path, f"column {name} stands twice, expected it once", field="line 1")
             rows.fieldnames = names
             pixels = [[_number(path, rows.line_num, name, row[name]) for name in ("i", "j")] for row in rows]
     except (OSError, UnicodeDecodeError, csv.Error) as error:

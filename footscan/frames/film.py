@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from footscan.frames.image import SUFFIXES, Rgb, decode_image, image_size
-from schemas.errors import RefusedInput
+from schemas.errors import Fault, RefusedInput
 
 if TYPE_CHECKING:
     from av.container import InputContainer
@@ -50,7 +50,8 @@ def open_film(path: Path, size: tuple[int, int] | None = None) -> Film:
     RefusedInput
         Missing, empty, truncated, of another kind or another size.
     """
-    film = _open_images(path) if path.is_dir() or path.suffix.lower() in SUFFIXES else _open_avi(path)
+    files = film_files(path)
+    film = _open_avi(path) if files == [path] and path.suffix.lower() not in SUFFIXES else _open_images(path, files)
     if size is not None and (film.height, film.width) != size:
         expected = f"expected frames of {size[1]} x {size[0]} pixels, found {film.width} x {film.height}"
         raise RefusedInput(path, expected, field="frame size")
@@ -107,12 +108,11 @@ def frame_digest(frame: bytes | Rgb) -> str:
     return hashlib.sha256(frame if isinstance(frame, bytes) else np.ascontiguousarray(frame).data).hexdigest()
 
 
-def _open_images(path: Path) -> Film:
-    files = film_files(path)
+def _open_images(path: Path, files: list[Path]) -> Film:
     try:
         sizes = {file: image_size(file.read_bytes()) for file in files}
     except OSError as error:
-        raise RefusedInput(path, error.strerror or "cannot be read") from None
+        raise Fault(f"{path}: cannot be read ({error.strerror or error})") from None
     except ValueError as error:
         broken = next(file for file in files if not _is_image(file))
         raise RefusedInput(broken, f"expected a JPEG or PNG image ({error})") from None
@@ -133,10 +133,12 @@ def _is_image(file: Path) -> bool:
 
 
 def _open_avi(path: Path) -> Film:
-    film_files(path)
-    declared = _declared_length(path)
+    try:
+        fewest, most = _declared_length(path)
+    except OSError as error:
+        raise Fault(f"{path}: cannot be read ({error.strerror or error})") from None
     with _container(path) as (container, stream):
-        codec = stream.codec_context.name
+        codec = stream.codec_context.name if stream.codec_context else "an unknown codec"
         kind = {"mjpeg": "mjpeg", "rawvideo": "raw"}.get(codec)
         if kind is None:
             raise RefusedInput(path, f"expected Motion-JPEG or raw video, found {codec}", field="codec")
@@ -145,17 +147,21 @@ def _open_avi(path: Path) -> Film:
     found = max(numbers, default=-1) + 1
     if not numbers:
         raise RefusedInput(path, "expected at least one frame, found none", field="frames")
-    if found < declared:
-        problem = f"truncated: expected the {declared} frames that its header declares, found {found}"
+    if found < fewest:
+        problem = f"truncated: expected the {fewest} frames that its header declares, found {found}"
+        raise RefusedInput(path, problem, field="frames")
+    if most is not None and found > most:
+        problem = f"expected the {most} frames that its header declares, found {found}: their numbers are uncertain"
         raise RefusedInput(path, problem, field="frames")
     return Film(path, kind, found, height, width)
 
 
-def _declared_length(path: Path) -> int:
-    """The number of frames in an AVI's main header, after a check that all its chunks are there.
+def _declared_length(path: Path) -> tuple[int, int | None]:
+    """The fewest and the most frames by an AVI's main header, after a check that all its chunks are there.
 
     RIFF: a chunk is a tag, its length in 4 bytes, and its content, padded to an even length; a long film is several
-    RIFF chunks in a row (OpenDML).
+    RIFF chunks in a row (OpenDML), and its main header may tell of the first alone. There, and where the recorder has
+    left the number out, it is no upper bound.
     """
     length = path.stat().st_size
     with path.open("rb") as file:
@@ -164,7 +170,7 @@ def _declared_length(path: Path) -> int:
             raise RefusedInput(path, "expected an AVI film", field="header")
         if head[24:28] != b"avih" or len(head) < 56:
             raise RefusedInput(path, "expected an AVI main header, found a torn file", field="header")
-        position = 0
+        position = chunks = 0
         while position + 8 <= length:
             file.seek(position)
             tag = file.read(4)
@@ -174,10 +180,12 @@ def _declared_length(path: Path) -> int:
             if size in {0, 0xFFFFFFFF}:
                 raise RefusedInput(path, "never finished by its recorder: its length is not written", field="header")
             position += 8 + size + size % 2
+            chunks += 1
             if position - size % 2 > length:
                 missing = position - size % 2 - length
                 raise RefusedInput(path, f"truncated: {missing} of {position} bytes are missing", field="length")
-    return int.from_bytes(head[48:52], "little")
+    declared = int.from_bytes(head[48:52], "little")
+    return declared, declared if declared and chunks == 1 else None
 
 
 @contextmanager
@@ -186,7 +194,7 @@ def _container(path: Path) -> "Iterator[tuple[InputContainer, VideoStream]]":
     import av  # 0.1 s that other commands need not wait for
 
     try:
-        with av.open(str(path), "r", format="avi") as container:
+        with av.open(str(path), "r", format="avi", metadata_errors="replace") as container:
             if not container.streams.video:
                 raise RefusedInput(path, "expected a video stream, found none", field="streams")
             yield container, container.streams.video[0]

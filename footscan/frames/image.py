@@ -5,7 +5,6 @@ upsampling"), where ffmpeg, and so the video readers built on it, repeats sample
 """
 
 import io
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,9 @@ Rgb = NDArray[np.uint8]
 """(rows, columns, 3) uint8: red, green, blue."""
 
 MAX_PIXELS = 200_000_000
+Image.MAX_IMAGE_PIXELS = MAX_PIXELS  # Pillow's own guard would warn at half of it
 SUFFIXES = (".jpg", ".jpeg", ".png")
+PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 def decode_image(data: bytes, buffer: Rgb | None = None) -> Rgb:
@@ -37,29 +38,30 @@ def decode_image(data: bytes, buffer: Rgb | None = None) -> Rgb:
     ValueError
         `data` is no such image, or a torn one.
     """
-    if data[:2] == b"\xff\xd8":
-        return _decode_jpeg(data, buffer)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", Image.DecompressionBombWarning)
-        try:
-            with Image.open(io.BytesIO(data), formats=("PNG",)) as image:
-                if image.width * image.height > MAX_PIXELS:
-                    raise ValueError(f"{image.width} x {image.height} pixels are too many")
-                return np.asarray(_eight_bit(image).convert("RGB"))
-        except (OSError, SyntaxError, Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
-            raise ValueError(f"neither a JPEG nor a PNG image ({error})") from None
+    size = image_size(data)
+    if _is_jpeg(data):
+        return _decode_jpeg(data, buffer if buffer is not None and buffer.shape == (*size, 3) else None)
+    try:
+        with Image.open(io.BytesIO(data), formats=("PNG",)) as image:
+            return np.asarray(_eight_bit(image).convert("RGB"))
+    except (OSError, SyntaxError, IndexError) as error:
+        raise ValueError(f"a torn PNG image ({error})") from None
 
 
 def image_size(data: bytes) -> tuple[int, int]:
     """(rows, columns) of an encoded image, without decoding its pixels; ValueError as in `decode_image`."""
-    if data[:2] == b"\xff\xd8":
-        rows, columns, _, _ = simplejpeg.decode_jpeg_header(data, strict=False)
-        return int(rows), int(columns)
-    try:
-        with Image.open(io.BytesIO(data), formats=("PNG",)) as image:
-            return image.height, image.width
-    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
-        raise ValueError(f"neither a JPEG nor a PNG image ({error})") from None
+    if _is_jpeg(data):
+        try:
+            rows, columns, _, _ = simplejpeg.decode_jpeg_header(data, strict=False)
+        except KeyError:  # a colour space or a subsampling that there is not
+            raise ValueError("a torn JPEG header") from None
+    elif data[:8] == PNG_SIGNATURE and data[12:16] == b"IHDR" and len(data) >= 24:
+        rows, columns = int.from_bytes(data[20:24], "big"), int.from_bytes(data[16:20], "big")
+    else:
+        raise ValueError("neither JPEG nor PNG")
+    if not 0 < rows * columns <= MAX_PIXELS:
+        raise ValueError(f"{columns} x {rows} pixels")
+    return int(rows), int(columns)
 
 
 def encode_png(pixels: Rgb) -> bytes:
@@ -79,12 +81,11 @@ def read_image(path: Path) -> Rgb:
         raise RefusedInput(path, f"expected a JPEG or PNG image ({error})") from None
 
 
+def _is_jpeg(data: bytes) -> bool:
+    return data[:2] == b"\xff\xd8"
+
+
 def _decode_jpeg(data: bytes, buffer: Rgb | None) -> Rgb:
-    rows, columns, _, _ = simplejpeg.decode_jpeg_header(data, strict=False)
-    if rows * columns > MAX_PIXELS:
-        raise ValueError(f"{columns} x {rows} pixels are too many")
-    if buffer is not None and buffer.shape != (rows, columns, 3):
-        buffer = None
     try:
         return np.asarray(simplejpeg.decode_jpeg(data, buffer=buffer))
     except ValueError as error:

@@ -4,9 +4,11 @@ An array is written beside its place and renamed when it is whole: what has its 
 """
 
 import contextlib
+import errno
 import os
 import shutil
 import socket
+import threading
 from pathlib import Path
 
 import zarr
@@ -84,7 +86,7 @@ def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SI
             frames=digests,
         )
         target.update_attributes({"footscan": manifest.model_dump(mode="json"), "film": film.name})
-        _replace(partial, array)
+        _move_into_place(partial, array)
         with contextlib.suppress(ContainsGroupError):  # another camera's thread was first
             zarr.open_group(str(array.parent), mode="a")
     except OSError as error:
@@ -110,17 +112,33 @@ def discard(array: Path) -> None:
 
 
 def _partial_folder(array: Path) -> Path:
-    """Outside of the group, so that no reader of it meets a part."""
-    return array.parent.parent / f".{array.name}.partial-{socket.gethostname()}-{os.getpid()}"
+    """Outside of the group, so that no reader of it meets a part; one for each thread that ingests."""
+    return array.parent.parent / f".{array.name}.partial-{socket.gethostname()}-{threading.get_ident()}-{os.getpid()}"
 
 
-def _replace(partial: Path, array: Path) -> None:
-    """Give `partial` the name `array`. A folder cannot be renamed onto another: the old one steps aside first."""
-    if array.exists():
-        aside = partial.with_name(partial.name + ".old")
-        array.rename(aside)
-        shutil.rmtree(aside, ignore_errors=True)
-    partial.rename(array)
+def _move_into_place(partial: Path, array: Path) -> None:
+    """Give `partial` the name `array`. A folder cannot be renamed onto another: the old one steps aside first.
+
+    Others may ingest the same array meanwhile; whoever comes last stays.
+    """
+    aside = partial.with_name(partial.name + ".old")
+    while True:
+        try:
+            partial.rename(array)
+            return
+        except OSError as error:
+            if error.errno not in {errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR}:
+                raise
+        with contextlib.suppress(FileNotFoundError):  # another was faster
+            array.rename(aside)
+            _remove(aside)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _sweep(folder: Path) -> None:

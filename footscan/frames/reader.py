@@ -64,12 +64,15 @@ def _image_reader(array: Path) -> _Reader:
 
 
 def _pixel_reader(array: Path) -> _Reader:
-    frames = zarr.open_array(str(array), mode="r")
+    try:
+        frames = zarr.open_array(str(array), mode="r")
+    except Exception as error:  # damaged metadata can make Zarr raise anything
+        raise DamagedError(f"{array}: expected a Zarr array ({error})") from None
 
     def read(number: int) -> Rgb | None:
         try:
             return np.asarray(frames[number], np.uint8)
-        except (OSError, ValueError, RuntimeError):  # what the decompressor says of a damaged chunk
+        except Exception:  # a damaged chunk can make its decompressor raise anything
             return None
 
     return read

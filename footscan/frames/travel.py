@@ -52,8 +52,8 @@ def read_positions(path: Path) -> NDArray[np.float64]:
 def _position(path: Path, line: int, row: dict[str, str | None]) -> tuple[int, float]:
     try:
         frame, x_mm = int(row["frame"] or ""), float(row["x_mm"] or "")
-    except (ValueError, TypeError):
+    except ValueError:
         frame, x_mm = -1, math.nan
-    if not 0 <= frame < MAX_FRAMES or not math.isfinite(x_mm):
+    if not 0 <= frame < MAX_FRAMES or not math.isfinite(x_mm) or len(row) > 2:  # a decimal comma makes a third column
         raise RefusedInput(path, "expected a frame number from 0 and x_mm in millimetres", field=f"line {line}")
     return frame, x_mm

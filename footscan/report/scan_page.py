@@ -172,6 +172,7 @@ def _cameras_table(quality: Quality, cloud: NDArray[np.void]) -> str:
     headings = [
         "Camera",
         "Frames",
+        "Lost",
         "With stripe",
         "Points",
         *(f"Removed: {text(words(r))}" for r in reasons),
@@ -180,6 +181,7 @@ def _cameras_table(quality: Quality, cloud: NDArray[np.void]) -> str:
     rows = [
         [
             camera.frames,
+            camera.frames_lost,
             camera.frames_with_stripe,
             camera.points,
             *(camera.removed.get(reason, 0) for reason in reasons),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from pipelines.cli.output import AsJson, message, print_json, print_table
-from schemas.errors import RefusedInput
+from schemas.errors import Fault, RefusedInput
 
 if TYPE_CHECKING:
     from schemas.parameters.simulation import SimulationSettings
@@ -39,6 +39,7 @@ def simulate_scan(
 ) -> None:
     """Film a mesh that stands on the glass, in the middle of the travel."""
     from footscan.virtual.record import record_scan
+    from pipelines.cli.progress import frame_progress
     from pipelines.virtual_objects import stand_in_the_middle, virtual_object
     from schemas.documents import pseudonym
 
@@ -48,17 +49,19 @@ def simulate_scan(
     vertices, faces, known_side = virtual_object(mesh, foot, side)
     settings = _settings(light, seed, scanner_seed, frames, step_mm)
     vertices = stand_in_the_middle(vertices, settings)
-    record_scan(
-        vertices,
-        faces,
-        out,
-        patient=pseudonym(patient, "--patient"),
-        scan=pseudonym(scan or out.resolve().name, "--scan"),
-        side=known_side,
-        settings=settings,
-        calibration=calibration,
-        stripe_truth=stripe_truth,
-    )
+    with frame_progress("filming") as progress:
+        record_scan(
+            vertices,
+            faces,
+            out,
+            patient=pseudonym(patient, "--patient"),
+            scan=pseudonym(scan or out.resolve().name, "--scan"),
+            side=known_side,
+            settings=settings,
+            calibration=calibration,
+            stripe_truth=stripe_truth,
+            progress=progress,
+        )
     message(f"{out}: filmed {settings.frames} frames by each of 8 cameras")
 
 
@@ -72,9 +75,17 @@ def simulate_capture(
     """Film the reference object in ten placements, and write the chart of its corners as a person would click them."""
     from footscan.virtual.capture import record_capture
     from footscan.virtual.reference import standard_reference
+    from pipelines.cli.progress import frame_progress
 
     _check_empty(out)
-    record_capture(out, standard_reference(), settings=_settings(light, seed, scanner_seed))
+    with frame_progress("filming") as progress:
+        record_capture(
+            out,
+            standard_reference(),
+            settings=_settings(light, seed, scanner_seed),
+            clicks_seed=seed,
+            progress=progress,
+        )
     message(f"{out}: filmed the reference object, chart in {out / 'chart.csv'}")
 
 
@@ -107,6 +118,8 @@ def ingest(
         message(f"footscan: {end.problem}")
     if not failed:
         return 0
+    if any(end.exit_status == Fault.exit_status for end in failed):
+        return Fault.exit_status
     return RefusedInput.exit_status if len(folders) == 1 and len({end.scan for end in ends}) == 1 else 1
 
 

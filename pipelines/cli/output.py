@@ -26,13 +26,16 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=title or None, title_justify="left", title_style="bold")
+    console = Console(width=None if sys.stdout.isatty() else 120)
+    if title:
+        console.print(Text(title, style="bold"))
+    table = Table()
     for index, column in enumerate(columns):
         numbers = all(_is_number(row[index]) for row in rows)
         table.add_column(column, justify="right" if numbers else "left")
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))  # Text: names of scans are data, never markup
-    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    console.print(table)
 
 
 def _is_number(cell: str) -> bool:

@@ -1,6 +1,8 @@
 """A progress bar on standard error, fed by the events of a run."""
 
 import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Self
 
@@ -9,6 +11,15 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from pipelines.engine.plan import Plan
 from pipelines.engine.run import StepEnd
+
+
+@contextmanager
+def frame_progress(what: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar of frames done and frames in all, for what is not a run of steps."""
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(what)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 class StepProgress:
@@ -20,14 +31,15 @@ class StepProgress:
         self.seconds: dict[str, float] = {}
         """Time taken by each kind of step, summed over cameras and scans."""
         self._lock = threading.Lock()
+        console = Console(stderr=True)
         self._bar = Progress(
             TextColumn("{task.description:<24}"),
             BarColumn(),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
-            console=Console(stderr=True),
+            console=console,
             transient=True,
-            disable=not plan.to_run,
+            disable=not plan.to_run or not console.is_terminal,
         )
         self._task = self._bar.add_task("", total=len(plan.to_run))
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from pipelines.cli.output import AsJson, print_json, print_table
+from schemas.errors import Finding, RefusedInput
 
 if TYPE_CHECKING:
     from schemas.measures import Measures
@@ -23,7 +24,10 @@ def measure(
     from pipelines.engine.atomic import write_atomically
 
     vertices, faces = read_mesh(file)
-    measures = measure_foot(vertices, faces, side)
+    try:
+        measures = measure_foot(vertices, faces, side)
+    except Finding as error:
+        raise RefusedInput(file, str(error)) from None
     if out is not None:
         write_atomically(out, (measures.model_dump_json(indent=2) + "\n").encode())
     if as_json:

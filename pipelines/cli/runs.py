@@ -44,14 +44,15 @@ def run(
 
     job = _job(workflow, scan, calibration, out, workers)
     planned = plan_job(job)
-    message(_summary(planned.plan))
+    if planned.plan.steps:
+        message(_summary(planned.plan))
     with StepProgress(planned.plan) as progress:
         ends = list(run_job(planned, progress.on_step_end))
     if as_json:
         print_json(_ends_json(planned, ends, progress.ran))
     for end in ends:
         if end.problem is not None:
-            message(f"footscan: {end.scan}: {end.problem}")
+            _tell(end.scan, end.problem)
         elif not as_json:
             print(f"{end.scan}: {end.folder}")
     return _status(ends, single=scan is not None)
@@ -77,9 +78,10 @@ def plan(
         ]
         if rows:
             print_table("", ["scan", "step", "camera", "reason"], rows)
-        print(_summary(planned.plan))
+        if planned.plan.steps:
+            print(_summary(planned.plan))
     for folder, error in planned.refused.items():
-        message(f"footscan: {folder}: {error}")
+        _tell(folder, str(error))
     if planned.refused:
         return RefusedInput.exit_status if scan is not None else 1
     return 0
@@ -100,6 +102,11 @@ def _job(
     if out is None:
         raise RefusedInput("--out", "is missing, expected a folder for the results of --scan")
     return job_of_scan(scan, calibration, out, workers)
+
+
+def _tell(scan: str, problem: str) -> None:
+    """One line for a scan that failed; most problems name a file of the scan and so the scan itself."""
+    message(f"footscan: {problem}" if scan in problem else f"footscan: {scan}: {problem}")
 
 
 def _summary(plan: "Plan") -> str:

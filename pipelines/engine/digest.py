@@ -50,7 +50,7 @@ class FileDigests:
         try:
             rows = json.loads(memory.read_bytes())
             return cls(memory, {path: (FileState(*state), str(digest)) for path, state, digest in rows})
-        except (OSError, ValueError, TypeError):
+        except (OSError, ValueError, TypeError, RecursionError):
             return cls(memory)
 
     def save(self) -> None:

@@ -1,8 +1,9 @@
 """What would run, and why: a pure function of the graph and the action cache."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 
 from pipelines.engine.key import difference, key_of, pre_image
 from pipelines.engine.step import Failure, Outcome, Output, Step, Success
@@ -58,11 +59,27 @@ def make_plan(steps: Sequence[Step], store: Store) -> Plan:
 
 def cached_outcome(step: Step, row: Row | None) -> Outcome | None:
     """What a row of the action cache says of a step; None where the step must run."""
-    if row is None or (step.writes is not None and not step.writes.exists()):
+    if row is None:
         return None
     if row.failure is not None:
-        return Failure(problem=row.failure[1], kind=row.failure[0], cause=step.name)
-    return None if row.digest is None else Success(row.digest)
+        kind, problem = row.failure
+        return Failure(with_places(problem, step.places), kind, step.name)
+    is_there = step.writes is None or step.writes.exists()
+    return Success(row.digest) if row.digest is not None and is_there else None
+
+
+def without_places(problem: str, places: Mapping[str, Path]) -> str:
+    """`problem` with names in the stead of paths: an equal film elsewhere fails alike, but is another file."""
+    for name, path in places.items():
+        problem = problem.replace(str(path), f"\0{name}\0")
+    return problem
+
+
+def with_places(problem: str, places: Mapping[str, Path]) -> str:
+    """The opposite of `without_places`."""
+    for name, path in places.items():
+        problem = problem.replace(f"\0{name}\0", str(path))
+    return problem
 
 
 def _plan_step(step: Step, planned: dict[str, PlannedStep], store: Store) -> PlannedStep:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from pipelines.engine.digest import file_state
-from pipelines.engine.key import key_of, pre_image
-from pipelines.engine.plan import Plan, State, cached_outcome
+from pipelines.engine.key import PreImage, key_of, pre_image
+from pipelines.engine.plan import Plan, State, cached_outcome, without_places
 from pipelines.engine.step import Failure, Outcome, Output, SourceFile, Step, Success, Value
 from pipelines.engine.store import Row, Store
 from schemas.errors import DamagedError, Fault, Finding, RefusedInput, one_line
@@ -67,16 +67,7 @@ def execute(step: Step, inputs: Mapping[str, str], store: Store) -> tuple[Outcom
     if known is not None:
         return known, False
     try:
-        content = {name: _content(step, source, inputs[name], store) for name, source in step.inputs.items()}
-        result = step.module.run(content, step.parameters, step.places)
-        _check_sources(step)
-        digest = store.put(result)
-        store.record(step.name, Row(image, digest))
-        return Success(digest), True
-    except (RefusedInput, Finding) as error:
-        kind = "finding" if isinstance(error, Finding) else "refused"
-        store.record(step.name, Row(image, None, (kind, str(error))))
-        return Failure(str(error), kind, step.name), True
+        return _run(step, image, inputs, store), True
     except Fault as error:
         return Failure(str(error), "damaged" if isinstance(error, DamagedError) else "fault", step.name), True
     except Exception as error:  # a defect of ours, or of a library, in one scan must not cost the others
@@ -105,6 +96,22 @@ def _run_step(step: Step, before: Mapping[str, Outcome], store: Store, on_step_e
     return outcome
 
 
+def _run(step: Step, image: PreImage, inputs: Mapping[str, str], store: Store) -> Outcome:
+    """Run a step and record what came out, unless its files were changed meanwhile."""
+    content = {name: _content(step, source, inputs[name], store) for name, source in step.inputs.items()}
+    try:
+        result = step.module.run(content, step.parameters, step.places)
+    except (RefusedInput, Finding) as error:
+        _check_sources(step)
+        kind, problem = "finding" if isinstance(error, Finding) else "refused", str(error)
+        store.record(step.name, Row(image, None, (kind, without_places(problem, step.places))))
+        return Failure(problem, kind, step.name)
+    _check_sources(step)
+    digest = store.put(result)
+    store.record(step.name, Row(image, digest))
+    return Success(digest)
+
+
 def _content(step: Step, source: Value | Output | SourceFile, digest: str, store: Store) -> bytes:
     if isinstance(source, Value):
         return source.content
@@ -117,9 +124,13 @@ def _content(step: Step, source: Value | Output | SourceFile, digest: str, store
 
 
 def _check_sources(step: Step) -> None:
-    """A film that was exchanged while it was read has given a result that belongs to no digest."""
+    """A film that was exchanged while it was read has given a result, or a failure, that belongs to no digest."""
     for source in step.inputs.values():
         if isinstance(source, SourceFile):
             for path, state in source.states:
-                if file_state(path) != state:
+                try:
+                    unchanged = file_state(path) == state
+                except OSError:
+                    unchanged = False
+                if not unchanged:
                     raise Fault(f"{path}: changed while it was read, expected a finished file")

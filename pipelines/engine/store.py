@@ -4,6 +4,7 @@ Every write is atomic; an action's row is written after its blob. Nothing in her
 its digest whenever it is read, and a damaged one counts as missing.
 """
 
+import contextlib
 import json
 import logging
 from dataclasses import dataclass
@@ -51,7 +52,8 @@ class Store:
             return None
         if sha256(data) != digest:
             log.warning("%s: damaged, will be made again", self._blob(digest))
-            self._blob(digest).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                self._blob(digest).unlink()
             return None
         return data
 
@@ -61,20 +63,24 @@ class Store:
 
     def lookup(self, key: str) -> Row | None:
         """The action cache's row for a key, if its result is there."""
-        row = self._read_row(self._action(key))
-        if row is None or key_of(row.image) != key:
+        row = self._read_row(key)
+        if row is None:
             return None
         return row if row.failure is not None or (row.digest is not None and self.has(row.digest)) else None
 
     def record(self, step_name: str, row: Row) -> None:
         """Write the row of an action, and remember it as the last one of its step."""
         content = canonical_json({"image": row.image, "digest": row.digest, "failure": row.failure}).encode()
-        write_atomically(self._action(key_of(row.image)), content)
-        write_atomically(self._latest(step_name), content)
+        key = key_of(row.image)
+        write_atomically(self._action(key), content)
+        write_atomically(self._latest(step_name), key.encode())
 
     def latest(self, step_name: str) -> Row | None:
         """The last action of a step, whatever its key."""
-        return self._read_row(self._latest(step_name))
+        try:
+            return self._read_row(self._latest(step_name).read_text())
+        except (OSError, ValueError):
+            return None
 
     def _blob(self, digest: str) -> Path:
         return self.root / "blobs" / _plain_hex(digest)[:2] / digest
@@ -86,26 +92,28 @@ class Store:
         digest = sha256(step_name.encode())
         return self.root / "latest" / digest[:2] / f"{digest}.json"
 
-    @staticmethod
-    def _read_row(path: Path) -> Row | None:
+    def _read_row(self, key: str) -> Row | None:
+        path = self._action(key)
         try:
             value: dict[str, Any] = json.loads(path.read_bytes())
-            failure = value["failure"]
-            digest = value["digest"]
-            return Row(
-                image=dict(value["image"]),
-                digest=None if digest is None else _plain_hex(digest),
-                failure=None if failure is None else (str(failure[0]), str(failure[1])),
-            )
+            image, digest, failure = value["image"], value["digest"], value["failure"]
+            if key_of(image) != key:
+                raise ValueError("the row of another action")
+            if failure is None:
+                return Row(image, _plain_hex(digest))
+            kind, problem = failure
+            if digest is not None or kind not in {"refused", "finding"} or not isinstance(problem, str):
+                raise ValueError("neither a result nor a failure")
+            return Row(image, None, (kind, problem))
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, KeyError, TypeError, IndexError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             log.warning("%s: damaged, will be made again", path)
             return None
 
 
-def _plain_hex(digest: str) -> str:
+def _plain_hex(digest: Any) -> str:
     """`digest` where it is one: a name out of a file of the cache must not become a path."""
-    if len(digest) != 64 or not set(digest) <= set("0123456789abcdef"):
-        raise ValueError(f"{digest[:80]!r} is no SHA-256 digest")
+    if not isinstance(digest, str) or len(digest) != 64 or not set(digest) <= set("0123456789abcdef"):
+        raise ValueError(f"{str(digest)[:80]!r} is no SHA-256 digest")
     return digest

@@ -29,10 +29,12 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
 
 
 def _camera(camera: int, inputs: Mapping[str, bytes], removed: dict[str, int]) -> CameraQuality:
-    stripe = unpack(inputs[f"stripe-{camera}"])["stripe"]
+    extracted = unpack(inputs[f"stripe-{camera}"])
+    stripe = extracted["stripe"]
     return CameraQuality(
         camera=camera,
         frames=len(FrameManifest.model_validate_json(inputs[f"manifest-{camera}"]).frames),
+        frames_lost=len(extracted["lost"]),
         frames_with_stripe=len(np.unique(stripe["frame"])),
         points=len(stripe),
         removed=removed,

@@ -15,6 +15,7 @@ class OutlierParameters(Document):
     x_mm: Range = (-500.0, 500.0)
     """Control volume along the travel; wide, for the travel itself bounds X."""
     y_mm: Range = (-75.0, 75.0)
+    """Control volume across the travel."""
     z_mm: Range = (-0.5, 120.0)
     """The sole rests on the glass at Z = 0; below it stands the foot's mirror image."""
     drop_unsupported: bool = True
@@ -26,9 +27,9 @@ class OutlierParameters(Document):
     distance_ratio: Annotated[float, Field(gt=1, le=100)] = 3.0
     """A point is far from its neighbours when their mean distance exceeds this many times the cloud's median."""
     off_surface_mm: Annotated[float, Field(gt=0, le=50)] = 0.5
-    """A point off the surface is farther than this from the plane through its neighbours, and"""
+    """A point closer than this to the plane through its neighbours is never off the surface."""
     off_surface_ratio: Annotated[float, Field(gt=1, le=100)] = 4.0
-    """farther than this many times their own standard deviation from it."""
+    """A point is off the surface when it is farther from that plane than so many times its neighbours' deviation."""
     island_gap_steps: Annotated[float, Field(gt=0, le=50)] = 2.5
     """Parts of the cloud closer than about so many steps from stripe to stripe belong together."""
     island_share: Annotated[float, Field(ge=0, lt=1)] = 0.02

@@ -20,9 +20,13 @@ class SimulationSettings(Document):
     """Of the scanner itself: mounting, lenses, glints. Recordings of one scanner share it."""
 
     start_mm: Annotated[float, Field(ge=-1e4, le=1e4)] = 0.0
+    """X of the laser plane at the first frame."""
     step_mm: Annotated[float, Field(gt=0, le=1000)] = 2.0
+    """Travel from frame to frame."""
     frames: Annotated[int, Field(ge=1, le=10_000)] = 200
+    """Frames of each camera."""
     frames_per_second: Annotated[int, Field(ge=1, le=120)] = 18
+    """Rate that the films bear."""
 
     ambient: Literal["dark", "ambient", "bright"] = "ambient"
     """Light in the room; `bright` saturates parts of the picture."""
@@ -53,6 +57,8 @@ class SimulationSettings(Document):
     bayer: bool = True
     """One colour a pixel, the others interpolated."""
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 85
+    """Quality of the camera's JPEG compression."""
     jpeg_chroma: Literal["444", "422", "420"] = "420"
+    """How the JPEG samples colour: 420 keeps one value for four pixels."""
     click_error_px: Scale = 0.3
     """Standard deviation with which a person clicks a corner, before rounding to half a pixel."""

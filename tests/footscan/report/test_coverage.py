@@ -9,7 +9,7 @@ CLOUD = make_points(np.zeros((6, 3)), camera=np.array([1, 1, 1, 2, 1, 2]), frame
 
 
 def camera(number):
-    return CameraQuality(camera=number, frames=4, frames_with_stripe=2, points=3, removed={})
+    return CameraQuality(camera=number, frames=4, frames_lost=1, frames_with_stripe=2, points=3, removed={})
 
 
 def test_points_are_counted_by_camera_and_frame():

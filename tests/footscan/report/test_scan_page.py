@@ -40,8 +40,12 @@ def scan():
         ),
         "quality": Quality(
             cameras=[
-                CameraQuality(camera=1, frames=4, frames_with_stripe=2, points=1711, removed={"far_off": 13}),
-                CameraQuality(camera=2, frames=4, frames_with_stripe=3, points=1722, removed={"outside": 17}),
+                CameraQuality(
+                    camera=1, frames=4, frames_lost=1, frames_with_stripe=2, points=1711, removed={"far_off": 13}
+                ),
+                CameraQuality(
+                    camera=2, frames=4, frames_lost=1, frames_with_stripe=3, points=1722, removed={"outside": 17}
+                ),
             ],
             cloud_points=4,
             mesh=MeshQuality(vertices=4, triangles=4, open_edges=0, non_manifold_edges=0, components=1, holes=0),
@@ -73,10 +77,19 @@ def test_every_measure_stands_with_value_unit_status_and_definition(scan):
 
 def test_the_cameras_table_adds_up(scan):
     rows = rows_of(scan_page(**scan))
-    assert ["Camera", "Frames", "With stripe", "Points", "Removed: Far off", "Removed: Outside", "In cloud"] in rows
-    assert ["1", "4", "2", "1\u202f711", "13", "0", "2"] in rows
-    assert ["2", "4", "3", "1\u202f722", "0", "17", "2"] in rows
-    assert ["All", "8", "5", "3\u202f433", "13", "17", "4"] in rows
+    assert [
+        "Camera",
+        "Frames",
+        "Lost",
+        "With stripe",
+        "Points",
+        "Removed: Far off",
+        "Removed: Outside",
+        "In cloud",
+    ] in rows
+    assert ["1", "4", "1", "2", "1\u202f711", "13", "0", "2"] in rows
+    assert ["2", "4", "1", "3", "1\u202f722", "0", "17", "2"] in rows
+    assert ["All", "8", "2", "5", "3\u202f433", "13", "17", "4"] in rows
 
 
 def test_provenance_and_mesh(scan):

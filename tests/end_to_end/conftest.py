@@ -1,0 +1,149 @@
+"""One recorded scan and one capture, made by the command itself, and a copy of them for each test to spoil.
+
+A bench is a folder: `workflow.yaml`, `calibration.json`, `capture/`, `archive/P0001/small/` (the scan, with its frames
+in Zarr once it has run) and `results/`.
+"""
+
+import fcntl
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipelines.cli.main import run_command
+
+Footscan = Callable[..., subprocess.CompletedProcess[str]]
+FOOTSCAN = Path(sys.executable).with_name("footscan")
+WORKFLOW = """\
+format: footscan.workflow/1
+archive: archive
+calibration: calibration.json
+results: results
+"""
+
+
+def _command(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
+    line = [str(part) for part in (FOOTSCAN, *arguments)]
+    return subprocess.run(line, capture_output=True, text=True, timeout=120, check=False, **options)
+
+
+@pytest.fixture(scope="session")
+def command() -> Footscan:
+    """`footscan ARGUMENTS` as a process of its own."""
+    return _command
+
+
+@pytest.fixture
+def footscan(capsys: pytest.CaptureFixture[str]) -> Footscan:
+    """`footscan ARGUMENTS` within this process: the same, without waiting for Python and its libraries."""
+
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        capsys.readouterr()
+        status = run_command([str(part) for part in arguments])
+        said = capsys.readouterr()
+        return subprocess.CompletedProcess(arguments, status, said.out, said.err)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bench as it is before its first run: 72 frames, 4 mm apart, of the right foot. To be read only."""
+    return _made_once(tmp_path_factory, "recorded", _record)
+
+
+@pytest.fixture(scope="session")
+def measured(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bench after its first run. To be read only."""
+    return _made_once(tmp_path_factory, "measured", lambda bench: _measure(recorded, bench))
+
+
+def _made_once(tmp_path_factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:
+    """A folder made by the first worker that asks for it; the other workers of the test run share it."""
+    root = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        root = root.parent
+    folder, unfinished = root / name, root / f"{name}-unfinished"
+    with (root / f"{name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not folder.exists():
+            shutil.rmtree(unfinished, ignore_errors=True)
+            make(unfinished)
+            unfinished.rename(folder)
+    return folder
+
+
+def _record(bench: Path) -> None:
+    scan = bench / "archive" / "P0001" / "small"
+    for arguments in (
+        ("simulate", "capture", "--out", bench / "capture"),
+        ("simulate", "scan", "--foot", "right", "--out", scan, "--frames", "72", "--step-mm", "4"),
+        ("calibrate", "chart", bench / "capture" / "chart.csv", "--out", bench / "calibration.json"),
+    ):
+        done = _command(*arguments)
+        assert done.returncode == 0, done.stderr
+    (bench / "workflow.yaml").write_text(WORKFLOW)
+
+
+def _measure(recorded: Path, bench: Path) -> None:
+    shutil.copytree(recorded, bench)
+    done = _command("run", bench / "workflow.yaml")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.splitlines()[0] == "34 of 34 steps to run"
+    assert done.stdout == f"P0001/small: {bench / 'results' / 'P0001' / 'small'}\n"
+
+
+@pytest.fixture
+def fresh(recorded: Path, tmp_path: Path) -> Iterator[Path]:
+    """A copy of the bench before its first run."""
+    yield from _copy(recorded, tmp_path / "bench")
+
+
+@pytest.fixture
+def bench(measured: Path, tmp_path: Path) -> Iterator[Path]:
+    """A copy of the bench after its first run."""
+    yield from _copy(measured, tmp_path / "bench")
+
+
+def _copy(bench: Path, to: Path) -> Iterator[Path]:
+    shutil.copytree(bench, to, copy_function=_copy_or_link)
+    yield to
+    shutil.rmtree(to)  # 40 MB that pytest would keep
+
+
+def _copy_or_link(file: str, to: str) -> None:
+    """Frames and store are many files and only ever replaced: a test that damages one removes it first."""
+    if "frames.zarr" in file or ".footscan" in file:
+        os.link(file, to)
+    else:
+        shutil.copy2(file, to)
+
+
+@pytest.fixture(scope="session")
+def results() -> Callable[[Path], dict[str, bytes]]:
+    """Of a bench: content of each result of its scan, by file name."""
+
+    def read(bench: Path) -> dict[str, bytes]:
+        folder = bench / "results" / "P0001" / "small"
+        return {file.name: file.read_bytes() for file in sorted(folder.iterdir())}
+
+    return read
+
+
+@pytest.fixture(scope="session")
+def mistake() -> Callable[[subprocess.CompletedProcess[str]], str]:
+    """The one line in which a command says what is wrong, after a check that it says nothing else but its plan."""
+
+    def line(done: subprocess.CompletedProcess[str]) -> str:
+        lines = [line for line in done.stderr.splitlines() if not line.endswith(" steps to run") and line.strip()]
+        assert len(lines) == 1, done.stderr
+        assert lines[0].startswith("footscan: "), done.stderr
+        assert "Traceback" not in done.stderr + done.stdout
+        return lines[0].removeprefix("footscan: ")
+
+    return line

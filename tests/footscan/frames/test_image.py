@@ -1,0 +1,136 @@
+"""Encoded images to pixels; what is torn is said to be so, by a ValueError and nothing else."""
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import simplejpeg
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from footscan.frames.image import MAX_PIXELS, decode_image, encode_png, image_size, read_image
+from schemas.errors import RefusedInput
+
+RAMP = np.arange(8 * 9 * 3, dtype=np.uint8).reshape(8, 9, 3)
+JPEG = bytes(simplejpeg.encode_jpeg(RAMP, 90, "RGB", "420"))
+PNG = encode_png(RAMP)
+
+
+def png(image: Image.Image) -> bytes:
+    out = io.BytesIO()
+    image.save(out, format="PNG")
+    return out.getvalue()
+
+
+def without_huffman_tables(data: bytes) -> bytes:
+    """A JPEG as Motion-JPEG has it: the segments with the (standard) Huffman tables left out."""
+    out, at = data[:2], 2
+    while data[at : at + 2] != b"\xff\xda":
+        length = 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+        if data[at + 1] != 0xC4:
+            out += data[at : at + length]
+        at += length
+    return out + data[at:]
+
+
+def test_png_is_lossless() -> None:
+    np.testing.assert_array_equal(decode_image(PNG), RAMP)
+    assert image_size(PNG) == (8, 9)
+
+
+def test_jpeg_is_decoded_by_libjpeg_turbo_into_the_buffer() -> None:
+    expected = simplejpeg.decode_jpeg(JPEG, "RGB")
+    buffer = np.zeros((8, 9, 3), np.uint8)
+    assert np.shares_memory(decode_image(JPEG, buffer), buffer)
+    np.testing.assert_array_equal(buffer, expected)
+    other = np.zeros((9, 8, 3), np.uint8)
+    np.testing.assert_array_equal(decode_image(JPEG, other), expected)
+    assert not other.any()
+    assert image_size(JPEG) == (8, 9)
+
+
+def test_chroma_is_interpolated_not_repeated() -> None:
+    rows = np.zeros((16, 16, 3), np.uint8)
+    rows[:, 8:, 0] = 255
+    data = simplejpeg.encode_jpeg(rows, 100, "RGB", "420")
+    red = decode_image(bytes(data))[8, :, 0].astype(int)
+    assert len(set(red[5:11])) > 3  # repeated samples would make pairs
+
+
+def test_huffman_tables_may_be_missing() -> None:
+    bare = without_huffman_tables(JPEG)
+    assert len(bare) < len(JPEG) - 300
+    np.testing.assert_array_equal(decode_image(bare), decode_image(JPEG))
+
+
+def test_padding_behind_the_image_is_accepted() -> None:
+    np.testing.assert_array_equal(decode_image(JPEG + bytes(64)), decode_image(JPEG))
+    padded = JPEG[:-2] + bytes(5) + JPEG[-2:]  # as webcams pad their entropy-coded data
+    np.testing.assert_array_equal(decode_image(padded), decode_image(JPEG))
+
+
+@pytest.mark.parametrize("mode", ["L", "P", "1", "RGBA", "LA"])
+def test_other_kinds_of_png_become_rgb(mode: str) -> None:
+    image = Image.fromarray(RAMP).convert(mode)
+    np.testing.assert_array_equal(decode_image(png(image)), np.asarray(image.convert("RGB")))
+
+
+def test_sixteen_bits_keep_their_high_byte() -> None:
+    grey = np.array([[0, 255, 256, 0x1234, 0xFFFF]], np.uint16)
+    decoded = decode_image(png(Image.fromarray(grey)))
+    np.testing.assert_array_equal(decoded[0, :, 1], [0, 0, 1, 0x12, 0xFF])
+
+
+@pytest.mark.parametrize("seed", [JPEG, PNG], ids=["jpeg", "png"])
+def test_a_cut_image_is_a_value_error_or_all_there(seed: bytes) -> None:
+    whole, refused = decode_image(seed), 0
+    for length in range(len(seed)):
+        try:
+            np.testing.assert_array_equal(decode_image(seed[:length]), whole)
+        except ValueError:
+            refused += 1
+    assert refused >= len(seed) - 24  # what follows the pixels: checksums and the end mark
+
+
+@given(st.sampled_from([JPEG, PNG]), st.lists(st.tuples(st.integers(0, 4095), st.integers(0, 255)), max_size=4))
+def test_changed_bytes_give_an_image_or_a_value_error(seed: bytes, changes: list[tuple[int, int]]) -> None:
+    data = bytearray(seed)
+    for at, value in changes:
+        data[at % len(data)] = value
+    for look in (decode_image, image_size):
+        try:
+            result = look(bytes(data))
+        except ValueError:
+            continue
+        assert len(result)
+
+
+def test_unknown_colour_space_of_a_jpeg_is_a_value_error() -> None:
+    at = JPEG.index(b"\xff\xc0")
+    torn = JPEG[: at + 11] + b"\xff" + JPEG[at + 12 :]  # sampling factors that there are not
+    for look in (decode_image, image_size):
+        with pytest.raises(ValueError, match=r"JPEG|sampling"):
+            look(torn)
+
+
+def test_bombs_are_refused_before_they_are_decoded() -> None:
+    for columns, rows in ((50_000, 50_000), (MAX_PIXELS + 1, 1), (0, 8)):
+        bomb = PNG[:16] + columns.to_bytes(4, "big") + rows.to_bytes(4, "big") + PNG[24:]
+        for look in (decode_image, image_size):
+            with pytest.raises(ValueError, match=f"{columns} x {rows} pixels"):
+                look(bomb)
+
+
+def test_files_that_are_no_images_are_refused(tmp_path: Path, jpeg: Callable[..., bytes]) -> None:
+    (tmp_path / "a.jpg").write_bytes(jpeg(1))
+    assert read_image(tmp_path / "a.jpg").shape == (48, 64, 3)
+    (tmp_path / "b.jpg").write_bytes(b"")
+    (tmp_path / "c.png").write_bytes(b"GIF89a")
+    for name in ("b.jpg", "c.png"):
+        with pytest.raises(RefusedInput, match=rf"{name}: expected a JPEG or PNG image"):
+            read_image(tmp_path / name)
+    with pytest.raises(RefusedInput, match=r"d\.png: No such file"):
+        read_image(tmp_path / "d.png")

@@ -1,0 +1,142 @@
+"""An archive: each scan's failure is its own, in one line, and is told again without any work."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipelines.archive import job_of_scan, plan_job, run_job
+from pipelines.engine import run as engine_run
+from pipelines.steps import measure
+from schemas.calibration import Calibration
+from schemas.documents import read_yaml
+from schemas.errors import Finding, RefusedInput
+from schemas.scan import Scan
+
+
+def add_scan(archive: Any, name: str, old: str = "", new: str = "") -> Path:
+    """A copy of the first scan under another name, with something of its document exchanged."""
+    folder = archive.scan.with_name(name)
+    shutil.copytree(archive.scan, folder, ignore=shutil.ignore_patterns("frames.zarr"))
+    document = folder / "scan.yaml"
+    document.write_text(document.read_text().replace("scan: S1", f"scan: {name}").replace(old, new))
+    return folder
+
+
+def test_each_broken_scan_is_one_line_and_the_rest_is_whole(done: Any) -> None:
+    truncated = add_scan(done, "S2") / "cam1.avi"
+    truncated.write_bytes(truncated.read_bytes()[:-5000])
+    missing = add_scan(done, "S3") / "cam5.avi"
+    missing.unlink()
+    hostile = add_scan(done, "S4", "patient: P0001", "patient: ../../x") / "scan.yaml"
+    broken = add_scan(done, "S5", "side: right", "side: [right") / "scan.yaml"
+    leaving = add_scan(done, "S6", "cam5.avi", "../../../../cam5.avi") / "scan.yaml"
+    twice = add_scan(done, "S7", "scan: S7", "scan: S1") / "scan.yaml"
+    empty = add_scan(done, "S8") / "cam1.avi"
+    empty.write_bytes(b"")
+    also_empty = add_scan(done, "S9") / "cam5.avi"
+    also_empty.write_bytes(b"")
+    for _ in range(2):
+        scans, ran = done.run()
+        problems = {scan.scan.rpartition("/")[2]: (scan.kind, scan.problem or "") for scan in scans}
+        assert all(problem.isprintable() for _, problem in problems.values())
+        assert problems["S1"] == (None, "")
+        length = truncated.stat().st_size + 5000
+        assert problems["S2"] == ("refused", f"{truncated}: length: truncated: 5000 of {length} bytes are missing")
+        assert problems["S3"] == ("refused", f"{missing}: no such film")
+        assert problems["S4"][1].startswith(f"{hostile}: patient: string should match pattern")
+        assert problems["S5"][1].startswith(f"{broken}: line 5, column 7: ")
+        expected = "file of camera 5: '../../../../cam5.avi' leaves the archive, expected a path inside it"
+        assert problems["S6"] == ("refused", f"{leaving}: {expected}")
+        assert problems["S7"][1] == f"{twice}: P0001/S1 is also in {done.scan}, expected each scan once"
+        assert problems["S8"] == ("refused", f"{empty}: header: expected an AVI film")
+        assert problems["S9"] == ("refused", f"{also_empty}: header: expected an AVI film")
+    assert ran == set()
+    assert [path.name for path in (done.root / "results/P0001").iterdir()] == ["S1"]
+
+
+def test_finding_fails_its_scan_and_is_remembered(archive: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: object) -> bytes:
+        raise Finding("no foot in the surface")
+
+    monkeypatch.setattr(measure, "run", none)
+    [scan], ran = archive.run()
+    assert (scan.problem, scan.kind, scan.folder) == ("no foot in the surface", "finding", None)
+    assert "measure" in ran
+    assert archive.plan() == (15, {})
+    assert archive.run() == ([scan], set())
+    assert not archive.results.exists()
+
+
+def test_defect_costs_its_scan_and_is_tried_again(done: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    add_scan(done, "S2", "step_mm: 10.0", "step_mm: 10.5")
+    with monkeypatch.context() as patch:
+        patch.setattr(measure, "run", lambda *_: 1 // 0)
+        scans, _ = done.run()
+        assert [(scan.scan, scan.kind) for scan in scans] == [("P0001/S1", None), ("P0001/S2", "fault")]
+        assert scans[1].problem == "P0001/S2/measure: ZeroDivisionError: integer division or modulo by zero"
+    scans, ran = done.run()
+    assert [scan.problem for scan in scans] == [None, None]
+    assert ran == {"P0001/S2/measure", "P0001/S2/report"}
+
+
+def test_equal_films_of_two_scans_are_computed_once(done: Any) -> None:
+    add_scan(done, "S2")
+    scans, ran = done.run()
+    assert [scan.problem for scan in scans] == [None, None]
+    assert ran == {"P0001/S2/ingest-1", "P0001/S2/ingest-5", "P0001/S2/report"}  # the report names its scan
+
+
+def test_interrupted_run_goes_on_from_what_is_complete(archive: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    original = engine_run._run_step
+
+    def interrupted(step: Any, *others: Any) -> Any:
+        if step.kind == "fuse":
+            raise KeyboardInterrupt
+        return original(step, *others)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(engine_run, "_run_step", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            archive.run()
+    [scan], ran = archive.run()
+    assert scan.problem is None
+    assert not any(name.startswith(("ingest", "extract", "map")) for name in ran)
+
+
+def test_scan_without_calibration_is_refused(done: Any) -> None:
+    done.workflow.write_text(done.workflow.read_text().replace("calibration: calibration.json\n", ""))
+    [scan], _ = done.run()
+    assert scan.problem == (
+        f"{done.scan / 'scan.yaml'}: calibration: names no calibration, expected one here or in the workflow"
+    )
+
+
+def test_own_calibration_of_a_scan_comes_before_the_workflows(
+    done: Any, calibration: Callable[..., Calibration]
+) -> None:
+    (done.scan.parent / "own.json").write_text(calibration(1.01).model_dump_json())
+    document = done.scan / "scan.yaml"
+    document.write_text(document.read_text().replace("cameras:", "calibration: ../own.json\ncameras:"))
+    assert done.plan()[1]["map-1"] == "input calibration changed"
+    job = job_of_scan(done.scan, done.root / "calibration.json", done.root / "results", 1)
+    assert "P0001/S1/map-1" not in [planned.step.name for planned in plan_job(job).plan.to_run]
+
+
+def test_calibration_without_a_camera_is_refused(done: Any, calibration: Callable[..., Calibration]) -> None:
+    one = calibration()
+    path = done.root / "calibration.json"
+    path.write_text(one.model_copy(update={"cameras": [one.camera(1)]}).model_dump_json())
+    [scan], _ = done.run()
+    assert scan.problem == f"{path}: cameras: has no camera 5, expected one of 1"
+
+
+def test_one_scan_without_a_workflow(done: Any, tmp_path: Path) -> None:
+    job = job_of_scan(done.scan, done.root / "calibration.json", tmp_path / "out", 2)
+    [scan] = run_job(plan_job(job), lambda _: None)
+    assert (scan.problem, scan.folder) == (None, tmp_path / "out/P0001/S1")
+    assert (tmp_path / "out/P0001/S1/foot.stl").read_bytes() == (done.results / "foot.stl").read_bytes()
+    with pytest.raises(RefusedInput, match="no such file"):
+        read_yaml(tmp_path / "scan.yaml", Scan)
