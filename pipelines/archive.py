@@ -1,5 +1,6 @@
 """An archive of scans: planned as a whole, run as a whole; one scan's failure is its own."""
 
+import logging
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -20,6 +21,8 @@ from schemas.measures import Measures
 from schemas.workflow import ScanParameters, Workflow
 
 CACHE = ".footscan"
+
+log = logging.getLogger("footscan.archive")
 
 
 @dataclass(frozen=True)
@@ -125,7 +128,10 @@ def run_job(planned: PlannedJob, on_step_end: OnStepEnd) -> Iterable[ScanEnd]:
     for folder, error in planned.refused.items():
         yield ScanEnd(folder, None, str(error), "refused")
     outcomes = run_plan(planned.plan, store, workers=job.workers, on_step_end=on_step_end)
-    if any(isinstance(outcome, Failure) and outcome.kind == "damaged" for outcome in outcomes.values()):
+    damage = {end.problem for end in outcomes.values() if isinstance(end, Failure) and end.kind == "damaged"}
+    if damage:
+        for problem in sorted(damage):
+            log.warning("%s", problem)
         # What was damaged has been set aside: a new plan makes it anew.
         again = make_plan([p.step for p in planned.plan.steps], store)
         outcomes = run_plan(again, store, workers=job.workers, on_step_end=on_step_end)

@@ -7,7 +7,6 @@ are fractions of it.
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import find_peaks
 
 from schemas.errors import Finding
 
@@ -62,6 +61,8 @@ def is_right(samples: NDArray[np.float64]) -> bool:
 
 def second_toe_tip(samples: NDArray[np.float64], length: float) -> Point | None:
     """The tip of the second toe, counted from the medial side; None where toes cannot be told apart."""
+    from scipy.signal import find_peaks  # half a second that other commands need not wait for
+
     toes = samples[(samples[:, 2] <= LOW_MM) & (samples[:, 0] >= 0.8 * length)]
     if not len(toes):
         return None

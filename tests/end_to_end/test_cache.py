@@ -199,8 +199,8 @@ def test_a_damaged_frame_is_ingested_again(footscan: Footscan, bench: Path, capl
     replace(chunk, sound[:-1000] + bytes(1000))
     set_parameters(bench, "{extraction: {glint_frames: 8}}")
     done = footscan("run", bench / "workflow.yaml")
-    print(done.stderr, caplog.text)
     assert done.returncode == 0, done.stderr
+    assert f"{chunk.parent}: frame 40 is damaged" in caplog.text
     assert chunk.read_bytes() == sound
     mesh = trimesh.load_mesh(bench / "results/P0001/small/foot.stl")
     foot = make_foot(side="right")
