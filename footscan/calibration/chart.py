@@ -1,10 +1,6 @@
 """A calibration chart: control points whose world position and pixel are known, one CSV for all cameras."""
 
-import csv
-import io
-import math
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.calibration import LengthUnit
-from schemas.documents import MAX_BYTES
 from schemas.errors import RefusedInput
+from schemas.tables import finite, read_records
 
 MAX_MAGNITUDE = 1e6
 """No coordinate of a foot scanner is larger, in any unit; its powers stay finite."""
@@ -22,7 +18,6 @@ _WORLD: dict[LengthUnit, tuple[str, str, str]] = {
     "cm": ("x_cm", "y_cm", "z_cm"),
     "mm": ("x_mm", "y_mm", "z_mm"),
 }
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _CAMERA = re.compile(r"[0-9]{1,9}")
 
 
@@ -59,7 +54,7 @@ def read_chart(path: Path) -> dict[int, Chart]:
     RefusedInput
         The file breaks the format; one line names file, line and column and what was expected.
     """
-    records = _records(path)
+    records = read_records(path)
     try:
         line, header = next(records)
     except StopIteration:
@@ -77,30 +72,6 @@ def read_chart(path: Path) -> dict[int, Chart]:
     if not rows:
         raise RefusedInput(path, "has a header but no control point, expected at least one row")
     return {camera: _chart(camera, unit, rows) for camera in sorted({row.camera for row in rows})}
-
-
-def _records(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Number and stripped cells of each line that is not blank."""
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise RefusedInput(path, f"larger than {MAX_BYTES} bytes, expected a calibration chart")
-        text = path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise RefusedInput(path, "no such file") from None
-    except UnicodeDecodeError:
-        raise RefusedInput(path, "expected a CSV file in UTF-8") from None
-    except (OSError, ValueError) as error:
-        raise RefusedInput(path, f"cannot be read ({getattr(error, 'strerror', None) or error})") from None
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    try:
-        for cells in reader:
-            stripped = [cell.strip() for cell in cells]
-            if any(stripped):
-                yield reader.line_num, stripped
-    except csv.Error as error:
-        raise RefusedInput(
-            path, f"expected comma-separated values ({error})", field=f"line {reader.line_num}"
-        ) from None
 
 
 def _columns(path: Path, line: int, header: list[str]) -> tuple[LengthUnit, dict[str, int]]:
@@ -141,7 +112,7 @@ def _row(path: Path, line: int, cells: list[str], unit: LengthUnit, columns: dic
 
     def number(column: str) -> float:
         text = cells[columns[column]]
-        value = float(text) if _NUMBER.fullmatch(text) else math.nan
+        value = finite(text)
         if not abs(value) <= MAX_MAGNITUDE:
             raise refuse(column, f"a number between -{MAX_MAGNITUDE:.0f} and {MAX_MAGNITUDE:.0f}")
         return value

@@ -1,6 +1,5 @@
 """Pixel coordinates out of a CSV file."""
 
-import csv
 import math
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.errors import RefusedInput
+from schemas.tables import finite, read_records
 
 
 def read_pixels(path: Path) -> NDArray[np.float64]:
@@ -18,28 +18,20 @@ def read_pixels(path: Path) -> NDArray[np.float64]:
     RefusedInput
         The file or a column is missing, or a value is no finite number.
     """
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = csv.DictReader(file, skipinitialspace=True)
-            names = [name.strip() for name in rows.fieldnames or []]
-            if not {"i", "j"} <= set(names):
-                raise RefusedInput(path, f"expected columns i and j, found {','.join(names)[:80]!r}")
-            for name in ("i", "j"):
-                if names.count(name) > 1:
-                    raise RefusedInput(path, f"column {name} stands twice, expected it once", field="line 1")
-            rows.fieldnames = names
-            pixels = [[_number(path, rows.line_num, name, row[name]) for name in ("i", "j")] for row in rows]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        problem = "no such file" if isinstance(error, FileNotFoundError) else f"expected a CSV file ({error})"
-        raise RefusedInput(path, problem) from None
+    records = read_records(path)
+    _, header = next(records, (1, []))
+    for name in ("i", "j"):
+        if header.count(name) != 1:
+            problem = f"expected columns i and j, each once, found {','.join(header)[:80]!r}"
+            raise RefusedInput(path, problem, field="line 1")
+    columns = [(name, header.index(name)) for name in ("i", "j")]
+    pixels = [[_number(path, line, name, cells[at : at + 1]) for name, at in columns] for line, cells in records]
     return np.array(pixels, np.float64).reshape(-1, 2)
 
 
-def _number(path: Path, line: int, name: str, text: str | None) -> float:
-    try:
-        value = float(text or "")
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise RefusedInput(path, f"expected a number of pixels, found {text!r}", field=f"line {line}, column {name}")
+def _number(path: Path, line: int, name: str, cell: list[str]) -> float:
+    value = finite(cell[0]) if cell else math.nan
+    if math.isnan(value):
+        found = cell[0][:80] if cell else ""
+        raise RefusedInput(path, f"expected a number of pixels, found {found!r}", field=f"line {line}, column {name}")
     return value

@@ -1,6 +1,5 @@
 """Where the laser plane stood at each frame."""
 
-import csv
 import math
 from pathlib import Path
 
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from schemas.errors import RefusedInput
 from schemas.scan import Travel
+from schemas.tables import finite, read_records
 
 MAX_FRAMES = 1_000_000
 
@@ -26,22 +26,16 @@ def read_positions(path: Path) -> NDArray[np.float64]:
     RefusedInput
         The file is missing or breaks this format.
     """
+    records = read_records(path)
+    _, header = next(records, (1, []))
+    if sorted(header) != ["frame", "x_mm"]:
+        raise RefusedInput(path, f"expected the columns frame,x_mm, found {','.join(header)[:80]!r}")
     positions: dict[int, float] = {}
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = csv.DictReader(file, skipinitialspace=True)
-            names = [name.strip() for name in rows.fieldnames or []]
-            if sorted(names) != ["frame", "x_mm"]:
-                raise RefusedInput(path, f"expected the columns frame,x_mm, found {','.join(names)[:80]!r}")
-            rows.fieldnames = names
-            for row in rows:
-                frame, x_mm = _position(path, rows.line_num, row)
-                if frame in positions:
-                    raise RefusedInput(path, f"frame {frame} stands twice", field=f"line {rows.line_num}")
-                positions[frame] = x_mm
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        problem = "no such file" if isinstance(error, FileNotFoundError) else f"expected a CSV file ({error})"
-        raise RefusedInput(path, problem) from None
+    for line, cells in records:
+        frame, x_mm = _position(path, line, header, cells)
+        if frame in positions:
+            raise RefusedInput(path, f"frame {frame} stands twice", field=f"line {line}")
+        positions[frame] = x_mm
     if not positions:
         raise RefusedInput(path, "expected a row for each frame, found none")
     x = np.full(max(positions) + 1, np.nan)
@@ -49,11 +43,11 @@ def read_positions(path: Path) -> NDArray[np.float64]:
     return x
 
 
-def _position(path: Path, line: int, row: dict[str, str | None]) -> tuple[int, float]:
-    try:
-        frame, x_mm = int(row["frame"] or ""), float(row["x_mm"] or "")
-    except ValueError:
-        frame, x_mm = -1, math.nan
-    if not 0 <= frame < MAX_FRAMES or not math.isfinite(x_mm) or len(row) > 2:  # a decimal comma makes a third column
+def _position(path: Path, line: int, header: list[str], cells: list[str]) -> tuple[int, float]:
+    row = dict(zip(header, cells, strict=False))
+    number = row.get("frame", "")
+    frame = int(number) if number.isdecimal() and len(number) < 9 else MAX_FRAMES
+    x_mm = finite(row.get("x_mm", ""))
+    if len(cells) != len(header) or frame >= MAX_FRAMES or math.isnan(x_mm):
         raise RefusedInput(path, "expected a frame number from 0 and x_mm in millimetres", field=f"line {line}")
     return frame, x_mm

@@ -62,7 +62,7 @@ def test_tolerates_order_spaces_mark_and_blank_lines(tmp_path: Path) -> None:
         (HEADER + "1,A,0,0,0,1\n", "line 2: expected 7 values"),
         (HEADER + "1,A,0,5,0,0,1,2\n", "line 2: expected 7 values"),
         (HEADER + "1,A,0,0,0,1,2\n2,A,0,0,0,1,2\n1,A,0,0,0,1,2\n", "line 4, column point: camera 1 has 'A' in line 2"),
-        (HEADER + '1,"A,0,0,0,1,2\n', "expected comma-separated values"),
+        (HEADER + '1,"A,0,0,0,1,2\n', "expected a CSV file"),
         (b"camera,point\xff", "expected a CSV file in UTF-8"),
     ],
 )

@@ -1,0 +1,48 @@
+"""Reading of CSV files, with one clear line per mistake."""
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from schemas.errors import RefusedInput
+
+MAX_BYTES = 256 * 2**20
+
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+
+
+def read_records(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Number and stripped cells of each line of a CSV file that is not blank, the header among them.
+
+    Raises
+    ------
+    RefusedInput
+        The file is missing, too large, or no CSV in UTF-8.
+    """
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise RefusedInput(path, f"larger than {MAX_BYTES} bytes, expected a table of points")
+        text = path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise RefusedInput(path, "no such file") from None
+    except UnicodeDecodeError:
+        raise RefusedInput(path, "expected a CSV file in UTF-8") from None
+    except (OSError, ValueError) as error:
+        raise RefusedInput(path, f"expected a CSV file ({getattr(error, 'strerror', None) or error})") from None
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        for cells in reader:
+            stripped = [cell.strip() for cell in cells]
+            if any(stripped):
+                yield reader.line_num, stripped
+    except csv.Error as error:
+        raise RefusedInput(path, f"expected a CSV file ({error})", field=f"line {reader.line_num}") from None
+
+
+def finite(text: str) -> float:
+    """The number that `text` is; NaN where it is none, or not finite. Words such as `inf` and `1_000` are none."""
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    return value if math.isfinite(value) else math.nan
