@@ -2,7 +2,7 @@
 
 import logging
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from pipelines.recorded import RecordedScan, read_scan, scan_folders
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
 from schemas.calibration import calibration_from_json
 from schemas.documents import read_text, read_yaml
-from schemas.errors import RefusedInput
+from schemas.errors import DamagedError, Fault, RefusedInput
 from schemas.measures import Measures
 from schemas.workflow import ScanParameters, Workflow
 
@@ -127,22 +127,38 @@ def run_job(planned: PlannedJob, on_step_end: OnStepEnd) -> Iterable[ScanEnd]:
     job, store = planned.job, Store(planned.job.cache)
     for folder, error in planned.refused.items():
         yield ScanEnd(folder, None, str(error), "refused")
-    outcomes = run_plan(planned.plan, store, workers=job.workers, on_step_end=on_step_end)
-    damage = {end.problem for end in outcomes.values() if isinstance(end, Failure) and end.kind == "damaged"}
-    if damage:
-        for problem in sorted(damage):
-            log.warning("%s", problem)
-        # What was damaged has been set aside: a new plan makes it anew.
-        again = make_plan([p.step for p in planned.plan.steps], store)
-        outcomes = run_plan(again, store, workers=job.workers, on_step_end=on_step_end)
+    outcomes = _run_and_mend(planned.plan, store, job.workers, on_step_end)
     for scan in planned.scans:
-        yield _end_scan(scan, outcomes, store, planned)
+        end = _end_scan(scan, outcomes, store, planned)
+        if end.kind == "damaged":
+            log.warning("%s", end.problem)
+            again = make_plan([p.step for p in planned.plan.steps], store)
+            outcomes = _run_and_mend(again, store, job.workers, on_step_end)
+            end = _end_scan(scan, outcomes, store, planned)
+        yield end
     planned.digests.save()
 
 
 def cores() -> int:
     """How many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _run_and_mend(plan: Plan, store: Store, workers: int, on_step_end: OnStepEnd) -> dict[str, Outcome]:
+    """Run a plan; what turns out to be damaged has been set aside then, and is made anew by another."""
+    outcomes = run_plan(plan, store, workers=workers, on_step_end=on_step_end)
+    told: set[str] = set()
+    while damage := _damage(outcomes) - told:  # behind what was damaged there may be more
+        for problem in sorted(damage):
+            log.warning("%s", problem)
+        told |= damage
+        again = make_plan([p.step for p in plan.steps], store)
+        outcomes = run_plan(again, store, workers=workers, on_step_end=on_step_end)
+    return outcomes
+
+
+def _damage(outcomes: Mapping[str, Outcome]) -> set[str]:
+    return {end.problem for end in outcomes.values() if isinstance(end, Failure) and end.kind == "damaged"}
 
 
 def _end_scan(scan: RecordedScan, outcomes: dict[str, Outcome], store: Store, planned: PlannedJob) -> ScanEnd:
@@ -154,9 +170,10 @@ def _end_scan(scan: RecordedScan, outcomes: dict[str, Outcome], store: Store, pl
             return ScanEnd(scan.name, None, outcome.problem, outcome.kind)
         digests[file] = outcome.digest
     target = planned.job.results / scan.document.patient / scan.document.scan
-    problem = deliver(digests, store, planned.digests, target)
-    if problem is not None:
-        return ScanEnd(scan.name, None, problem, "fault")
+    try:
+        deliver(digests, store, planned.digests, target)
+    except Fault as error:
+        return ScanEnd(scan.name, None, str(error), "damaged" if isinstance(error, DamagedError) else "fault")
     finding = Measures.model_validate_json((target / "measures.json").read_bytes()).finding
     return ScanEnd(scan.name, target, finding, None if finding is None else "finding")
 

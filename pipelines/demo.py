@@ -67,10 +67,7 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
             raise Fault(f"{step.name}: {outcome.problem}")
         digests[step.kind] = outcome.digest
     files = FileDigests.load(store.root / "files.json")
-    if problem := deliver(
-        {"calibration.json": digests["calibrate"], "known.json": digests["film"]}, store, files, folder
-    ):
-        raise Fault(problem)
+    deliver({"calibration.json": digests["calibrate"], "known.json": digests["film"]}, store, files, folder)
 
     planned = plan_job(_job(folder, results))
     with timed("reconstruction", planned.plan) as on_step_end:

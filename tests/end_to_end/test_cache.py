@@ -179,6 +179,20 @@ def test_a_damaged_blob_is_told_and_made_anew(command: Footscan, bench: Path) ->
     assert (again.returncode, again.stderr) == (0, f"0 of {STEPS} steps to run\n")
 
 
+def test_a_store_that_is_damaged_all_over_is_made_anew(footscan: Footscan, bench: Path, results: Results) -> None:
+    before = results(bench)
+    blobs = sorted((bench / "results/.footscan/blobs").glob("*/*"))
+    for blob in blobs:
+        content = bytearray(blob.read_bytes())
+        content[len(content) // 2] ^= 1
+        replace(blob, bytes(content))
+    set_parameters(bench, "{outliers: {neighbours: 23}}")
+    assert run(footscan, bench)["planned"] == 9
+    (bench / "workflow.yaml").write_text((bench / "workflow.yaml").read_text().replace("23", "24"))  # the default
+    run(footscan, bench)
+    assert results(bench) == before
+
+
 def test_frames_that_are_gone_are_ingested_again(footscan: Footscan, bench: Path, results: Results) -> None:
     before = results(bench)
     frames = bench / "archive/P0001/small/frames.zarr/cam3"
