@@ -16,7 +16,7 @@ from pipelines.recorded import RecordedScan, read_scan, scan_folders
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
 from schemas.calibration import calibration_from_json
 from schemas.documents import read_text, read_yaml
-from schemas.errors import DamagedError, Fault, RefusedInput
+from schemas.errors import RefusedInput
 from schemas.measures import Measures
 from schemas.workflow import ScanParameters, Workflow
 
@@ -62,7 +62,7 @@ class ScanEnd:
     """Its results; None where it has none."""
     problem: str | None
     kind: str | None
-    """`refused`, `finding`, `fault`, as in `Failure`."""
+    """`refused`, `finding`, `fault` or `damaged`, as in `Failure`."""
 
 
 def job_of_workflow(path: Path, workers: int | None = None) -> Job:
@@ -170,10 +170,10 @@ def _end_scan(scan: RecordedScan, outcomes: dict[str, Outcome], store: Store, pl
             return ScanEnd(scan.name, None, outcome.problem, outcome.kind)
         digests[file] = outcome.digest
     target = planned.job.results / scan.document.patient / scan.document.scan
-    try:
-        deliver(digests, store, planned.digests, target)
-    except Fault as error:
-        return ScanEnd(scan.name, None, str(error), "damaged" if isinstance(error, DamagedError) else "fault")
+    problem = deliver(digests, store, planned.digests, target)
+    if problem is not None:
+        whole = all(store.has(digest) for digest in digests.values())  # what is damaged has been set aside
+        return ScanEnd(scan.name, None, problem, "fault" if whole else "damaged")
     finding = Measures.model_validate_json((target / "measures.json").read_bytes()).finding
     return ScanEnd(scan.name, target, finding, None if finding is None else "finding")
 

@@ -6,28 +6,28 @@ from pathlib import Path
 from pipelines.engine.atomic import write_atomically
 from pipelines.engine.digest import FileDigests
 from pipelines.engine.store import Store
-from schemas.errors import DamagedError
+from schemas.errors import Fault
 
 
-def deliver(blobs: Mapping[str, str], store: Store, digests: FileDigests, folder: Path) -> None:
+def deliver(blobs: Mapping[str, str], store: Store, digests: FileDigests, folder: Path) -> str | None:
     """Write each blob under its file name into `folder`, where another file or none is there.
 
-    Raises
-    ------
-    DamagedError
-        Blobs are damaged, and have been set aside; all others were written.
-    Fault
-        A file cannot be written.
+    Returns
+    -------
+    problem : str or None
+        Why it could not be done for one of them, in one line.
     """
-    damaged: list[str] = []
+    problem = None
     for name, digest in blobs.items():
         target = folder / name
         if target.is_file() and digests.of(target)[0] == digest:
             continue
         data = store.get(digest)
         if data is None:
-            damaged.append(name)
-        else:
+            problem = f"{target}: its content is damaged in the store; run again to make it anew"
+            continue  # so that all that is damaged is noticed at once
+        try:
             write_atomically(target, data)
-    if damaged:
-        raise DamagedError(f"{folder}: the content of {', '.join(damaged)} is damaged, expected what was stored")
+        except Fault as error:
+            return str(error)
+    return problem

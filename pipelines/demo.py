@@ -67,7 +67,10 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
             raise Fault(f"{step.name}: {outcome.problem}")
         digests[step.kind] = outcome.digest
     files = FileDigests.load(store.root / "files.json")
-    deliver({"calibration.json": digests["calibrate"], "known.json": digests["film"]}, store, files, folder)
+    if problem := deliver(
+        {"calibration.json": digests["calibrate"], "known.json": digests["film"]}, store, files, folder
+    ):
+        raise Fault(problem)
 
     planned = plan_job(_job(folder, results))
     with timed("reconstruction", planned.plan) as on_step_end:
