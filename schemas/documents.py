@@ -8,14 +8,21 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import yaml
-from pydantic import AfterValidator, BaseModel, ConfigDict, StringConstraints, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from schemas.errors import RefusedInput
 
 MAX_BYTES = 8 * 2**20
 MAX_DEPTH = 24
 
-Pseudonym = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
+
+def _pseudonym(name: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", name):
+        raise ValueError("expected 1 to 64 letters, digits, '-' and '_'")
+    return name
+
+
+Pseudonym = Annotated[str, AfterValidator(_pseudonym)]
 """A name that may become a folder: letters, digits, '-' and '_', 1 to 64 of them."""
 
 
@@ -84,10 +91,9 @@ def validate(source: Path | str, model: type[AnyDocument], value: Any) -> AnyDoc
 def pseudonym(name: str, field: str) -> str:
     """`name`, or a refusal where it could not be a folder."""
     try:
-        return TypeAdapter(Pseudonym).validate_python(name)
-    except ValidationError:
-        problem = f"expected 1 to 64 letters, digits, '-' and '_', found {name[:80]!r}"
-        raise RefusedInput(field, problem) from None
+        return _pseudonym(name)
+    except ValueError as error:
+        raise RefusedInput(field, f"{error}, found {name[:80]!r}") from None
 
 
 def inside(archive: Path, document: Path, relative: str, field: str) -> Path:

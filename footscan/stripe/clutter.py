@@ -9,12 +9,14 @@ from schemas.parameters.extraction import ExtractionParameters
 
 CELL_PX = 4.0
 """A glint's flicker moves its points by less than this."""
+FEWEST_FRAMES = 8
+"""In fewer frames nothing has stood still."""
 STATIC_SHARE = 0.5
 """A piece with more than this share of its points in static places is static."""
 
 
-def on_glint(points: StripePoints, parameters: ExtractionParameters) -> NDArray[np.bool_]:
-    """Which of (N,) points of a film belong to glints.
+def on_glint(points: StripePoints, frames: int, parameters: ExtractionParameters) -> NDArray[np.bool_]:
+    """Which of (N,) points of a film of so many frames belong to glints.
 
     A glint is a short piece whose place holds points in many frames. A long piece may stand still: so does the stripe
     on a prism. A place through which long pieces turn, as around the bend of an ankle, is no glint's either, for it is
@@ -23,7 +25,7 @@ def on_glint(points: StripePoints, parameters: ExtractionParameters) -> NDArray[
     if not len(points):
         return np.zeros(0, np.bool_)
     centres = np.column_stack([points["i"], points["j"]])
-    static = _frames_in_place(points["frame"], centres) >= parameters.glint_frames
+    static = _frames_in_place(points["frame"], centres) >= max(FEWEST_FRAMES, parameters.glint_share * frames)
     # Frames side by side, too far apart to touch: the pieces of all frames at once.
     apart = centres + np.outer(points["frame"] * (np.ptp(centres[:, 0]) + 2 * parameters.gap_px), [1.0, 0.0])
     piece = connect(apart, parameters.gap_px)

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from footscan.frames.image import Rgb
 from footscan.stripe.clutter import on_glint
@@ -13,10 +13,17 @@ from schemas.parameters.extraction import ExtractionParameters
 
 def extract_film(frames: Iterable[Rgb | None], parameters: ExtractionParameters) -> StripePoints:
     """The stripe points of all frames of one camera; a lost frame (None) has none."""
-    points = film_points(
-        (number, extract_stripe(frame, parameters)) for number, frame in enumerate(frames) if frame is not None
-    )
-    return points[~on_glint(points, parameters)]
+    count = 0
+
+    def found() -> Iterator[tuple[int, StripePoints]]:
+        nonlocal count
+        for frame in frames:
+            if frame is not None:
+                yield count, extract_stripe(frame, parameters)
+            count += 1
+
+    points = film_points(found())
+    return points[~on_glint(points, count, parameters)]
 
 
 def points_csv(points: StripePoints) -> str:

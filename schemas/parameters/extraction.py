@@ -68,11 +68,12 @@ class ExtractionParameters(Document):
         le=1.0,
         description="strength of a group of pieces, relative to the strongest one, below which it is dropped",
     )
-    glint_frames: int = Field(
-        default=20,
-        ge=2,
-        le=10_000,
-        description="frames in which a short piece must stand in one place to be a glint: the foot moves, hardware not",
+    glint_share: float = Field(
+        default=0.1,
+        ge=0.01,
+        le=1.0,
+        description="share of a film's frames in which a short piece must stand in one place to be a glint: the foot "
+        "moves, the hardware does not",
     )
     glint_length_px: float = Field(
         default=40.0,

@@ -207,11 +207,11 @@ def test_frames_that_are_gone_are_ingested_again(footscan: Footscan, bench: Path
 
 
 def test_a_damaged_frame_is_ingested_again(footscan: Footscan, bench: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """The parameter lets glints of a tenth of the frames count; 20 frames, the default, are more than a quarter."""
+    """Another parameter of the extraction has it read the frames again."""
     chunk = bench / "archive/P0001/small/frames.zarr/cam2/40.0.0.0"
     sound = chunk.read_bytes()
     replace(chunk, sound[:-1000] + bytes(1000))
-    set_parameters(bench, "{extraction: {glint_frames: 8}}")
+    set_parameters(bench, "{extraction: {red_threshold: 19}}")
     done = footscan("run", bench / "workflow.yaml")
     assert done.returncode == 0, done.stderr
     assert f"{chunk.parent}: frame 40 is damaged" in caplog.text

@@ -46,7 +46,7 @@ def test_each_broken_scan_is_one_line_and_the_rest_is_whole(done: Any) -> None:
         length = truncated.stat().st_size + 5000
         assert problems["S2"] == ("refused", f"{truncated}: length: truncated: 5000 of {length} bytes are missing")
         assert problems["S3"] == ("refused", f"{missing}: no such film")
-        assert problems["S4"][1].startswith(f"{hostile}: patient: string should match pattern")
+        assert problems["S4"][1].startswith(f"{hostile}: patient: expected 1 to 64 letters, digits, '-' and '_'")
         assert problems["S5"][1].startswith(f"{broken}: line 5, column 7: ")
         expected = "file of camera 5: '../../../../cam5.avi' leaves the archive, expected a path inside it"
         assert problems["S6"] == ("refused", f"{leaving}: {expected}")
