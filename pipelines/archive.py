@@ -88,6 +88,8 @@ def job_of_workflow(path: Path, workers: int | None = None) -> Job:
 
 def job_of_scan(folder: Path, calibration: Path | None, results: Path, workers: int | None = None) -> Job:
     """The job of one scan without a workflow."""
+    if results.exists() and not results.is_dir():
+        raise RefusedInput(results, "is a file, expected a folder for the results")
     return Job(
         folders=[folder],
         archive=None,
@@ -163,13 +165,13 @@ def _damage(outcomes: Mapping[str, Outcome]) -> set[str]:
 
 def _end_scan(scan: RecordedScan, outcomes: dict[str, Outcome], store: Store, planned: PlannedJob) -> ScanEnd:
     """Deliver a scan's results, if it has them."""
+    target = planned.job.results / scan.document.patient / scan.document.scan
     digests: dict[str, str] = {}
     for file, kind in DELIVERED.items():
         outcome = outcomes[f"{scan.name}/{kind}"]
         if isinstance(outcome, Failure):
-            return ScanEnd(scan.name, None, outcome.problem, outcome.kind)
+            return ScanEnd(scan.name, None, outcome.problem + _what_stays(target), outcome.kind)
         digests[file] = outcome.digest
-    target = planned.job.results / scan.document.patient / scan.document.scan
     problem = deliver(digests, store, planned.digests, target)
     if problem is not None:
         whole = all(store.has(digest) for digest in digests.values())  # what is damaged has been set aside
@@ -178,10 +180,19 @@ def _end_scan(scan: RecordedScan, outcomes: dict[str, Outcome], store: Store, pl
     return ScanEnd(scan.name, target, finding, None if finding is None else "finding")
 
 
+def _what_stays(target: Path) -> str:
+    """A warning where a scan that failed has results, which then are an earlier run's."""
+    return f" ({target} still holds the results of an earlier run)" if target.exists() else ""
+
+
 def _calibration(scan: RecordedScan, job: Job, known: dict[Path, CalibrationFile]) -> CalibrationFile:
     path = job.calibration if job.calibration_wins and job.calibration else scan.calibration or job.calibration
     if path is None:
-        raise RefusedInput(scan.file, "names no calibration, expected one here or in the workflow", field="calibration")
+        raise RefusedInput(
+            scan.file,
+            "names no calibration, expected one here or in the workflow",
+            field="calibration",
+        )
     if path not in known:
         text = read_text(path)
         known[path] = CalibrationFile(path, calibration_from_json(text, path), sha256(text.encode()))

@@ -62,6 +62,8 @@ def read_scan(folder: Path, archive: Path | None = None) -> RecordedScan:
     RefusedInput
         No scan.yaml, or one that breaks its format.
     """
+    if folder.is_file():
+        raise RefusedInput(folder, f"is a file, expected the folder that holds {SCAN_FILE}")
     if not folder.is_dir():
         raise RefusedInput(folder, "no such folder, expected a recorded scan")
     folder = folder.resolve()

@@ -61,7 +61,9 @@ def chart(
         _print_quadratic(charts, as_json=as_json)
     else:
         _print_trials(calibration, trials, as_json=as_json)
-    if out is not None:
+    if out is None:
+        message("nothing was written; --out FILE writes the calibration")
+    else:
         message(f"{out}: calibration of {len(calibration.cameras)} cameras")
 
 

@@ -33,8 +33,9 @@ app.command("compare")(results.compare)
 
 def main() -> None:
     """Run the command line and exit with its status."""
-    level = logging.DEBUG if os.environ.get("FOOTSCAN_DEBUG") else logging.WARNING
-    logging.basicConfig(format="footscan: %(message)s", level=level)
+    logging.basicConfig(format="footscan: %(message)s", level=logging.WARNING)
+    if os.environ.get("FOOTSCAN_DEBUG"):
+        logging.getLogger("footscan").setLevel(logging.DEBUG)
     sys.exit(run_command(sys.argv[1:]))
 
 
@@ -44,7 +45,8 @@ def run_command(arguments: list[str]) -> int:
         return int(app(arguments, standalone_mode=False, prog_name="footscan") or 0)
     except (FootscanError, typer.TyperException, typer.Abort, KeyboardInterrupt, OSError, MemoryError) as error:
         problem, status = _explain(error)
-        print(f"footscan: {problem}", file=sys.stderr)
+        if problem:
+            print(f"footscan: {problem}", file=sys.stderr)
         return status
 
 
@@ -53,6 +55,8 @@ def _explain(error: BaseException) -> tuple[str, int]:
     match error:
         case FootscanError():
             return str(error), error.exit_status
+        case typer.TyperException() if not error.format_message():
+            return "", RefusedInput.exit_status  # its help was printed
         case typer.TyperException():
             return f"{one_line(error.format_message())} (see 'footscan --help')", RefusedInput.exit_status
         case OSError():

@@ -82,6 +82,8 @@ def plan(
             print(_summary(planned.plan))
     for folder, error in planned.refused.items():
         _tell(folder, str(error))
+    for name, problem in planned.plan.known_failures.items():
+        _tell(name, problem)
     if planned.refused:
         return RefusedInput.exit_status if scan is not None else 1
     return 0
@@ -122,6 +124,7 @@ def _plan_json(planned: "PlannedJob") -> dict[str, object]:
             {"scan": p.step.scan, "step": p.step.kind, "camera": p.step.camera, "reason": p.reason} for p in waiting
         ],
         "refused": [{"scan": folder, "problem": str(error)} for folder, error in planned.refused.items()],
+        "failed": [{"scan": name, "problem": problem} for name, problem in planned.plan.known_failures.items()],
     }
 
 

@@ -8,6 +8,7 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import sys
+import threading
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -25,6 +26,10 @@ DISTRIBUTIONS = {
 """Distributions that bring a module of another name."""
 
 
+_PARSING = threading.Lock()
+"""Before Python 3.11.5, two threads that build syntax trees at once can fail (cpython#106905)."""
+
+
 @dataclass(frozen=True)
 class CodeIdentity:
     """What a module's behaviour depends on."""
@@ -35,9 +40,14 @@ class CodeIdentity:
     """Version of each library imported by one of them."""
 
 
-@cache
 def code_identity(module: ModuleType) -> CodeIdentity:
     """The identity of `module` and of everything in this project that it reaches by import."""
+    with _PARSING:
+        return _identity(module)
+
+
+@cache
+def _identity(module: ModuleType) -> CodeIdentity:
     modules: dict[str, str] = {}
     libraries: dict[str, str] = {}
     waiting = [module.__name__]

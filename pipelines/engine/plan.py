@@ -42,6 +42,12 @@ class Plan:
         """All that is no hit."""
         return [planned for planned in self.steps if planned.state is not State.HIT]
 
+    @property
+    def known_failures(self) -> dict[str, str]:
+        """Scans of which it is known that they cannot be measured, and why."""
+        failures = {p.step.scan: p.outcome for p in reversed(self.steps) if isinstance(p.outcome, Failure)}
+        return {scan: failure.problem for scan, failure in sorted(failures.items())}
+
 
 def make_plan(steps: Sequence[Step], store: Store) -> Plan:
     """Look each step up in the action cache.

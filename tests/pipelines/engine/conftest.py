@@ -47,7 +47,7 @@ class MadeUpPackage:
         for name in [name for name in sys.modules if name.split(".")[0] == self.name]:
             del sys.modules[name]
         importlib.invalidate_caches()
-        code.code_identity.cache_clear()
+        code._identity.cache_clear()
         code._parse.cache_clear()
 
     def step_module(self, name: str, source: str = JOIN) -> ModuleType:
