@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from footscan.frames.film import film_files
-from footscan.frames.ingest import GROUP, ingest_film
+from footscan.frames.ingest import ingest_film
 from pipelines.recorded import SCAN_FILE, read_scan, scan_folders
 from schemas.errors import FootscanError
 
@@ -49,7 +49,7 @@ def _ingest_scan(folder: Path, archive: Path | None) -> list[CameraIngest]:
     ends = []
     for camera in scan.document.cameras:
         film = scan.film(camera)
-        array = scan.folder / GROUP / f"cam{camera.id}"
+        array = scan.array(camera)
         try:
             manifest = ingest_film(film, array)
             size = sum(file.stat().st_size for file in film_files(film))

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from footscan.frames.ingest import GROUP
 from schemas.documents import inside, read_yaml
 from schemas.errors import RefusedInput
 from schemas.scan import CameraFilm, Scan
@@ -34,6 +35,10 @@ class RecordedScan:
     def film(self, camera: CameraFilm) -> Path:
         """The film of a camera, which may be missing."""
         return inside(self.archive, self.file, camera.file, f"file of camera {camera.id}")
+
+    def array(self, camera: CameraFilm) -> Path:
+        """The Zarr array of a camera's frames, which may not be there yet."""
+        return self.folder / GROUP / f"cam{camera.id}"
 
     def positions(self, camera: CameraFilm) -> Path | None:
         """The file with the positions of a camera's frames."""

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from footscan.frames.film import film_files
-from footscan.frames.ingest import GROUP
 from footscan.frames.travel import read_positions
 from pipelines.engine.digest import FileDigests, sha256
 from pipelines.engine.step import Input, Output, SourceFile, Step, Value
@@ -72,7 +71,7 @@ def scan_steps(
     arrays: dict[str, Path] = {}
     for camera in scan.document.cameras:
         film = scan.film(camera)
-        array = scan.folder / GROUP / f"cam{camera.id}"
+        array = scan.array(camera)
         manifest = add(
             Step(
                 scan.name, "ingest", ingest, None, {"film": source_files(film, digests)}, camera.id,
