@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.chart import Chart, read_chart
-from footscan.calibration.fit import calibrate_chart
-from footscan.calibration.polynomial import evaluate
-from schemas.calibration import MILLIMETRES, PolynomialCamera
-from schemas.parameters.calibration import ChartCalibrationParameters
+from footscan.calibration.from_chart import calibrate_chart
+from footscan.calibration.maps import to_world
+from schemas.calibration import CameraCalibration, Source
+from schemas.parameters.calibration import CalibrationParameters
+from schemas.units import MILLIMETRES
 
 DEFAULT = Path("demo/capture/chart.csv")
 PARTS = 5
@@ -35,7 +36,8 @@ def main() -> None:
     errors = {
         "quadratic, five points": {camera: _five_points(chart) for camera, chart in charts.items()},
         "quadratic, all points": {camera: _held_out(chart, "quadratic") for camera, chart in charts.items()},
-        "order by held-out error": {camera: _held_out(chart, "polynomial") for camera, chart in charts.items()},
+        "polynomial of chosen order": {camera: _held_out(chart, "polynomial") for camera, chart in charts.items()},
+        "chosen model": {camera: _held_out(chart, "auto") for camera, chart in charts.items()},
     }
     baseline = next(iter(errors.values()))
     print(f"  {'rms mm of held-out points':<28}" + "".join(f"{f'camera {camera}':>10}" for camera in charts))
@@ -78,15 +80,15 @@ def _thesis_points(chart: Chart) -> NDArray[np.bool_]:
     return np.isin(np.arange(len(distance)), distance.argmin(axis=0))
 
 
-def _errors(camera: PolynomialCamera, chart: Chart) -> NDArray[np.float64]:
-    residuals = evaluate(camera, chart.pixels) - MILLIMETRES[chart.unit] * chart.world[:, 1:]
+def _errors(camera: CameraCalibration, chart: Chart) -> NDArray[np.float64]:
+    residuals = to_world(camera, chart.pixels) - MILLIMETRES[chart.unit] * chart.world[:, 1:]
     return np.asarray(np.hypot(residuals[:, 0], residuals[:, 1]))
 
 
-def _fit(chart: Chart, model: str) -> PolynomialCamera:
-    parameters = ChartCalibrationParameters.model_validate({"model": model})
+def _fit(chart: Chart, model: str) -> CameraCalibration:
+    parameters = CalibrationParameters.model_validate({"model": model})
     calibration, _ = calibrate_chart(
-        {chart.camera: chart}, parameters=parameters, source="chart", source_sha256="", software=""
+        {chart.camera: chart}, parameters=parameters, source=Source(name="chart", sha256=""), software=""
     )
     return calibration.cameras[0]
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from schemas.parameters.calibration import ChartCalibrationParameters
+from schemas.parameters.calibration import CalibrationParameters
 from schemas.parameters.simulation import SimulationSettings
 from schemas.workflow import ScanParameters
 
@@ -30,7 +30,7 @@ STEPS: dict[str, type[BaseModel]] = {
 """The model of each step, by its name in workflow.yaml."""
 MODELS: dict[str, type[BaseModel]] = {
     **STEPS,
-    "chart": ChartCalibrationParameters,
+    "chart": CalibrationParameters,
     "simulation": SimulationSettings,
 }
 UNITS = {"mm": "mm", "px": "px", "steps": "steps", "frames": "frames"}
@@ -55,18 +55,18 @@ def table(model: type[BaseModel]) -> str:
     """All fields of a model: name, unit, default, range, sentence."""
     schema = model.model_json_schema()
     definitions: Schema = schema.get("$defs", {})
-    sentences = _sentences(model)
+    described = sentences(model)
     lines = ["| name | unit | default | range | |", "|---|---|---|---|---|"]
     for name, field in model.model_fields.items():
         content = _resolve(schema["properties"][field.alias or name], definitions)
-        sentence = field.description or sentences.get(name, "")
+        sentence = field.description or described.get(name, "")
         default = "required" if field.is_required() else _default(content.get("default"))
         cells = [f"`{name}`", _unit(name, sentence), default, _range(content, definitions), sentence]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
-def _sentences(model: type[BaseModel]) -> dict[str, str]:
+def sentences(model: type[BaseModel]) -> dict[str, str]:
     """The text under each field of a class and of those that it is made from, in one line."""
     found: dict[str, str] = {}
     for base in reversed(model.__mro__):

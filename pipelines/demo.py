@@ -17,7 +17,7 @@ from pipelines.engine.store import Store
 from pipelines.recorded import SCAN_FILE, scan_folders
 from pipelines.steps import calibrate_chart, simulate_capture, simulate_scan
 from schemas.errors import Fault
-from schemas.parameters.calibration import ChartCalibrationParameters
+from schemas.parameters.calibration import CalibrationParameters
 from schemas.parameters.demo import FilmedFoot
 from schemas.workflow import ScanParameters
 
@@ -91,7 +91,7 @@ def _filming(folder: Path, foot: FilmedFoot) -> list[Step]:
         places={"folder": capture}, writes=capture / "capture.yaml",
     )  # fmt: skip
     calibrate = Step(
-        "demo", "calibrate", calibrate_chart, ChartCalibrationParameters(), {"chart": Output(chart.name)},
+        "demo", "calibrate", calibrate_chart, CalibrationParameters(), {"chart": Output(chart.name)},
         places={"chart": capture / "chart.csv"},
     )  # fmt: skip
     return [film, chart, calibrate]

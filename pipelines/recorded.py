@@ -8,7 +8,7 @@ from pathlib import Path
 from footscan.frames.ingest import GROUP
 from schemas.documents import inside, read_yaml
 from schemas.errors import RefusedInput
-from schemas.scan import CameraFilm, Scan
+from schemas.scan import CameraFilm, CameraSource, Scan
 
 SCAN_FILE = "scan.yaml"
 
@@ -34,7 +34,7 @@ class RecordedScan:
 
     def film(self, camera: CameraFilm) -> Path:
         """The film of a camera, which may be missing."""
-        return inside(self.archive, self.file, camera.file, f"file of camera {camera.id}")
+        return film_path(self.archive, self.file, camera)
 
     def array(self, camera: CameraFilm) -> Path:
         """The Zarr array of a camera's frames, which may not be there yet."""
@@ -67,16 +67,26 @@ def read_scan(folder: Path, archive: Path | None = None) -> RecordedScan:
     RefusedInput
         No scan.yaml, or one that breaks its format.
     """
-    if folder.is_file():
-        raise RefusedInput(folder, f"is a file, expected the folder that holds {SCAN_FILE}")
-    if not folder.is_dir():
-        raise RefusedInput(folder, "no such folder, expected a recorded scan")
-    folder = folder.resolve()
+    folder = recorded_folder(folder, SCAN_FILE, "a recorded scan")
     scan = RecordedScan(folder, (archive or folder.parent.parent).resolve(), read_yaml(folder / SCAN_FILE, Scan))
     for camera in scan.document.cameras:
         scan.film(camera)  # refused here, before any work, where they leave the archive
         scan.positions(camera)
     return scan
+
+
+def recorded_folder(folder: Path, file: str, what: str) -> Path:
+    """`folder`, resolved; a refusal where it is none and so cannot hold `file`, the document of `what`."""
+    if folder.is_file():
+        raise RefusedInput(folder, f"is a file, expected the folder that holds {file}")
+    if not folder.is_dir():
+        raise RefusedInput(folder, f"no such folder, expected {what}")
+    return folder.resolve()
+
+
+def film_path(archive: Path, document: Path, camera: CameraSource) -> Path:
+    """The film that `document` names for a camera, which may be missing; refused where it leaves `archive`."""
+    return inside(archive, document, camera.file, f"file of camera {camera.id}")
 
 
 def scan_folders(archive: Path) -> Iterator[Path]:

@@ -1,92 +1,173 @@
-"""The calibration file: a pixel-to-world map for each camera, versioned.
+"""The calibration file: a map from pixels to millimetres for each camera, versioned.
 
 Version 1 holds what the thesis holds: six coefficients for Y and six for Z a camera, of the plain pixel coordinates.
-Version 2 holds polynomials of any order in normalised coordinates with the region that supports them.
+Version 2 holds polynomials of any order in normalised coordinates with the region that supports them. Version 3, the
+current one, holds any of the models with their covariance, and says what they were made from. Older files are migrated
+when they are read.
 """
 
+import math
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AwareDatetime, Field, model_validator
 
+from schemas.calibration_history import CalibrationV1, CalibrationV2, migrate_v1, migrate_v2
 from schemas.documents import Document, parse_json, read_text, validate
 from schemas.errors import RefusedInput
+from schemas.units import Point
 
-LengthUnit = Literal["cm", "mm"]
-MILLIMETRES: dict[str, float] = {"cm": 10.0, "mm": 1.0}
-Six = Annotated[list[float], Field(min_length=6, max_length=6)]
-Point = tuple[float, float]
-
-
-class QuadraticCamera(Document):
-    """Y and Z as second-order polynomials of the pixel, coefficients in the order 1, i, j, i^2, ij, j^2."""
-
-    camera: Annotated[int, Field(ge=1)]
-    alpha_y: Six
-    alpha_z: Six
+VERSION = 3
+_FAMILY = "footscan.calibration/"
+LARGEST = 1e15
+"""No number of a camera's map is larger; what is computed from it stays finite."""
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Scale = Annotated[float, Field(ge=1e-9, le=LARGEST)]
+DENT_PX = 1e-6
+"""How far a corner of a convex region may lie inside of it, for rounding."""
 
 
-class CalibrationV1(Document):
-    """The thesis's calibration."""
-
-    format: Literal["footscan.calibration/1"]
-    unit: LengthUnit
-    cameras: Annotated[list[QuadraticCamera], Field(min_length=1)]
-
-    @model_validator(mode="after")
-    def _unique(self) -> Self:
-        _refuse_twice([camera.camera for camera in self.cameras])
-        return self
-
-
-class PolynomialCamera(Document):
+class PolynomialMap(Document):
     """Y and Z in mm as polynomials of u = (i - centre_i) / scale and v = (j - centre_j) / scale.
 
     Terms are ordered by degree, and within a degree by falling power of u: 1, u, v, u^2, uv, v^2, u^3, ...
     """
 
-    camera: Annotated[int, Field(ge=1)]
     model: Literal["polynomial"] = "polynomial"
     order: Annotated[int, Field(ge=1, le=5)]
     centre_px: Point
-    scale_px: Annotated[float, Field(gt=0)]
-    alpha_y: list[float]
-    alpha_z: list[float]
-    region_px: list[Point]
-    """Corners of the convex region of pixels (i, j) that control points support; empty where it is not known."""
-    points: Annotated[int, Field(ge=0)]
-    """How many control points were used."""
-    rms_mm: float | None = None
-    """Distance from the control points, root mean square."""
-    held_out_rms_mm: float | None = None
-    """The same on control points left out of the fit; None where there are too few to leave any out."""
+    scale_px: Scale
+    alpha_y: list[Number]
+    alpha_z: list[Number]
 
     @model_validator(mode="after")
     def _count_terms(self) -> Self:
-        terms = (self.order + 1) * (self.order + 2) // 2
-        if len(self.alpha_y) != terms or len(self.alpha_z) != terms:
-            raise ValueError(f"order {self.order} has {terms} terms, expected as many in alpha_y and alpha_z")
+        _check_terms(self.order, 0, self.alpha_y, self.alpha_z)
         return self
+
+
+class Distortion(Document):
+    """From the seen to the ideal place of a pixel, in normalised coordinates (Brown 1971), with r^2 = u^2 + v^2:
+
+    u + u (k1 r^2 + k2 r^4) + 2 p1 u v + p2 (r^2 + 2 u^2) and v + v (k1 r^2 + k2 r^4) + p1 (r^2 + 2 v^2) + 2 p2 u v.
+    """
+
+    k1: Number
+    k2: Number
+    p1: Number
+    p2: Number
+
+
+class Correction(Document):
+    """What is added to Y and Z in mm: polynomials of (u, v) without their terms of degree 0 and 1."""
+
+    order: Annotated[int, Field(ge=2, le=5)]
+    alpha_y: list[Number]
+    alpha_z: list[Number]
+
+    @model_validator(mode="after")
+    def _count_terms(self) -> Self:
+        _check_terms(self.order, 3, self.alpha_y, self.alpha_z)
+        return self
+
+
+class HomographyMap(Document):
+    """A plane seen by a pinhole: (Y w, Z w, w) = `matrix` (u, v, 1), with u = (i - centre_i) / scale and v likewise.
+
+    `distortion` is taken out of (u, v) first; `correction` is added at the end.
+    """
+
+    model: Literal["homography"] = "homography"
+    centre_px: Point
+    scale_px: Scale
+    matrix: Annotated[list[Number], Field(min_length=8, max_length=8)]
+    """Row by row; the ninth number is 1."""
+    distortion: Distortion | None = None
+    correction: Correction | None = None
+
+
+PixelMap = Annotated[PolynomialMap | HomographyMap, Field(discriminator="model")]
+
+
+class CameraCalibration(Document):
+    """The map of one camera, how sure it is, and where."""
+
+    camera: Annotated[int, Field(ge=1)]
+    image_px: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] | None = None
+    """Columns and rows of the images it holds for; None where they are not known."""
+    map: PixelMap
+    covariance: list[list[float]] = Field(default_factory=list)
+    """Of the map's parameters, the lower triangle row by row; empty where it is not known. The order of parameters is
+    alpha_y, alpha_z; or matrix, k1, k2, p1, p2, then alpha_y and alpha_z of the correction."""
+    condition: float | None = None
+    """Condition number of the fit with all columns scaled to one length."""
+    region_px: Annotated[list[Point], Field(max_length=10_000)]
+    """Corners of the convex region of pixels (i, j) that data support; empty where it is not known."""
+    points: Annotated[int, Field(ge=0)]
+    """How many control points, or points of the stripe, were used."""
+    rms_mm: float | None = None
+    """Distance from what was fitted, root mean square."""
+    held_out_rms_mm: float | None = None
+    """The same on what was held out of the fit; None where there is too little to hold any out."""
+    worst_mm: float | None = None
+    """Largest distance, on what was held out where that is known."""
+
+    @model_validator(mode="after")
+    def _is_triangle(self) -> Self:
+        size = parameter_count(self.map)
+        lengths = [len(row) for row in self.covariance]
+        if self.covariance and lengths != list(range(1, size + 1)):
+            raise ValueError(f"covariance: expected the lower triangle of {size} x {size} numbers, row by row")
+        return self
+
+    @model_validator(mode="after")
+    def _is_convex(self) -> Self:
+        if self.region_px and not _convex(self.region_px):
+            raise ValueError("region_px: expected the corners of a convex region one after the other, three at least")
+        return self
+
+
+class PairAgreement(Document):
+    """How far apart two cameras place one and the same edge."""
+
+    cameras: tuple[int, int]
+    places: Annotated[int, Field(ge=1)]
+    """Stretches of edges that both saw."""
+    rms_mm: float
+    worst_mm: float
+
+
+class Source(Document):
+    """A file that a calibration was made from."""
+
+    name: str
+    sha256: str
 
 
 class Calibration(Document):
     """The current version."""
 
-    format: Literal["footscan.calibration/2"] = "footscan.calibration/2"
+    format: Literal["footscan.calibration/3"] = "footscan.calibration/3"
     unit: Literal["mm"] = "mm"
-    source: str
-    """What it was made from: the chart's or capture's name."""
-    source_sha256: str
+    sources: list[Source]
+    """The chart; or the capture, its reference object and its films."""
     software: str
     """Name and version of the program that wrote it."""
-    cameras: Annotated[list[PolynomialCamera], Field(min_length=1)]
+    created: AwareDatetime | None = None
+    """When; None where it was made as a step of a pipeline, whose results depend on nothing but their inputs."""
+    cameras: Annotated[list[CameraCalibration], Field(min_length=1)]
+    pairs: list[PairAgreement] = Field(default_factory=list)
+    """Disagreement of each two cameras that saw the same edges."""
 
     @model_validator(mode="after")
     def _unique(self) -> Self:
-        _refuse_twice([camera.camera for camera in self.cameras])
+        ids = [camera.camera for camera in self.cameras]
+        if len(set(ids)) != len(ids):
+            raise ValueError(f"expected each camera once, found {ids}")
         return self
 
-    def camera(self, camera_id: int, source: Path | str = "calibration") -> PolynomialCamera:
+    def camera(self, camera_id: int, source: Path | str = "calibration") -> CameraCalibration:
         """The map of one camera, or a refusal that names what there is."""
         for camera in self.cameras:
             if camera.camera == camera_id:
@@ -95,9 +176,29 @@ class Calibration(Document):
         raise RefusedInput(source, f"has no camera {camera_id}, expected one of {known}", field="cameras")
 
 
-def _refuse_twice(ids: list[int]) -> None:
-    if len(set(ids)) != len(ids):
-        raise ValueError(f"expected each camera once, found {ids}")
+def parameter_count(pixel_map: PolynomialMap | HomographyMap) -> int:
+    """How many numbers a map has that a fit can change."""
+    if isinstance(pixel_map, PolynomialMap):
+        return len(pixel_map.alpha_y) + len(pixel_map.alpha_z)
+    correction = pixel_map.correction
+    return 8 + 4 * (pixel_map.distortion is not None) + (2 * len(correction.alpha_y) if correction else 0)
+
+
+def _check_terms(order: int, without: int, alpha_y: list[float], alpha_z: list[float]) -> None:
+    terms = (order + 1) * (order + 2) // 2 - without
+    if len(alpha_y) != terms or len(alpha_z) != terms:
+        raise ValueError(f"order {order} has {terms} terms, expected as many in alpha_y and alpha_z")
+
+
+def _convex(corners: list[Point]) -> bool:
+    """Whether corners run once around a convex region, either way; a corner may stand twice or lie on a side."""
+    turns: list[float] = []
+    for k, (i, j) in enumerate(corners):
+        (i0, j0), (i1, j1) = corners[k - 1], corners[(k + 1) % len(corners)]
+        a, b = (i - i0, j - j0), (i1 - i, j1 - j)
+        longer = max(math.hypot(*a), math.hypot(*b)) or 1.0
+        turns.append((a[0] * b[1] - a[1] * b[0]) / longer)  # about how far the corner stands out, px
+    return (min(turns) >= -DENT_PX) != (max(turns) <= DENT_PX)
 
 
 def read_calibration(path: Path) -> Calibration:
@@ -108,34 +209,22 @@ def read_calibration(path: Path) -> Calibration:
 def calibration_from_json(text: str, source: Path | str) -> Calibration:
     """A calibration from its JSON text; `source` names it in messages."""
     value: Any = parse_json(source, text)
-    version = value.get("format") if isinstance(value, dict) else None
-    if version == "footscan.calibration/1":
-        return migrate_v1(validate(source, CalibrationV1, value), source)
-    if version != "footscan.calibration/2":
-        expected = "expected 'footscan.calibration/1' or 'footscan.calibration/2'"
-        raise RefusedInput(source, f"{expected}, found {version!r}", field="format")
-    return validate(source, Calibration, value)
+    found = value.get("format") if isinstance(value, dict) else None
+    match found:
+        case "footscan.calibration/1":
+            value = migrate_v2(migrate_v1(validate(source, CalibrationV1, value), source))
+        case "footscan.calibration/2":
+            value = migrate_v2(validate(source, CalibrationV2, value))
+        case "footscan.calibration/3":
+            pass
+        case _:
+            raise RefusedInput(source, _unknown(found), field="format")
+    return validate(source, Calibration, value)  # a coefficient near the largest number has no counterpart in mm
 
 
-def migrate_v1(old: CalibrationV1, source: Path | str) -> Calibration:
-    """Version 1 as version 2: the same polynomials, in mm, of coordinates that are not normalised."""
-    scale = MILLIMETRES[old.unit]
-    migrated = {
-        "source": str(source),
-        "source_sha256": "",
-        "software": "footscan.calibration/1",
-        "cameras": [
-            {
-                "camera": camera.camera,
-                "order": 2,
-                "centre_px": (0.0, 0.0),
-                "scale_px": 1.0,
-                "alpha_y": [scale * a for a in camera.alpha_y],
-                "alpha_z": [scale * a for a in camera.alpha_z],
-                "region_px": [],
-                "points": 0,
-            }
-            for camera in old.cameras
-        ],
-    }
-    return validate(source, Calibration, migrated)  # a coefficient near the largest number has no counterpart in mm
+def _unknown(found: object) -> str:
+    shown = repr(found[:80] if isinstance(found, str) else found)
+    newer = re.fullmatch(f"{_FAMILY}([1-9][0-9]*)", found) if isinstance(found, str) else None
+    if newer and int(newer[1][:9]) > VERSION:
+        return f"expected version 1 to {VERSION}, found {shown}: a newer footscan wrote it"
+    return f"expected '{_FAMILY}1' to '{_FAMILY}{VERSION}', found {shown}"

@@ -1,6 +1,9 @@
-"""The tables of parameters in docs/ are those of the models."""
+"""The tables of parameters and the JSON Schemas in docs/ are those of the models."""
 
-import importlib.util
+import importlib
+import json
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -9,14 +12,21 @@ import pytest
 DOCS = Path(__file__).parents[1] / "docs"
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _scripts_see_each_other() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(DOCS)
+        yield
+
+
 @pytest.fixture(scope="module")
-def parameters() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("docs_parameters", DOCS / "parameters.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def parameters(_scripts_see_each_other: None) -> ModuleType:
+    return importlib.import_module("parameters")
+
+
+@pytest.fixture(scope="module")
+def json_schemas(_scripts_see_each_other: None) -> ModuleType:
+    return importlib.import_module("json_schemas")
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
@@ -44,3 +54,42 @@ def test_links_lead_somewhere() -> None:
         for target in page.read_text(encoding="utf-8").split("](")[1:]:
             path = target.split(")")[0].split("#")[0]
             assert not path or "://" in path or (page.parent / path).exists(), f"{page.name}: {path}"
+
+
+def test_json_schemas_are_current(json_schemas: ModuleType) -> None:
+    written = {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "formats").iterdir()}
+    assert written == json_schemas.json_schemas(), "run docs/json_schemas.py"
+
+
+def test_every_document_has_its_json_schema(json_schemas: ModuleType) -> None:
+    """Wherever `schemas` names a format, there is the schema of it."""
+    named = {
+        found
+        for module in (DOCS.parent / "schemas").rglob("*.py")
+        for found in re.findall(r'format: Literal\["(footscan\.\w+/\d+)"\]', module.read_text(encoding="utf-8"))
+    }
+    schemas = [json.loads(text) for text in json_schemas.json_schemas().values()]
+    assert {schema["properties"]["format"]["const"] for schema in schemas} == named
+    assert {"footscan.calibration/1", "footscan.calibration/3", "footscan.workflow/1"} <= named
+
+
+def test_json_schemas_say_what_fields_mean(json_schemas: ModuleType) -> None:
+    calibration = json.loads(json_schemas.json_schemas()["calibration.schema.json"])
+    camera = calibration["$defs"]["CameraCalibration"]["properties"]
+    assert camera["region_px"]["description"].startswith("Corners of the convex region of pixels")
+    assert camera["region_px"]["maxItems"] == 10_000
+    assert calibration["properties"]["created"]["description"].startswith("When; None where")
+    assert "format" in calibration["required"]
+
+
+def test_json_schemas_take_what_we_take(json_schemas: ModuleType) -> None:
+    jsonschema = pytest.importorskip("jsonschema", reason="not among our own dependencies")
+    written = json_schemas.json_schemas()
+    for path in (DOCS.parent / "tests/schemas/frozen").glob("*.json"):
+        name = path.stem.removesuffix("-mm").removesuffix("-cm").removesuffix("-3")  # the current one has no number
+        schema = json.loads(written[f"{name}.schema.json"])
+        validator = jsonschema.Draft202012Validator(schema)
+        content = json.loads(path.read_text(encoding="utf-8"))
+        validator.check_schema(schema)
+        assert list(validator.iter_errors(content)) == []
+        assert list(validator.iter_errors(content | {"unit": "inch"})) != []

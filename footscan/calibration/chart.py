@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.calibration import LengthUnit
 from schemas.errors import RefusedInput
 from schemas.tables import finite, read_records
+from schemas.units import LengthUnit
 
 MAX_MAGNITUDE = 1e6
 """No coordinate of a foot scanner is larger, in any unit; its powers stay finite."""

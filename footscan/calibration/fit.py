@@ -1,228 +1,194 @@
-"""Calibration from charts: polynomials of several orders, and the choice among them by held-out error."""
+"""The parameters of a model that bring pixels closest to where they belong, and how sure they are."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
-from footscan.calibration.chart import Chart
-from footscan.calibration.polynomial import design_matrix, evaluate, terms
-from footscan.calibration.quadratic import ORDER as QUADRATIC
-from footscan.calibration.quadratic import fit_quadratic
-from schemas.calibration import MILLIMETRES, Calibration, Point, PolynomialCamera
-from schemas.errors import RefusedInput
-from schemas.parameters.calibration import ChartCalibrationParameters
+from footscan.calibration.maps import Model
+from footscan.calibration.observations import Observations
+from schemas.calibration import LARGEST
 
-FEWEST_POINTS = 4
-"""A plane has three unknowns, and one more point tells how well it fits."""
+Floats = NDArray[np.float64]
+
 WORST_CONDITION = 1e7
-"""Condition number of the normalised design matrix beyond which control points do not tell the terms apart."""
+"""Condition number beyond which the observations do not tell the parameters apart."""
+STEPS = 40
+ROUNDS = 4
+"""How often the weights of outliers are found anew."""
+TUKEY = 4.685
+"""Residuals beyond so many standard deviations have no weight (Tukey's biweight, 95 % efficient)."""
+LEAST_SPREAD_MM = 0.01
+"""Residuals of exact data are no reason to call the largest of them outliers."""
 
 
 @dataclass(frozen=True)
-class OrderTrial:
-    """How well a polynomial of one order describes the chart of one camera."""
+class Fit:
+    """A model with the parameters that were found."""
 
-    camera: int
-    order: int
-    unknowns: int
-    """Coefficients of Y, and as many of Z."""
-    points: int
-    rms_mm: float | None
-    """Distance from the control points that it was fitted to, root mean square; None where there is no fit."""
-    held_out_rms_mm: float | None
-    """The same on points left out of the fit; None where none can be left out."""
-    worst_mm: float | None
-    """Largest distance from a control point, held out where that is known."""
-    worst_point: str | None
-    status: Literal["chosen", "tried", "determined", "refused"]
-    """`determined`: it passes through its points by construction, so nothing is known of its error."""
-    remark: str = ""
+    model: Model
+    parameters: Floats
+    """(P,)."""
+    covariance: Floats | None
+    """(P, P); None where there are as many unknowns as observations, which leave nothing to judge by."""
+    condition: float
+    residuals: Floats
+    """(N,) normal . (Y, Z) - offset, mm."""
 
 
-def calibrate_chart(
-    charts: Mapping[int, Chart],
-    *,
-    parameters: ChartCalibrationParameters,
-    source: str,
-    source_sha256: str,
-    software: str,
-) -> tuple[Calibration, list[OrderTrial]]:
-    """A calibration in mm from charts, and what each order achieved, camera by camera.
+class UndeterminedError(Exception):
+    """The observations do not determine the parameters."""
 
-    `source` names the chart in messages and in the calibration.
+
+def fit(model: Model, observations: Observations, *, robust: bool) -> Fit:
+    """Least squares of the distances from the observed lines, in mm, by the method of Levenberg and Marquardt.
+
+    Each block of observations counts as one, however many pixels it has. With `robust`, outliers lose their weight.
 
     Raises
     ------
-    RefusedInput
-        A camera has too few control points, or they lie on one line, or cannot carry the order that was asked for.
+    UndeterminedError
+        More unknowns than the observations carry, or observations that do not tell them apart.
     """
-    cameras: list[PolynomialCamera] = []
-    trials: list[OrderTrial] = []
-    for camera_id in sorted(charts):
-        chart = charts[camera_id]
-        region = _region(chart, source)
-        if parameters.model == "quadratic":
-            model, rows = _quadratic(chart, region)
+    if observations.independent < model.unknowns:
+        raise UndeterminedError(f"{observations.independent} observations for {model.unknowns} unknowns")
+    share = _share_of_block(observations.block)
+    start = model.start(observations.pixels, observations.normals, observations.offsets)
+    weights = share
+    parameters = _minimise(model, observations, weights, start)
+    for _ in range(ROUNDS if robust else 0):
+        weights = share * (1.0 - _remoteness(_residuals(model, observations, parameters))) ** 2
+        parameters = _minimise(model, observations, weights, parameters)
+    jacobian = _jacobian(model, observations, parameters)
+    normal, _ = _normal_equations(jacobian, weights, np.zeros(len(weights)))
+    condition = _condition(normal + np.diag(model.prior_precision()))
+    if not (condition < WORST_CONDITION and np.abs(parameters).max() <= LARGEST):
+        raise UndeterminedError("the data lie so that they do not tell all unknowns apart")
+    residuals = _residuals(model, observations, parameters)
+    remoteness = _remoteness(residuals) if robust else np.zeros(len(residuals))
+    covariance = _covariance(observations.block, jacobian, residuals, remoteness, model.prior_precision())
+    return Fit(model, parameters, covariance, condition, residuals)
+
+
+def predict(found: Fit, observations: Observations) -> Floats:
+    """Residuals (N,), mm, of observations that the fit need not have seen."""
+    return _residuals(found.model, observations, found.parameters)
+
+
+def _residuals(model: Model, observations: Observations, parameters: Floats) -> Floats:
+    world = model.world(parameters, observations.pixels)
+    return np.asarray(np.einsum("nk,nk->n", observations.normals, world) - observations.offsets)
+
+
+def _jacobian(model: Model, observations: Observations, parameters: Floats) -> Floats:
+    by_parameters = model.by_parameters(parameters, observations.pixels)
+    return np.asarray(np.einsum("nk,nkp->np", observations.normals, by_parameters))
+
+
+def _share_of_block(block: NDArray[np.intp]) -> Floats:
+    _, number, count = np.unique(block, return_inverse=True, return_counts=True)
+    return np.asarray(1.0 / count[number])
+
+
+def _remoteness(residuals: Floats) -> Floats:
+    """(residual / largest with weight)^2, 1 for those beyond: the weight of Tukey's biweight is (1 - that)^2."""
+    spread = max(1.4826 * float(np.median(np.abs(residuals))), LEAST_SPREAD_MM)
+    return np.asarray(np.clip((residuals / (TUKEY * spread)) ** 2, None, 1.0))
+
+
+def _minimise(model: Model, observations: Observations, weights: Floats, start: Floats) -> Floats:
+    """The parameters of the least weighted squares; steps that do not lower them are damped and tried again."""
+    precision = model.prior_precision()
+
+    def cost_of(parameters: Floats) -> tuple[float, Floats]:
+        residuals = _residuals(model, observations, parameters)
+        return float(np.sum(weights * residuals**2) + np.sum(precision * parameters**2)), residuals
+
+    parameters = start
+    cost, residuals = cost_of(parameters)
+    if not np.isfinite(cost):
+        raise UndeterminedError("no homography takes the pixels near to where they belong")
+    damping = 0.0
+    for _ in range(STEPS):
+        jacobian = _jacobian(model, observations, parameters)
+        normal, gradient = _normal_equations(jacobian, weights, residuals)
+        normal += np.diag(precision)
+        gradient += precision * parameters
+        scale = np.sqrt(np.diagonal(normal))
+        scale[scale == 0.0] = 1.0
+        scaled = normal / np.outer(scale, scale)
+        for _ in range(12):
+            damped = scaled + max(damping, 1e-14) * np.eye(len(scale))
+            step = -np.linalg.solve(damped, gradient / scale) / scale
+            lower, moved = cost_of(parameters + step)
+            if lower <= cost:
+                break
+            damping = max(10.0 * damping, 1e-6)
         else:
-            model, rows = _polynomial(chart, region, parameters, source)
-        cameras.append(model)
-        trials += rows
-    calibration = Calibration(source=source, source_sha256=source_sha256, software=software, cameras=cameras)
-    return calibration, trials
+            return parameters
+        parameters, residuals = parameters + step, moved
+        damping = 0.0 if damping <= 1e-6 else damping / 10.0
+        if cost - lower <= 1e-12 * cost + 1e-24:
+            break
+        cost = lower
+    return parameters
 
 
-def _region(chart: Chart, source: str) -> list[Point]:
-    """Corners of the convex hull of the control pixels."""
-    if len(chart.points) < FEWEST_POINTS:
-        problem = f"{len(chart.points)} control points, expected at least {FEWEST_POINTS}"
-        raise RefusedInput(source, problem, field=f"camera {chart.camera}")
-    try:
-        corners = chart.pixels[ConvexHull(chart.pixels).vertices]
-    except QhullError:
-        problem = "the pixels of all control points lie on one line, expected them to cover a region of the image"
-        raise RefusedInput(source, problem, field=f"camera {chart.camera}") from None
-    return [(float(i), float(j)) for i, j in corners]
+@numba.njit(cache=True, nogil=True)
+def _normal_equations(jacobian: Floats, weights: Floats, residuals: Floats) -> tuple[Floats, Floats]:
+    """J^T W J and J^T W r. Not by BLAS, whose sums depend on the number of its threads."""
+    unknowns = jacobian.shape[1]
+    normal, gradient = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
+    for n in range(jacobian.shape[0]):
+        for p in range(unknowns):
+            weighted = weights[n] * jacobian[n, p]
+            gradient[p] += weighted * residuals[n]
+            for q in range(p + 1):
+                normal[p, q] += weighted * jacobian[n, q]
+    for p in range(unknowns):
+        for q in range(p):
+            normal[q, p] = normal[p, q]
+    return normal, gradient
 
 
-def _polynomial(
-    chart: Chart, region: list[Point], parameters: ChartCalibrationParameters, source: str
-) -> tuple[PolynomialCamera, list[OrderTrial]]:
-    """The polynomial of the order that was asked for, or else of that with the least held-out error."""
-    highest = max(parameters.highest_order, parameters.order or 1)
-    attempts = [_try_order(chart, region, order) for order in range(1, highest + 1)]
-    trials = [trial for _, trial in attempts]
-    if parameters.order is not None:
-        chosen = parameters.order - 1
-    else:
-        chosen = min(range(highest), key=lambda index: _or_infinite(trials[index].held_out_rms_mm))
-    model, trial = attempts[chosen]
-    if model is None or (parameters.order is None and trial.held_out_rms_mm is None):
-        problem = f"order {trial.order} cannot be fitted: {trial.remark or 'no point can be held out'}"
-        raise RefusedInput(source, problem, field=f"camera {chart.camera}")
-    if trial.status == "tried":
-        trials[chosen] = replace(trial, status="chosen")
-    return model, trials
+def _condition(normal: Floats) -> float:
+    """Of the weighted Jacobian, prior included, with its columns scaled to one length: within sqrt P the best scaling.
 
-
-def _or_infinite(value: float | None) -> float:
-    return np.inf if value is None else value
-
-
-def _try_order(chart: Chart, region: list[Point], order: int) -> tuple[PolynomialCamera | None, OrderTrial]:
-    """Least squares in normalised coordinates, and the errors in mm."""
-    points, unknowns = len(chart.points), terms(order)
-
-    def refused(remark: str) -> tuple[None, OrderTrial]:
-        trial = OrderTrial(chart.camera, order, unknowns, points, None, None, None, None, "refused", remark)
-        return None, trial
-
-    if points < unknowns:
-        return refused(f"{points} points for {unknowns} unknowns")
-    low, high = chart.pixels.min(axis=0), chart.pixels.max(axis=0)
-    centre, scale = (low + high) / 2, float((high - low).max() / 2)
-    normalised = (chart.pixels - centre) / scale
-    matrix = design_matrix(normalised[:, 0], normalised[:, 1], order)
-    if np.linalg.cond(matrix) > WORST_CONDITION:
-        return refused("the points lie so that they do not tell all terms apart")
-    q, r = np.linalg.qr(matrix)
-    world = MILLIMETRES[chart.unit] * chart.world[:, 1:]
-    alpha = np.linalg.solve(r, q.T @ world)
-    residuals = world - matrix @ alpha
-    held_out = _held_out_residuals(chart, q, residuals)
-    rms = _rms(residuals)
-    held_out_rms = None if held_out is None else _rms(held_out)
-    model = PolynomialCamera(
-        camera=chart.camera,
-        order=order,
-        centre_px=(float(centre[0]), float(centre[1])),
-        scale_px=scale,
-        alpha_y=alpha[:, 0].tolist(),
-        alpha_z=alpha[:, 1].tolist(),
-        region_px=region,
-        points=points,
-        rms_mm=rms,
-        held_out_rms_mm=held_out_rms,
-    )
-    worst_mm, worst_point = _worst(chart, residuals if held_out is None else held_out)
-    determined = points == unknowns
-    remark = "passes through its points by construction" if determined else ""
-    status: Literal["determined", "tried"] = "determined" if determined else "tried"
-    return model, OrderTrial(
-        chart.camera, order, unknowns, points, rms, held_out_rms, worst_mm, worst_point, status, remark
-    )
-
-
-def _held_out_residuals(
-    chart: Chart, q: NDArray[np.float64], residuals: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
-    """Residuals (N, 2) of each point under the polynomial fitted without it; None where a point cannot be left out.
-
-    Points at one world position or at one pixel are left out together: they are one corner, clicked twice. For a group
-    g with the block H_gg of the hat matrix, the residuals are (I - H_gg)^-1 e_g (Cook & Weisberg 1982, section 3.2).
+    From its normal matrix, which tells condition numbers up to about 1e8. A. van der Sluis, "Condition numbers and
+    equilibration of matrices", Numer. Math. 14 (1969) 14-23.
     """
-    held_out = np.empty_like(residuals)
-    group = _groups(chart)
-    for number in np.unique(group):
-        members = np.flatnonzero(group == number)
-        left = np.eye(len(members)) - q[members] @ q[members].T
-        if np.linalg.eigvalsh(left)[0] < 1.0 / WORST_CONDITION:
-            return None
-        held_out[members] = np.linalg.solve(left, residuals[members])
-    return held_out
+    lengths = np.sqrt(np.diagonal(normal))
+    if not lengths.all() or not np.isfinite(lengths).all():
+        return np.inf
+    spectrum = np.linalg.eigvalsh(normal / np.outer(lengths, lengths))
+    return float(np.sqrt(spectrum[-1] / spectrum[0])) if spectrum[0] > 0.0 else np.inf
 
 
-def _groups(chart: Chart) -> NDArray[np.intp]:
-    """A number (N,) for each point, the same for points that share a world position or a pixel."""
-    group = np.arange(len(chart.points))
-    for positions in (chart.world, chart.pixels):
-        same = np.unique(positions, axis=0, return_inverse=True)[1].ravel()
-        for number in range(same.max() + 1):
-            touched = np.isin(group, group[same == number])
-            group[touched] = group[touched].min()
-    return group
+def _covariance(
+    block: NDArray[np.intp], jacobian: Floats, residuals: Floats, remoteness: Floats, precision: Floats
+) -> Floats | None:
+    """The variance of a block times the inverse of the normal matrix.
+
+    The variance is that of the blocks' mean residuals: what neighbours err in common does not average out. Residuals
+    count as far as their weight lets them pull, and what the weights cost is made up for: P. J. Huber, "Robust
+    regression: asymptotics, conjectures and Monte Carlo", Ann. Statist. 1 (1973) 799-821. Without outliers to guard
+    against (`remoteness` zero) this is the ordinary covariance of least squares.
+    """
+    share = _share_of_block(block)
+    pulls = np.bincount(np.unique(block, return_inverse=True)[1], share * residuals * (1.0 - remoteness) ** 2)
+    blocks, unknowns = len(pulls), jacobian.shape[1]
+    slopes = (1.0 - remoteness) * (1.0 - 5.0 * remoteness)  # of the pull by the residual
+    slope = float(np.sum(share * slopes)) / blocks
+    if blocks <= unknowns or slope <= 0.0:
+        return None
+    few = 1.0 + unknowns / blocks * float(np.sum(share * (slopes - slope) ** 2)) / blocks / slope**2
+    variance = few**2 * float(np.sum(pulls**2)) / (blocks - unknowns)
+    normal, _ = _normal_equations(jacobian, share, residuals)
+    covariance = variance / slope * _inverse(slope * normal + np.diag(precision))
+    return np.asarray((covariance + covariance.T) / 2)
 
 
-def _rms(residuals: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(np.sum(residuals**2, axis=1))))
-
-
-def _worst(chart: Chart, residuals: NDArray[np.float64]) -> tuple[float, str]:
-    distances = np.hypot(residuals[:, 0], residuals[:, 1])
-    index = int(distances.argmax())
-    return float(distances[index]), chart.points[index]
-
-
-def _quadratic(chart: Chart, region: list[Point]) -> tuple[PolynomialCamera, list[OrderTrial]]:
-    """The thesis's model: second order of the plain pixels; its held-out error is that of any second order."""
-    fit = fit_quadratic(chart)
-    scale = MILLIMETRES[chart.unit]
-    model = PolynomialCamera(
-        camera=chart.camera,
-        order=QUADRATIC,
-        centre_px=(0.0, 0.0),
-        scale_px=1.0,
-        alpha_y=[scale * a for a in fit.alpha_y],
-        alpha_z=[scale * a for a in fit.alpha_z],
-        region_px=region,
-        points=fit.points,
-    )
-    residuals = scale * chart.world[:, 1:] - evaluate(model, chart.pixels)
-    _, trial = _try_order(chart, region, QUADRATIC)
-    worst_mm, worst_point = trial.worst_mm, trial.worst_point
-    if worst_mm is None or worst_point is None:
-        worst_mm, worst_point = _worst(chart, residuals)
-    rms = _rms(residuals)
-    model = model.model_copy(update={"rms_mm": rms, "held_out_rms_mm": trial.held_out_rms_mm})
-    trial = replace(
-        trial,
-        rms_mm=rms,
-        worst_mm=worst_mm,
-        worst_point=worst_point,
-        status="determined" if fit.determined else "chosen",
-        remark=fit.remark or "",
-    )
-    return model, [trial]
+def _inverse(normal: Floats) -> Floats:
+    scale = np.sqrt(np.diagonal(normal))
+    return np.asarray(np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale))

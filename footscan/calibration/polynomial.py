@@ -1,10 +1,67 @@
-"""Polynomials of the pixel: their terms, their value, and the region of the image that supports them."""
+"""Polynomials of the pixel as a model of a camera."""
 
-import numba
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from schemas.calibration import PolynomialCamera
+from schemas.calibration import PolynomialMap
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PolynomialModel:
+    """Y and Z as polynomials of one order in u = (i - centre_i) / scale and v = (j - centre_j) / scale."""
+
+    order: int
+    centre_px: tuple[float, float]
+    scale_px: float
+
+    @property
+    def unknowns(self) -> int:
+        """Coefficients of Y and of Z."""
+        return 2 * terms(self.order)
+
+    def start(self, pixels: Floats, normals: Floats, offsets: Floats) -> Floats:
+        """Parameters (P,) from which a fit begins; the fit is linear, so any will do."""
+        del pixels, normals, offsets
+        return np.zeros(self.unknowns)
+
+    def prior_precision(self) -> Floats:
+        """Nothing is known beforehand: (P,) zeros."""
+        return np.zeros(self.unknowns)
+
+    def world(self, parameters: Floats, pixels: Floats) -> Floats:
+        """Y and Z, (N, 2) mm, of `pixels` (N, 2)."""
+        matrix = design_matrix(*self._normalised(pixels), self.order)
+        return np.asarray(np.einsum("nt,kt->nk", matrix, parameters.reshape(2, -1)))
+
+    def by_parameters(self, parameters: Floats, pixels: Floats) -> Floats:
+        """Derivatives (N, 2, P) of `world` by the parameters."""
+        del parameters
+        matrix = design_matrix(*self._normalised(pixels), self.order)
+        jacobian = np.zeros((len(pixels), 2, self.unknowns))
+        jacobian[:, 0, : matrix.shape[1]] = matrix
+        jacobian[:, 1, matrix.shape[1] :] = matrix
+        return jacobian
+
+    def by_pixels(self, parameters: Floats, pixels: Floats) -> Floats:
+        """Derivatives (N, 2, 2) of `world` by i and j, mm/px."""
+        by_u, by_v = derivatives(*self._normalised(pixels), self.order)
+        alpha = parameters.reshape(2, -1).T
+        return np.stack([by_u @ alpha, by_v @ alpha], axis=-1) / self.scale_px
+
+    def as_map(self, parameters: Floats) -> PolynomialMap:
+        """For the calibration file."""
+        alpha_y, alpha_z = parameters.reshape(2, -1).tolist()
+        return PolynomialMap(
+            order=self.order, centre_px=self.centre_px, scale_px=self.scale_px, alpha_y=alpha_y, alpha_z=alpha_z
+        )
+
+    def _normalised(self, pixels: Floats) -> tuple[Floats, Floats]:
+        u, v = ((pixels - np.array(self.centre_px)) / self.scale_px).T
+        return u, v
 
 
 def terms(order: int) -> int:
@@ -16,86 +73,35 @@ def terms(order: int) -> int:
     return (order + 1) * (order + 2) // 2
 
 
-def design_matrix(u: ArrayLike, v: ArrayLike, order: int) -> NDArray[np.float64]:
+def design_matrix(u: ArrayLike, v: ArrayLike, order: int) -> Floats:
     """The terms at (u, v), each of shape (N,): an (N, terms) matrix in the order 1, u, v, u^2, uv, v^2, u^3, ...
 
     >>> design_matrix([2.0], [3.0], 2)
     array([[1., 2., 3., 4., 6., 9.]])
     """
-    u, v = np.asarray(u, np.float64), np.asarray(v, np.float64)
-    powers = [(degree - k, k) for degree in range(order + 1) for k in range(degree + 1)]
-    return np.stack([u**a * v**b for a, b in powers], axis=-1)
+    u_power, v_power = _powers(u, order), _powers(v, order)
+    return np.stack([u_power[a] * v_power[b] for a, b in _exponents(order)], axis=-1)
 
 
-def evaluate(camera: PolynomialCamera, pixels: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Y and Z of pixels.
+def derivatives(u: ArrayLike, v: ArrayLike, order: int) -> tuple[Floats, Floats]:
+    """The derivatives of the terms by u and by v, two (N, terms) matrices in the order of `design_matrix`.
 
-    Parameters
-    ----------
-    pixels : (N, 2), px, image frame: column i and row j.
-
-    Returns
-    -------
-    (N, 2) float64, mm, scanner frame: Y and Z.
+    >>> derivatives([2.0], [3.0], 2)
+    (array([[0., 1., 0., 4., 3., 0.]]), array([[0., 0., 1., 0., 2., 6.]]))
     """
-    normalised = (np.asarray(pixels, np.float64) - np.array(camera.centre_px)) / camera.scale_px
-    world: NDArray[np.float64] = _evaluate(normalised, camera.order, np.array([camera.alpha_y, camera.alpha_z]))
-    return world
+    u_power, v_power = _powers(u, order), _powers(v, order)
+    by_u = [a * u_power[max(a - 1, 0)] * v_power[b] for a, b in _exponents(order)]
+    by_v = [b * u_power[a] * v_power[max(b - 1, 0)] for a, b in _exponents(order)]
+    return np.stack(by_u, axis=-1), np.stack(by_v, axis=-1)
 
 
-def supported(camera: PolynomialCamera, pixels: NDArray[np.floating], margin_px: float = 0.0) -> NDArray[np.bool_]:
-    """Which pixels lie in the region that control points support, or at most `margin_px` beyond one of its sides.
-
-    The region is convex. `pixels` is (N, 2), px, image frame; the result is (N,). A camera whose region is not known
-    supports every pixel.
-    """
-    if not camera.region_px:
-        return np.ones(len(pixels), np.bool_)
-    corners = np.array(camera.region_px)
-    sides = np.roll(corners, -1, axis=0) - corners
-    sides, corners = sides[np.any(sides != 0, axis=1)], corners[np.any(sides != 0, axis=1)]
-    doubled_area = np.sum(corners[:, 0] * np.roll(corners[:, 1], -1) - np.roll(corners[:, 0], -1) * corners[:, 1])
-    # Inward unit normals: the corners may run either way round.
-    inward = np.sign(doubled_area) * np.stack([-sides[:, 1], sides[:, 0]], axis=1)
-    inward /= np.hypot(sides[:, 0], sides[:, 1])[:, np.newaxis]
-    offsets = np.sum(inward * corners, axis=1)
-    rounding = 1e-9 * (1.0 + np.abs(corners).max(initial=0.0))  # a corner lies in its own region
-    inside: NDArray[np.bool_] = _inside(np.asarray(pixels, np.float64), inward, offsets - margin_px - rounding)
-    return inside
+def _exponents(order: int) -> list[tuple[int, int]]:
+    return [(degree - k, k) for degree in range(order + 1) for k in range(degree + 1)]
 
 
-@numba.njit(cache=True, nogil=True)
-def _evaluate(uv: NDArray[np.float64], order: int, alpha: NDArray[np.float64]) -> NDArray[np.float64]:
-    world = np.empty((uv.shape[0], 2))
-    u_power = np.ones(order + 1)
-    v_power = np.ones(order + 1)
-    for n in range(uv.shape[0]):
-        for k in range(1, order + 1):
-            u_power[k] = u_power[k - 1] * uv[n, 0]
-            v_power[k] = v_power[k - 1] * uv[n, 1]
-        y = 0.0
-        z = 0.0
-        term = 0
-        for degree in range(order + 1):
-            for k in range(degree + 1):
-                value = u_power[degree - k] * v_power[k]
-                y += alpha[0, term] * value
-                z += alpha[1, term] * value
-                term += 1
-        world[n, 0] = y
-        world[n, 1] = z
-    return world
-
-
-@numba.njit(cache=True, nogil=True)
-def _inside(
-    pixels: NDArray[np.float64], inward: NDArray[np.float64], offsets: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    inside = np.ones(pixels.shape[0], np.bool_)
-    for n in range(pixels.shape[0]):
-        for k in range(offsets.shape[0]):
-            # Written so that a pixel that is not a number lies outside.
-            if not inward[k, 0] * pixels[n, 0] + inward[k, 1] * pixels[n, 1] >= offsets[k]:
-                inside[n] = False
-                break
-    return inside
+def _powers(values: ArrayLike, order: int) -> list[Floats]:
+    base = np.asarray(values, np.float64)
+    powers = [np.ones_like(base)]
+    for _ in range(order):
+        powers.append(powers[-1] * base)
+    return powers

@@ -8,7 +8,7 @@ from scipy.linalg import qr, solve_triangular
 
 from footscan.calibration.chart import Chart
 from footscan.calibration.polynomial import design_matrix, terms
-from schemas.calibration import LengthUnit
+from schemas.units import LengthUnit
 
 ORDER = 2
 

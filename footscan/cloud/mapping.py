@@ -3,17 +3,17 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.polynomial import evaluate, supported
+from footscan.calibration.maps import is_supported, to_world
 from footscan.cloud.points import make_points
 from footscan.stripe.points import StripePoints
-from schemas.calibration import PolynomialCamera
+from schemas.calibration import CameraCalibration
 from schemas.errors import RefusedInput
 from schemas.parameters.mapping import MappingParameters
 
 
 def map_stripe(
     stripe: StripePoints,
-    camera: PolynomialCamera,
+    camera: CameraCalibration,
     x_of_frame: NDArray[np.float64],
     parameters: MappingParameters,
 ) -> NDArray[np.void]:
@@ -40,11 +40,11 @@ def map_stripe(
         problem = f"stripe points in frames up to {int(frame.max())}, expected an X for each, found {len(x_of_frame)}"
         raise RefusedInput(f"camera {camera.camera}", problem, field="positions")
     pixels = np.column_stack([stripe["i"], stripe["j"]]).astype(np.float64)
-    yz = evaluate(camera, pixels)
+    yz = to_world(camera, pixels)
     return make_points(
         np.column_stack([x_of_frame[frame], yz]),
         camera=camera.camera,
         frame=frame,
         source=np.arange(len(pixels)),
-        supported=supported(camera, pixels, parameters.margin_px),
+        supported=is_supported(camera, pixels, parameters.margin_px),
     )

@@ -1,5 +1,9 @@
 """The reference object that the virtual scanner is calibrated with."""
 
+from pathlib import Path
+
+from schemas.documents import read_yaml
+from schemas.errors import RefusedInput
 from schemas.reference import ReferenceObject
 
 _PROFILE: list[tuple[float, float]] = [
@@ -7,8 +11,9 @@ _PROFILE: list[tuple[float, float]] = [
     (-20, 30),
 ]  # fmt: skip
 _PLACEMENTS: list[tuple[float, float]] = [
-    (0, 0), (30, 0), (-30, 0), (15, 0), (-15, 0), (24, 8), (-24, 8), (0, 14), (40, 14), (-40, 14),
+    (0, 0), (40, 14), (-40, 14), (30, 0), (-30, 0), (0, 14), (24, 8), (-24, 8), (15, 0), (-15, 0),
 ]  # fmt: skip
+"""The first five fill the volume on their own: its four corners and the middle."""
 
 
 def standard_reference() -> ReferenceObject:
@@ -21,3 +26,14 @@ def standard_reference() -> ReferenceObject:
         profile_mm=[list(corner) for corner in _PROFILE],
         placements_mm=[list(placement) for placement in _PLACEMENTS],
     )
+
+
+def read_reference(path: Path) -> ReferenceObject:
+    """The reference object in the YAML file `path`; refused where a placement would put it into the glass."""
+    reference = read_yaml(path, ReferenceObject)
+    lowest = min(z for _, z in reference.profile_mm)
+    for number, (_, shift) in enumerate(reference.placements_mm):
+        if lowest + shift < -1e-9:  # sums of decimals are not exact
+            problem = f"reaches down to Z = {lowest + shift:g} mm, expected the object on the glass (Z = 0) or above it"
+            raise RefusedInput(path, problem, field=f"placements_mm.{number}")
+    return reference

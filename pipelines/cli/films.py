@@ -11,6 +11,7 @@ from schemas.errors import Fault, RefusedInput
 
 if TYPE_CHECKING:
     from schemas.parameters.simulation import SimulationSettings
+    from schemas.reference import ReferenceObject
 
 simulate = typer.Typer(help="Film with the virtual scanner: a scan, or the reference object.", no_args_is_help=True)
 
@@ -68,25 +69,32 @@ def simulate_scan(
 @simulate.command("capture")
 def simulate_capture(
     out: Out,
+    reference: Annotated[Path | None, typer.Option(help="Reference object (YAML) instead of the standard one.")] = None,
+    placements: Annotated[int | None, typer.Option(min=1, help="Only so many of its placements.")] = None,
     light: Light = "ambient",
     seed: Seed = 1,
     scanner_seed: ScannerSeed = 1,
 ) -> None:
-    """Film the reference object in ten placements, and write the chart of its corners as a person would click them."""
+    """Film the reference object in its placements, and write the chart of its corners as a person would click them."""
     from footscan.virtual.capture import record_capture
-    from footscan.virtual.reference import standard_reference
+    from footscan.virtual.reference import read_reference, standard_reference
     from pipelines.cli.progress import frame_progress
 
     _check_empty(out)
+    filmed = standard_reference() if reference is None else read_reference(reference)
+    if placements is not None:
+        filmed = _first_placements(filmed, placements)
     with frame_progress("filming") as progress:
         record_capture(
             out,
-            standard_reference(),
+            filmed,
             settings=_settings(light, seed, scanner_seed),
             clicks_seed=seed,
             progress=progress,
         )
-    message(f"{out}: filmed the reference object, chart in {out / 'chart.csv'}")
+    count = len(filmed.placements_mm)
+    placed = f"{count} placement{'s' * (count != 1)}"
+    message(f"{out}: filmed the reference object in {placed}, chart in {out / 'chart.csv'}")
 
 
 def ingest(
@@ -153,6 +161,13 @@ def _settings(
     from schemas.parameters.simulation import SimulationSettings
 
     return SimulationSettings(seed=seed, scanner_seed=scanner_seed, ambient=light, frames=frames, step_mm=step_mm)
+
+
+def _first_placements(reference: "ReferenceObject", count: int) -> "ReferenceObject":
+    known = len(reference.placements_mm)
+    if count > known:
+        raise RefusedInput("--placements", f"the reference object has {known}, expected at most as many, found {count}")
+    return reference.model_copy(update={"placements_mm": reference.placements_mm[:count]})
 
 
 def _check_empty(folder: Path) -> None:

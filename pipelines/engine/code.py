@@ -4,6 +4,7 @@ Comments, docstrings and layout do not count. Libraries whose arithmetic it uses
 """
 
 import ast
+import gc
 import hashlib
 import importlib.metadata
 import importlib.util
@@ -27,7 +28,8 @@ DISTRIBUTIONS = {
 
 
 _PARSING = threading.Lock()
-"""Before Python 3.11.5, two threads that build syntax trees at once can fail (cpython#106905)."""
+"""With Python 3.11, a thread that builds a syntax tree can fail where another one builds one, or runs code of its own
+while the first collects garbage (cpython#106905)."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,13 @@ class CodeIdentity:
 def code_identity(module: ModuleType) -> CodeIdentity:
     """The identity of `module` and of everything in this project that it reaches by import."""
     with _PARSING:
-        return _identity(module)
+        collecting = gc.isenabled()
+        gc.disable()
+        try:
+            return _identity(module)
+        finally:
+            if collecting:
+                gc.enable()
 
 
 @cache

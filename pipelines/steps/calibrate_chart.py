@@ -4,14 +4,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from footscan.calibration.chart import read_chart
-from footscan.calibration.fit import calibrate_chart
+from footscan.calibration.from_chart import calibrate_chart
 from pipelines.engine.digest import sha256
 from pipelines.version import SOFTWARE
+from schemas.calibration import Source
 from schemas.errors import DamagedError
-from schemas.parameters.calibration import ChartCalibrationParameters
+from schemas.parameters.calibration import CalibrationParameters
 
 
-def run(inputs: Mapping[str, bytes], parameters: ChartCalibrationParameters, places: Mapping[str, Path]) -> bytes:
+def run(inputs: Mapping[str, bytes], parameters: CalibrationParameters, places: Mapping[str, Path]) -> bytes:
     """`inputs`: the `chart`; `places`: the `chart`'s file."""
     file = places["chart"]
     if file.read_bytes() != inputs["chart"]:
@@ -19,8 +20,7 @@ def run(inputs: Mapping[str, bytes], parameters: ChartCalibrationParameters, pla
     calibration, _ = calibrate_chart(
         read_chart(file),
         parameters=parameters,
-        source=file.name,
-        source_sha256=sha256(inputs["chart"]),
+        source=Source(name=file.name, sha256=sha256(inputs["chart"])),
         software=SOFTWARE,
     )
     return (calibration.model_dump_json(indent=2) + "\n").encode()

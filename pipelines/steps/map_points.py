@@ -9,7 +9,7 @@ import numpy as np
 from footscan.cloud.mapping import map_stripe
 from footscan.frames.travel import travelled
 from pipelines.arrays import pack, unpack
-from schemas.calibration import PolynomialCamera
+from schemas.calibration import CameraCalibration
 from schemas.errors import RefusedInput
 from schemas.frames import FrameManifest
 from schemas.parameters.mapping import MappingParameters
@@ -20,7 +20,7 @@ def run(inputs: Mapping[str, bytes], parameters: MappingParameters, places: Mapp
     """`inputs`: `stripe`, `manifest`, the camera's `calibration`, and its `travel` or `positions`."""
     del places
     stripe = unpack(inputs["stripe"])["stripe"]
-    camera = PolynomialCamera.model_validate_json(inputs["calibration"])
+    camera = CameraCalibration.model_validate_json(inputs["calibration"])
     frames = len(FrameManifest.model_validate_json(inputs["manifest"]).frames)
     if "positions" in inputs:
         positions = json.loads(inputs["positions"])

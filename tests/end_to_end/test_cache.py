@@ -65,7 +65,7 @@ def change_calibration(bench: Path, cameras: set[int]) -> None:
     calibration = json.loads(file.read_bytes())
     for camera in calibration["cameras"]:
         if camera["camera"] in cameras:
-            camera["alpha_y"][0] += 0.1
+            camera["map"]["matrix"][2] += 0.1
     file.write_text(json.dumps(calibration))
 
 

@@ -174,13 +174,17 @@ def test_missing_positions(refuse: Refuse, scan: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ('"footscan.calibration/2"', '"footscan.calibration/7"', "format: expected 'footscan.calibration/1' or"),
+        ('"footscan.calibration/3"', '"footscan.calibration/7"', "format: expected version 1 to 3, found 'footscan.c"),
         ('"camera": 3,', '"camera": 33,', "cameras: has no camera 3, expected one of 1, 2, 33, 4"),
         ('"camera": 3,', '"camera": 2,', "expected each camera once"),
         ('"scale_px": ', '"scale_px": NaN, "x": ', "expected a JSON document (NaN is no JSON number)"),
-        ('"scale_px": ', '"scale_px": -', "cameras.0.scale_px: "),
-        ('"scale_px": ', '"scales_px": ', "cameras.0.scales_px: unknown field, did you mean 'scale_px'?"),
-        ('"order": ', '"ordre": ', "cameras.0.ordre: unknown field, did you mean 'order'?"),
+        ('"scale_px": ', '"scale_px": -', "cameras.0.map.homography.scale_px: "),
+        (
+            '"scale_px": ',
+            '"scales_px": ',
+            "cameras.0.map.homography.scales_px: unknown field, did you mean 'scale_px'?",
+        ),
+        ('"matrix": ', '"matrx": ', "cameras.0.map.homography.matrx: unknown field, did you mean 'matrix'?"),
         ("{", "", "expected a JSON document"),
     ],
 )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipelines.archive import Job, ScanEnd, job_of_workflow, plan_job, run_job
 from pipelines.engine.run import StepEnd
-from schemas.calibration import Calibration, PolynomialCamera
+from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
 
 FRAMES, STEP_MM = 20, 10.0
 PX_PER_MM = 5.0
@@ -89,14 +89,12 @@ def _write_film(path: Path, pictures: list[bytes]) -> None:
 
 
 def _calibration(scale: float = 1.0) -> Calibration:
-    cameras = [
-        PolynomialCamera(
-            camera=camera, order=1, centre_px=(320.0, 240.0), scale_px=PX_PER_MM,
-            alpha_y=[0.0, scale, 0.0], alpha_z=[CENTRE_Z_MM, 0.0, -scale], region_px=[], points=0,
-        )
-        for camera in (1, 5)
-    ]  # fmt: skip
-    return Calibration(source="made up", source_sha256="", software="tests", cameras=cameras)
+    pixel_map = PolynomialMap(
+        order=1, centre_px=(320.0, 240.0), scale_px=PX_PER_MM, alpha_y=[0.0, scale, 0.0],
+        alpha_z=[CENTRE_Z_MM, 0.0, -scale],
+    )  # fmt: skip
+    cameras = [CameraCalibration(camera=camera, map=pixel_map, region_px=[], points=0) for camera in (1, 5)]
+    return Calibration(sources=[Source(name="made up", sha256="")], software="tests", cameras=cameras)
 
 
 def _radii() -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Values of polynomials and their region, against numbers worked out by hand."""
+"""Polynomials of the pixel and their derivatives, against numbers worked out by hand and finite differences."""
 
 import doctest
 
@@ -6,24 +6,9 @@ import numpy as np
 import pytest
 
 from footscan.calibration import polynomial
-from footscan.calibration.polynomial import design_matrix, evaluate, supported, terms
-from schemas.calibration import Point, PolynomialCamera
+from footscan.calibration.polynomial import PolynomialModel, derivatives, design_matrix, terms
 
-
-def camera(order: int, region: list[Point] | None = None, **changes: object) -> PolynomialCamera:
-    count = terms(order)
-    fields = {
-        "camera": 1,
-        "order": order,
-        "centre_px": (0.0, 0.0),
-        "scale_px": 1.0,
-        "alpha_y": [0.0] * count,
-        "alpha_z": [0.0] * count,
-        "region_px": region or [],
-        "points": 0,
-        **changes,
-    }
-    return PolynomialCamera.model_validate(fields)
+ORDERS = [1, 2, 3, 4, 5]
 
 
 def test_examples() -> None:
@@ -35,40 +20,53 @@ def test_terms_of_third_order() -> None:
     np.testing.assert_array_equal(design_matrix([2.0], [5.0], 3), [[1, 2, 5, 4, 10, 25, 8, 20, 50, 125]])
 
 
-def test_evaluate_by_hand() -> None:
-    model = camera(
-        2, centre_px=(10.0, 20.0), scale_px=5.0, alpha_y=[1, 2, 3, 4, 5, 6], alpha_z=[0.5, 0.0, -1.0, 0.0, 0.0, 2.0]
-    )
+def test_derivatives_of_third_order() -> None:
+    # by u at (2, 5): 3 u^2 = 12, 2 u v = 20, v^2 = 25, 0; by v: 0, u^2 = 4, 2 u v = 20, 3 v^2 = 75
+    by_u, by_v = derivatives([2.0], [5.0], 3)
+    np.testing.assert_array_equal(by_u, [[0, 1, 0, 4, 5, 0, 12, 20, 25, 0]])
+    np.testing.assert_array_equal(by_v, [[0, 0, 1, 0, 2, 10, 0, 4, 20, 75]])
+
+
+def test_world_by_hand() -> None:
+    model = PolynomialModel(2, (10.0, 20.0), 5.0)
+    parameters = np.array([1, 2, 3, 4, 5, 6, 0.5, 0.0, -1.0, 0.0, 0.0, 2.0])
     # (20, 15): u = 2, v = -1: Y = 1 + 4 - 3 + 16 - 10 + 6 = 14, Z = 0.5 + 1 + 2 = 3.5; the centre: the constants
-    world = evaluate(model, np.array([[20, 15], [10, 20]], np.float32))
-    np.testing.assert_allclose(world, [[14, 3.5], [1, 0.5]])
+    world = model.world(parameters, np.array([[20.0, 15.0], [10.0, 20.0]]))
+    np.testing.assert_allclose(world, [[14, 3.5], [1, 0.5]], rtol=1e-15)
 
 
-@pytest.mark.parametrize("order", [1, 2, 3, 4, 5])
-def test_evaluate_is_the_design_matrix_times_alpha(order: int) -> None:
+@pytest.mark.parametrize("order", ORDERS)
+def test_parameters_are_linear(order: int) -> None:
+    model = PolynomialModel(order, (320.0, 240.0), 300.0)
     generator = np.random.default_rng(order)
-    alpha = generator.normal(size=(2, terms(order)))
-    model = camera(order, centre_px=(320.0, 240.0), scale_px=300.0, alpha_y=list(alpha[0]), alpha_z=list(alpha[1]))
-    pixels = generator.uniform(0, 640, (1000, 2))
-    u, v = (pixels[:, 0] - 320) / 300, (pixels[:, 1] - 240) / 300
-    np.testing.assert_allclose(evaluate(model, pixels), design_matrix(u, v, order) @ alpha.T, rtol=1e-12, atol=1e-12)
+    parameters, pixels = generator.normal(size=model.unknowns), generator.uniform(0, 480, (50, 2))
+    assert model.unknowns == 2 * terms(order)
+    world = model.by_parameters(parameters, pixels) @ parameters
+    np.testing.assert_allclose(world, model.world(parameters, pixels), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_slope_is_that_of_finite_differences(order: int) -> None:
+    model = PolynomialModel(order, (320.0, 240.0), 300.0)
+    generator = np.random.default_rng(order)
+    parameters, pixels = 50 * generator.normal(size=model.unknowns), generator.uniform(0, 480, (50, 2))
+    for axis in (0, 1):
+        step = 1e-2 * np.eye(2)[axis]
+        slope = (model.world(parameters, pixels + step) - model.world(parameters, pixels - step)) / 2e-2
+        np.testing.assert_allclose(model.by_pixels(parameters, pixels)[:, :, axis], slope, rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_goes_into_the_file_as_it_is(order: int) -> None:
+    model = PolynomialModel(order, (320.0, 240.0), 300.0)
+    parameters = np.arange(float(model.unknowns))
+    written = model.as_map(parameters)
+    assert (written.order, written.centre_px, written.scale_px) == (order, (320.0, 240.0), 300.0)
+    assert written.alpha_y + written.alpha_z == parameters.tolist()
 
 
 def test_no_pixels() -> None:
-    model = camera(1, [(0, 0), (4, 0), (0, 4)])
-    assert evaluate(model, np.empty((0, 2))).shape == (0, 2)
-    assert supported(model, np.empty((0, 2))).shape == (0,)
-
-
-@pytest.mark.parametrize("turned", [False, True])
-def test_supported_by_a_triangle(turned: bool) -> None:
-    corners: list[Point] = [(0, 0), (4, 0), (0, 4)]
-    model = camera(1, corners[::-1] if turned else corners)
-    pixels = np.array([[1, 1], [0, 0], [4, 0], [2, 2], [2.1, 2.1], [-0.1, 1], [1, -1], [np.nan, 1]])
-    assert supported(model, pixels).tolist() == [True, True, True, True, False, False, False, False]
-    # (2.1, 2.1) is 0.1 sqrt(2) = 0.141 px beyond the long side, (1, -1) is 1 px beyond another
-    assert supported(model, pixels, 0.15).tolist() == [True, True, True, True, True, True, False, False]
-
-
-def test_unknown_region_supports_all() -> None:
-    assert supported(camera(1), np.array([[1e6, -5.0]])).tolist() == [True]
+    model, none = PolynomialModel(1, (0.0, 0.0), 1.0), np.empty((0, 2))
+    assert model.world(np.zeros(6), none).shape == (0, 2)
+    assert model.by_pixels(np.zeros(6), none).shape == (0, 2, 2)
+    assert model.by_parameters(np.zeros(6), none).shape == (0, 2, 6)

@@ -3,17 +3,15 @@ import pytest
 
 from footscan.cloud.mapping import map_stripe
 from footscan.cloud.points import coordinates
-from schemas.calibration import PolynomialCamera
+from schemas.calibration import CameraCalibration, PolynomialMap
 from schemas.errors import RefusedInput
 from schemas.parameters.mapping import MappingParameters
 
-CAMERA = PolynomialCamera(
+CAMERA = CameraCalibration(
     camera=4,
-    order=1,
-    centre_px=(320.0, 240.0),
-    scale_px=100.0,
-    alpha_y=[5.0, 10.0, 0.0],
-    alpha_z=[50.0, 0.0, -20.0],
+    map=PolynomialMap(
+        order=1, centre_px=(320.0, 240.0), scale_px=100.0, alpha_y=[5.0, 10.0, 0.0], alpha_z=[50.0, 0.0, -20.0]
+    ),
     region_px=[(300.0, 200.0), (400.0, 200.0), (400.0, 300.0), (300.0, 300.0)],
     points=9,
 )

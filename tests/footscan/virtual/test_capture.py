@@ -6,10 +6,13 @@ import av
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
-from footscan.virtual.capture import record_capture, visible_corners
+from footscan.virtual.capture import prism, record_capture, visible_corners
 from footscan.virtual.reference import standard_reference
-from footscan.virtual.scanner import HEIGHT, WIDTH, standard_scanner
+from footscan.virtual.scanner import HEIGHT, VOLUME_MM, WIDTH, standard_scanner
+from footscan.virtual.scene import MATT_GREY, Scene
+from footscan.virtual.stripe_truth import is_lit, is_seen
 from schemas.documents import read_yaml
 from schemas.parameters.simulation import SimulationSettings
 from schemas.reference import Capture, ReferenceObject
@@ -76,10 +79,16 @@ def test_corners_that_can_be_clicked() -> None:
         np.testing.assert_array_equal(backwards[camera_id], seen[::-1])
 
 
-def test_reference_covers_the_volume() -> None:
+def test_all_placements_stand_on_the_glass_or_above() -> None:
     reference = standard_reference()
     assert len(reference.placements_mm) == 10
     assert reference.placements_mm[0] == [0, 0]
+    assert min(z for _, z in reference.profile_mm) == 0.0
+    assert all(dz >= 0.0 for _, dz in reference.placements_mm)
+
+
+def test_reference_covers_the_volume() -> None:
+    reference = standard_reference()
     corners: dict[int, list[NDArray[np.float64]]] = {camera.id: [] for camera in SCANNER.cameras}
     for placement in reference.placements_mm:
         profile = np.asarray(reference.profile_mm) + np.asarray(placement)
@@ -94,3 +103,38 @@ def test_reference_covers_the_volume() -> None:
         assert len(y) >= 40
         if camera_id <= 4:
             assert z.max() >= 110.0
+
+
+def test_five_placements_cover_most_of_it() -> None:
+    """The stripe over the first five, which is more than their corners, against that over all ten, in the volume."""
+    reference = standard_reference()
+    stripes = [stripe_seen(np.asarray(reference.profile_mm) + place) for place in reference.placements_mm]
+    for camera in SCANNER.cameras:
+        seen = [stripe[camera.id] for stripe in stripes]
+        five = np.concatenate(seen[:5])
+        assert hull_within_the_volume(five) >= 0.85 * hull_within_the_volume(np.concatenate(seen))
+        outward = five[:, 0] if camera.id in (1, 2, 5, 6) else -five[:, 0]
+        assert outward.max() >= 70.0
+        assert outward[five[:, 1] < 1.0].max() >= 49.0
+        assert five[:, 1].max() >= (113.0 if camera.id <= 4 else 80.0)
+
+
+def hull_within_the_volume(points: NDArray[np.float64]) -> float:
+    """Area of the convex hull of those of `points` (N, 2) that lie in the scan volume, mm2."""
+    low, high = np.array(VOLUME_MM).T
+    return float(ConvexHull(points[((points >= low) & (points <= high)).all(axis=1)]).volume)
+
+
+def stripe_seen(profile: NDArray[np.float64]) -> dict[int, NDArray[np.float64]]:
+    """For each camera (N, 2) Y and Z of the lit profile that it sees, a mm apart; corners counter-clockwise."""
+    ways = np.roll(profile, -1, axis=0) - profile
+    lengths = np.linalg.norm(ways, axis=1)
+    units = ways / lengths[:, np.newaxis]
+    along = [np.arange(0.5, length)[:, np.newaxis] for length in lengths]
+    on_profile = np.concatenate([c + a * u for c, a, u in zip(profile, along, units, strict=True)])
+    counts = [len(part) for part in along]
+    points = np.column_stack([np.zeros(len(on_profile)), on_profile])
+    normals = np.repeat(np.column_stack([np.zeros(len(units)), units[:, 1], -units[:, 0]]), counts, axis=0)
+    scene = Scene(prism(profile), MATT_GREY)
+    lit = is_lit(scene, SCANNER, 0.0, points, normals, SETTINGS)
+    return {camera.id: on_profile[lit & is_seen(scene, camera, 0.0, points, normals)] for camera in SCANNER.cameras}

@@ -1,0 +1,208 @@
+"""A plane seen by a pinhole camera, with the distortion of its lens and a smooth correction for what is left.
+
+The map from a laser's plane to the image of a pinhole is a homography (Hartley & Zisserman 2004, section 8.1). A lens
+bends it: D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37 (1971) 855-866, whose terms run
+from the seen to the ideal place. What a glass plate in the way adds is smooth, and small enough for a polynomial.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.calibration.polynomial import derivatives, design_matrix, terms
+from schemas.calibration import Correction, Distortion, HomographyMap
+
+Floats = NDArray[np.float64]
+
+MATRIX = 8
+LINEAR = 3
+"""Terms of degree 0 and 1, which a correction leaves to the homography."""
+PRIOR_DISTORTION = (0.03, 0.02, 0.003, 0.003)
+"""Standard deviation of k1, k2, p1 and p2 among webcams' lenses, in units of half an image's diagonal: where the data
+say nothing of them, they are small."""
+PRIOR_CORRECTION_MM = 5.0
+"""The same for a correction's coefficients, of which the homography can express some too."""
+NOISE_MM = 0.015
+"""What the data are thought to be good for when they are weighed against what is known beforehand."""
+
+
+@dataclass(frozen=True)
+class HomographyModel:
+    """A homography of u = (i - centre_i) / scale and v = (j - centre_j) / scale, and what is added to it."""
+
+    centre_px: tuple[float, float]
+    scale_px: float
+    distorted: bool = False
+    correction: int | None = None
+    """Order of the correction; None is none."""
+
+    @property
+    def unknowns(self) -> int:
+        """Eight of the matrix, four of the distortion, those of the correction to Y and to Z."""
+        return self._corrected + 2 * self._correction_terms
+
+    def start(self, pixels: Floats, normals: Floats, offsets: Floats) -> Floats:
+        """Parameters (P,) from which a fit begins: the homography that an algebraic error gives, and nothing else.
+
+        `pixels` (N, 2), px; `normals` (N, 2) and `offsets` (N,), mm: each pixel's world point lies on the line
+        normal . (Y, Z) = offset.
+        """
+        parameters = np.zeros(self.unknowns)
+        parameters[:MATRIX] = algebraic_homography(self._normalised(pixels), normals, offsets).ravel()[:MATRIX]
+        return parameters
+
+    def prior_precision(self) -> Floats:
+        """How strongly each parameter is held to zero, (P,), where an error of 1 mm counts as 1."""
+        precision = np.zeros(self.unknowns)
+        if self.distorted:
+            precision[MATRIX : MATRIX + 4] = (NOISE_MM / np.array(PRIOR_DISTORTION)) ** 2
+        precision[self._corrected :] = (NOISE_MM / PRIOR_CORRECTION_MM) ** 2
+        return precision
+
+    def world(self, parameters: Floats, pixels: Floats) -> Floats:
+        """Y and Z, (N, 2) mm, of `pixels` (N, 2)."""
+        uv = self._normalised(pixels)
+        plane, _ = _project(parameters, self._ideal(parameters, uv))
+        if self.correction is not None:
+            plane = plane + np.einsum("nt,kt->nk", self._correction_matrix(uv), self._correction(parameters))
+        return plane
+
+    def by_parameters(self, parameters: Floats, pixels: Floats) -> Floats:
+        """Derivatives (N, 2, P) of `world` by the parameters."""
+        uv = self._normalised(pixels)
+        ideal = self._ideal(parameters, uv)
+        plane, depth = _project(parameters, ideal)
+        jacobian = np.zeros((len(uv), 2, self.unknowns))
+        over_depth = np.column_stack([ideal, np.ones(len(uv))]) / depth[:, np.newaxis]
+        jacobian[:, 0, 0:3] = over_depth
+        jacobian[:, 1, 3:6] = over_depth
+        jacobian[:, :, 6:8] = -plane[:, :, np.newaxis] * over_depth[:, np.newaxis, :2]
+        if self.distorted:
+            by_ideal = _by_ideal(parameters, plane, depth)
+            jacobian[:, :, MATRIX : MATRIX + 4] = by_ideal @ _distortion_terms(uv)
+        if self.correction is not None:
+            matrix = self._correction_matrix(uv)
+            jacobian[:, 0, self._corrected : self._corrected + matrix.shape[1]] = matrix
+            jacobian[:, 1, self._corrected + matrix.shape[1] :] = matrix
+        return jacobian
+
+    def by_pixels(self, parameters: Floats, pixels: Floats) -> Floats:
+        """Derivatives (N, 2, 2) of `world` by i and j, mm/px."""
+        uv = self._normalised(pixels)
+        plane, depth = _project(parameters, self._ideal(parameters, uv))
+        by_uv = _by_ideal(parameters, plane, depth) @ self._ideal_by_uv(parameters, uv)
+        if self.correction is not None:
+            by_u, by_v = derivatives(uv[:, 0], uv[:, 1], self.correction)
+            alpha = self._correction(parameters).T
+            by_uv = by_uv + np.stack([by_u[:, LINEAR:] @ alpha, by_v[:, LINEAR:] @ alpha], axis=-1)
+        return np.asarray(by_uv / self.scale_px)
+
+    def as_map(self, parameters: Floats) -> HomographyMap:
+        """For the calibration file."""
+        distortion = correction = None
+        if self.distorted:
+            k1, k2, p1, p2 = parameters[MATRIX : MATRIX + 4].tolist()
+            distortion = Distortion(k1=k1, k2=k2, p1=p1, p2=p2)
+        if self.correction is not None:
+            alpha_y, alpha_z = self._correction(parameters).tolist()
+            correction = Correction(order=self.correction, alpha_y=alpha_y, alpha_z=alpha_z)
+        return HomographyMap(
+            centre_px=self.centre_px,
+            scale_px=self.scale_px,
+            matrix=parameters[:MATRIX].tolist(),
+            distortion=distortion,
+            correction=correction,
+        )
+
+    @property
+    def _corrected(self) -> int:
+        """Where the parameters of the correction begin."""
+        return MATRIX + 4 * self.distorted
+
+    @property
+    def _correction_terms(self) -> int:
+        return 0 if self.correction is None else terms(self.correction) - LINEAR
+
+    def _correction(self, parameters: Floats) -> Floats:
+        return parameters[self._corrected :].reshape(2, -1)
+
+    def _correction_matrix(self, uv: Floats) -> Floats:
+        assert self.correction is not None
+        return design_matrix(uv[:, 0], uv[:, 1], self.correction)[:, LINEAR:]
+
+    def _normalised(self, pixels: Floats) -> Floats:
+        return np.asarray((pixels - np.array(self.centre_px)) / self.scale_px)
+
+    def _ideal(self, parameters: Floats, uv: Floats) -> Floats:
+        if not self.distorted:
+            return uv
+        return uv + _distortion_terms(uv) @ parameters[MATRIX : MATRIX + 4]
+
+    def _ideal_by_uv(self, parameters: Floats, uv: Floats) -> Floats:
+        identity = np.broadcast_to(np.eye(2), (len(uv), 2, 2))
+        if not self.distorted:
+            return identity
+        k1, k2, p1, p2 = parameters[MATRIX : MATRIX + 4]
+        u, v = uv.T
+        r2 = u * u + v * v
+        radial, slope = k1 * r2 + k2 * r2 * r2, 2.0 * (k1 + 2.0 * k2 * r2)
+        across = slope * u * v + 2.0 * (p1 * u + p2 * v)
+        by_u = np.stack([radial + slope * u * u + 2.0 * p1 * v + 6.0 * p2 * u, across], axis=-1)
+        by_v = np.stack([across, radial + slope * v * v + 6.0 * p1 * v + 2.0 * p2 * u], axis=-1)
+        return np.asarray(identity + np.stack([by_u, by_v], axis=-1))
+
+
+def algebraic_homography(uv: Floats, normals: Floats, offsets: Floats) -> Floats:
+    """The (3, 3) matrix that takes points (u, v) onto lines, by the least algebraic error; its last number is 1.
+
+    Each row is n_y (h1 x) + n_z (h2 x) - d (h3 x) = 0 with x = (u, v, 1): linear in the nine entries (direct linear
+    transformation, Hartley & Zisserman 2004, section 4.1, with lines for points on the world's side). Points and lines
+    are brought to about unit size first, without which it is not to be trusted.
+
+    Parameters
+    ----------
+    uv : (N, 2), N >= 8.
+    normals, offsets : (N, 2) unit and (N,), any unit of length: the lines normal . (Y, Z) = offset.
+    """
+    middle = uv.mean(axis=0)
+    size = float(np.sqrt(np.mean(np.sum((uv - middle) ** 2, axis=1)))) or 1.0
+    origin = np.linalg.pinv(_inner(normals, normals)) @ _inner(normals, offsets[:, np.newaxis])[:, 0]  # their middle
+    distances = offsets - np.sum(normals * origin, axis=1)
+    reach = float(np.sqrt(np.mean(distances**2))) or 1.0
+    x = np.column_stack([(uv - middle) / size, np.ones(len(uv))])
+    rows = np.concatenate([normals[:, :1] * x, normals[:, 1:] * x, -(distances / reach)[:, np.newaxis] * x], axis=1)
+    matrix = np.linalg.eigh(_inner(rows, rows))[1][:, 0].reshape(3, 3)
+    to_unit = np.array([[1.0 / size, 0.0, -middle[0] / size], [0.0, 1.0 / size, -middle[1] / size], [0.0, 0.0, 1.0]])
+    from_unit = np.array([[reach, 0.0, origin[0]], [0.0, reach, origin[1]], [0.0, 0.0, 1.0]])
+    matrix = from_unit @ matrix @ to_unit
+    least = 1e-12 * float(np.abs(matrix).max())  # of the last number, which is 0 where the origin lies on the horizon
+    return np.asarray(matrix / (matrix[2, 2] if abs(matrix[2, 2]) > least else least))
+
+
+def _inner(a: Floats, b: Floats) -> Floats:
+    """The transpose of (N, P) times (N, Q). Not by BLAS, whose sums depend on the number of its threads."""
+    return np.asarray(np.einsum("np,nq->pq", a, b))
+
+
+def _project(parameters: Floats, ideal: Floats) -> tuple[Floats, Floats]:
+    """The plane's points (N, 2), and the depths (N,) by which they were divided."""
+    matrix = np.append(parameters[:MATRIX], 1.0).reshape(3, 3)
+    points = np.einsum("nk,lk->nl", ideal, matrix[:, :2]) + matrix[:, 2]
+    depth = np.where(np.abs(points[:, 2]) < 1e-9, 1e-9, points[:, 2])  # on the horizon: far away, not infinite
+    return points[:, :2] / depth[:, np.newaxis], depth
+
+
+def _by_ideal(parameters: Floats, plane: Floats, depth: Floats) -> Floats:
+    matrix = parameters[:6].reshape(2, 3)[:, :2]
+    horizon = parameters[6:8]
+    return np.asarray((matrix - plane[:, :, np.newaxis] * horizon) / depth[:, np.newaxis, np.newaxis])
+
+
+def _distortion_terms(uv: Floats) -> Floats:
+    """(N, 2, 4): what k1, k2, p1 and p2 are multiplied with."""
+    u, v = uv.T
+    r2 = u * u + v * v
+    along_u = np.stack([u * r2, u * r2 * r2, 2.0 * u * v, r2 + 2.0 * u * u], axis=-1)
+    along_v = np.stack([v * r2, v * r2 * r2, r2 + 2.0 * v * v, 2.0 * u * v], axis=-1)
+    return np.stack([along_u, along_v], axis=1)

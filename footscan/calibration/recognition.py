@@ -1,0 +1,309 @@
+"""Which edge of the reference object each straight piece of the stripe lies on: the first map of a camera, unaided.
+
+Four lines of the image and four of the cross-section, no three of them through one point, determine a homography. All
+ways to name four pieces are tried; a camera sees only edges that face it, which leaves few. The right one explains the
+stripe in all placements. An object that is symmetric looks the same from several sides; which of them it is, placements
+that break the symmetry tell, or else where the camera stands.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations, permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.calibration.edge_points import edge_distances
+from footscan.calibration.homography import algebraic_homography
+from footscan.calibration.lines import ImageLine, find_lines
+from footscan.calibration.reference import Edges
+from schemas.mounting import Mounting
+
+Floats = NDArray[np.float64]
+
+SHORTEST_LINE_PX = 25.0
+LINES_A_FRAME = 6
+"""The longest pieces of a frame are those of the object."""
+EDGES = 16
+"""Names are tried among the longest edges."""
+QUADRUPLES = 16
+"""So many sets of four pieces are tried, the best conditioned first."""
+TRIED_BEFORE_STOPPING = 4
+SAMPLE = 120
+"""Points of a frame by which a map is judged before it is refined."""
+REACH_MM = 4.0
+"""A point farther from every edge than this is not explained at all: lens distortion is not known yet."""
+REFINED = 12
+"""So many maps are refined."""
+GATES_MM = (4.0, 3.0, 2.0, 1.5, 1.5)
+EXPLAINED_MM = 1.5
+"""A point as near to an edge as this is explained by a homography that knows of no distortion."""
+STRAY_SHARE = 0.1
+"""So many points may be nearest to an edge that the camera does not see, at a corner or by chance."""
+SCALE_MM_PX = (0.02, 2.0)
+"""Millimetres to the pixel that a foot scanner's camera can have."""
+SHARP_MM = 0.75
+"""At this distance a point speaks no more for a map: what lies near an edge, not on it, does so by chance."""
+FEWEST_EXPLAINED = 0.4
+"""A map with a lower score is none."""
+AS_GOOD = 0.9
+"""A map with this share of the best one's score may be the right one."""
+APART_MM = 5.0
+"""Maps that place more than stray points farther apart than this are two."""
+
+
+@dataclass(frozen=True)
+class FirstMap:
+    """A homography that knows of no distortion, good to a millimetre or two."""
+
+    matrix: Floats
+    """(3, 3) from (i, j, 1) to (Y, Z, 1), mm."""
+    explained: Floats
+    """(K,) share of the stripe in each placement that lies near an edge; NaN where there is no stripe."""
+    score: float
+    """Share of the stripe that is explained, over all placements; a point counts less the farther off it lies."""
+
+    def world(self, pixels: Floats) -> Floats:
+        """Y and Z, (N, 2) mm, of `pixels` (N, 2)."""
+        return _apply(self.matrix, pixels)
+
+
+class UnrecognisedError(Exception):
+    """The object is not to be recognised."""
+
+
+def recognise(stripes: Sequence[Floats], edges: Edges, placements: Floats, mounting: Mounting) -> FirstMap:
+    """The first map of a camera from the stripe over the reference object.
+
+    Parameters
+    ----------
+    stripes : for each of K placements the stripe's points (N, 2), px; empty where there are none.
+    edges : of the object's cross-section, E of them.
+    placements : (K, 2) shift of the object in each placement, mm.
+    mounting : where the camera stands; it decides where the stripe alone cannot.
+
+    Raises
+    ------
+    UnrecognisedError
+        Too few straight pieces, or no map explains them, or several do.
+    """
+    lines = [[line for line in find_lines(s) if line.length >= SHORTEST_LINE_PX][:LINES_A_FRAME] for s in stripes]
+    pieces = [(placement, line) for placement, found in enumerate(lines) for line in found]
+    if len(pieces) < 4:
+        raise UnrecognisedError(f"{len(pieces)} straight pieces of the stripe in all frames, expected at least four")
+    frames = _Frames.of(stripes, edges, placements)
+    found: list[FirstMap] = []
+    for number, quadruple in enumerate(_quadruples(pieces)):
+        maps = _named_maps([pieces[k] for k in quadruple], edges, placements)
+        found += _refined(maps, frames)
+        if number + 1 >= TRIED_BEFORE_STOPPING and found and max(m.score for m in found) > 0.85:
+            break
+    if not found:
+        raise UnrecognisedError("no view of the object explains the stripe")
+    best = max(found, key=lambda m: m.score)
+    if best.score < FEWEST_EXPLAINED:
+        raise UnrecognisedError(f"the best view of the object explains {best.score:.0%} of the stripe")
+    return _decide([m for m in found if m.score >= AS_GOOD * best.score], frames, mounting)
+
+
+@dataclass(frozen=True)
+class _Frames:
+    """A sample of the stripe's points in all placements."""
+
+    pixels: Floats
+    """(N, 2)."""
+    placement: NDArray[np.intp]
+    """(N,)."""
+    shift: Floats
+    """(N, 2) of the object, mm."""
+    edges: Edges
+    count: int
+
+    @staticmethod
+    def of(stripes: Sequence[Floats], edges: Edges, placements: Floats) -> "_Frames":
+        chosen = []
+        for stripe in stripes:
+            order = np.lexsort((stripe[:, 1], stripe[:, 0]))
+            chosen.append(stripe[order[:: max(1, -(-len(stripe) // SAMPLE))]])
+        placement = np.repeat(np.arange(len(stripes)), [len(s) for s in chosen])
+        return _Frames(np.concatenate(chosen), placement, placements[placement], edges, len(stripes))
+
+    def distances(self, matrix: Floats) -> tuple[NDArray[np.intp], Floats]:
+        """The nearest edge (N,), and the distance from it (N,)."""
+        return edge_distances(self.edges, _apply(matrix, self.pixels) - self.shift)
+
+
+def _quadruples(pieces: list[tuple[int, ImageLine]]) -> list[tuple[int, ...]]:
+    """Sets of four pieces, of which no three meet in one point, the best conditioned first; within a frame if any."""
+    middle = np.array([320.0, 240.0])
+    rows = np.array([[*line.normal, (line.normal @ middle - line.offset) / 200.0] for _, line in pieces])
+    rows /= np.linalg.norm(rows, axis=1, keepdims=True)
+    by_frame: dict[int, list[int]] = {}
+    for k, (placement, _) in enumerate(pieces):
+        by_frame.setdefault(placement, []).append(k)
+    sets: list[tuple[int, ...]] = [q for members in by_frame.values() for q in combinations(members, 4)]
+    if len(sets) < QUADRUPLES:
+        frames = list(by_frame.values())
+        for a, b in combinations(range(len(frames)), 2):
+            sets += [
+                (*p, *q) for p in combinations(frames[a][:3], 2) for q in combinations(frames[b][:3], 2)
+            ]  # fmt: skip
+    if not sets:
+        sets = list(combinations(range(min(len(pieces), 8)), 4))
+
+    def quality(members: tuple[int, ...]) -> float:
+        volumes = [abs(float(np.linalg.det(rows[list(three)]))) for three in combinations(members, 3)]
+        return min(volumes) * min(pieces[k][1].length for k in members)
+
+    return sorted(sets, key=lambda q: (-quality(q), q))[:QUADRUPLES]
+
+
+def _named_maps(quadruple: Sequence[tuple[int, ImageLine]], edges: Edges, placements: Floats) -> list[Floats]:
+    """A homography for each way to name four pieces."""
+    names = _supporting_lines(edges)
+    shifts = placements[[placement for placement, _ in quadruple]]
+    samples = [line.ends for _, line in quadruple]
+    maps = []
+    for named in _namings([placement for placement, _ in quadruple], names, edges):
+        normals = edges.normal[list(named)]
+        offsets = edges.offset[list(named)] + np.sum(normals * shifts, axis=1)
+        if not _in_general_position(normals, offsets):
+            continue
+        matrix = algebraic_homography(np.concatenate(samples), np.repeat(normals, 2, axis=0), np.repeat(offsets, 2))
+        if _is_view(matrix, np.concatenate(samples)):
+            maps.append(matrix)
+    return maps
+
+
+def _supporting_lines(edges: Edges) -> list[int]:
+    """One edge of each line on which edges lie, the longest first."""
+    seen: dict[tuple[float, ...], int] = {}
+    for k in np.argsort(-edges.length, kind="stable").tolist():
+        seen.setdefault((*np.round(edges.normal[k], 6).tolist(), round(float(edges.offset[k]), 6)), k)
+    return list(seen.values())[:EDGES]
+
+
+def _namings(frames: Sequence[int], names: Sequence[int], edges: Edges) -> list[tuple[int, ...]]:
+    """Ways to name pieces so that all named edges can face one camera; within a frame each name once."""
+    facing = edges.normal[list(names)] @ edges.normal[list(names)].T > -1.0 + 1e-6
+    position = {name: k for k, name in enumerate(names)}
+    found = []
+    candidates = permutations(names, 4) if len(set(frames)) == 1 else product(names, repeat=4)
+    for named in candidates:
+        if any(a == b and frames[m] == frames[n] for (m, a), (n, b) in combinations(enumerate(named), 2)):
+            continue
+        if not all(facing[position[a], position[b]] for a, b in combinations(named, 2)):
+            continue
+        if _half_plane(edges.normal[list(named)]):
+            found.append(named)
+    return found
+
+
+def _half_plane(normals: Floats) -> bool:
+    """Whether some direction has all `normals` on its side."""
+    angles = np.sort(np.arctan2(normals[:, 1], normals[:, 0]))
+    gaps = np.diff(np.append(angles, angles[0] + 2 * np.pi))
+    return bool(gaps.max() > np.pi + 1e-6)
+
+
+def _in_general_position(normals: Floats, offsets: Floats) -> bool:
+    """Whether no three of four lines meet in one point, near or at infinity."""
+    rows = np.column_stack([normals, offsets / 50.0])
+    rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    return all(abs(float(np.linalg.det(rows[list(three)]))) > 1e-3 for three in combinations(range(4), 3))
+
+
+def _is_view(matrix: Floats, pixels: Floats) -> bool:
+    """Whether a camera can see the plane so: all of it before the camera, and at a scale that a scanner has."""
+    if not np.isfinite(matrix).all():
+        return False
+    depth = pixels @ matrix[2, :2] + matrix[2, 2]
+    if not (np.all(depth > 0.05) or np.all(depth < -0.05)):
+        return False
+    plane = _apply(matrix, pixels)
+    slopes = (matrix[:2, :2] - plane[:, :, np.newaxis] * matrix[2, :2]) / depth[:, np.newaxis, np.newaxis]
+    stretch = np.linalg.svd(slopes, compute_uv=False)
+    return bool(np.all((stretch > SCALE_MM_PX[0]) & (stretch < SCALE_MM_PX[1])))
+
+
+def _refined(maps: list[Floats], frames: _Frames) -> list[FirstMap]:
+    """The maps that explain most, each fitted to all the points that it explains."""
+
+    def misfit(matrix: Floats) -> float:
+        return float(np.mean(np.minimum(frames.distances(matrix)[1], REACH_MM)))
+
+    found = []
+    for matrix in sorted(maps, key=misfit)[:REFINED]:
+        refined = _refine(matrix, frames)
+        if refined is not None:
+            found.append(refined)
+    return found
+
+
+def _refine(matrix: Floats, frames: _Frames) -> FirstMap | None:
+    for gate in GATES_MM:
+        index, distance = frames.distances(matrix)
+        near = distance < gate
+        if near.sum() < 12:
+            return None
+        normals = frames.edges.normal[index[near]]
+        offsets = frames.edges.offset[index[near]] + np.sum(normals * frames.shift[near], axis=1)
+        matrix = algebraic_homography(frames.pixels[near], normals, offsets)
+        if not _is_view(matrix, frames.pixels[near]):
+            return None
+    index, distance = frames.distances(matrix)
+    near = distance < EXPLAINED_MM
+    seen = np.bincount(index[near], minlength=len(frames.edges.length)) > STRAY_SHARE * near.sum()
+    if not seen.any() or not _half_plane(frames.edges.normal[seen]):
+        return None
+    with np.errstate(invalid="ignore"):
+        shares = np.bincount(frames.placement, near, minlength=frames.count) / np.bincount(
+            frames.placement, minlength=frames.count
+        )
+    return FirstMap(matrix, shares, float(np.mean(np.clip(1.0 - (distance / SHARP_MM) ** 2, 0.0, None))))
+
+
+def _decide(found: list[FirstMap], frames: _Frames, mounting: Mounting) -> FirstMap:
+    """The best of maps that differ; where several explain the stripe as well, the one that fits the mounting."""
+    kept: list[FirstMap] = []
+    for candidate in sorted(found, key=lambda m: -m.score):
+        explained = frames.pixels[frames.distances(candidate.matrix)[1] < EXPLAINED_MM]
+        places = _apply(candidate.matrix, explained)
+        apart = [np.linalg.norm(places - _apply(other.matrix, explained), axis=1) > APART_MM for other in kept]
+        if all(far.mean() > STRAY_SHARE for far in apart):
+            kept.append(candidate)
+    if len(kept) == 1:
+        return kept[0]
+    ranks = [_agreement(candidate, frames, mounting) for candidate in kept]
+    best = max(ranks)
+    if ranks.count(best) > 1:
+        raise UnrecognisedError(
+            f"{ranks.count(best)} views of the object explain the stripe as well; "
+            "say where the camera stands, or add a placement that tells them apart"
+        )
+    return kept[ranks.index(best)]
+
+
+def _agreement(candidate: FirstMap, frames: _Frames, mounting: Mounting) -> tuple[int, int]:
+    """How well a map fits the mounting: the side from which the edges are seen, then the side of the laser's plane."""
+    index, distance = frames.distances(candidate.matrix)
+    facing = frames.edges.normal[index[distance < EXPLAINED_MM]].mean(axis=0)
+    side = int(np.sign(facing[0]) == mounting.y) + int(np.sign(facing[1]) == mounting.z)
+    return side, int(_from_front(candidate.matrix, frames.pixels) == mounting.x)
+
+
+def _from_front(matrix: Floats, pixels: Floats) -> int:
+    """1 for a camera before the laser's plane (+X), -1 behind it.
+
+    Seen from +X with Z up, Y runs to the right; i runs to the right and j down, so the map turns the image over.
+    """
+    middle = pixels.mean(axis=0)
+    corner = _apply(matrix, middle + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    (a, b), (c, d) = corner[1:] - corner[0]
+    return -int(np.sign(a * d - b * c))
+
+
+def _apply(matrix: Floats, pixels: Floats) -> Floats:
+    points = pixels @ matrix[:, :2].T + matrix[:, 2]
+    depth = np.where(np.abs(points[:, 2]) < 1e-9, 1e-9, points[:, 2])
+    return np.asarray(points[:, :2] / depth[:, np.newaxis])

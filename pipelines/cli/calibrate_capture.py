@@ -1,0 +1,76 @@
+"""`footscan calibrate capture`."""
+
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from pipelines.cli.output import AsJson, message, print_json, print_table
+from schemas.errors import RefusedInput
+
+if TYPE_CHECKING:
+    from schemas.calibration import PairAgreement
+
+
+def capture(
+    folder: Annotated[Path, typer.Argument(help="Folder with capture.yaml, the reference object and the frames.")],
+    model: Annotated[
+        Literal["auto", "polynomial", "homography", "homography-distortion", "homography-correction"],
+        typer.Option(help="auto: the one with the least error on edges held out."),
+    ] = "auto",
+    order: Annotated[
+        int | None, typer.Option(min=1, max=5, help="Order of the polynomial, instead of a choice.")
+    ] = None,
+    tolerance_mm: Annotated[
+        float, typer.Option(min=0.01, max=50, help="How far the object may stand from where it should.")
+    ] = 1.0,
+    out: Annotated[Path | None, typer.Option(help="Write the calibration here.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Calibrate from the stripe over the reference object: nobody clicks."""
+    from pipelines.archive import cores
+    from pipelines.calibrate import calibrate_capture
+    from pipelines.cli.trials import print_trials
+    from pipelines.engine.atomic import write_atomically
+    from schemas.parameters.calibration import CaptureCalibrationParameters
+
+    if order is not None and model != "polynomial":
+        raise RefusedInput("--order", "goes with --model polynomial alone")
+    parameters = CaptureCalibrationParameters(model=model, order=order, placement_tolerance_mm=tolerance_mm)
+    made = calibrate_capture(folder, parameters, cores())
+    calibration = made.calibration
+    if out is not None:
+        calibration = calibration.model_copy(update={"created": datetime.now(UTC).replace(microsecond=0)})
+        write_atomically(out, (calibration.model_dump_json(indent=2) + "\n").encode())
+    if as_json:
+        print_json(
+            {
+                "cameras": [camera.model_dump(mode="json") for camera in calibration.cameras],
+                "trials": [asdict(trial) for trial in made.trials],
+                "pairs": [pair.model_dump(mode="json") for pair in calibration.pairs],
+                "departures_mm": made.departures_mm.tolist(),
+            }
+        )
+    else:
+        print_trials(made.trials)
+        _print_pairs(calibration.pairs)
+    for number, (y, z) in enumerate(made.departures_mm):
+        if y or z:
+            message(
+                f"frame {number}: the cameras agree that the object stood {y:+.2f}, {z:+.2f} mm from where it should"
+            )
+    if out is None:
+        message("nothing was written; --out FILE writes the calibration")
+    else:
+        message(f"{out}: calibration of {len(calibration.cameras)} cameras")
+
+
+def _print_pairs(pairs: "list[PairAgreement]") -> None:
+    rows = [
+        [f"{pair.cameras[0]} and {pair.cameras[1]}", str(pair.places), f"{pair.rms_mm:.3f}", f"{pair.worst_mm:.3f}"]
+        for pair in pairs
+    ]
+    if rows:
+        print_table("The same edges seen by two cameras", ["cameras", "places", "apart rms mm", "worst mm"], rows)
