@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.from_capture import (
-    CalibratedView,
     CameraView,
     assemble,
     calibrate_view,
@@ -39,7 +38,6 @@ class CaptureCalibration:
     departures_mm: Floats
     """(K, 2) how far, in Y and Z, the object stood from where it was said, as the cameras agree; zeros where that does
     not help."""
-    views: list[CalibratedView]
 
 
 def calibrate_capture(folder: Path, parameters: CaptureCalibrationParameters, workers: int) -> CaptureCalibration:
@@ -63,19 +61,18 @@ def calibrate_capture(folder: Path, parameters: CaptureCalibrationParameters, wo
         seen = dask.compute(*(dask.delayed(recognised)(camera) for camera in capture.document.cameras))
         views = {view.camera: view for view, _ in seen}
         first = {view.camera: found for view, found in seen}
-        located = locate(views, first, edges, placements, parameters.placement_tolerance_mm, source)
+        poses = locate(views, first, edges, placements, parameters.placement_tolerance_mm, source)
         known = {camera: found for camera, found in first.items() if isinstance(found, FirstMap)}
         calibrated = dask.compute(
             *(
-                dask.delayed(calibrate_view)(views[camera], known[camera], edges, located.poses, parameters, source)
+                dask.delayed(calibrate_view)(views[camera], known[camera], edges, poses, parameters, source)
                 for camera in sorted(known)
             )
         )
     return CaptureCalibration(
         assemble(calibrated, _sources(capture), SOFTWARE),
         [trial for view in calibrated for trial in view.trials],
-        located.poses[:, :2] - placements,
-        list(calibrated),
+        poses[:, :2] - placements,
     )
 
 

@@ -90,6 +90,10 @@ class HomographyMap(Document):
 PixelMap = Annotated[PolynomialMap | HomographyMap, Field(discriminator="model")]
 
 
+Residual = tuple[Number, Number, Number, Number]
+"""A pixel (i, j), and how far the map takes it from its place in Y and in Z, mm."""
+
+
 class CameraCalibration(Document):
     """The map of one camera, how sure it is, and where."""
 
@@ -112,6 +116,8 @@ class CameraCalibration(Document):
     """The same on what was held out of the fit; None where there is too little to hold any out."""
     worst_mm: float | None = None
     """Largest distance, on what was held out where that is known."""
+    residuals: Annotated[list[Residual], Field(max_length=10_000)] = Field(default_factory=list)
+    """What the fit leaves at each control point, or across each stretch of an edge; empty where it is not known."""
 
     @model_validator(mode="after")
     def _is_triangle(self) -> Self:

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from schemas.documents import Document, RelativePath
 from schemas.mounting import CaptureCamera
-from schemas.scan import CameraSource, unique_ids
+from schemas.scan import unique_ids
 
 EXTENT_MM = (10.0, 1000.0)
 FARTHEST_MM = 1000.0
@@ -66,8 +66,7 @@ class Capture(Document):
 
     @model_validator(mode="after")
     def _unique(self) -> Self:
-        cameras: list[CameraSource] = [*self.cameras]
-        unique_ids(cameras)
+        unique_ids(self.cameras)
         return self
 
 

@@ -1,5 +1,6 @@
 """A recorded scan: `scan.yaml` and the films of its cameras."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -55,7 +56,7 @@ class Scan(Document):
         return self
 
 
-def unique_ids(cameras: list[CameraFilm] | list[CameraSource]) -> None:
+def unique_ids(cameras: Sequence[CameraSource]) -> None:
     """Refuses two cameras with one id."""
     ids = [camera.id for camera in cameras]
     for camera_id in ids:

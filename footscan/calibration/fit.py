@@ -53,7 +53,7 @@ def fit(model: Model, observations: Observations, *, robust: bool) -> Fit:
     """
     if observations.independent < model.unknowns:
         raise UndeterminedError(f"{observations.independent} observations for {model.unknowns} unknowns")
-    share = _share_of_block(observations.block)
+    share = observations.share
     start = model.start(observations.pixels, observations.normals, observations.offsets)
     weights = share
     parameters = _minimise(model, observations, weights, start)
@@ -67,7 +67,7 @@ def fit(model: Model, observations: Observations, *, robust: bool) -> Fit:
         raise UndeterminedError("the data lie so that they do not tell all unknowns apart")
     residuals = _residuals(model, observations, parameters)
     remoteness = _remoteness(residuals) if robust else np.zeros(len(residuals))
-    covariance = _covariance(observations.block, jacobian, residuals, remoteness, model.prior_precision())
+    covariance = _covariance(observations, jacobian, residuals, remoteness, model.prior_precision())
     return Fit(model, parameters, covariance, condition, residuals)
 
 
@@ -84,11 +84,6 @@ def _residuals(model: Model, observations: Observations, parameters: Floats) -> 
 def _jacobian(model: Model, observations: Observations, parameters: Floats) -> Floats:
     by_parameters = model.by_parameters(parameters, observations.pixels)
     return np.asarray(np.einsum("nk,nkp->np", observations.normals, by_parameters))
-
-
-def _share_of_block(block: NDArray[np.intp]) -> Floats:
-    _, number, count = np.unique(block, return_inverse=True, return_counts=True)
-    return np.asarray(1.0 / count[number])
 
 
 def _remoteness(residuals: Floats) -> Floats:
@@ -166,7 +161,7 @@ def _condition(normal: Floats) -> float:
 
 
 def _covariance(
-    block: NDArray[np.intp], jacobian: Floats, residuals: Floats, remoteness: Floats, precision: Floats
+    observations: Observations, jacobian: Floats, residuals: Floats, remoteness: Floats, precision: Floats
 ) -> Floats | None:
     """The variance of a block times the inverse of the normal matrix.
 
@@ -175,8 +170,10 @@ def _covariance(
     regression: asymptotics, conjectures and Monte Carlo", Ann. Statist. 1 (1973) 799-821. Without outliers to guard
     against (`remoteness` zero) this is the ordinary covariance of least squares.
     """
-    share = _share_of_block(block)
-    pulls = np.bincount(np.unique(block, return_inverse=True)[1], share * residuals * (1.0 - remoteness) ** 2)
+    share = observations.share
+    pulls = np.bincount(
+        np.unique(observations.block, return_inverse=True)[1], share * residuals * (1.0 - remoteness) ** 2
+    )
     blocks, unknowns = len(pulls), jacobian.shape[1]
     slopes = (1.0 - remoteness) * (1.0 - 5.0 * remoteness)  # of the pull by the residual
     slope = float(np.sum(share * slopes)) / blocks

@@ -15,11 +15,11 @@ from footscan.calibration.agreement import pair_agreements
 from footscan.calibration.edge_points import EdgePoints
 from footscan.calibration.fit import UndeterminedError
 from footscan.calibration.from_chart import calibrated
-from footscan.calibration.homography import HomographyModel
+from footscan.calibration.homography import HomographyModel, image_frame
 from footscan.calibration.placement import CameraFit, departure, fit_to_edges, joined_poses
 from footscan.calibration.recognition import FirstMap, UnrecognisedError, recognise
 from footscan.calibration.reference import Edges
-from footscan.calibration.selection import ModelTrial, candidates, select
+from footscan.calibration.selection import ModelTrial, asked_for, candidates, select
 from schemas.calibration import Calibration, CameraCalibration, Source
 from schemas.errors import RefusedInput
 from schemas.mounting import Mounting
@@ -50,16 +50,6 @@ class CameraView:
 
 
 @dataclass(frozen=True)
-class Located:
-    """Where the object stood in each placement."""
-
-    poses: Floats
-    """(K, 3): mm, mm and radians."""
-    held_out_mm: tuple[float, float] | None
-    """Held-out error with the poses as said, and with those on which the cameras agree; None for one placement."""
-
-
-@dataclass(frozen=True)
 class CalibratedView:
     """The calibration of one camera, and what it rests on."""
 
@@ -67,15 +57,6 @@ class CalibratedView:
     trials: list[ModelTrial]
     points: EdgePoints
     """What was used of the stripe."""
-
-
-class RefusedCapture(RefusedInput):
-    """A capture that cannot be used, with what a picture can show of the reason."""
-
-    def __init__(self, source: str, problem: str, field: str, maps: Mapping[int, FirstMap]) -> None:
-        super().__init__(source, problem, field=field)
-        self.maps = dict(maps)
-        """By camera, those that were recognised."""
 
 
 def recognise_view(view: CameraView, edges: Edges, placements: Floats) -> FirstMap | str:
@@ -93,12 +74,12 @@ def locate(
     placements: Floats,
     tolerance_mm: float,
     source: str,
-) -> Located:
-    """Where the object stood, as all cameras together tell.
+) -> Floats:
+    """Where the object stood, as all cameras together tell: (K, 3) mm, mm and radians.
 
     Raises
     ------
-    RefusedCapture
+    RefusedInput
         A camera does not recognise the object, or it stood elsewhere than said by more than `tolerance_mm`.
     """
     maps = {camera: found for camera, found in first.items() if isinstance(found, FirstMap)}
@@ -106,7 +87,7 @@ def locate(
     poses = np.column_stack([placements, np.zeros(len(placements))])
     for number in range(len(placements)):
         if sum(len(view.stripes[number]) for view in views.values()) < FEWEST_POINTS:
-            raise RefusedCapture(source, "shows no stripe in any camera, expected the object", f"frame {number}", maps)
+            raise RefusedInput(source, "shows no stripe in any camera, expected the object", field=f"frame {number}")
     fits = {camera: _fit(views[camera], found, edges, poses) for camera, found in maps.items()}
     known = {camera: found for camera, found in fits.items() if found is not None}
     if len(placements) > 1 and known:
@@ -116,11 +97,10 @@ def locate(
         camera = min(failed)
         others = f" (and so cameras {', '.join(map(str, sorted(failed)[1:]))})" if len(failed) > 1 else ""
         problem = f"the reference object is not recognised: {failed[camera]}{others}"
-        raise RefusedCapture(source, problem, f"camera {camera}", maps)
+        raise RefusedInput(source, problem, field=f"camera {camera}")
     if len(placements) == 1:
-        return Located(poses, None)
-    joined, said, agreed = joined_poses(known, edges, poses)
-    return Located(joined, (said, agreed) if np.isfinite(said) else None)
+        return poses
+    return joined_poses(known, edges, poses)[0]
 
 
 def calibrate_view(
@@ -142,12 +122,7 @@ def calibrate_view(
     assert rough is not None, "it was fitted when the object was located"
     points = rough.points
     observations = points.observations()
-    tried = [
-        candidate
-        for candidate in candidates(observations.pixels, view.image_px)
-        if parameters.model in ("auto", candidate.kind)
-        and (parameters.order is None or candidate.name == f"polynomial {parameters.order}")
-    ]
+    tried = asked_for(candidates(observations.pixels, view.image_px), parameters)
     found, trials = select(tried, observations, view.camera, robust=True)
     if found is None:
         reason = trials[0].remark or "nothing can be held out"
@@ -180,8 +155,7 @@ def _fit(view: CameraView, first: FirstMap, edges: Edges, poses: Floats) -> Came
 
 
 def _lens(view: CameraView) -> HomographyModel:
-    middle = ((view.image_px[0] - 1) / 2, (view.image_px[1] - 1) / 2)
-    return HomographyModel(middle, float(np.hypot(*middle)), distorted=True)
+    return HomographyModel(*image_frame(view.image_px), distorted=True)
 
 
 def _check_placements(
@@ -221,4 +195,4 @@ def _check_placements(
         if size > tolerance_mm and (worst is None or size > worst[0]):
             worst = (size, problem, f"frame {number}")
     if worst is not None:
-        raise RefusedCapture(source, worst[1], worst[2], maps)
+        raise RefusedInput(source, worst[1], field=worst[2])

@@ -8,19 +8,22 @@ from numpy.typing import NDArray
 
 from footscan.calibration.chart import Chart
 from footscan.calibration.fit import Fit
+from footscan.calibration.maps import Model
 from footscan.calibration.observations import Observations, of_points
 from footscan.calibration.polynomial import PolynomialModel, terms
 from footscan.calibration.quadratic import ORDER as QUADRATIC
-from footscan.calibration.quadratic import fit_quadratic
+from footscan.calibration.quadratic import QuadraticFit, fit_quadratic
 from footscan.calibration.region import region_of
-from footscan.calibration.selection import Candidate, ModelTrial, candidates, rms, select, try_model
-from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
+from footscan.calibration.selection import Candidate, ModelTrial, asked_for, candidates, rms, select, try_model
+from schemas.calibration import Calibration, CameraCalibration, Residual, Source
 from schemas.errors import RefusedInput
 from schemas.parameters.calibration import CalibrationParameters
 from schemas.units import MILLIMETRES
 
 IMAGE_PX = (640, 480)
 """Columns and rows of the cameras' images; a chart does not say."""
+PLAIN_QUADRATIC = PolynomialModel(QUADRATIC, (0.0, 0.0), 1.0)
+"""The thesis's model: of pixels that are not normalised."""
 FEWEST_POINTS = 4
 """A plane has three unknowns, and one more point tells how well it fits."""
 
@@ -76,12 +79,7 @@ def _calibrate_camera(
     observations = observe(chart)
     if parameters.model == "quadratic":
         return _quadratic(chart, observations)
-    tried = [
-        candidate
-        for candidate in candidates(chart.pixels, IMAGE_PX)
-        if parameters.model in ("auto", candidate.kind)
-        and (parameters.order is None or candidate.name == f"polynomial {parameters.order}")
-    ]
+    tried = asked_for(candidates(chart.pixels, IMAGE_PX), parameters)
     found, trials = select(tried, observations, chart.camera, robust=False)
     if found is None and len(tried) == 1:  # it was asked for by name: what cannot be judged is taken all the same
         found, _ = try_model(tried[0], observations, chart.camera, robust=False)
@@ -120,34 +118,41 @@ def calibrated(
         rms_mm=trial.rms_mm,
         held_out_rms_mm=trial.held_out_rms_mm,
         worst_mm=trial.worst_mm,
+        residuals=_residuals(found.model, found.parameters, observations),
     )
+
+
+def _residuals(model: Model, parameters: NDArray[np.float64], observations: Observations) -> list[Residual]:
+    """What the fit leaves at each place, in an order that does not depend on that of the observations."""
+    known = observations.sorted()
+    across = np.sum(known.normals * model.world(parameters, known.pixels), axis=1) - known.offsets
+    pixels, errors = known.errors(across)
+    rows = np.column_stack([pixels.round(2), errors.round(5)]).tolist()
+    return [(i, j, y, z) for i, j, y, z in rows]
 
 
 def _quadratic(chart: Chart, observations: Observations) -> tuple[CameraCalibration, list[ModelTrial]]:
     """The thesis's model: second order of the plain pixels; its held-out error is that of any second order."""
-    result = fit_quadratic(chart)
-    scale = MILLIMETRES[chart.unit]
-    quadratic = PolynomialModel(QUADRATIC, (0.0, 0.0), 1.0)
     normalised = next(c for c in candidates(chart.pixels, IMAGE_PX) if c.name == f"polynomial {QUADRATIC}")
     _, trial = try_model(
         Candidate("quadratic", "polynomial", normalised.model), observations, chart.camera, robust=False
     )
-    parameters = scale * np.array(result.alpha_y + result.alpha_z)
-    world = scale * chart.world[:, 1:]
-    distances = np.linalg.norm(quadratic.world(parameters, chart.pixels) - world, axis=1)
+    result = fit_quadratic(chart)
+    parameters = _in_mm(result)
+    world = MILLIMETRES[chart.unit] * chart.world[:, 1:]
+    distances = np.linalg.norm(PLAIN_QUADRATIC.world(parameters, chart.pixels) - world, axis=1)
     worst = trial.worst_mm if trial.held_out_rms_mm is not None else float(distances.max())
     trial = replace(trial, rms_mm=rms(distances), worst_mm=worst, status="chosen", remark=result.remark or "")
-    pixel_map = quadratic.as_map(parameters)
-    assert isinstance(pixel_map, PolynomialMap)
     camera = CameraCalibration(
         camera=chart.camera,
         image_px=IMAGE_PX,
-        map=pixel_map,
+        map=PLAIN_QUADRATIC.as_map(parameters),
         region_px=region_of(chart.pixels),
         points=len(chart.points),
         rms_mm=trial.rms_mm,
         held_out_rms_mm=trial.held_out_rms_mm,
         worst_mm=trial.worst_mm,
+        residuals=_residuals(PLAIN_QUADRATIC, parameters, observations),
     )
     return camera, [trial]
 
@@ -183,9 +188,11 @@ def _thesis_trial(chart: Chart, observations: Observations) -> ModelTrial:
 
 def _quadratic_world(chart: Chart, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
     """Y and Z (N, 2), mm, of `pixels` (N, 2) by the quadratic of a chart."""
-    result = fit_quadratic(chart)
-    model = PolynomialModel(QUADRATIC, (0.0, 0.0), 1.0)
-    return model.world(MILLIMETRES[chart.unit] * np.array(result.alpha_y + result.alpha_z), pixels)
+    return PLAIN_QUADRATIC.world(_in_mm(fit_quadratic(chart)), pixels)
+
+
+def _in_mm(result: QuadraticFit) -> NDArray[np.float64]:
+    return MILLIMETRES[result.unit] * np.array(result.alpha_y + result.alpha_z)
 
 
 def _part(chart: Chart, chosen: NDArray[np.bool_]) -> Chart:

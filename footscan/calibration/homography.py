@@ -63,7 +63,7 @@ class HomographyModel:
     def world(self, parameters: Floats, pixels: Floats) -> Floats:
         """Y and Z, (N, 2) mm, of `pixels` (N, 2)."""
         uv = self._normalised(pixels)
-        plane, _ = _project(parameters, self._ideal(parameters, uv))
+        plane, _ = project(_matrix(parameters), self._ideal(parameters, uv))
         if self.correction is not None:
             plane = plane + np.einsum("nt,kt->nk", self._correction_matrix(uv), self._correction(parameters))
         return plane
@@ -72,14 +72,14 @@ class HomographyModel:
         """Derivatives (N, 2, P) of `world` by the parameters."""
         uv = self._normalised(pixels)
         ideal = self._ideal(parameters, uv)
-        plane, depth = _project(parameters, ideal)
+        plane, depth = project(_matrix(parameters), ideal)
         jacobian = np.zeros((len(uv), 2, self.unknowns))
         over_depth = np.column_stack([ideal, np.ones(len(uv))]) / depth[:, np.newaxis]
         jacobian[:, 0, 0:3] = over_depth
         jacobian[:, 1, 3:6] = over_depth
         jacobian[:, :, 6:8] = -plane[:, :, np.newaxis] * over_depth[:, np.newaxis, :2]
         if self.distorted:
-            by_ideal = _by_ideal(parameters, plane, depth)
+            by_ideal = slopes(_matrix(parameters), plane, depth)
             jacobian[:, :, MATRIX : MATRIX + 4] = by_ideal @ _distortion_terms(uv)
         if self.correction is not None:
             matrix = self._correction_matrix(uv)
@@ -90,8 +90,8 @@ class HomographyModel:
     def by_pixels(self, parameters: Floats, pixels: Floats) -> Floats:
         """Derivatives (N, 2, 2) of `world` by i and j, mm/px."""
         uv = self._normalised(pixels)
-        plane, depth = _project(parameters, self._ideal(parameters, uv))
-        by_uv = _by_ideal(parameters, plane, depth) @ self._ideal_by_uv(parameters, uv)
+        plane, depth = project(_matrix(parameters), self._ideal(parameters, uv))
+        by_uv = slopes(_matrix(parameters), plane, depth) @ self._ideal_by_uv(parameters, uv)
         if self.correction is not None:
             by_u, by_v = derivatives(uv[:, 0], uv[:, 1], self.correction)
             alpha = self._correction(parameters).T
@@ -180,23 +180,31 @@ def algebraic_homography(uv: Floats, normals: Floats, offsets: Floats) -> Floats
     return np.asarray(matrix / (matrix[2, 2] if abs(matrix[2, 2]) > least else least))
 
 
+def project(matrix: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Where a homography (3, 3) takes `points` (N, 2), (N, 2), and the depths (N,) by which they were divided."""
+    taken = np.einsum("nk,lk->nl", points, matrix[:, :2]) + matrix[:, 2]
+    depth = np.where(np.abs(taken[:, 2]) < 1e-9, 1e-9, taken[:, 2])  # on the horizon: far away, not infinite
+    return taken[:, :2] / depth[:, np.newaxis], depth
+
+
+def slopes(matrix: Floats, plane: Floats, depth: Floats) -> Floats:
+    """Derivatives (N, 2, 2) of what `project` gave by its points."""
+    return np.asarray((matrix[:2, :2] - plane[:, :, np.newaxis] * matrix[2, :2]) / depth[:, np.newaxis, np.newaxis])
+
+
+def image_frame(image_px: tuple[int, int]) -> tuple[tuple[float, float], float]:
+    """Centre and scale, px, to which homographies of an image of so many columns and rows are normalised."""
+    middle = ((image_px[0] - 1) / 2, (image_px[1] - 1) / 2)
+    return middle, float(np.hypot(*middle))
+
+
 def _inner(a: Floats, b: Floats) -> Floats:
     """The transpose of (N, P) times (N, Q). Not by BLAS, whose sums depend on the number of its threads."""
     return np.asarray(np.einsum("np,nq->pq", a, b))
 
 
-def _project(parameters: Floats, ideal: Floats) -> tuple[Floats, Floats]:
-    """The plane's points (N, 2), and the depths (N,) by which they were divided."""
-    matrix = np.append(parameters[:MATRIX], 1.0).reshape(3, 3)
-    points = np.einsum("nk,lk->nl", ideal, matrix[:, :2]) + matrix[:, 2]
-    depth = np.where(np.abs(points[:, 2]) < 1e-9, 1e-9, points[:, 2])  # on the horizon: far away, not infinite
-    return points[:, :2] / depth[:, np.newaxis], depth
-
-
-def _by_ideal(parameters: Floats, plane: Floats, depth: Floats) -> Floats:
-    matrix = parameters[:6].reshape(2, 3)[:, :2]
-    horizon = parameters[6:8]
-    return np.asarray((matrix - plane[:, :, np.newaxis] * horizon) / depth[:, np.newaxis, np.newaxis])
+def _matrix(parameters: Floats) -> Floats:
+    return np.append(parameters[:MATRIX], 1.0).reshape(3, 3)
 
 
 def _distortion_terms(uv: Floats) -> Floats:

@@ -41,6 +41,12 @@ class Observations:
         """How many points they tell of."""
         return len(np.unique(self.point))
 
+    @property
+    def share(self) -> Floats:
+        """The weight (N,) of each in its block: all of a block count as one."""
+        _, number, count = np.unique(self.block, return_inverse=True, return_counts=True)
+        return np.asarray(1.0 / count[number])
+
     def part(self, chosen: NDArray[np.bool_]) -> "Observations":
         """Those that are chosen, (N,)."""
         return Observations(
@@ -65,6 +71,25 @@ class Observations:
         """Distance of each point, in the order of their numbers, from `residuals` (N,) of the observations."""
         _, number = np.unique(self.point, return_inverse=True)
         return np.asarray(np.sqrt(np.bincount(number, residuals**2)))
+
+    def errors(self, residuals: Floats) -> tuple[Floats, Floats]:
+        """Where in the image the `residuals` (N,) leave what error: pixels (M, 2) and Y and Z (M, 2), mm.
+
+        There is one for each control point, and one for each block of pixels on an edge, across it: along the edge
+        nothing is known.
+        """
+        first = np.full(self.point.max(initial=-1) + 1, np.iinfo(np.intp).max)
+        np.minimum.at(first, self.point, self.block)  # the two blocks of a control point have one place
+        _, place, count = np.unique(first[self.point], return_inverse=True, return_counts=True)
+
+        def summed(values: Floats) -> Floats:
+            return np.stack([np.bincount(place, column) for column in values.T], axis=-1)
+
+        outer = self.normals[:, :, np.newaxis] * self.normals[:, np.newaxis, :]
+        normal = summed(outer.reshape(-1, 4)).reshape(-1, 2, 2)
+        right = summed(self.normals * residuals[:, np.newaxis])
+        errors = np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ right[:, :, np.newaxis]
+        return summed(self.pixels) / count[:, np.newaxis], errors[:, :, 0]
 
 
 def of_points(pixels: Floats, world: Floats, group: NDArray[np.intp]) -> Observations:

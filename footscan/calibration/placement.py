@@ -122,9 +122,7 @@ def agreed_poses(cameras: Mapping[int, CameraFit], poses: Floats, without: int |
             continue
         points = known.points
         model, parameters = known.fit.model, known.fit.parameters
-        observations = points.observations()
-        _, number, size = np.unique(observations.block, return_inverse=True, return_counts=True)
-        weights = 1.0 / size[number]
+        weights = points.observations().share
         world = model.world(parameters, points.pixels)
         residuals = np.sum(points.normals * world, axis=1) - points.offsets
         by_map = np.einsum("nk,nkp->np", points.normals, model.by_parameters(parameters, points.pixels))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.edge_points import edge_distances
-from footscan.calibration.homography import algebraic_homography
+from footscan.calibration.homography import algebraic_homography, project, slopes
 from footscan.calibration.lines import ImageLine, find_lines
 from footscan.calibration.reference import Edges
 from schemas.mounting import Mounting
@@ -65,7 +65,7 @@ class FirstMap:
 
     def world(self, pixels: Floats) -> Floats:
         """Y and Z, (N, 2) mm, of `pixels` (N, 2)."""
-        return _apply(self.matrix, pixels)
+        return project(self.matrix, pixels)[0]
 
 
 class UnrecognisedError(Exception):
@@ -130,7 +130,7 @@ class _Frames:
 
     def distances(self, matrix: Floats) -> tuple[NDArray[np.intp], Floats]:
         """The nearest edge (N,), and the distance from it (N,)."""
-        return edge_distances(self.edges, _apply(matrix, self.pixels) - self.shift)
+        return edge_distances(self.edges, project(matrix, self.pixels)[0] - self.shift)
 
 
 def _quadruples(pieces: list[tuple[int, ImageLine]]) -> list[tuple[int, ...]]:
@@ -217,12 +217,10 @@ def _is_view(matrix: Floats, pixels: Floats) -> bool:
     """Whether a camera can see the plane so: all of it before the camera, and at a scale that a scanner has."""
     if not np.isfinite(matrix).all():
         return False
-    depth = pixels @ matrix[2, :2] + matrix[2, 2]
+    plane, depth = project(matrix, pixels)
     if not (np.all(depth > 0.05) or np.all(depth < -0.05)):
         return False
-    plane = _apply(matrix, pixels)
-    slopes = (matrix[:2, :2] - plane[:, :, np.newaxis] * matrix[2, :2]) / depth[:, np.newaxis, np.newaxis]
-    stretch = np.linalg.svd(slopes, compute_uv=False)
+    stretch = np.linalg.svd(slopes(matrix, plane, depth), compute_uv=False)
     return bool(np.all((stretch > SCALE_MM_PX[0]) & (stretch < SCALE_MM_PX[1])))
 
 
@@ -268,8 +266,8 @@ def _decide(found: list[FirstMap], frames: _Frames, mounting: Mounting) -> First
     kept: list[FirstMap] = []
     for candidate in sorted(found, key=lambda m: -m.score):
         explained = frames.pixels[frames.distances(candidate.matrix)[1] < EXPLAINED_MM]
-        places = _apply(candidate.matrix, explained)
-        apart = [np.linalg.norm(places - _apply(other.matrix, explained), axis=1) > APART_MM for other in kept]
+        places = candidate.world(explained)
+        apart = [np.linalg.norm(places - other.world(explained), axis=1) > APART_MM for other in kept]
         if all(far.mean() > STRAY_SHARE for far in apart):
             kept.append(candidate)
     if len(kept) == 1:
@@ -298,12 +296,6 @@ def _from_front(matrix: Floats, pixels: Floats) -> int:
     Seen from +X with Z up, Y runs to the right; i runs to the right and j down, so the map turns the image over.
     """
     middle = pixels.mean(axis=0)
-    corner = _apply(matrix, middle + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    corner, _ = project(matrix, middle + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
     (a, b), (c, d) = corner[1:] - corner[0]
     return -int(np.sign(a * d - b * c))
-
-
-def _apply(matrix: Floats, pixels: Floats) -> Floats:
-    points = pixels @ matrix[:, :2].T + matrix[:, 2]
-    depth = np.where(np.abs(points[:, 2]) < 1e-9, 1e-9, points[:, 2])
-    return np.asarray(points[:, :2] / depth[:, np.newaxis])

@@ -8,18 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.fit import Fit, UndeterminedError, fit, predict
-from footscan.calibration.homography import HomographyModel
+from footscan.calibration.homography import HomographyModel, image_frame
 from footscan.calibration.maps import Model
 from footscan.calibration.observations import Observations
 from footscan.calibration.polynomial import PolynomialModel
 from footscan.calibration.region import region_of, supported
-from schemas.parameters.calibration import ModelName
+from schemas.parameters.calibration import CalibrationParameters, ModelName
 
 Floats = NDArray[np.float64]
 
 LEAVE_ONE_OUT = 12
 """Up to so many groups each is held out by itself; more are dealt out to `FOLDS` folds."""
 FOLDS = 10
+ORDERS = (1, 2, 3, 4, 5)
+"""Orders of the polynomials that are tried."""
 CORRECTIONS = (2, 3, 4)
 """Orders of the smooth correction that are tried."""
 SMALLEST_EXTENT_PX = 1e-6
@@ -64,17 +66,16 @@ class Candidate:
     model: Model
 
 
-def candidates(pixels: Floats, image_px: tuple[int, int], *, highest_order: int = 5) -> list[Candidate]:
+def candidates(pixels: Floats, image_px: tuple[int, int]) -> list[Candidate]:
     """All models: polynomials normalised to the extent of `pixels` (N, 2), homographies to the image."""
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     centre = ((low + high) / 2).tolist()
     extent = max(float((high - low).max() / 2), SMALLEST_EXTENT_PX)
     polynomials = [
         Candidate(f"polynomial {order}", "polynomial", PolynomialModel(order, (centre[0], centre[1]), extent))
-        for order in range(1, highest_order + 1)
+        for order in ORDERS
     ]
-    middle = ((image_px[0] - 1) / 2, (image_px[1] - 1) / 2)
-    reach = float(np.hypot(*middle))
+    middle, reach = image_frame(image_px)
     return [
         *polynomials,
         Candidate("homography", "homography", HomographyModel(middle, reach)),
@@ -87,6 +88,16 @@ def candidates(pixels: Floats, image_px: tuple[int, int], *, highest_order: int 
             )
             for order in CORRECTIONS
         ),
+    ]
+
+
+def asked_for(tried: Sequence[Candidate], parameters: CalibrationParameters) -> list[Candidate]:
+    """Those of the candidates that the parameters leave to choose from."""
+    return [
+        candidate
+        for candidate in tried
+        if parameters.model in ("auto", candidate.kind)
+        and (parameters.order is None or candidate.name == f"polynomial {parameters.order}")
     ]
 
 

@@ -1,12 +1,12 @@
 """`footscan calibrate capture`."""
 
 from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from pipelines.cli.calibration_file import tell_calibration, write_calibration
 from pipelines.cli.output import AsJson, message, print_json, print_table
 from schemas.errors import RefusedInput
 
@@ -33,7 +33,6 @@ def capture(
     from pipelines.archive import cores
     from pipelines.calibrate import calibrate_capture
     from pipelines.cli.trials import print_trials
-    from pipelines.engine.atomic import write_atomically
     from schemas.parameters.calibration import CaptureCalibrationParameters
 
     if order is not None and model != "polynomial":
@@ -41,9 +40,7 @@ def capture(
     parameters = CaptureCalibrationParameters(model=model, order=order, placement_tolerance_mm=tolerance_mm)
     made = calibrate_capture(folder, parameters, cores())
     calibration = made.calibration
-    if out is not None:
-        calibration = calibration.model_copy(update={"created": datetime.now(UTC).replace(microsecond=0)})
-        write_atomically(out, (calibration.model_dump_json(indent=2) + "\n").encode())
+    write_calibration(calibration, out)
     if as_json:
         print_json(
             {
@@ -61,10 +58,7 @@ def capture(
             message(
                 f"frame {number}: the cameras agree that the object stood {y:+.2f}, {z:+.2f} mm from where it should"
             )
-    if out is None:
-        message("nothing was written; --out FILE writes the calibration")
-    else:
-        message(f"{out}: calibration of {len(calibration.cameras)} cameras")
+    tell_calibration(calibration, out)
 
 
 def _print_pairs(pairs: "list[PairAgreement]") -> None:

@@ -1,12 +1,12 @@
 """`footscan calibrate chart` and `footscan calibrate models`."""
 
 from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from pipelines.cli.calibration_file import tell_calibration, write_calibration
 from pipelines.cli.output import AsJson, message, print_json, print_table
 from schemas.errors import RefusedInput
 
@@ -38,7 +38,6 @@ def chart(
     """Calibrate from control points whose pixels are known."""
     from footscan.calibration.from_chart import calibrate_chart
     from pipelines.cli.trials import print_trials
-    from pipelines.engine.atomic import write_atomically
     from pipelines.engine.digest import sha256
     from pipelines.version import SOFTWARE
     from schemas.calibration import Source
@@ -54,19 +53,14 @@ def chart(
         software=SOFTWARE,
     )
     _tell(file, warnings)
-    if out is not None:
-        calibration = calibration.model_copy(update={"created": datetime.now(UTC).replace(microsecond=0)})
-        write_atomically(out, (calibration.model_dump_json(indent=2) + "\n").encode())
+    write_calibration(calibration, out)
     if model == "quadratic":
         _print_quadratic(charts, as_json=as_json)
     elif as_json:
         print_json(_calibration_json(charts, calibration, trials, warnings))
     else:
         print_trials(trials)
-    if out is None:
-        message("nothing was written; --out FILE writes the calibration")
-    else:
-        message(f"{out}: calibration of {len(calibration.cameras)} cameras")
+    tell_calibration(calibration, out)
 
 
 def models(

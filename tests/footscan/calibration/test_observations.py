@@ -54,3 +54,19 @@ def test_a_block_counts_once() -> None:
         group=np.zeros(10, np.intp),
     )
     assert (len(stripe), stripe.points, stripe.independent) == (10, 10, 3)
+
+
+def test_errors_of_a_control_point_are_its_own_and_those_of_an_edge_lie_across_it() -> None:
+    chart = of_points(np.array([[1.0, 2.0], [3.0, 4.0]]), np.zeros((2, 2)), np.arange(2))
+    pixels, errors = chart.errors(np.array([0.1, 0.2, -0.3, 0.4]))  # Y of both, then Z of both
+    np.testing.assert_allclose(pixels, [[1, 2], [3, 4]])
+    np.testing.assert_allclose(errors, [[0.1, -0.3], [0.2, 0.4]], atol=1e-12)
+
+    slanted = np.array([0.6, 0.8])
+    edge = Observations(
+        np.array([[0.0, 0.0], [2.0, 0.0], [9.0, 9.0]]),
+        np.tile(slanted, (3, 1)), np.zeros(3), np.arange(3), np.array([0, 0, 1]), np.zeros(3, np.intp),
+    )  # fmt: skip
+    pixels, errors = edge.errors(np.array([1.0, 3.0, 5.0]))
+    np.testing.assert_allclose(pixels, [[1, 0], [9, 9]])
+    np.testing.assert_allclose(errors, [2 * slanted, 5 * slanted], atol=1e-12)
