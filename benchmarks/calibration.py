@@ -1,104 +1,138 @@
-"""Mapping error of calibrations on control points that they have not seen, in mm.
+"""Mapping error of calibrations of the same capture, in mm, from five clicked points to all of the stripe.
 
-    .venv/bin/python -m benchmarks.calibration [CHART]
+    .venv/bin/python -m benchmarks.calibration [CAPTURE ...]
 
-The thesis's calibration knows five corners of the reference object. For the others, the control points of each camera
-are dealt into five parts by their place in the world, and each part in turn is held out. All are judged by the same
-points, the five left out.
+CAPTURE is a folder that the virtual scanner filmed with its standard settings; without one, the reference object is
+filmed in its first five placements, and in the first alone. What judges is the scanner's own projection, which no
+calibration has seen: points of a grid in the laser plane are projected by the true camera and mapped back. All
+calibrations of a camera are judged by the same points, those in the region that the stripe supports.
 """
 
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from footscan.calibration.chart import Chart, read_chart
 from footscan.calibration.from_chart import calibrate_chart
-from footscan.calibration.maps import to_world
-from schemas.calibration import CameraCalibration, Source
-from schemas.parameters.calibration import CalibrationParameters
-from schemas.units import MILLIMETRES
+from footscan.calibration.maps import is_supported, to_world
+from footscan.virtual.capture import record_capture
+from footscan.virtual.reference import standard_reference
+from footscan.virtual.scanner import VOLUME_MM, Camera, standard_scanner
+from pipelines.calibrate import CaptureCalibration, calibrate_capture
+from schemas.calibration import Calibration, CameraCalibration, Source
+from schemas.parameters.calibration import CalibrationParameters, CaptureCalibrationParameters
+from schemas.parameters.simulation import SimulationSettings
 
-DEFAULT = Path("demo/capture/chart.csv")
-PARTS = 5
+Floats = NDArray[np.float64]
+
+PLACEMENTS = (5, 1)
+GRID_MM = 2.0
+BASELINE = "five clicks, quadratic"
 THESIS_CORNERS_MM = {
     (1, 2): [(50, 30), (50, 70), (20, 70), (20, 100), (-20, 100)],
     (3, 4): [(-50, 30), (-50, 70), (-20, 70), (-20, 100), (20, 100)],
     (5, 6): [(-20, 0), (20, 0), (20, 30), (50, 30), (50, 70)],
     (7, 8): [(20, 0), (-20, 0), (-20, 30), (-50, 30), (-50, 70)],
 }
-"""Y and Z of the corners that the thesis used for each camera."""
+"""Y and Z of the corners that the thesis used for each camera, with the object in the middle."""
+
+Errors = dict[str, dict[int, Floats]]
+"""By calibration and camera: (N,) mm, how far points of the grid are mapped from their places."""
 
 
 def main() -> None:
-    charts = read_chart(Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT)
-    errors = {
-        "quadratic, five points": {camera: _five_points(chart) for camera, chart in charts.items()},
-        "quadratic, all points": {camera: _held_out(chart, "quadratic") for camera, chart in charts.items()},
-        "polynomial of chosen order": {camera: _held_out(chart, "polynomial") for camera, chart in charts.items()},
-        "chosen model": {camera: _held_out(chart, "auto") for camera, chart in charts.items()},
+    for folder in sys.argv[1:]:
+        _compare(Path(folder))
+    if not sys.argv[1:]:
+        with tempfile.TemporaryDirectory() as place:
+            for placements in PLACEMENTS:
+                _compare(_film(Path(place) / str(placements), placements))
+
+
+def _film(folder: Path, placements: int) -> Path:
+    reference = standard_reference()
+    shown = reference.model_copy(update={"placements_mm": reference.placements_mm[:placements]})
+    record_capture(folder, shown, settings=SimulationSettings())
+    return folder
+
+
+def _compare(folder: Path) -> None:
+    charts = read_chart(folder / "chart.csv")
+    stripe = _from_stripe(folder, "auto")
+    calibrations = {
+        BASELINE: _from_clicks({camera: _thesis_clicks(chart) for camera, chart in charts.items()}, "quadratic"),
+        "all clicks, chosen model": _from_clicks(charts, "auto"),
+        "stripe, quadratic": _from_stripe(folder, "polynomial", order=2).calibration,
+        "stripe, chosen model": stripe.calibration,
     }
-    baseline = next(iter(errors.values()))
-    print(f"  {'rms mm of held-out points':<28}" + "".join(f"{f'camera {camera}':>10}" for camera in charts))
-    for name, by_camera in errors.items():
-        print(f"  {name:<28}" + "".join(f"{_rms(error):10.3f}" for error in by_camera.values()))
-    print(
-        f"\n  {'all cameras':<28}{'rms mm':>10}{'median mm':>12}{'largest mm':>12}   rms to the baseline's, by camera"
-    )
-    for name, by_camera in errors.items():
-        every = np.concatenate(list(by_camera.values()))
-        ratios = np.array([_rms(error) / _rms(baseline[camera]) for camera, error in by_camera.items()])
-        spread = f"{np.median(ratios):.4f} ({ratios.min():.4f} to {ratios.max():.4f})"
-        ratio = "baseline" if by_camera is baseline else spread
-        print(f"  {name:<28}{_rms(every):10.3f}{np.median(every):12.3f}{every.max():12.3f}   {ratio}")
+    errors: Errors = {name: {} for name in calibrations}
+    for camera in standard_scanner(SimulationSettings().scanner_seed).cameras:
+        plane, pixels = _seen_grid(camera, stripe.calibration.camera(camera.id))
+        for name, calibration in calibrations.items():
+            mapped = to_world(calibration.camera(camera.id), pixels)
+            errors[name][camera.id] = np.linalg.norm(mapped - plane, axis=1)
+    clicks = ", ".join(str(len(chart.points)) for chart in charts.values())
+    print(f"\nPlacements: {len(stripe.departures_mm)}. Clicks of each camera: {clicks}")
+    _print_cameras(errors, {trial.camera: trial.model for trial in stripe.trials if trial.status == "chosen"})
+    _print_all(errors)
 
 
-def _five_points(chart: Chart) -> NDArray[np.float64]:
-    """(N,) mm: how far the points besides the thesis's are mapped from their places by its calibration."""
-    known = _thesis_points(chart)
-    return _errors(_fit(_subset(chart, known), "quadratic"), _subset(chart, ~known))
-
-
-def _held_out(chart: Chart, model: str) -> NDArray[np.float64]:
-    """(N,) mm: the same points, each mapped by a calibration that was made without its part."""
-    place = np.unique(chart.world, axis=0, return_inverse=True)[1].ravel()
-    part = np.random.default_rng(1).permutation(place.max() + 1)[place] % PARTS
-    judged = ~_thesis_points(chart)
-    return np.concatenate(
-        [
-            _errors(_fit(_subset(chart, part != out), model), _subset(chart, judged & (part == out)))
-            for out in range(PARTS)
-        ]
-    )
-
-
-def _thesis_points(chart: Chart) -> NDArray[np.bool_]:
-    """Which of (N,) points are the thesis's five, or the nearest to them."""
-    corners = next(corners for cameras, corners in THESIS_CORNERS_MM.items() if chart.camera in cameras)
-    distance = np.linalg.norm(MILLIMETRES[chart.unit] * chart.world[:, None, 1:] - np.array(corners), axis=2)
-    return np.isin(np.arange(len(distance)), distance.argmin(axis=0))
-
-
-def _errors(camera: CameraCalibration, chart: Chart) -> NDArray[np.float64]:
-    residuals = to_world(camera, chart.pixels) - MILLIMETRES[chart.unit] * chart.world[:, 1:]
-    return np.asarray(np.hypot(residuals[:, 0], residuals[:, 1]))
-
-
-def _fit(chart: Chart, model: str) -> CameraCalibration:
+def _from_clicks(charts: dict[int, Chart], model: str) -> Calibration:
     parameters = CalibrationParameters.model_validate({"model": model})
-    calibration, _ = calibrate_chart(
-        {chart.camera: chart}, parameters=parameters, source=Source(name="chart", sha256=""), software=""
-    )
-    return calibration.cameras[0]
+    return calibrate_chart(charts, parameters=parameters, source=Source(name="chart", sha256=""), software="")[0]
 
 
-def _subset(chart: Chart, rows: NDArray[np.bool_]) -> Chart:
-    names = tuple(name for name, taken in zip(chart.points, rows, strict=True) if taken)
+def _from_stripe(folder: Path, model: str, order: int | None = None) -> CaptureCalibration:
+    parameters = CaptureCalibrationParameters.model_validate({"model": model, "order": order})
+    return calibrate_capture(folder, parameters, workers=2)
+
+
+def _thesis_clicks(chart: Chart) -> Chart:
+    """Five clicks, on the thesis's corners, or where one could not be clicked on the nearest place that could.
+
+    A place that was clicked in several placements counts with the first, the object in the middle.
+    """
+    corners = next(corners for cameras, corners in THESIS_CORNERS_MM.items() if chart.camera in cameras)
+    places, first = np.unique(chart.world[:, 1:], axis=0, return_index=True)
+    distance = np.linalg.norm(np.array(corners, np.float64)[:, np.newaxis] - places, axis=2)
+    rows = first[linear_sum_assignment(distance)[1]]
+    names = tuple(chart.points[row] for row in rows)
     return Chart(chart.camera, names, chart.world[rows], chart.unit, chart.pixels[rows])
 
 
-def _rms(distance: NDArray[np.float64]) -> float:
+def _seen_grid(camera: Camera, stripe: CameraCalibration) -> tuple[Floats, Floats]:
+    """The grid's points in the region that the stripe supports: (Y, Z) in mm and their exact pixels, (N, 2) each."""
+    y, z = (np.arange(low, high + GRID_MM, GRID_MM) for low, high in VOLUME_MM)
+    plane = np.stack(np.meshgrid(y, z), axis=-1).reshape(-1, 2)
+    pixels = camera.project_plane(plane[:, 0], plane[:, 1])
+    inside = is_supported(stripe, pixels)
+    return plane[inside], pixels[inside]
+
+
+def _print_cameras(errors: Errors, chosen: dict[int, str]) -> None:
+    print(f"  {'rms (largest) mm':<18}" + "".join(f"{name:>26}" for name in errors) + "   on a grid of   chosen model")
+    for camera, model in chosen.items():
+        cells = [f"{_rms(found[camera]):.3f} ({found[camera].max():.3f})" for found in errors.values()]
+        points = len(errors[BASELINE][camera])
+        print(f"  {f'camera {camera}':<18}" + "".join(f"{cell:>26}" for cell in cells) + f"{points:>15}   {model}")
+
+
+def _print_all(errors: Errors) -> None:
+    title = "rms to the baseline's, by camera"
+    print(f"\n  {'all cameras':<26}{'rms mm':>10}{'median mm':>12}{'largest mm':>12}   {title}")
+    for name, found in errors.items():
+        every = np.concatenate(list(found.values()))
+        ratios = np.array([_rms(found[camera]) / _rms(errors[BASELINE][camera]) for camera in found])
+        spread = f"{np.median(ratios):.5f} ({ratios.min():.5f} to {ratios.max():.5f})"
+        ratio = "baseline" if name == BASELINE else spread
+        print(f"  {name:<26}{_rms(every):10.3f}{np.median(every):12.3f}{every.max():12.3f}   {ratio}")
+
+
+def _rms(distance: Floats) -> float:
     return float(np.sqrt(np.mean(distance**2)))
 
 

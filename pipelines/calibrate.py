@@ -1,23 +1,28 @@
-"""A calibration from a capture: extract and recognise, camera by camera; locate the object; fit, camera by camera."""
+"""From a capture: a calibration, or how far the scanner has drifted since its last one."""
 
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import dask
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.calibration.drift import Drift, drift_of
 from footscan.calibration.from_capture import (
+    CalibratedView,
     CameraView,
+    Recognised,
     assemble,
     calibrate_view,
-    locate,
+    object_poses,
     recognise_view,
 )
-from footscan.calibration.recognition import FirstMap
-from footscan.calibration.reference import edges_of
+from footscan.calibration.reference import Edges, edges_of
+from footscan.calibration.refused_capture import RefusedCapture, check_placements, refuse_unrecognised
 from footscan.calibration.selection import ModelTrial
 from footscan.frames.film import film_files, open_film, pixel_frames
+from footscan.report.capture_figure import capture_figure
 from footscan.stripe.extract import extract_stripe
 from pipelines.captures import RecordedCapture, read_capture
 from pipelines.engine.digest import sha256
@@ -46,33 +51,114 @@ def calibrate_capture(folder: Path, parameters: CaptureCalibrationParameters, wo
     Raises
     ------
     RefusedInput
-        The capture breaks its format, or the object is not recognised or stood elsewhere than said.
+        The capture breaks its format, or the object is not recognised or stood elsewhere than said; the latter two as
+        `RefusedCapture`.
     """
     capture = read_capture(folder)
-    edges = edges_of(capture.reference.profile_mm)
-    placements = np.array(capture.reference.placements_mm, np.float64)
-    source = str(capture.file)
-
-    def recognised(camera: CaptureCamera) -> tuple[CameraView, FirstMap | str]:
-        view = _view(capture, camera, parameters)
-        return view, recognise_view(view, edges, placements)
-
     with dask.config.set(scheduler="threads", num_workers=workers):
-        seen = dask.compute(*(dask.delayed(recognised)(camera) for camera in capture.document.cameras))
-        views = {view.camera: view for view, _ in seen}
-        first = {view.camera: found for view, found in seen}
-        poses = locate(views, first, edges, placements, parameters.placement_tolerance_mm, source)
-        known = {camera: found for camera, found in first.items() if isinstance(found, FirstMap)}
-        calibrated = dask.compute(
-            *(
-                dask.delayed(calibrate_view)(views[camera], known[camera], edges, poses, parameters, source)
-                for camera in sorted(known)
-            )
-        )
+        seen = _see(capture, parameters)
+        seen.check(parameters.placement_tolerance_mm)
+        refuse_unrecognised(seen.views, seen.unrecognised, seen.source)
+        poses, calibrated = seen.calibrate(parameters)
     return CaptureCalibration(
         assemble(calibrated, _sources(capture), SOFTWARE),
         [trial for view in calibrated for trial in view.trials],
-        poses[:, :2] - placements,
+        poses[:, :2] - seen.placements,
+    )
+
+
+def check_calibration(
+    calibration: Calibration,
+    folder: Path,
+    parameters: CaptureCalibrationParameters,
+    tolerance_mm: float,
+    workers: int,
+) -> list[Drift]:
+    """How far each camera of a scanner has drifted since its calibration, by the capture in `folder`.
+
+    A camera that does not recognise the object, or has no film in the capture, is part of the result.
+
+    Raises
+    ------
+    RefusedInput
+        The capture breaks its format, has a camera that the calibration lacks, or the object stood elsewhere than said
+        or is recognised by no camera; the latter two as `RefusedCapture`.
+    """
+    capture = read_capture(folder)
+    filmed = [camera.id for camera in capture.document.cameras]
+    for camera in filmed:
+        calibration.camera(camera)
+    with dask.config.set(scheduler="threads", num_workers=workers):
+        seen = _see(capture, parameters)
+        seen.check(parameters.placement_tolerance_mm)
+        if not seen.recognised:
+            refuse_unrecognised(seen.views, seen.unrecognised, seen.source)
+        _, calibrated = seen.calibrate(parameters)
+    today = {view.calibration.camera: view for view in calibrated}
+    drifts = []
+    for known in sorted(calibration.cameras, key=lambda camera: camera.camera):
+        if known.camera in today:
+            drifts.append(drift_of(known, today[known.camera], tolerance_mm))
+        elif known.camera in filmed:
+            drifts.append(Drift(known.camera, "not recognised", remark=seen.unrecognised[known.camera]))
+        else:
+            drifts.append(Drift(known.camera, "not in the capture"))
+    return drifts
+
+
+def picture_of(folder: Path, refused: RefusedCapture) -> bytes:
+    """A PNG of what the capture in `folder` was refused for."""
+    capture = read_capture(folder)
+    films = {camera.id: capture.film(camera) for camera in capture.document.cameras}
+    shown = [
+        (evidence, next(islice(pixel_frames(open_film(films[evidence.camera])), evidence.frame, None), None))
+        for evidence in refused.evidence
+    ]
+    return capture_figure(str(refused), shown)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What all cameras of a capture see of the reference object."""
+
+    source: str
+    edges: Edges
+    placements: Floats
+    views: dict[int, CameraView]
+    recognised: dict[int, Recognised]
+    unrecognised: dict[int, str]
+
+    def check(self, tolerance_mm: float) -> None:
+        check_placements(self.views, self.recognised, self.edges, self.placements, tolerance_mm, self.source)
+
+    def calibrate(self, parameters: CaptureCalibrationParameters) -> tuple[Floats, list[CalibratedView]]:
+        """The poses of the object, and the calibration of each camera that recognises it."""
+        poses = object_poses(self.recognised, self.edges, self.placements)
+        calibrated = dask.compute(
+            *(
+                dask.delayed(calibrate_view)(self.recognised[camera], self.edges, poses, parameters, self.source)
+                for camera in sorted(self.recognised)
+            )
+        )
+        return poses, list(calibrated)
+
+
+def _see(capture: RecordedCapture, parameters: CaptureCalibrationParameters) -> _Seen:
+    edges = edges_of(capture.reference.profile_mm)
+    placements = np.array(capture.reference.placements_mm, np.float64)
+
+    def seen(camera: CaptureCamera) -> tuple[CameraView, Recognised | str]:
+        view = _view(capture, camera, parameters)
+        return view, recognise_view(view, edges, placements)
+
+    every = dask.compute(*(dask.delayed(seen)(camera) for camera in capture.document.cameras))
+    return _Seen(
+        str(capture.file),
+        edges,
+        placements,
+        {view.camera: view for view, _ in every},
+        {view.camera: found for view, found in every if isinstance(found, Recognised)},
+        {view.camera: found for view, found in every if isinstance(found, str)},
     )
 
 

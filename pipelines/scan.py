@@ -24,7 +24,7 @@ from pipelines.steps import (
     surface,
     verify,
 )
-from schemas.calibration import Calibration
+from schemas.calibration import Calibration, Source
 from schemas.documents import Document, canonical_json
 from schemas.parameters.foot import FootParameters
 from schemas.scan import CameraFilm
@@ -107,12 +107,13 @@ def scan_steps(
         pair: dict[str, Input] = {"surface": mesh, "truth": source_files(truth, digests)}
         verified = {"verified": add(Step(scan.name, "verify", verify, None, pair, places={"truth": truth}))}
     of_cameras = {**manifests, **stripes, **verified}
-    qualities = add(Step(scan.name, "quality", quality, None, {"clean": cleaned, "surface": mesh, **of_cameras}))
+    judged: dict[str, Input] = {"clean": cleaned, "surface": mesh, "calibration": _source(calibration), **of_cameras}
+    qualities = add(Step(scan.name, "quality", quality, None, judged))
     add(Step(scan.name, "cloud.ply", cloud_ply, None, {"oriented": oriented}))
     add(Step(scan.name, "foot.stl", foot_stl, foot, {"surface": mesh}))
     shown: dict[str, Input] = {
         "oriented": oriented, "surface": mesh, "measures": measures, "quality": qualities,
-        "about": _about(scan, calibration, parameters), **of_cameras,
+        "calibration": _used(calibration, scan), "about": _about(scan, parameters), **of_cameras,
     }  # fmt: skip
     add(Step(scan.name, "report", report, foot, shown, places=arrays))
     return steps
@@ -143,15 +144,22 @@ def _document(document: Document) -> Value:
     return Value(canonical_json(document.model_dump(mode="json")).encode())
 
 
-def _about(scan: RecordedScan, calibration: CalibrationFile, parameters: ScanParameters) -> Value:
+def _source(calibration: CalibrationFile) -> Value:
+    return _document(Source(name=calibration.path.name, sha256=calibration.digest))
+
+
+def _used(calibration: CalibrationFile, scan: RecordedScan) -> Value:
+    """The calibration, with the maps of the scan's cameras alone."""
+    ids = {camera.id for camera in scan.document.cameras}
+    cameras = [camera for camera in calibration.content.cameras if camera.camera in ids]
+    return _document(calibration.content.model_copy(update={"cameras": cameras}))
+
+
+def _about(scan: RecordedScan, parameters: ScanParameters) -> Value:
     provenance = {
-        "calibration": calibration.path.name,
-        "calibration SHA-256": calibration.digest,
-        **{
-            f"{step}.{name}": canonical_json(value)
-            for step, values in parameters.model_dump(mode="json").items()
-            for name, value in values.items()
-        },
+        f"{step}.{name}": canonical_json(value)
+        for step, values in parameters.model_dump(mode="json").items()
+        for name, value in values.items()
     }
     about = {"patient": scan.document.patient, "scan": scan.document.scan, "provenance": provenance}
     return Value(canonical_json(about).encode())

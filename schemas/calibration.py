@@ -23,6 +23,7 @@ _FAMILY = "footscan.calibration/"
 LARGEST = 1e15
 """No number of a camera's map is larger; what is computed from it stays finite."""
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Side = Annotated[int, Field(ge=1, le=100_000)]
 Scale = Annotated[float, Field(ge=1e-9, le=LARGEST)]
 DENT_PX = 1e-6
 """How far a corner of a convex region may lie inside of it, for rounding."""
@@ -98,7 +99,7 @@ class CameraCalibration(Document):
     """The map of one camera, how sure it is, and where."""
 
     camera: Annotated[int, Field(ge=1)]
-    image_px: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] | None = None
+    image_px: tuple[Side, Side] | None = None
     """Columns and rows of the images it holds for; None where they are not known."""
     map: PixelMap
     covariance: list[list[float]] = Field(default_factory=list)

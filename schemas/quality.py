@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from schemas.calibration import Source
 from schemas.documents import Document
 
 Count = Annotated[int, Field(ge=0)]
@@ -61,6 +62,8 @@ class Quality(Document):
     """The content of quality.json."""
 
     format: Literal["footscan.quality/1"] = "footscan.quality/1"
+    calibration: Source
+    """The file that pixels were mapped by."""
     cameras: list[CameraQuality]
     cloud_points: Count
     """Points of the cloud that the surface was made of."""

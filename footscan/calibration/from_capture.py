@@ -6,7 +6,7 @@ the model of each camera is chosen by held-out error.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from footscan.calibration.edge_points import EdgePoints
 from footscan.calibration.fit import UndeterminedError
 from footscan.calibration.from_chart import calibrated
 from footscan.calibration.homography import HomographyModel, image_frame
-from footscan.calibration.placement import CameraFit, departure, fit_to_edges, joined_poses
+from footscan.calibration.placement import CameraFit, fit_to_edges, joined_poses
 from footscan.calibration.recognition import FirstMap, UnrecognisedError, recognise
 from footscan.calibration.reference import Edges
 from footscan.calibration.selection import ModelTrial, asked_for, candidates, select
@@ -29,12 +29,6 @@ Floats = NDArray[np.float64]
 
 SEEN = 0.5
 """A camera sees a placement where so much of its stripe is explained by the object."""
-FEWEST_POINTS = 40
-"""With fewer points of the stripe, all cameras together, a placement shows nothing."""
-FOUND = 0.5
-"""An object is where a departure says when so much of the stripe lies on its edges."""
-LEVER_MM = 50.0
-"""A turn moves the object's corners by this times its angle."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +44,16 @@ class CameraView:
 
 
 @dataclass(frozen=True)
+class Recognised:
+    """A view in which the object is recognised."""
+
+    view: CameraView
+    first: FirstMap
+    rough: CameraFit
+    """With the object where it was said to stand, and a lens."""
+
+
+@dataclass(frozen=True)
 class CalibratedView:
     """The calibration of one camera, and what it rests on."""
 
@@ -59,57 +63,49 @@ class CalibratedView:
     """What was used of the stripe."""
 
 
-def recognise_view(view: CameraView, edges: Edges, placements: Floats) -> FirstMap | str:
-    """The first map of a camera; or why there is none. `placements` is (K, 2), mm."""
+def recognise_view(view: CameraView, edges: Edges, placements: Floats) -> Recognised | str:
+    """The object in the view of a camera, standing in its `placements` (K, 2), mm; or why it is not recognised."""
     try:
-        return recognise(view.stripes, edges, placements, view.mounting)
+        first = recognise(view.stripes, edges, placements, view.mounting)
     except UnrecognisedError as reason:
         return str(reason)
+    try:
+        return Recognised(view, first, fit_view(view, first, edges, as_said(placements)))
+    except UndeterminedError:
+        return "too little of the stripe lies on the object"
 
 
-def locate(
-    views: Mapping[int, CameraView],
-    first: Mapping[int, FirstMap | str],
-    edges: Edges,
-    placements: Floats,
-    tolerance_mm: float,
-    source: str,
-) -> Floats:
-    """Where the object stood, as all cameras together tell: (K, 3) mm, mm and radians.
+def fit_view(view: CameraView, first: FirstMap, edges: Edges, poses: Floats, without: int | None = None) -> CameraFit:
+    """The map that knows the lens, from placements in which the camera sees the object; one may be left out.
 
     Raises
     ------
-    RefusedInput
-        A camera does not recognise the object, or it stood elsewhere than said by more than `tolerance_mm`.
+    UndeterminedError
+        Too little of the stripe lies on the object.
     """
-    maps = {camera: found for camera, found in first.items() if isinstance(found, FirstMap)}
-    failed = {camera: found for camera, found in first.items() if isinstance(found, str)}
-    poses = np.column_stack([placements, np.zeros(len(placements))])
-    for number in range(len(placements)):
-        if sum(len(view.stripes[number]) for view in views.values()) < FEWEST_POINTS:
-            raise RefusedInput(source, "shows no stripe in any camera, expected the object", field=f"frame {number}")
-    fits = {camera: _fit(views[camera], found, edges, poses) for camera, found in maps.items()}
-    known = {camera: found for camera, found in fits.items() if found is not None}
-    if len(placements) > 1 and known:
-        _check_placements(views, {camera: maps[camera] for camera in known}, edges, poses, tolerance_mm, source)
-    failed |= {camera: "too little of the stripe lies on the object" for camera in maps if camera not in known}
-    if failed:
-        camera = min(failed)
-        others = f" (and so cameras {', '.join(map(str, sorted(failed)[1:]))})" if len(failed) > 1 else ""
-        problem = f"the reference object is not recognised: {failed[camera]}{others}"
-        raise RefusedInput(source, problem, field=f"camera {camera}")
+    seen = [
+        stripe if share >= SEEN and number != without else np.empty((0, 2))
+        for number, (stripe, share) in enumerate(zip(view.stripes, first.explained, strict=True))
+    ]
+    lens = HomographyModel(*image_frame(view.image_px), distorted=True)
+    return fit_to_edges(seen, first.world, edges, poses, lens)
+
+
+def as_said(placements: Floats) -> Floats:
+    """Poses (K, 3), mm, mm and radians, of an object that stands in its `placements` (K, 2)."""
+    return np.column_stack([placements, np.zeros(len(placements))])
+
+
+def object_poses(recognised: Mapping[int, Recognised], edges: Edges, placements: Floats) -> Floats:
+    """Where the object stood, as all cameras tell: (K, 3) mm, mm and radians. A single placement is what it is."""
+    poses = as_said(placements)
     if len(placements) == 1:
         return poses
-    return joined_poses(known, edges, poses)[0]
+    return joined_poses({camera: known.rough for camera, known in recognised.items()}, edges, poses)[0]
 
 
 def calibrate_view(
-    view: CameraView,
-    first: FirstMap,
-    edges: Edges,
-    poses: Floats,
-    parameters: CalibrationParameters,
-    source: str,
+    recognised: Recognised, edges: Edges, poses: Floats, parameters: CalibrationParameters, source: str
 ) -> CalibratedView:
     """The calibration of one camera with the object in known `poses` (K, 3).
 
@@ -118,9 +114,8 @@ def calibrate_view(
     RefusedInput
         The model that was asked for cannot be fitted.
     """
-    rough = _fit(view, first, edges, poses)
-    assert rough is not None, "it was fitted when the object was located"
-    points = rough.points
+    view = recognised.view
+    points = fit_view(view, recognised.first, edges, poses).points
     observations = points.observations()
     tried = asked_for(candidates(observations.pixels, view.image_px), parameters)
     found, trials = select(tried, observations, view.camera, robust=True)
@@ -140,59 +135,3 @@ def assemble(views: Sequence[CalibratedView], sources: list[Source], software: s
         cameras=[cameras[camera] for camera in sorted(cameras)],
         pairs=pair_agreements(cameras, {view.calibration.camera: view.points for view in views}),
     )
-
-
-def _fit(view: CameraView, first: FirstMap, edges: Edges, poses: Floats) -> CameraFit | None:
-    """The map that knows the lens, from placements in which the camera sees the object."""
-    seen = [
-        stripe if share >= SEEN else np.empty((0, 2))
-        for stripe, share in zip(view.stripes, first.explained, strict=True)
-    ]
-    try:
-        return fit_to_edges(seen, first.world, edges, poses, _lens(view))
-    except UndeterminedError:
-        return None
-
-
-def _lens(view: CameraView) -> HomographyModel:
-    return HomographyModel(*image_frame(view.image_px), distorted=True)
-
-
-def _check_placements(
-    views: Mapping[int, CameraView],
-    maps: Mapping[int, FirstMap],
-    edges: Edges,
-    poses: Floats,
-    tolerance_mm: float,
-    source: str,
-) -> None:
-    """Refuses the placement in which the object stood farthest from where it was said, by maps that do not rest on it.
-
-    Only cameras that recognise the object in most placements have a say.
-    """
-    trusted = [camera for camera, found in maps.items() if np.nanmean(found.explained >= SEEN) > 0.5] or list(maps)
-    worst: tuple[float, str, str] | None = None
-    for number in range(len(poses)):
-        worlds = []
-        for camera in trusted:
-            view, explained = views[camera], maps[camera].explained.copy()
-            explained[number] = 0.0
-            fitted = _fit(view, replace(maps[camera], explained=explained), edges, poses)
-            if fitted is not None:
-                worlds.append(fitted.world(view.stripes[number]))
-        if not worlds:
-            continue
-        found = departure(worlds, edges, poses[number])
-        if found.share < FOUND:
-            problem, size = "the reference object is not recognised where it should stand, nor near to it", np.inf
-        else:
-            size = max(float(np.hypot(*found.pose[:2])), float(abs(found.pose[2])) * LEVER_MM)
-            stood, said = poses[number] + found.pose, poses[number]
-            problem = (
-                f"the object stood at ({stood[0]:.1f}, {stood[1]:.1f}) mm, turned by {np.degrees(stood[2]):.1f} "
-                f"degrees, expected ({said[0]:g}, {said[1]:g}) as placements_mm says"
-            )
-        if size > tolerance_mm and (worst is None or size > worst[0]):
-            worst = (size, problem, f"frame {number}")
-    if worst is not None:
-        raise RefusedInput(source, worst[1], field=worst[2])

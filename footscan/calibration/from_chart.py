@@ -14,7 +14,7 @@ from footscan.calibration.polynomial import PolynomialModel, terms
 from footscan.calibration.quadratic import ORDER as QUADRATIC
 from footscan.calibration.quadratic import QuadraticFit, fit_quadratic
 from footscan.calibration.region import region_of
-from footscan.calibration.selection import Candidate, ModelTrial, asked_for, candidates, rms, select, try_model
+from footscan.calibration.selection import ModelTrial, asked_for, candidates, rms, select, try_model
 from schemas.calibration import Calibration, CameraCalibration, Residual, Source
 from schemas.errors import RefusedInput
 from schemas.parameters.calibration import CalibrationParameters
@@ -133,16 +133,22 @@ def _residuals(model: Model, parameters: NDArray[np.float64], observations: Obse
 
 def _quadratic(chart: Chart, observations: Observations) -> tuple[CameraCalibration, list[ModelTrial]]:
     """The thesis's model: second order of the plain pixels; its held-out error is that of any second order."""
-    normalised = next(c for c in candidates(chart.pixels, IMAGE_PX) if c.name == f"polynomial {QUADRATIC}")
-    _, trial = try_model(
-        Candidate("quadratic", "polynomial", normalised.model), observations, chart.camera, robust=False
-    )
+    second_order = CalibrationParameters(model="polynomial", order=QUADRATIC)
+    (normalised,) = asked_for(candidates(chart.pixels, IMAGE_PX), second_order)
+    _, trial = try_model(normalised, observations, chart.camera, robust=False)
     result = fit_quadratic(chart)
     parameters = _in_mm(result)
     world = MILLIMETRES[chart.unit] * chart.world[:, 1:]
     distances = np.linalg.norm(PLAIN_QUADRATIC.world(parameters, chart.pixels) - world, axis=1)
     worst = trial.worst_mm if trial.held_out_rms_mm is not None else float(distances.max())
-    trial = replace(trial, rms_mm=rms(distances), worst_mm=worst, status="chosen", remark=result.remark or "")
+    trial = replace(
+        trial,
+        model="quadratic",
+        rms_mm=rms(distances),
+        worst_mm=worst,
+        status="chosen",
+        remark=result.remark or "",
+    )
     camera = CameraCalibration(
         camera=chart.camera,
         image_px=IMAGE_PX,

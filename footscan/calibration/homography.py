@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from footscan.calibration.polynomial import derivatives, design_matrix, terms
 from schemas.calibration import Correction, Distortion, HomographyMap
+from schemas.parameters.calibration import ModelName
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +37,20 @@ class HomographyModel:
     distorted: bool = False
     correction: int | None = None
     """Order of the correction; None is none."""
+
+    @property
+    def kind(self) -> ModelName:
+        """What it is asked for by."""
+        if self.correction is not None:
+            return "homography-correction"
+        return "homography-distortion" if self.distorted else "homography"
+
+    @property
+    def name(self) -> str:
+        """As it stands in tables."""
+        distortion = ", distortion" if self.distorted else ""
+        correction = f", correction {self.correction}" if self.correction is not None else ""
+        return f"homography{distortion}{correction}"
 
     @property
     def unknowns(self) -> int:

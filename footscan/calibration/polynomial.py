@@ -1,11 +1,13 @@
 """Polynomials of the pixel as a model of a camera."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from schemas.calibration import PolynomialMap
+from schemas.parameters.calibration import ModelName
 
 Floats = NDArray[np.float64]
 
@@ -17,6 +19,13 @@ class PolynomialModel:
     order: int
     centre_px: tuple[float, float]
     scale_px: float
+
+    kind: ClassVar[ModelName] = "polynomial"
+
+    @property
+    def name(self) -> str:
+        """As it stands in tables."""
+        return f"polynomial {self.order}"
 
     @property
     def unknowns(self) -> int:

@@ -13,7 +13,7 @@ from footscan.calibration.maps import Model
 from footscan.calibration.observations import Observations
 from footscan.calibration.polynomial import PolynomialModel
 from footscan.calibration.region import region_of, supported
-from schemas.parameters.calibration import CalibrationParameters, ModelName
+from schemas.parameters.calibration import CalibrationParameters
 
 Floats = NDArray[np.float64]
 
@@ -57,59 +57,39 @@ class ModelTrial:
     remark: str = ""
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A model to be tried, and its name in tables."""
-
-    name: str
-    kind: ModelName
-    model: Model
-
-
-def candidates(pixels: Floats, image_px: tuple[int, int]) -> list[Candidate]:
+def candidates(pixels: Floats, image_px: tuple[int, int]) -> list[Model]:
     """All models: polynomials normalised to the extent of `pixels` (N, 2), homographies to the image."""
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     centre = ((low + high) / 2).tolist()
     extent = max(float((high - low).max() / 2), SMALLEST_EXTENT_PX)
-    polynomials = [
-        Candidate(f"polynomial {order}", "polynomial", PolynomialModel(order, (centre[0], centre[1]), extent))
-        for order in ORDERS
-    ]
     middle, reach = image_frame(image_px)
     return [
-        *polynomials,
-        Candidate("homography", "homography", HomographyModel(middle, reach)),
-        Candidate("homography, distortion", "homography-distortion", HomographyModel(middle, reach, True)),
-        *(
-            Candidate(
-                f"homography, distortion, correction {order}",
-                "homography-correction",
-                HomographyModel(middle, reach, True, order),
-            )
-            for order in CORRECTIONS
-        ),
+        *(PolynomialModel(order, (centre[0], centre[1]), extent) for order in ORDERS),
+        HomographyModel(middle, reach),
+        HomographyModel(middle, reach, True),
+        *(HomographyModel(middle, reach, True, order) for order in CORRECTIONS),
     ]
 
 
-def asked_for(tried: Sequence[Candidate], parameters: CalibrationParameters) -> list[Candidate]:
-    """Those of the candidates that the parameters leave to choose from."""
+def asked_for(models: Sequence[Model], parameters: CalibrationParameters) -> list[Model]:
+    """Those that the parameters leave to choose from."""
     return [
-        candidate
-        for candidate in tried
-        if parameters.model in ("auto", candidate.kind)
-        and (parameters.order is None or candidate.name == f"polynomial {parameters.order}")
+        model
+        for model in models
+        if parameters.model in ("auto", model.kind)
+        and (not isinstance(model, PolynomialModel) or parameters.order in (None, model.order))
     ]
 
 
 def select(
-    tried: Sequence[Candidate], observations: Observations, camera: int, *, robust: bool
+    models: Sequence[Model], observations: Observations, camera: int, *, robust: bool
 ) -> tuple[Fit | None, list[ModelTrial]]:
     """The fit of the model with the least expected error, and how each fared; None where none can be judged.
 
     What is held out lies where the data lie, on few lines perhaps: it tells nothing of the region between them, where a
     model with many unknowns is free to swing. How freely, its covariance says; the two are added as squares.
     """
-    attempts = [try_model(candidate, observations, camera, robust=robust) for candidate in tried]
+    attempts = [try_model(model, observations, camera, robust=robust) for model in models]
     trials = [trial for _, trial in attempts]
     judged = [k for k, trial in enumerate(trials) if np.isfinite(_expected(trial))]
     if not judged:
@@ -121,14 +101,11 @@ def select(
     return attempts[chosen][0], trials
 
 
-def try_model(
-    candidate: Candidate, observations: Observations, camera: int, *, robust: bool
-) -> tuple[Fit | None, ModelTrial]:
+def try_model(model: Model, observations: Observations, camera: int, *, robust: bool) -> tuple[Fit | None, ModelTrial]:
     """The fit of one model, and its errors in mm."""
     observations = observations.sorted()
-    model = candidate.model
     common = ModelTrial(
-        camera, candidate.name, model.unknowns, observations.independent, observations.points,
+        camera, model.name, model.unknowns, observations.independent, observations.points,
         None, None, None, None, None, None, "refused",
     )  # fmt: skip
     try:

@@ -5,13 +5,15 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.report.calibration_figure import calibration_figure
 from footscan.report.colours import colour_bar, colour_limit, distance_colours
 from footscan.report.coverage import coverage_plot
-from footscan.report.markup import facts, number, section, table, text, words
+from footscan.report.markup import data_uri, facts, number, section, table, text, words
 from footscan.report.sample_frames import FrameSample, sample_frames
 from footscan.report.style import STYLE
 from footscan.report.surface_views import surface_views
 from footscan.report.viewer import SCRIPT, SCRIPT_DIGEST, viewer
+from schemas.calibration import Calibration, Source
 from schemas.measures import Measure, Measures
 from schemas.quality import Comparison, MeshQuality, Quality
 
@@ -46,6 +48,7 @@ def scan_page(
     cloud: NDArray[np.void],
     measures: Measures,
     quality: Quality,
+    calibration: Calibration,
     samples: Sequence[FrameSample],
     truth_distance: NDArray[np.floating] | None,
     provenance: Mapping[str, str],
@@ -60,6 +63,7 @@ def scan_page(
     cloud : array of `footscan.cloud.points.POINT_DTYPE`, mm, scanner frame
         What the surface was made of.
     measures, quality : the content of measures.json and quality.json
+    calibration : what its pixels were mapped by
     samples : a frame of each camera, in the order shown
     truth_distance : (V,) float, mm, signed, positive outside the reference model; None where there is no such model
     provenance : name and value of what the result came from, in the order shown
@@ -75,6 +79,7 @@ def scan_page(
         section("Cameras", _cameras_table(quality, cloud)),
         section("Stripe coverage", _COVERAGE_NOTE, coverage_plot(cloud, quality.cameras)),
         section("Sample frames", sample_frames(samples)) if samples else "",
+        section("Calibration", _calibration(calibration, quality.calibration)),
         section("Mesh", _mesh(quality.mesh, quality.cloud_points)),
         section("Provenance", table(["", ""], ([text(name), text(value)] for name, value in provenance.items()))),
     ]
@@ -195,6 +200,15 @@ def _cameras_table(quality: Quality, cloud: NDArray[np.void]) -> str:
         names.append("All")
     cells = ([name, *(number(count) for count in row)] for name, row in zip(names, rows, strict=True))
     return table(headings, cells, numeric=range(1, len(headings)))
+
+
+def _calibration(calibration: Calibration, file: Source) -> str:
+    picture = data_uri("image/png", calibration_figure(calibration))
+    made = f"{calibration.created:%Y-%m-%d %H:%M} UTC" if calibration.created else "unknown"
+    return (
+        facts([("File", text(file.name)), ("SHA-256", text(file.sha256)), ("Made", made)])
+        + f'<img class="picture" src="{picture}" alt="Residuals and coverage of each camera">'
+    )
 
 
 def _mesh(mesh: MeshQuality, cloud_points: int) -> str:

@@ -40,6 +40,7 @@ dd { margin: 0; font-weight: 600; font-variant-numeric: tabular-nums; }
 .incomplete { background: #fbdfdc; color: #92231a; }
 
 figure { margin: 0; }
+.picture { display: block; width: 100%; margin-top: 12px; }
 svg { display: block; width: 100%; height: auto; }
 svg text { fill: var(--soft); font-size: 8.5px; font-variant-numeric: tabular-nums; }
 figcaption { margin-bottom: 4px; font-size: 14px; color: var(--soft); }

@@ -2,16 +2,14 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
-from pipelines.cli.calibration_file import tell_calibration, write_calibration
-from pipelines.cli.output import AsJson, message, print_json, print_table
+from pipelines.cli.calibration_file import print_pairs, tell_calibration, write_calibration
+from pipelines.cli.output import AsJson, message, print_json
+from pipelines.cli.refused_picture import Picture, drawn
 from schemas.errors import RefusedInput
-
-if TYPE_CHECKING:
-    from schemas.calibration import PairAgreement
 
 
 def capture(
@@ -27,6 +25,7 @@ def capture(
         float, typer.Option(min=0.01, max=50, help="How far the object may stand from where it should.")
     ] = 1.0,
     out: Annotated[Path | None, typer.Option(help="Write the calibration here.")] = None,
+    picture: Picture = None,
     as_json: AsJson = False,
 ) -> None:
     """Calibrate from the stripe over the reference object: nobody clicks."""
@@ -38,7 +37,8 @@ def capture(
     if order is not None and model != "polynomial":
         raise RefusedInput("--order", "goes with --model polynomial alone")
     parameters = CaptureCalibrationParameters(model=model, order=order, placement_tolerance_mm=tolerance_mm)
-    made = calibrate_capture(folder, parameters, cores())
+    with drawn(folder, picture):
+        made = calibrate_capture(folder, parameters, cores())
     calibration = made.calibration
     write_calibration(calibration, out)
     if as_json:
@@ -52,19 +52,10 @@ def capture(
         )
     else:
         print_trials(made.trials)
-        _print_pairs(calibration.pairs)
+        print_pairs(calibration.pairs)
     for number, (y, z) in enumerate(made.departures_mm):
         if y or z:
             message(
                 f"frame {number}: the cameras agree that the object stood {y:+.2f}, {z:+.2f} mm from where it should"
             )
     tell_calibration(calibration, out)
-
-
-def _print_pairs(pairs: "list[PairAgreement]") -> None:
-    rows = [
-        [f"{pair.cameras[0]} and {pair.cameras[1]}", str(pair.places), f"{pair.rms_mm:.3f}", f"{pair.worst_mm:.3f}"]
-        for pair in pairs
-    ]
-    if rows:
-        print_table("The same edges seen by two cameras", ["cameras", "places", "apart rms mm", "worst mm"], rows)

@@ -7,13 +7,16 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.cli import calibrate_capture, calibrate_chart
+from pipelines.cli import calibrate_capture, calibrate_chart, calibrate_check, calibrate_compare, calibrate_show
 from pipelines.cli.output import AsJson, print_json
 
 calibrate = typer.Typer(help="Learn each camera's map from pixels to millimetres.", no_args_is_help=True)
 calibrate.command("chart")(calibrate_chart.chart)
 calibrate.command("capture")(calibrate_capture.capture)
 calibrate.command("models")(calibrate_chart.models)
+calibrate.command("show")(calibrate_show.show)
+calibrate.command("check")(calibrate_check.check)
+calibrate.command("compare")(calibrate_compare.compare)
 
 
 def map_pixels(

@@ -1,13 +1,13 @@
-"""What the commands do with the calibration that they made."""
+"""What the commands say of a calibration, and where it is written."""
 
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.cli.output import message
+from pipelines.cli.output import message, print_table
 
 if TYPE_CHECKING:
-    from schemas.calibration import Calibration
+    from schemas.calibration import Calibration, PairAgreement
 
 
 def write_calibration(calibration: "Calibration", out: Path | None) -> None:
@@ -25,3 +25,13 @@ def tell_calibration(calibration: "Calibration", out: Path | None) -> None:
         message("nothing was written; --out FILE writes the calibration")
     else:
         message(f"{out}: calibration of {len(calibration.cameras)} cameras")
+
+
+def print_pairs(pairs: "list[PairAgreement]") -> None:
+    """How far apart each two cameras place the edges that both see."""
+    rows = [
+        [f"{pair.cameras[0]} and {pair.cameras[1]}", str(pair.places), f"{pair.rms_mm:.3f}", f"{pair.worst_mm:.3f}"]
+        for pair in pairs
+    ]
+    if rows:
+        print_table("The same edges seen by two cameras", ["cameras", "places", "apart rms mm", "worst mm"], rows)

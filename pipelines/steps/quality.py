@@ -8,18 +8,21 @@ import numpy as np
 
 from footscan.surface.quality import mesh_quality
 from pipelines.arrays import unpack
+from schemas.calibration import Source
 from schemas.frames import FrameManifest
 from schemas.quality import CameraQuality, Comparison, Quality
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `clean`, `surface`, `manifest-N` and `stripe-N` of each camera, `verified` where there is a truth."""
+    """`inputs`: `calibration` (its name and digest), `clean`, `surface`, `manifest-N` and `stripe-N` of each camera,
+    `verified` where there is a truth."""
     del parameters, places
     clean = unpack(inputs["clean"])
     removed = json.loads(clean["removed"].tobytes())
     surface = unpack(inputs["surface"])
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
     quality = Quality(
+        calibration=Source.model_validate_json(inputs["calibration"]),
         cameras=[_camera(camera, inputs, removed.get(str(camera), {})) for camera in ids],
         cloud_points=len(clean["cloud"]),
         mesh=mesh_quality(surface["vertices"], surface["faces"]),

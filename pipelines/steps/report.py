@@ -11,6 +11,7 @@ from footscan.frames.reader import read_frame
 from footscan.report.sample_frames import FrameSample
 from footscan.report.scan_page import scan_page
 from pipelines.arrays import unpack
+from schemas.calibration import Calibration
 from schemas.errors import DamagedError
 from schemas.frames import FrameManifest
 from schemas.measures import Measures
@@ -19,8 +20,8 @@ from schemas.quality import Quality
 
 
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `oriented`, `surface`, `measures`, `quality`, `about` and, where there is a truth, `verified`; for each
-    camera `manifest-N` and `stripe-N`; `places`: each camera's array of frames, `array-N`."""
+    """`inputs`: `calibration`, `oriented`, `surface`, `measures`, `quality`, `about` and, where there is a truth,
+    `verified`; for each camera `manifest-N` and `stripe-N`; `places`: each camera's array of frames, `array-N`."""
     surface = unpack(inputs["surface"])
     about = json.loads(inputs["about"])
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
@@ -33,6 +34,7 @@ def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping
         cloud=unpack(inputs["oriented"])["cloud"],
         measures=Measures.model_validate_json(inputs["measures"]),
         quality=Quality.model_validate_json(inputs["quality"]),
+        calibration=Calibration.model_validate_json(inputs["calibration"]),
         samples=[sample for camera in ids for sample in _samples(camera, inputs, places)],
         truth_distance=unpack(inputs["verified"])["vertex_distance"] if "verified" in inputs else None,
         provenance=about["provenance"],

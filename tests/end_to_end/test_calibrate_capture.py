@@ -9,6 +9,7 @@ from subprocess import CompletedProcess
 import numpy as np
 import pytest
 import yaml
+from PIL import Image
 
 from footscan.calibration.maps import is_supported, to_world
 from footscan.virtual.scanner import standard_scanner
@@ -28,9 +29,19 @@ def filmed(command: Footscan, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def capture(filmed: Path, tmp_path: Path) -> Path:
-    """A copy to spoil."""
+def capture(filmed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy to spoil, beside which pictures are drawn."""
+    monkeypatch.chdir(tmp_path)
     return Path(shutil.copytree(filmed, tmp_path / "capture"))
+
+
+@pytest.fixture(scope="module")
+def calibrated(command: Footscan, filmed: Path) -> Path:
+    """The calibration from `filmed`."""
+    file = filmed.with_name("calibration.json")
+    done = command("calibrate", "capture", filmed, "--out", file)
+    assert done.returncode == 0, done.stderr
+    return file
 
 
 def test_every_map_is_near_the_truth(footscan: Footscan, capture: Path, tmp_path: Path) -> None:
@@ -80,11 +91,12 @@ def test_an_object_that_stood_elsewhere_is_refused(footscan: Footscan, capture: 
     assert "capture.yaml: frame 1: the object stood at" in done.stderr
     assert "as placements_mm says" in done.stderr
     assert not (tmp_path / "calibration.json").exists()
+    with Image.open("capture-refused.png") as picture:
+        assert picture.size[0] > 1000
+    assert done.stderr.rstrip().endswith("as placements_mm says (see capture-refused.png)")
 
 
 def test_a_dark_frame_of_all_cameras_is_refused(footscan: Footscan, capture: Path) -> None:
-    from PIL import Image
-
     for film in capture.glob("*.avi"):
         film.unlink()
     document = yaml.safe_load((capture / "capture.yaml").read_text())
@@ -103,3 +115,81 @@ def test_a_model_by_name(footscan: Footscan, capture: Path) -> None:
     assert done.returncode == 0
     assert all(camera["map"]["distortion"] is not None for camera in json.loads(done.stdout)["cameras"])
     assert footscan("calibrate", "capture", capture, "--order", 3).returncode == 2
+
+
+def test_show_draws_and_tells_what_it_was_made_from(footscan: Footscan, calibrated: Path, tmp_path: Path) -> None:
+    done = footscan("calibrate", "show", calibrated, "--out", tmp_path / "c.png")
+    assert done.returncode == 0
+    assert "homography" in done.stdout
+    assert "capture.yaml" in done.stdout
+    with Image.open(tmp_path / "c.png") as picture:
+        assert picture.size[0] > 1000
+
+
+def test_a_scanner_that_has_not_moved_holds_by_other_placements_too(
+    footscan: Footscan, calibrated: Path, tmp_path: Path
+) -> None:
+    again = tmp_path / "again"
+    assert footscan("simulate", "capture", "--out", again, "--placements", 1, "--scanner-seed", 3).returncode == 0
+    done = footscan("calibrate", "check", calibrated, again, "--json")
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    assert report["verdict"] == "steady"
+    assert all(camera["rms_mm"] < 0.05 for camera in report["cameras"])
+    assert "holds; every camera is within 0.2 mm" in done.stderr
+
+
+def test_drift_is_measured_camera_by_camera(
+    footscan: Footscan, calibrated: Path, capture: Path, tmp_path: Path
+) -> None:
+    """One camera's map is moved by 0.5 mm in Z, another has no film any more, and one sees nothing."""
+    moved = json.loads(calibrated.read_text())
+    matrix = moved["cameras"][1]["map"]["matrix"]
+    for term in range(3):
+        matrix[3 + term] += 0.5 * [*matrix[6:], 1.0][term]  # Z w + 0.5 w
+    (tmp_path / "moved.json").write_text(json.dumps(moved))
+    document = yaml.safe_load((capture / "capture.yaml").read_text())
+    document["cameras"] = [camera for camera in document["cameras"] if camera["id"] != 7]
+    document["cameras"][2]["file"] = "dark/"
+    (capture / "capture.yaml").write_text(yaml.safe_dump(document))
+    (capture / "dark").mkdir()
+    for number in range(PLACEMENTS):
+        Image.new("RGB", (640, 480)).save(capture / f"dark/{number}.png")
+    done = footscan("calibrate", "check", tmp_path / "moved.json", capture, "--json")
+    assert done.returncode == 1
+    cameras = {camera["camera"]: camera for camera in json.loads(done.stdout)["cameras"]}
+    assert {number: camera["verdict"] for number, camera in cameras.items()} == {
+        1: "steady", 2: "drifted", 3: "not recognised", 4: "steady",
+        5: "steady", 6: "steady", 7: "not in the capture", 8: "steady",
+    }  # fmt: skip
+    assert cameras[2]["shift_mm"] == pytest.approx([0.0, 0.5], abs=0.02)
+    assert cameras[2]["rms_mm"] == pytest.approx(0.5, abs=0.02)
+    assert "camera 2 is off by 0.50 mm; camera 3 is not recognised" in done.stderr
+
+
+def test_drift_of_another_scanner_is_what_its_true_maps_say(
+    footscan: Footscan, calibrated: Path, tmp_path: Path
+) -> None:
+    other = tmp_path / "other"
+    assert footscan("simulate", "capture", "--out", other, "--placements", 2, "--scanner-seed", 4).returncode == 0
+    done = footscan("calibrate", "check", calibrated, other, "--json")
+    assert done.returncode == 1
+    scanner, calibration = standard_scanner(4), read_calibration(calibrated)
+    told = {camera["camera"]: camera for camera in json.loads(done.stdout)["cameras"]}
+    for camera in calibration.cameras:
+        pixels = scanner.camera(camera.camera).project_plane(GRID[:, 0], GRID[:, 1])
+        inside = is_supported(camera, pixels)
+        true = np.mean(to_world(camera, pixels[inside]) - GRID[inside], axis=0)
+        assert told[camera.camera]["verdict"] == "drifted"
+        assert told[camera.camera]["shift_mm"] == pytest.approx(true, abs=0.3 * np.hypot(*true) + 0.3)
+
+
+def test_check_needs_a_camera_that_recognises_the_object(footscan: Footscan, calibrated: Path, capture: Path) -> None:
+    document = yaml.safe_load((capture / "reference.yaml").read_text())
+    document["profile_mm"] = [[0, 0], [30, 0], [30, 90], [0, 60]]
+    (capture / "reference.yaml").write_text(yaml.safe_dump(document))
+    done = footscan("calibrate", "check", calibrated, capture, "--picture", "why.png")
+    assert done.returncode == 2
+    assert "(see why.png)" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert Path("why.png").exists()

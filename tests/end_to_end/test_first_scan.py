@@ -1,5 +1,6 @@
 """A recorded scan becomes a measured foot whose true shape and measures are known."""
 
+import hashlib
 import json
 from collections.abc import Callable
 from html.parser import HTMLParser
@@ -68,12 +69,14 @@ def test_measures_are_those_of_the_foot(folder: Path) -> None:
     assert breadth["value"] == pytest.approx(known["foot_breadth"], abs=2.0)
 
 
-def test_the_surface_is_close_to_the_truth(folder: Path) -> None:
+def test_the_surface_is_close_to_the_truth(measured: Path, folder: Path) -> None:
     quality = _quality(folder)
     print(f"mean distance {quality['truth']['mean']:.3f} mm, 99 % below {quality['truth']['p99']:.3f} mm")
     assert quality["format"] == "footscan.quality/1"
     assert quality["truth"]["mean"] < 0.35
     assert quality["mesh"]["components"] == 1
+    digest = hashlib.sha256((measured / "calibration.json").read_bytes()).hexdigest()
+    assert quality["calibration"] == {"name": "calibration.json", "sha256": digest}
     assert [camera["camera"] for camera in quality["cameras"]] == list(range(1, 9))
 
 

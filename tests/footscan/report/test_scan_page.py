@@ -8,11 +8,16 @@ import pytest
 from footscan.cloud.points import make_points
 from footscan.report.sample_frames import FrameSample
 from footscan.report.scan_page import scan_page, upright
+from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
 from schemas.measures import Measure, Measures
 from schemas.quality import CameraQuality, Comparison, MeshQuality, Quality
 
 IDENTITY = np.eye(4).tolist()
 HOSTILE = '<script>alert("x")</script>'
+
+
+def identity_map():
+    return PolynomialMap(order=1, centre_px=(0, 0), scale_px=1, alpha_y=[0, 1, 0], alpha_z=[0, 0, 1])
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +43,13 @@ def scan():
                 "heel_girth": Measure(value=None, unit="mm", status="incomplete", definition="Taut", note="Cut off"),
             },
         ),
+        "calibration": Calibration(
+            sources=[],
+            software="footscan",
+            cameras=[CameraCalibration(camera=1, map=identity_map(), region_px=[(9, 9), (99, 9), (9, 99)], points=3)],
+        ),
         "quality": Quality(
+            calibration=Source(name=f"{HOSTILE}.json", sha256="12ab"),
             cameras=[
                 CameraQuality(
                     camera=1, frames=4, frames_lost=1, frames_with_stripe=2, points=1711, removed={"far_off": 13}
@@ -52,7 +63,7 @@ def scan():
         ),
         "samples": [FrameSample(camera, 1, image, *point) for camera in (1, 2)],
         "truth_distance": None,
-        "provenance": {"calibration": "sha256:12ab", "footscan": "0.1.0"},
+        "provenance": {"extraction.method": "ridge", "footscan": "0.1.0"},
     }
 
 
@@ -94,9 +105,16 @@ def test_the_cameras_table_adds_up(scan):
 
 def test_provenance_and_mesh(scan):
     page = scan_page(**scan)
-    assert ["calibration", "sha256:12ab"] in rows_of(page)
+    assert ["extraction.method", "ridge"] in rows_of(page)
     assert facts_of(page)["Closed"] == "Yes"
     assert facts_of(page)["Triangles"] == "4"
+
+
+def test_the_calibration_stands_with_its_digest_and_a_picture(scan):
+    page = scan_page(**scan)
+    assert facts_of(page)["SHA-256"] == "12ab"
+    assert facts_of(page)["Made"] == "unknown"
+    assert '<img class="picture" src="data:image/png;base64,' in page
 
 
 @pytest.mark.parametrize("broken", [{"open_edges": 3}, {"non_manifold_edges": 1}])
@@ -142,7 +160,7 @@ def test_what_comes_from_a_scan_is_no_markup(scan):
 
 def test_the_page_asks_for_nothing_from_elsewhere(scan):
     page = scan_page(**scan)
-    assert not re.search(r"https?://|src\s*=|@import|url\(|<link|<iframe", page, re.IGNORECASE)
+    assert not re.search(r"https?://|src\s*=(?!.data:image/)|@import|url\(|<link|<iframe", page, re.IGNORECASE)
     assert all(address.startswith("data:image/") for address in re.findall(r'href="([^"]*)"', page))
     assert "default-src 'none'" in page
 
@@ -150,7 +168,7 @@ def test_the_page_asks_for_nothing_from_elsewhere(scan):
 class Balance(HTMLParser):
     """Tags that were opened and are still open; refuses a wrong end."""
 
-    void = frozenset({"meta", "input"})
+    void = frozenset({"meta", "input", "img"})
 
     def __init__(self):
         super().__init__()
