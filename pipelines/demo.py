@@ -15,9 +15,9 @@ from pipelines.engine.run import OnStepEnd, run_plan
 from pipelines.engine.step import Failure, Output, Step
 from pipelines.engine.store import Store
 from pipelines.recorded import SCAN_FILE, scan_folders
-from pipelines.steps import calibrate_chart, simulate_capture, simulate_scan
+from pipelines.steps import calibrate_capture, simulate_capture, simulate_scan
 from schemas.errors import Fault
-from schemas.parameters.calibration import CalibrationParameters
+from schemas.parameters.calibration import CaptureCalibrationParameters
 from schemas.parameters.demo import FilmedFoot
 from schemas.workflow import ScanParameters
 
@@ -86,15 +86,16 @@ def _filming(folder: Path, foot: FilmedFoot) -> list[Step]:
     scan = folder / "archive" / foot.patient / foot.scan
     capture = folder / "capture"
     film = Step("demo", "film", simulate_scan, foot, places={"folder": scan}, writes=scan / SCAN_FILE)
-    chart = Step(
-        "demo", "capture", simulate_capture, foot.settings,
+    ordinary_light = foot.settings.model_copy(update={"ambient": "ambient"})  # a scanner is calibrated once
+    film_capture = Step(
+        "demo", "capture", simulate_capture, ordinary_light,
         places={"folder": capture}, writes=capture / "capture.yaml",
     )  # fmt: skip
     calibrate = Step(
-        "demo", "calibrate", calibrate_chart, CalibrationParameters(), {"chart": Output(chart.name)},
-        places={"chart": capture / "chart.csv"},
+        "demo", "calibrate", calibrate_capture, CaptureCalibrationParameters(), {"capture": Output(film_capture.name)},
+        places={"capture": capture},
     )  # fmt: skip
-    return [film, chart, calibrate]
+    return [film, film_capture, calibrate]
 
 
 def _job(folder: Path, results: Path) -> Job:

@@ -205,10 +205,8 @@ def _cameras_table(quality: Quality, cloud: NDArray[np.void]) -> str:
 def _calibration(calibration: Calibration, file: Source) -> str:
     picture = data_uri("image/png", calibration_figure(calibration))
     made = f"{calibration.created:%Y-%m-%d %H:%M} UTC" if calibration.created else "unknown"
-    return (
-        facts([("File", text(file.name)), ("SHA-256", text(file.sha256)), ("Made", made)])
-        + f'<img class="picture" src="{picture}" alt="Residuals and coverage of each camera">'
-    )
+    rows = [["File", text(file.name)], ["SHA-256", text(file.sha256)], ["Made", made]]
+    return table(["", ""], rows) + f'<img class="picture" src="{picture}" alt="Residuals and coverage of each camera">'
 
 
 def _mesh(mesh: MeshQuality, cloud_points: int) -> str:
