@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.drift import Drift, drift_of
+from footscan.calibration.found_corners import FoundCorner
 from footscan.calibration.from_capture import (
     CalibratedView,
     CameraView,
@@ -28,6 +29,7 @@ from pipelines.captures import RecordedCapture, read_capture
 from pipelines.engine.digest import sha256
 from pipelines.version import SOFTWARE
 from schemas.calibration import Calibration, Source
+from schemas.errors import RefusedInput
 from schemas.mounting import CaptureCamera, mounting_of
 from schemas.parameters.calibration import CaptureCalibrationParameters
 
@@ -40,6 +42,11 @@ class CaptureCalibration:
 
     calibration: Calibration
     trials: list[ModelTrial]
+    corners: list[FoundCorner]
+    x_mm: float
+    """Of all corners: where the laser's plane stood."""
+    warnings: list[str]
+    """What looks like a mistake, a line each."""
     departures_mm: Floats
     """(K, 2) how far, in Y and Z, the object stood from where it was said, as the cameras agree; zeros where that does
     not help."""
@@ -55,14 +62,18 @@ def calibrate_capture(folder: Path, parameters: CaptureCalibrationParameters, wo
         `RefusedCapture`.
     """
     capture = read_capture(folder)
+    sources = _sources(capture)
     with dask.config.set(scheduler="threads", num_workers=workers):
         seen = _see(capture, parameters)
         seen.check(parameters.placement_tolerance_mm)
         refuse_unrecognised(seen.views, seen.unrecognised, seen.source)
         poses, calibrated = seen.calibrate(parameters)
     return CaptureCalibration(
-        assemble(calibrated, _sources(capture), SOFTWARE),
+        assemble(calibrated, sources, SOFTWARE),
         [trial for view in calibrated for trial in view.trials],
+        [corner for view in calibrated for corner in view.corners],
+        capture.document.x_mm,
+        [known.contradiction for known in seen.recognised.values() if known.contradiction],
         poses[:, :2] - seen.placements,
     )
 
@@ -175,10 +186,32 @@ def _view(capture: RecordedCapture, camera: CaptureCamera, parameters: CaptureCa
 
 
 def _sources(capture: RecordedCapture) -> list[Source]:
-    """What the calibration rests on: the two documents, and each film or the frames of one."""
-    files = [capture.file, capture.reference_file]
-    files += [file for camera in capture.document.cameras for file in film_files(capture.film(camera))]
-    root = capture.folder.resolve()
-    return [
-        Source(name=file.resolve().relative_to(root).as_posix(), sha256=sha256(file.read_bytes())) for file in files
-    ]
+    """What the calibration rests on: the two documents, and each film or the frames of one.
+
+    Raises
+    ------
+    RefusedInput
+        Two cameras have one and the same film.
+    """
+    sources = [_source(file, capture.folder) for file in (capture.file, capture.reference_file)]
+    cameras: dict[tuple[str, ...], int] = {}
+    for camera in capture.document.cameras:
+        film = [_source(file, capture.folder) for file in film_files(capture.film(camera))]
+        other = cameras.setdefault(tuple(frame.sha256 for frame in film), camera.id)
+        if other != camera.id:
+            problem = f"has the same film as camera {other}, expected its own"
+            raise RefusedInput(capture.file, problem, field=f"camera {camera.id}")
+        sources += film
+    return sources
+
+
+def _source(file: Path, folder: Path) -> Source:
+    return Source(name=_name(file, folder), sha256=sha256(file.read_bytes()))
+
+
+def _name(file: Path, folder: Path) -> str:
+    """Its path within the capture; links are not followed, but those on the way to the capture."""
+    for root in (folder, folder.resolve()):
+        if file.is_relative_to(root):
+            return file.relative_to(root).as_posix()
+    return file.name

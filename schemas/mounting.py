@@ -37,6 +37,15 @@ class Mounting:
     y: Sign
     z: Sign
 
+    def __str__(self) -> str:
+        """Its sides by name: front, left, above."""
+        signs = zip((self.x, self.y, self.z), _OPPOSITES, strict=True)
+        return ", ".join(pair[0 if sign > 0 else 1] for sign, pair in signs if sign)
+
+    def contradicts(self, other: "Mounting") -> bool:
+        """Whether both know a side, and it is not the same."""
+        return any(a * b < 0 for a, b in ((self.x, other.x), (self.y, other.y), (self.z, other.z)))
+
 
 def mounting_of(camera: CaptureCamera) -> Mounting:
     """Where `camera` stands, by what its capture says or else by the numbering of the scanner's cameras."""

@@ -4,6 +4,7 @@ import csv
 import io
 import math
 import re
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -23,7 +24,10 @@ def read_records(path: Path) -> Iterator[tuple[int, list[str]]]:
         The file is missing, too large, or no CSV in UTF-8.
     """
     try:
-        if path.stat().st_size > MAX_BYTES:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise RefusedInput(path, "expected a CSV file")
+        if status.st_size > MAX_BYTES:
             raise RefusedInput(path, f"larger than {MAX_BYTES} bytes, expected a table of points")
         text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from footscan.calibration.agreement import pair_agreements
 from footscan.calibration.edge_points import EdgePoints
 from footscan.calibration.fit import UndeterminedError
+from footscan.calibration.found_corners import FoundCorner, corners_in
 from footscan.calibration.from_chart import calibrated
 from footscan.calibration.homography import HomographyModel, image_frame
 from footscan.calibration.placement import CameraFit, fit_to_edges, joined_poses
@@ -52,6 +53,17 @@ class Recognised:
     rough: CameraFit
     """With the object where it was said to stand, and a lens."""
 
+    @property
+    def contradiction(self) -> str | None:
+        """What speaks against this being the camera's own film, if anything does."""
+        said, seen = self.view.mounting, self.first.seen_from
+        if not seen.contradicts(said):
+            return None
+        return (
+            f"camera {self.view.camera} sees the object from {seen}, expected from {said}: is this its film, and do "
+            "the placements, the profile and `stands` say how it is?"
+        )
+
 
 @dataclass(frozen=True)
 class CalibratedView:
@@ -61,6 +73,7 @@ class CalibratedView:
     trials: list[ModelTrial]
     points: EdgePoints
     """What was used of the stripe."""
+    corners: list[FoundCorner]
 
 
 def recognise_view(view: CameraView, edges: Edges, placements: Floats) -> Recognised | str:
@@ -123,7 +136,8 @@ def calibrate_view(
         reason = trials[0].remark or "nothing can be held out"
         raise RefusedInput(source, f"no model can be judged: {reason}", field=f"camera {view.camera}")
     chosen = next(trial for trial in trials if trial.status == "chosen")
-    return CalibratedView(calibrated(found, observations, chosen, view.image_px), trials, points)
+    calibration = calibrated(found, observations, chosen, view.image_px)
+    return CalibratedView(calibration, trials, points, list(corners_in(calibration, view.stripes, edges, poses)))
 
 
 def assemble(views: Sequence[CalibratedView], sources: list[Source], software: str) -> Calibration:

@@ -28,6 +28,9 @@ NEAR_MM = 0.5
 """A point as near to an edge as this lies on it, whatever the lens."""
 LOST_MM, LOST_STEP_MM = 60.0, 7.5
 """How far around its place a lost object is looked for, and how densely."""
+REGISTER_GATES_MM = (12.0, 4.0, 1.5)
+STAY = 0.01
+"""How much a departure counts beside the distances: enough to keep the object from sliding along the edges seen."""
 LOST_TURNS = np.radians([-8.0, 0.0, 8.0])
 FOUND = 0.6
 """An object is found where so much of the stripe lies on its edges."""
@@ -177,15 +180,20 @@ def _by_poses(points: EdgePoints, world: Floats, poses: Floats) -> Floats:
 
 
 def _register(points: Floats, edges: Edges, pose: Floats, start: Floats) -> Departure:
+    """The departure near to `start` (3,) that brings points onto edges; what lies far from all of them has no say."""
     scale = np.array([1.0, 1.0, 0.02])
+    found = start
+    for gate in REGISTER_GATES_MM:
+        near = points[_distances(points, edges, pose + found) < gate]
+        if not len(near):
+            break
+        stay = STAY * np.sqrt(len(near))
 
-    def residuals(scaled: Floats) -> Floats:
-        return _distances(points, edges, pose + scaled * scale)
+        def residuals(scaled: Floats, near: Floats = near, stay: float = stay) -> Floats:
+            return np.append(_distances(near, edges, pose + scaled * scale), stay * (scaled - start / scale))
 
-    if not len(points):
-        return Departure(start, 0.0)
-    found = least_squares(residuals, start / scale, loss="soft_l1", f_scale=0.3, max_nfev=40).x * scale
-    share = float(np.mean(_distances(points, edges, pose + found) < NEAR_MM))
+        found = least_squares(residuals, found / scale, loss="soft_l1", f_scale=0.3, max_nfev=40).x * scale
+    share = float(np.mean(_distances(points, edges, pose + found) < NEAR_MM)) if len(points) else 0.0
     return Departure(np.asarray(found), share)
 
 

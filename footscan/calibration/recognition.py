@@ -7,25 +7,24 @@ that break the symmetry tell, or else where the camera stands.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import combinations, permutations, product
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.edge_points import edge_distances
-from footscan.calibration.homography import algebraic_homography, project, slopes
+from footscan.calibration.homography import algebraic_homography, project
 from footscan.calibration.lines import ImageLine, find_lines
+from footscan.calibration.naming import can_be_seen, facing_names, is_view, misfits, named_maps
 from footscan.calibration.reference import Edges
-from schemas.mounting import Mounting
+from schemas.mounting import Mounting, Sign
 
 Floats = NDArray[np.float64]
 
 SHORTEST_LINE_PX = 25.0
 LINES_A_FRAME = 6
 """The longest pieces of a frame are those of the object."""
-EDGES = 16
-"""Names are tried among the longest edges."""
 QUADRUPLES = 16
 """So many sets of four pieces are tried, the best conditioned first."""
 TRIED_BEFORE_STOPPING = 4
@@ -40,14 +39,15 @@ EXPLAINED_MM = 1.5
 """A point as near to an edge as this is explained by a homography that knows of no distortion."""
 STRAY_SHARE = 0.1
 """So many points may be nearest to an edge that the camera does not see, at a corner or by chance."""
-SCALE_MM_PX = (0.02, 2.0)
-"""Millimetres to the pixel that a foot scanner's camera can have."""
 SHARP_MM = 0.75
 """At this distance a point speaks no more for a map: what lies near an edge, not on it, does so by chance."""
 FEWEST_EXPLAINED = 0.4
 """A map with a lower score is none."""
 AS_GOOD = 0.9
 """A map with this share of the best one's score may be the right one."""
+LEVEL = 0.15
+"""Edges that face a side by less, in the mean, do not say that they are seen from there."""
+UNKNOWN = Mounting(0, 0, 0)
 APART_MM = 5.0
 """Maps that place more than stray points farther apart than this are two."""
 
@@ -62,6 +62,8 @@ class FirstMap:
     """(K,) share of the stripe in each placement that lies near an edge; NaN where there is no stripe."""
     score: float
     """Share of the stripe that is explained, over all placements; a point counts less the farther off it lies."""
+    seen_from: Mounting = UNKNOWN
+    """Where the camera stands by what it sees."""
 
     def world(self, pixels: Floats) -> Floats:
         """Y and Z, (N, 2) mm, of `pixels` (N, 2)."""
@@ -93,8 +95,13 @@ def recognise(stripes: Sequence[Floats], edges: Edges, placements: Floats, mount
         raise UnrecognisedError(f"{len(pieces)} straight pieces of the stripe in all frames, expected at least four")
     frames = _Frames.of(stripes, edges, placements)
     found: list[FirstMap] = []
+    names = facing_names(edges)
     for number, quadruple in enumerate(_quadruples(pieces)):
-        maps = _named_maps([pieces[k] for k in quadruple], edges, placements)
+        four = [pieces[k][1] for k in quadruple]
+        seen_in = np.array([pieces[k][0] for k in quadruple])
+        image_lines = np.array([[*line.normal, line.offset] for line in four])
+        ends = np.concatenate([line.ends for line in four])
+        maps = named_maps(names, image_lines, ends, seen_in, placements[seen_in], edges)
         found += _refined(maps, frames)
         if number + 1 >= TRIED_BEFORE_STOPPING and found and max(m.score for m in found) > 0.85:
             break
@@ -103,7 +110,8 @@ def recognise(stripes: Sequence[Floats], edges: Edges, placements: Floats, mount
     best = max(found, key=lambda m: m.score)
     if best.score < FEWEST_EXPLAINED:
         raise UnrecognisedError(f"the best view of the object explains {best.score:.0%} of the stripe")
-    return _decide([m for m in found if m.score >= AS_GOOD * best.score], frames, mounting)
+    chosen = _decide([m for m in found if m.score >= AS_GOOD * best.score], frames, mounting)
+    return replace(chosen, seen_from=_seen_from(chosen, frames))
 
 
 @dataclass(frozen=True)
@@ -158,81 +166,12 @@ def _quadruples(pieces: list[tuple[int, ImageLine]]) -> list[tuple[int, ...]]:
     return sorted(sets, key=lambda q: (-quality(q), q))[:QUADRUPLES]
 
 
-def _named_maps(quadruple: Sequence[tuple[int, ImageLine]], edges: Edges, placements: Floats) -> list[Floats]:
-    """A homography for each way to name four pieces."""
-    names = _supporting_lines(edges)
-    shifts = placements[[placement for placement, _ in quadruple]]
-    samples = [line.ends for _, line in quadruple]
-    maps = []
-    for named in _namings([placement for placement, _ in quadruple], names, edges):
-        normals = edges.normal[list(named)]
-        offsets = edges.offset[list(named)] + np.sum(normals * shifts, axis=1)
-        if not _in_general_position(normals, offsets):
-            continue
-        matrix = algebraic_homography(np.concatenate(samples), np.repeat(normals, 2, axis=0), np.repeat(offsets, 2))
-        if _is_view(matrix, np.concatenate(samples)):
-            maps.append(matrix)
-    return maps
-
-
-def _supporting_lines(edges: Edges) -> list[int]:
-    """One edge of each line on which edges lie, the longest first."""
-    seen: dict[tuple[float, ...], int] = {}
-    for k in np.argsort(-edges.length, kind="stable").tolist():
-        seen.setdefault((*np.round(edges.normal[k], 6).tolist(), round(float(edges.offset[k]), 6)), k)
-    return list(seen.values())[:EDGES]
-
-
-def _namings(frames: Sequence[int], names: Sequence[int], edges: Edges) -> list[tuple[int, ...]]:
-    """Ways to name pieces so that all named edges can face one camera; within a frame each name once."""
-    facing = edges.normal[list(names)] @ edges.normal[list(names)].T > -1.0 + 1e-6
-    position = {name: k for k, name in enumerate(names)}
+def _refined(maps: Floats, frames: _Frames) -> list[FirstMap]:
+    """Those of `maps` (M, 3, 3) that explain most, each fitted to all the points that it explains."""
+    misfit = misfits(maps, frames.pixels, frames.shift, frames.edges, REACH_MM)
     found = []
-    candidates = permutations(names, 4) if len(set(frames)) == 1 else product(names, repeat=4)
-    for named in candidates:
-        if any(a == b and frames[m] == frames[n] for (m, a), (n, b) in combinations(enumerate(named), 2)):
-            continue
-        if not all(facing[position[a], position[b]] for a, b in combinations(named, 2)):
-            continue
-        if _half_plane(edges.normal[list(named)]):
-            found.append(named)
-    return found
-
-
-def _half_plane(normals: Floats) -> bool:
-    """Whether some direction has all `normals` on its side."""
-    angles = np.sort(np.arctan2(normals[:, 1], normals[:, 0]))
-    gaps = np.diff(np.append(angles, angles[0] + 2 * np.pi))
-    return bool(gaps.max() > np.pi + 1e-6)
-
-
-def _in_general_position(normals: Floats, offsets: Floats) -> bool:
-    """Whether no three of four lines meet in one point, near or at infinity."""
-    rows = np.column_stack([normals, offsets / 50.0])
-    rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
-    return all(abs(float(np.linalg.det(rows[list(three)]))) > 1e-3 for three in combinations(range(4), 3))
-
-
-def _is_view(matrix: Floats, pixels: Floats) -> bool:
-    """Whether a camera can see the plane so: all of it before the camera, and at a scale that a scanner has."""
-    if not np.isfinite(matrix).all():
-        return False
-    plane, depth = project(matrix, pixels)
-    if not (np.all(depth > 0.05) or np.all(depth < -0.05)):
-        return False
-    stretch = np.linalg.svd(slopes(matrix, plane, depth), compute_uv=False)
-    return bool(np.all((stretch > SCALE_MM_PX[0]) & (stretch < SCALE_MM_PX[1])))
-
-
-def _refined(maps: list[Floats], frames: _Frames) -> list[FirstMap]:
-    """The maps that explain most, each fitted to all the points that it explains."""
-
-    def misfit(matrix: Floats) -> float:
-        return float(np.mean(np.minimum(frames.distances(matrix)[1], REACH_MM)))
-
-    found = []
-    for matrix in sorted(maps, key=misfit)[:REFINED]:
-        refined = _refine(matrix, frames)
+    for k in np.argsort(misfit, kind="stable")[:REFINED]:
+        refined = _refine(maps[k], frames)
         if refined is not None:
             found.append(refined)
     return found
@@ -247,12 +186,12 @@ def _refine(matrix: Floats, frames: _Frames) -> FirstMap | None:
         normals = frames.edges.normal[index[near]]
         offsets = frames.edges.offset[index[near]] + np.sum(normals * frames.shift[near], axis=1)
         matrix = algebraic_homography(frames.pixels[near], normals, offsets)
-        if not _is_view(matrix, frames.pixels[near]):
+        if not is_view(matrix, frames.pixels[near]):
             return None
     index, distance = frames.distances(matrix)
     near = distance < EXPLAINED_MM
     seen = np.bincount(index[near], minlength=len(frames.edges.length)) > STRAY_SHARE * near.sum()
-    if not seen.any() or not _half_plane(frames.edges.normal[seen]):
+    if not seen.any() or not can_be_seen(frames.edges, seen):
         return None
     with np.errstate(invalid="ignore"):
         shares = np.bincount(frames.placement, near, minlength=frames.count) / np.bincount(
@@ -272,7 +211,7 @@ def _decide(found: list[FirstMap], frames: _Frames, mounting: Mounting) -> First
             kept.append(candidate)
     if len(kept) == 1:
         return kept[0]
-    ranks = [_agreement(candidate, frames, mounting) for candidate in kept]
+    ranks = [_agreement(_seen_from(candidate, frames), mounting) for candidate in kept]
     best = max(ranks)
     if ranks.count(best) > 1:
         raise UnrecognisedError(
@@ -282,20 +221,26 @@ def _decide(found: list[FirstMap], frames: _Frames, mounting: Mounting) -> First
     return kept[ranks.index(best)]
 
 
-def _agreement(candidate: FirstMap, frames: _Frames, mounting: Mounting) -> tuple[int, int]:
+def _agreement(seen_from: Mounting, mounting: Mounting) -> tuple[int, int]:
     """How well a map fits the mounting: the side from which the edges are seen, then the side of the laser's plane."""
-    index, distance = frames.distances(candidate.matrix)
-    facing = frames.edges.normal[index[distance < EXPLAINED_MM]].mean(axis=0)
-    side = int(np.sign(facing[0]) == mounting.y) + int(np.sign(facing[1]) == mounting.z)
-    return side, int(_from_front(candidate.matrix, frames.pixels) == mounting.x)
+    side = int(seen_from.y * mounting.y > 0) + int(seen_from.z * mounting.z > 0)
+    return side, int(seen_from.x * mounting.x > 0)
 
 
-def _from_front(matrix: Floats, pixels: Floats) -> int:
-    """1 for a camera before the laser's plane (+X), -1 behind it.
+def _seen_from(candidate: FirstMap, frames: _Frames) -> Mounting:
+    """The side from which the edges are seen, and the side of the laser's plane.
 
     Seen from +X with Z up, Y runs to the right; i runs to the right and j down, so the map turns the image over.
     """
-    middle = pixels.mean(axis=0)
-    corner, _ = project(matrix, middle + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    index, distance = frames.distances(candidate.matrix)
+    facing = frames.edges.normal[index[distance < EXPLAINED_MM]].mean(axis=0)
+    middle = frames.pixels.mean(axis=0)
+    corner = candidate.world(middle + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
     (a, b), (c, d) = corner[1:] - corner[0]
-    return -int(np.sign(a * d - b * c))
+    return Mounting(_sign(b * c - a * d, 0.0), _sign(facing[0], LEVEL), _sign(facing[1], LEVEL))
+
+
+def _sign(value: float, level: float) -> Sign:
+    if abs(value) <= level:
+        return 0
+    return 1 if value > 0 else -1

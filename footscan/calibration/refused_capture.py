@@ -21,6 +21,10 @@ FEWEST_POINTS = 40
 """With fewer points of the stripe, all cameras together, a placement shows nothing."""
 FOUND = 0.5
 """An object is where a departure says when so much of the stripe lies on its edges."""
+SURE_MM = 0.25
+"""A camera whose map, fitted without a placement, is less sure than this of what it shows there has no say in it."""
+SIGMAS = 3.0
+"""How far beyond the tolerance a departure may be by what the maps do not know."""
 LEVER_MM = 50.0
 """A turn moves the object's corners by this times its angle."""
 OUTLINE_STEP_MM = 1.0
@@ -75,11 +79,14 @@ def check_placements(
     worst: tuple[float, RefusedCapture] | None = None
     for number in range(len(poses)) if len(poses) > 1 else ():
         maps = _maps_without(number, recognised, edges, poses)
+        unsure = {camera: _sigma(known, views[camera].stripes[number]) for camera, known in maps.items()}
+        maps = {camera: known for camera, known in maps.items() if unsure[camera] <= SURE_MM}
         if not maps:
             continue
         found = departure(
             [known.world(views[camera].stripes[number]) for camera, known in maps.items()], edges, poses[number]
         )
+        allowed = tolerance_mm + SIGMAS * min(unsure[camera] for camera in maps)
         size = max(float(np.hypot(*found.pose[:2])), float(abs(found.pose[2])) * LEVER_MM)
         said, stood = poses[number], poses[number] + found.pose
         problem = (
@@ -88,7 +95,7 @@ def check_placements(
         )
         if found.share < FOUND:
             size, problem = np.inf, "the reference object is not recognised where it should stand, nor near to it"
-        if size > tolerance_mm and (worst is None or size > worst[0]):
+        if size > allowed and (worst is None or size > worst[0]):
             shown = [
                 Evidence(
                     camera,
@@ -136,6 +143,16 @@ def _maps_without(
         except UndeterminedError:
             continue
     return maps
+
+
+def _sigma(known: CameraFit, pixels: Floats) -> float:
+    """Standard deviation, mm, of what a map says of `pixels` (N, 2), root mean square; infinite where it is not known,
+    and where there are none."""
+    if known.fit.covariance is None or not len(pixels):
+        return np.inf
+    by_parameters = known.fit.model.by_parameters(known.fit.parameters, pixels)
+    variances = np.einsum("nkp,pq,nkq->n", by_parameters, known.fit.covariance, by_parameters, optimize=True)
+    return float(np.sqrt(np.mean(variances)))
 
 
 def _outline(known: CameraFit, view: CameraView, edges: Edges, pose: Floats) -> Floats:

@@ -87,10 +87,11 @@ def select(
     """The fit of the model with the least expected error, and how each fared; None where none can be judged.
 
     What is held out lies where the data lie, on few lines perhaps: it tells nothing of the region between them, where a
-    model with many unknowns is free to swing. How freely, its covariance says; the two are added as squares.
+    model with many unknowns is free to swing, and one without a lens is stiff. How far off it may be there, covariances
+    say; the two are added as squares.
     """
     attempts = [try_model(model, observations, camera, robust=robust) for model in models]
-    trials = [trial for _, trial in attempts]
+    trials = _with_a_lens([trial for _, trial in attempts])
     judged = [k for k, trial in enumerate(trials) if np.isfinite(_expected(trial))]
     if not judged:
         return None, trials
@@ -99,6 +100,16 @@ def select(
     chosen = min(near, key=lambda k: (trials[k].unknowns, _expected(trials[k])))
     trials[chosen] = replace(trials[chosen], status="chosen")
     return attempts[chosen][0], trials
+
+
+def _with_a_lens(trials: list[ModelTrial]) -> list[ModelTrial]:
+    """No model can be surer between the data than the homography with a lens, whose covariance knows what a lens may
+    do there: a model without one leaves that out of its own."""
+    known = [t.region_sigma_mm for t in trials if t.model == "homography, distortion" and t.region_sigma_mm]
+    return [
+        replace(trial, region_sigma_mm=max([trial.region_sigma_mm, *known])) if trial.region_sigma_mm else trial
+        for trial in trials
+    ]
 
 
 def try_model(model: Model, observations: Observations, camera: int, *, robust: bool) -> tuple[Fit | None, ModelTrial]:

@@ -96,6 +96,9 @@ def film_files(path: Path) -> list[Path]:
     """The files that make up a film; RefusedInput where there are none."""
     try:
         files = image_files(path)
+        for file in files:
+            if file != path and not file.is_file():
+                raise RefusedInput(file, "expected an image, found a folder or another thing that is no file")
         if files and files[0].is_file():
             return files
     except OSError as error:

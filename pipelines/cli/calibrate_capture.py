@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -10,6 +10,9 @@ from pipelines.cli.calibration_file import print_pairs, tell_calibration, write_
 from pipelines.cli.output import AsJson, message, print_json
 from pipelines.cli.refused_picture import Picture, drawn
 from schemas.errors import RefusedInput
+
+if TYPE_CHECKING:
+    from pipelines.calibrate import CaptureCalibration
 
 
 def capture(
@@ -25,6 +28,9 @@ def capture(
         float, typer.Option(min=0.01, max=50, help="How far the object may stand from where it should.")
     ] = 1.0,
     out: Annotated[Path | None, typer.Option(help="Write the calibration here.")] = None,
+    chart: Annotated[
+        Path | None, typer.Option(help="Write the corners that were found here, as a chart of control points (CSV).")
+    ] = None,
     picture: Picture = None,
     as_json: AsJson = False,
 ) -> None:
@@ -39,14 +45,19 @@ def capture(
     parameters = CaptureCalibrationParameters(model=model, order=order, placement_tolerance_mm=tolerance_mm)
     with drawn(folder, picture):
         made = calibrate_capture(folder, parameters, cores())
+    for warning in made.warnings:
+        message(f"{folder}: {warning}")
     calibration = made.calibration
     write_calibration(calibration, out)
+    if chart is not None:
+        _write_chart(chart, made)
     if as_json:
         print_json(
             {
                 "cameras": [camera.model_dump(mode="json") for camera in calibration.cameras],
                 "trials": [asdict(trial) for trial in made.trials],
                 "pairs": [pair.model_dump(mode="json") for pair in calibration.pairs],
+                "warnings": made.warnings,
                 "departures_mm": made.departures_mm.tolist(),
             }
         )
@@ -59,3 +70,14 @@ def capture(
                 f"frame {number}: the cameras agree that the object stood {y:+.2f}, {z:+.2f} mm from where it should"
             )
     tell_calibration(calibration, out)
+
+
+def _write_chart(file: Path, made: "CaptureCalibration") -> None:
+    from pipelines.engine.atomic import write_atomically
+
+    lines = ["camera,point,x_mm,y_mm,z_mm,i,j\n"]
+    for number, corner in enumerate(made.corners, start=1):
+        (i, j), (y, z) = corner.pixel, corner.world_mm
+        lines.append(f"{corner.camera},{number},{made.x_mm:g},{y:.4f},{z:.4f},{i:.3f},{j:.3f}\n")
+    write_atomically(file, "".join(lines).encode())
+    message(f"{file}: {len(made.corners)} corners")

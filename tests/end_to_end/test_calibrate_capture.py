@@ -11,6 +11,7 @@ import pytest
 import yaml
 from PIL import Image
 
+from footscan.calibration.chart import read_chart
 from footscan.calibration.maps import is_supported, to_world
 from footscan.virtual.scanner import standard_scanner
 from schemas.calibration import read_calibration
@@ -193,3 +194,64 @@ def test_check_needs_a_camera_that_recognises_the_object(footscan: Footscan, cal
     assert "(see why.png)" in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert Path("why.png").exists()
+
+
+def keep(capture: Path, *cameras: int) -> None:
+    document = yaml.safe_load((capture / "capture.yaml").read_text())
+    document["cameras"] = [camera for camera in document["cameras"] if camera["id"] in cameras]
+    (capture / "capture.yaml").write_text(yaml.safe_dump(document))
+
+
+def test_corners_are_found_without_a_click(footscan: Footscan, capture: Path) -> None:
+    keep(capture, 1, 5)
+    done = footscan("calibrate", "capture", capture, "--chart", "found.csv")
+    assert done.returncode == 0, done.stderr
+    charts = read_chart(Path("found.csv"))
+    assert sorted(charts) == [1, 5]
+    scanner = standard_scanner(3)
+    for number, chart in charts.items():
+        assert len(chart.points) >= 5
+        exact = scanner.camera(number).project_plane(chart.world[:, 1], chart.world[:, 2])
+        assert np.linalg.norm(chart.pixels - exact, axis=1).max() < 0.3
+    assert footscan("calibrate", "chart", "found.csv").returncode == 0
+
+
+@pytest.mark.parametrize("camera", [1, 5])
+def test_one_camera_alone_is_calibrated(footscan: Footscan, capture: Path, camera: int) -> None:
+    """Stray light is a third of what it sees, and no other camera tells where the object stood."""
+    keep(capture, camera)
+    done = footscan("calibrate", "capture", capture, "--out", "alone.json")
+    assert done.returncode == 0, done.stderr
+    assert "sees the object" not in done.stderr
+
+
+def test_exchanged_films_are_told(footscan: Footscan, capture: Path) -> None:
+    keep(capture, 1, 5)
+    (capture / "cam1.avi").rename(capture / "kept.avi")
+    (capture / "cam5.avi").rename(capture / "cam1.avi")
+    (capture / "kept.avi").rename(capture / "cam5.avi")
+    done = footscan("calibrate", "capture", capture)
+    assert "camera 1 sees the object from front, left, below, expected from front, left, above" in done.stderr
+    assert "camera 5 sees the object from front, left, above, expected from front, left, below" in done.stderr
+
+
+def test_one_film_for_two_cameras_is_refused(footscan: Footscan, capture: Path) -> None:
+    keep(capture, 1, 5)
+    shutil.copy(capture / "cam1.avi", capture / "cam5.avi")
+    done = footscan("calibrate", "capture", capture)
+    assert done.returncode == 2
+    assert "capture.yaml: camera 5: has the same film as camera 1" in done.stderr
+
+
+def test_a_capture_of_links_is_read(footscan: Footscan, capture: Path, tmp_path: Path) -> None:
+    keep(capture, 1)
+    outside = tmp_path / "outside.yaml"
+    (capture / "capture.yaml").rename(outside)
+    (capture / "capture.yaml").symlink_to(outside)
+    (tmp_path / "linked").symlink_to(capture, target_is_directory=True)
+    done = footscan("calibrate", "capture", tmp_path / "linked", "--out", "c.json", "--model", "homography")
+    assert done.returncode == 0, done.stderr
+    assert [source.name for source in read_calibration(Path("c.json")).sources][:2] == [
+        "capture.yaml",
+        "reference.yaml",
+    ]

@@ -89,7 +89,7 @@ def test_the_scans_own_calibration_wins(footscan: Footscan, mistake: Mistake, be
     edit(bench / "archive/P0001/small", "side: right", "side: right\ncalibration: ../other.json")
     (bench / "archive/P0001/other.json").write_bytes((bench / "calibration.json").read_bytes())
     (bench / "calibration.json").unlink()
-    assert run(footscan, bench)["ran"] == 1  # the report, which names the calibration
+    assert run(footscan, bench)["ran"] == 2  # quality and report, which name the calibration
     assert "other.json" in (bench / "results/P0001/small/report.html").read_text()
     (bench / "archive/P0001/other.json").unlink()
     done = footscan("run", bench / "workflow.yaml")

@@ -77,3 +77,11 @@ def test_what_cannot_be_is_refused(tmp_path: Path, stands: str, line: str) -> No
     with pytest.raises(RefusedInput) as caught:
         camera_with(tmp_path, stands)
     assert str(caught.value) == f"{tmp_path / 'capture.yaml'}: {line}"
+
+
+def test_two_mountings_contradict_each_other_where_both_know_a_side() -> None:
+    front_left = Mounting(1, 1, 0)
+    assert str(front_left) == "front, left"
+    assert str(Mounting(-1, -1, -1)) == "behind, right, below"
+    assert front_left.contradicts(Mounting(1, -1, 1))
+    assert not front_left.contradicts(Mounting(1, 0, -1))

@@ -31,7 +31,7 @@ def view(shift_px: float = 0.0) -> CalibratedView:
     zeros = np.zeros(160, np.intp)
     edge = np.repeat(np.arange(4), 40)
     points = EdgePoints(world / 0.25 + shift_px, zeros, edge, np.tile(along, 4), normals, offsets)
-    return CalibratedView(TODAY, [], points)
+    return CalibratedView(TODAY, [], points, [])
 
 
 def test_nothing_moved() -> None:

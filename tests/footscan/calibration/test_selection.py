@@ -249,3 +249,14 @@ def test_a_trial_does_not_depend_on_the_order(pinhole: Any) -> None:
 
 def test_rms() -> None:
     assert rms(np.array([1.0, 7.0])) == 5.0
+
+
+def test_a_model_without_a_lens_is_no_surer_between_the_data_than_one_with_a_lens(pinhole: Any) -> None:
+    """Two edges near one side of the image say nothing of the lens at the other side."""
+    pixels = np.random.default_rng(4).uniform((300, 200), (380, 260), (60, 2))
+    pixels = np.concatenate([pixels, [[20.0, 240.0]]])
+    _, trials = fares(clicked(pinhole().world(pixels), pixels, 0.02))
+    plain, with_a_lens = (trials[name].region_sigma_mm for name in ("homography", "homography, distortion"))
+    assert plain is not None
+    assert with_a_lens is not None
+    assert plain >= with_a_lens

@@ -259,3 +259,10 @@ def test_frame_digest_is_that_of_the_bytes() -> None:
     assert frame_digest(np.frombuffer(b"abc", np.uint8).reshape(1, 1, 3)).startswith("ba7816bf8f01cfea")
     spread = np.zeros((2, 2, 6), np.uint8)[:, :, ::2]
     assert frame_digest(spread) == frame_digest(bytes(12))
+
+
+def test_a_folder_among_frames_is_named(tmp_path: Path, jpeg: Callable[..., bytes]) -> None:
+    (tmp_path / "1.jpg").write_bytes(jpeg(1))
+    (tmp_path / "2.jpg").mkdir()
+    with pytest.raises(RefusedInput, match=r"2\.jpg: expected an image, found a folder"):
+        film_files(tmp_path)
