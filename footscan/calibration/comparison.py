@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.maps import is_supported, model_of, to_world
+from footscan.calibration.selection import rms
 from schemas.calibration import Calibration, CameraCalibration
 
 Floats = NDArray[np.float64]
@@ -145,11 +146,11 @@ def _with_figures(common: CameraComparison, pixels: Floats, a: Floats, b: Floats
         common,
         mean_y_mm=mean_y,
         mean_z_mm=mean_z,
-        rms_mm=_rms(distances),
+        rms_mm=rms(distances),
         largest_mm=float(distances[largest]),
         largest_at_px=(float(pixels[largest, 0]), float(pixels[largest, 1])),
         turn_deg=float(np.rad2deg(turn)),
-        left_rms_mm=_rms(left),
+        left_rms_mm=rms(left),
     )
 
 
@@ -166,7 +167,3 @@ def _rigid(a: Floats, b: Floats) -> tuple[float, Floats]:
     y, z = from_a.T
     turned = np.column_stack([np.cos(turn) * y - np.sin(turn) * z, np.sin(turn) * y + np.cos(turn) * z])
     return turn, np.hypot(*(from_b - turned).T)
-
-
-def _rms(distances: Floats) -> float:
-    return float(np.sqrt(np.mean(distances**2)))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from footscan.calibration.from_capture import CalibratedView
 from footscan.calibration.maps import is_supported, to_world
+from footscan.calibration.selection import rms
 from schemas.calibration import CameraCalibration
 
 Floats = NDArray[np.float64]
@@ -57,7 +58,7 @@ def drift_of(calibration: CameraCalibration, today: CalibratedView, tolerance_mm
     along = terms @ field.T
     off = along + (across - np.sum(points.normals * along, axis=1))[:, np.newaxis] * points.normals
     distance = np.hypot(off[:, 0], off[:, 1])
-    rms_mm = float(np.sqrt(np.mean(distance**2)))
+    rms_mm = rms(distance)
     return Drift(
         camera,
         "steady" if rms_mm <= tolerance_mm else "drifted",

@@ -36,6 +36,15 @@ class Fit:
     residuals: Floats
     """(N,) normal . (Y, Z) - offset, mm."""
 
+    def region_sigma(self, pixels: Floats) -> float | None:
+        """Standard deviation, mm, of what the model says of (Y, Z) at `pixels` (N, 2), root mean square over them; None
+        where it is not known."""
+        if self.covariance is None or not len(pixels):
+            return None
+        by_parameters = self.model.by_parameters(self.parameters, pixels)
+        variances = np.einsum("nkp,pq,nkq->n", by_parameters, self.covariance, by_parameters, optimize=True)
+        return float(np.sqrt(np.mean(variances)))
+
 
 class UndeterminedError(Exception):
     """The observations do not determine the parameters."""

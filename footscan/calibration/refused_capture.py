@@ -79,14 +79,15 @@ def check_placements(
     worst: tuple[float, RefusedCapture] | None = None
     for number in range(len(poses)) if len(poses) > 1 else ():
         maps = _maps_without(number, recognised, edges, poses)
-        unsure = {camera: _sigma(known, views[camera].stripes[number]) for camera, known in maps.items()}
-        maps = {camera: known for camera, known in maps.items() if unsure[camera] <= SURE_MM}
+        sigmas = {camera: known.fit.region_sigma(views[camera].stripes[number]) for camera, known in maps.items()}
+        unsure = {camera: sigma for camera, sigma in sigmas.items() if sigma is not None and sigma <= SURE_MM}
+        maps = {camera: maps[camera] for camera in unsure}
         if not maps:
             continue
         found = departure(
             [known.world(views[camera].stripes[number]) for camera, known in maps.items()], edges, poses[number]
         )
-        allowed = tolerance_mm + SIGMAS * min(unsure[camera] for camera in maps)
+        allowed = tolerance_mm + SIGMAS * min(unsure.values())
         size = max(float(np.hypot(*found.pose[:2])), float(abs(found.pose[2])) * LEVER_MM)
         said, stood = poses[number], poses[number] + found.pose
         problem = (
@@ -143,16 +144,6 @@ def _maps_without(
         except UndeterminedError:
             continue
     return maps
-
-
-def _sigma(known: CameraFit, pixels: Floats) -> float:
-    """Standard deviation, mm, of what a map says of `pixels` (N, 2), root mean square; infinite where it is not known,
-    and where there are none."""
-    if known.fit.covariance is None or not len(pixels):
-        return np.inf
-    by_parameters = known.fit.model.by_parameters(known.fit.parameters, pixels)
-    variances = np.einsum("nkp,pq,nkq->n", by_parameters, known.fit.covariance, by_parameters, optimize=True)
-    return float(np.sqrt(np.mean(variances)))
 
 
 def _outline(known: CameraFit, view: CameraView, edges: Edges, pose: Floats) -> Floats:

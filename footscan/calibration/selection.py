@@ -172,15 +172,11 @@ def _expected(trial: ModelTrial) -> float:
 
 
 def _region_sigma(found: Fit, pixels: Floats) -> float | None:
-    if found.covariance is None:
-        return None
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     i, j = np.meshgrid(*(np.linspace(low[k], high[k], REGION_GRID) for k in (0, 1)))
     grid = np.column_stack([i.ravel(), j.ravel()])
     grid = grid[supported(region_of(pixels), grid)]
-    by_parameters = found.model.by_parameters(found.parameters, grid)
-    variances = np.einsum("nkp,pq,nkq->n", by_parameters, found.covariance, by_parameters, optimize=True)
-    return float(np.sqrt(np.mean(variances)))
+    return found.region_sigma(grid)
 
 
 def _folds(group: NDArray[np.intp]) -> NDArray[np.intp]:
