@@ -3,6 +3,7 @@
 .venv/bin/python docs/pictures.py [DEMO]
 """
 
+import io
 import sys
 from itertools import islice
 from pathlib import Path
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from footscan.frames.film import open_film, pixel_frames
+from footscan.report.calibration_figure import calibration_figure
 from footscan.report.colours import distance_colours
 from footscan.report.render import render_mesh
 from footscan.stripe.film import extract_film
@@ -20,6 +22,7 @@ from footscan.surface.export import read_mesh
 from footscan.verify.compare import signed_distances
 from footscan.virtual.scanner import FAN_DEGREES, VOLUME_MM, standard_scanner
 from pipelines.recorded import read_scan
+from schemas.calibration import read_calibration
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.scan import Travel
 
@@ -50,6 +53,8 @@ def main() -> None:
             IMAGES / f"{name}.png", optimize=True
         )
     _draw_geometry(IMAGES / "geometry.png")
+    calibration = calibration_figure(read_calibration(demo / "calibration.json"))
+    _few_colours(Image.open(io.BytesIO(calibration)).convert("RGB")).save(IMAGES / "calibration.png", optimize=True)
 
 
 def _draw_result(mesh: Path, scan: Path) -> Image.Image:
