@@ -32,8 +32,9 @@ def read_records(path: Path) -> Iterator[tuple[int, list[str]]]:
         text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
         raise RefusedInput(path, "no such file") from None
-    except UnicodeDecodeError:
-        raise RefusedInput(path, "expected a CSV file in UTF-8") from None
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        raise RefusedInput(path, "expected a CSV file in UTF-8", field=f"line {line}") from None
     except (OSError, ValueError) as error:
         raise RefusedInput(path, f"expected a CSV file ({getattr(error, 'strerror', None) or error})") from None
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)

@@ -84,6 +84,8 @@ def _columns(path: Path, line: int, header: list[str]) -> tuple[LengthUnit, dict
     unit = units[0] if units else "mm"
     expected = _header(unit) if units else f"{_header('cm')} or {_header('mm')}"
     known = {"camera", "point", "i", "j", *_WORLD[unit]}
+    if len(header) == 1:
+        raise RefusedInput(path, f"one column, expected {expected}, with commas between them", field=where)
     for name in header:
         if name.lower() not in known:
             raise RefusedInput(

@@ -1,6 +1,6 @@
 """What is wrong with a capture as a whole, and what shows it: an object that stood elsewhere, or is not recognised."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,7 +95,13 @@ def check_placements(
             f"expected ({said[0]:g}, {said[1]:g}) as placements_mm says"
         )
         if found.share < FOUND:
-            size, problem = np.inf, "the reference object is not recognised where it should stand, nor near to it"
+            size, problem = (
+                np.inf,
+                (
+                    "the reference object is not recognised where it should stand, nor near to it, "
+                    f"by {_cameras(maps)}, which recognise it in the other frames"
+                ),
+            )
         if size > allowed and (worst is None or size > worst[0]):
             shown = [
                 Evidence(
@@ -123,10 +129,16 @@ def refuse_unrecognised(views: Mapping[int, CameraView], reasons: Mapping[int, s
     if not reasons:
         return
     camera = min(reasons)
-    others = f" (and so cameras {', '.join(map(str, sorted(reasons)[1:]))})" if len(reasons) > 1 else ""
+    others = f" (nor by {_cameras(sorted(reasons)[1:])})" if len(reasons) > 1 else ""
     shown = [Evidence(camera, number, stripe, *_NOTHING) for number, stripe in enumerate(views[camera].stripes)]
     problem = f"the reference object is not recognised: {reasons[camera]}{others}"
     raise RefusedCapture(source, problem, field=f"camera {camera}", evidence=shown)
+
+
+def _cameras(numbers: Iterable[int]) -> str:
+    """Their numbers in words."""
+    listed = ", ".join(map(str, sorted(numbers)))
+    return f"cameras {listed}" if "," in listed else f"camera {listed}"
 
 
 _NOTHING = (np.empty((0, 2)), np.empty((0, 2)))

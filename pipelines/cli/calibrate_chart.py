@@ -46,12 +46,15 @@ def chart(
     if order is not None and model != "polynomial":
         raise RefusedInput("--order", "goes with --model polynomial alone")
     charts, warnings = _checked(file, keep_going=keep_going)
-    calibration, trials = calibrate_chart(
-        charts,
-        parameters=CalibrationParameters(model=model, order=order),
-        source=Source(name=file.name, sha256=sha256(file.read_bytes())),
-        software=SOFTWARE,
-    )
+    try:
+        calibration, trials = calibrate_chart(
+            charts,
+            parameters=CalibrationParameters(model=model, order=order),
+            source=Source(name=file.name, sha256=sha256(file.read_bytes())),
+            software=SOFTWARE,
+        )
+    except RefusedInput as refused:  # which knows the chart by its name alone, as the calibration does
+        raise RefusedInput(file, refused.problem, field=refused.field) from None
     _tell(file, warnings)
     write_calibration(calibration, out)
     if model == "quadratic":
@@ -74,7 +77,7 @@ def models(
     from pipelines.cli.trials import markdown_of_models, print_models
 
     charts, warnings = _checked(file, keep_going=keep_going)
-    trials = [trial for chart in charts.values() for trial in compare_models(chart, file.name)]
+    trials = [trial for chart in charts.values() for trial in compare_models(chart, str(file))]
     _tell(file, warnings)
     if as_json:
         print_json(
