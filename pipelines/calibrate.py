@@ -19,7 +19,7 @@ from footscan.calibration.from_capture import (
     object_poses,
     recognise_view,
 )
-from footscan.calibration.reference import Edges, edges_of
+from footscan.calibration.reference import Edges, doubts_about, edges_of
 from footscan.calibration.refused_capture import RefusedCapture, check_placements, refuse_unrecognised
 from footscan.calibration.selection import ModelTrial
 from footscan.frames.film import film_files, open_film, pixel_frames
@@ -73,7 +73,7 @@ def calibrate_capture(folder: Path, parameters: CaptureCalibrationParameters, wo
         [trial for view in calibrated for trial in view.trials],
         [corner for view in calibrated for corner in view.corners],
         capture.document.x_mm,
-        [known.contradiction for known in seen.recognised.values() if known.contradiction],
+        _doubts(capture, seen),
         poses[:, :2] - seen.placements,
     )
 
@@ -154,6 +154,12 @@ class _Seen:
         return poses, list(calibrated)
 
 
+def _doubts(capture: RecordedCapture, seen: _Seen) -> list[str]:
+    places = doubts_about(capture.reference.profile_mm, capture.reference.placements_mm)
+    views = [doubt for known in seen.recognised.values() for doubt in known.doubts]
+    return [f"{capture.reference_file.name}: {doubt}" for doubt in places] + views
+
+
 def _see(capture: RecordedCapture, parameters: CaptureCalibrationParameters) -> _Seen:
     edges = edges_of(capture.reference.profile_mm)
     placements = np.array(capture.reference.placements_mm, np.float64)
@@ -176,13 +182,15 @@ def _see(capture: RecordedCapture, parameters: CaptureCalibrationParameters) -> 
 def _view(capture: RecordedCapture, camera: CaptureCamera, parameters: CaptureCalibrationParameters) -> CameraView:
     film = open_film(capture.film(camera))
     stripes: list[Floats] = []
-    for frame in pixel_frames(film):
+    lost: list[int] = []
+    for number, frame in enumerate(pixel_frames(film)):
         if frame is None:
+            lost.append(number)
             stripes.append(np.empty((0, 2)))
             continue
         points = extract_stripe(frame, parameters.extraction)
         stripes.append(np.column_stack([points["i"], points["j"]]))
-    return CameraView(camera.id, (film.width, film.height), stripes, mounting_of(camera))
+    return CameraView(camera.id, (film.width, film.height), stripes, mounting_of(camera), tuple(lost))
 
 
 def _sources(capture: RecordedCapture) -> list[Source]:

@@ -18,7 +18,7 @@ _WORLD: dict[LengthUnit, tuple[str, str, str]] = {
     "cm": ("x_cm", "y_cm", "z_cm"),
     "mm": ("x_mm", "y_mm", "z_mm"),
 }
-_CAMERA = re.compile(r"[0-9]{1,9}")
+_CAMERA = re.compile(r"[1-9][0-9]{0,8}")
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def _row(path: Path, line: int, cells: list[str], unit: LengthUnit, columns: dic
         return value
 
     camera = cells[columns["camera"]]
-    if not _CAMERA.fullmatch(camera) or int(camera) < 1:
+    if not _CAMERA.fullmatch(camera):
         raise refuse("camera", "a whole number from 1")
     point = cells[columns["point"]]
     if not point:

@@ -28,6 +28,8 @@ from schemas.parameters.calibration import CalibrationParameters
 
 Floats = NDArray[np.float64]
 
+STRIPE = 100
+"""With so many points a frame shows a stripe, whatever it lies on."""
 SEEN = 0.5
 """A camera sees a placement where so much of its stripe is explained by the object."""
 
@@ -42,6 +44,8 @@ class CameraView:
     stripes: Sequence[Floats]
     """For each of K placements the stripe's points (N, 2), px; empty where there are none."""
     mounting: Mounting
+    lost: tuple[int, ...] = ()
+    """Frames that cannot be decoded."""
 
 
 @dataclass(frozen=True)
@@ -54,15 +58,22 @@ class Recognised:
     """With the object where it was said to stand, and a lens."""
 
     @property
-    def contradiction(self) -> str | None:
-        """What speaks against this being the camera's own film, if anything does."""
+    def doubts(self) -> list[str]:
+        """What looks like a mistake in the capture, a line each."""
+        camera = f"camera {self.view.camera}"
+        found = [f"{camera}: frame {number} cannot be decoded and is not used" for number in self.view.lost]
+        found += [
+            f"{camera}: the object is not recognised in frame {number}, which is not used"
+            for number, (stripe, share) in enumerate(zip(self.view.stripes, self.first.explained, strict=True))
+            if len(stripe) >= STRIPE and share < SEEN
+        ]
         said, seen = self.view.mounting, self.first.seen_from
-        if not seen.contradicts(said):
-            return None
-        return (
-            f"camera {self.view.camera} sees the object from {seen}, expected from {said}: is this its film, and do "
-            "the placements, the profile and `stands` say how it is?"
-        )
+        if seen.contradicts(said):
+            found.append(
+                f"{camera} sees the object from {seen}, expected from {said}: is this its film, and do the placements, "
+                "the profile and `stands` say how it is?"
+            )
+        return found
 
 
 @dataclass(frozen=True)

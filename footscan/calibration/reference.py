@@ -12,6 +12,9 @@ Indices = NDArray[np.intp]
 
 STRAIGHT_MM = 1e-6
 """A corner as near as this to the line between its neighbours is none."""
+BELOW_MM = 0.5
+FAR_MM = 250.0
+"""So far from the middle of the glass no foot reaches."""
 BLOCK = 1024
 """Points at a time: what is known of them stays in the fastest cache while edge after edge is held against them."""
 
@@ -48,6 +51,19 @@ def edges_of(profile: Sequence[Sequence[float]]) -> Edges:
     length = np.hypot(way[:, 0], way[:, 1])
     normal = np.column_stack([way[:, 1], -way[:, 0]]) / length[:, np.newaxis] + 0.0  # no negative zeros
     return Edges(start, end, normal, np.sum(normal * start, axis=1), length)
+
+
+def doubts_about(profile: Sequence[Sequence[float]], placements: Sequence[Sequence[float]]) -> list[str]:
+    """What looks like a mistake in where a profile of corners (Y, Z), mm, stands in its placements (dY, dZ), mm."""
+    doubts = []
+    for number, (shift_y, shift_z) in enumerate(placements):
+        lowest, highest = min(z for _, z in profile) + shift_z, max(z for _, z in profile) + shift_z
+        aside = max(abs(y + shift_y) for y, _ in profile)
+        if lowest < -BELOW_MM:
+            doubts.append(f"placement {number} reaches down to Z = {lowest:g} mm, below the glass at 0")
+        if aside > FAR_MM or highest > FAR_MM:
+            doubts.append(f"placement {number} reaches out to {max(aside, highest):g} mm, far from where feet stand")
+    return doubts
 
 
 def nearest_edge(edges: Edges, points: Floats) -> tuple[Indices, Floats, Floats]:

@@ -13,6 +13,7 @@ from PIL import Image
 
 from footscan.calibration.chart import read_chart
 from footscan.calibration.maps import is_supported, to_world
+from footscan.frames.film import open_film, pixel_frames
 from footscan.virtual.scanner import standard_scanner
 from schemas.calibration import read_calibration
 
@@ -233,6 +234,20 @@ def test_exchanged_films_are_told(footscan: Footscan, capture: Path) -> None:
     done = footscan("calibrate", "capture", capture)
     assert "camera 1 sees the object from front, left, below, expected from front, left, above" in done.stderr
     assert "camera 5 sees the object from front, left, above, expected from front, left, below" in done.stderr
+
+
+def test_a_camera_that_misses_the_object_in_one_frame_is_told(footscan: Footscan, capture: Path) -> None:
+    keep(capture, 1, 2, 5, 6)
+    document = yaml.safe_load((capture / "capture.yaml").read_text())
+    document["cameras"][2]["file"] = "five/"
+    (capture / "capture.yaml").write_text(yaml.safe_dump(document))
+    (capture / "five").mkdir()
+    for number, frame in enumerate(pixel_frames(open_film(capture / "cam5.avi"))):
+        assert frame is not None
+        Image.fromarray(frame[::-1] if number == 2 else frame).save(capture / f"five/{number}.png")
+    done = footscan("calibrate", "capture", capture)
+    assert done.returncode == 0, done.stderr
+    assert "camera 5: the object is not recognised in frame 2, which is not used" in done.stderr
 
 
 def test_one_film_for_two_cameras_is_refused(footscan: Footscan, capture: Path) -> None:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from footscan.calibration.reference import edges_of, nearest_edge
+from footscan.calibration.reference import doubts_about, edges_of, nearest_edge
 
 Floats = NDArray[np.float64]
 
@@ -107,3 +107,10 @@ def _distances(start: Floats, end: Floats, points: Floats) -> Floats:
     way = end - start
     share = np.clip((points - start) @ way / (way @ way), 0.0, 1.0)
     return np.asarray(np.linalg.norm(points - start - share[:, np.newaxis] * way, axis=1))
+
+
+def test_an_object_in_the_glass_or_far_off_is_doubted() -> None:
+    square = [[-50, 0], [50, 0], [50, 90], [-50, 90]]
+    assert doubts_about(square, [[0, 0], [40, 14]]) == []
+    assert doubts_about(square, [[0, 0], [0, -3]]) == ["placement 1 reaches down to Z = -3 mm, below the glass at 0"]
+    assert doubts_about(square, [[500, 0]]) == ["placement 0 reaches out to 550 mm, far from where feet stand"]
