@@ -270,3 +270,10 @@ def test_a_capture_of_links_is_read(footscan: Footscan, capture: Path, tmp_path:
         "capture.yaml",
         "reference.yaml",
     ]
+
+
+def test_a_shift_that_all_cameras_share_may_be_the_objects(footscan: Footscan, calibrated: Path, capture: Path) -> None:
+    place(capture, [[y + 0.5, z] for y, z in placements_of(capture)])
+    done = footscan("calibrate", "check", calibrated, capture)
+    assert done.returncode == 1
+    assert "all cameras are off alike, by -0.50, " in done.stderr
