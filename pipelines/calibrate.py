@@ -1,6 +1,6 @@
 """From a capture: a calibration, or how far the scanner has drifted since its last one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -20,7 +20,12 @@ from footscan.calibration.from_capture import (
     recognise_view,
 )
 from footscan.calibration.reference import Edges, doubts_about, edges_of
-from footscan.calibration.refused_capture import RefusedCapture, check_placements, refuse_unrecognised
+from footscan.calibration.refused_capture import (
+    RefusedCapture,
+    check_placements,
+    refuse_contradictions,
+    refuse_unrecognised,
+)
 from footscan.calibration.selection import ModelTrial
 from footscan.frames.film import film_files, open_film, pixel_frames
 from footscan.report.capture_figure import capture_figure
@@ -45,15 +50,17 @@ class CaptureCalibration:
     corners: list[FoundCorner]
     x_mm: float
     """Of all corners: where the laser's plane stood."""
-    warnings: list[str]
-    """What looks like a mistake, a line each."""
     departures_mm: Floats
     """(K, 2) how far, in Y and Z, the object stood from where it was said, as the cameras agree; zeros where that does
     not help."""
 
 
-def calibrate_capture(folder: Path, parameters: CaptureCalibrationParameters, workers: int) -> CaptureCalibration:
+def calibrate_capture(
+    folder: Path, parameters: CaptureCalibrationParameters, workers: int, *, keep_going: bool = False
+) -> CaptureCalibration:
     """The calibration of all cameras of the capture in `folder`, with so many threads.
+
+    With `keep_going` cameras that see the object from another side than they stand on are calibrated all the same.
 
     Raises
     ------
@@ -67,13 +74,14 @@ def calibrate_capture(folder: Path, parameters: CaptureCalibrationParameters, wo
         seen = _see(capture, parameters)
         seen.check(parameters.placement_tolerance_mm)
         refuse_unrecognised(seen.views, seen.unrecognised, seen.source)
+        if not keep_going:
+            refuse_contradictions(seen.recognised, seen.source)
         poses, calibrated = seen.calibrate(parameters)
     return CaptureCalibration(
-        assemble(calibrated, sources, SOFTWARE),
+        assemble(calibrated, sources, SOFTWARE, _doubts(capture, seen)),
         [trial for view in calibrated for trial in view.trials],
         [corner for view in calibrated for corner in view.corners],
         capture.document.x_mm,
-        _doubts(capture, seen),
         poses[:, :2] - seen.placements,
     )
 
@@ -87,18 +95,16 @@ def check_calibration(
 ) -> list[Drift]:
     """How far each camera of a scanner has drifted since its calibration, by the capture in `folder`.
 
-    A camera that does not recognise the object, or has no film in the capture, is part of the result.
+    A camera that does not recognise the object, or is in the capture or the calibration alone, is part of the result.
 
     Raises
     ------
     RefusedInput
-        The capture breaks its format, has a camera that the calibration lacks, or the object stood elsewhere than said
-        or is recognised by no camera; the latter two as `RefusedCapture`.
+        The capture breaks its format, or the object stood elsewhere than said or is recognised by no camera; the latter
+        two as `RefusedCapture`.
     """
     capture = read_capture(folder)
     filmed = [camera.id for camera in capture.document.cameras]
-    for camera in filmed:
-        calibration.camera(camera)
     with dask.config.set(scheduler="threads", num_workers=workers):
         seen = _see(capture, parameters)
         seen.check(parameters.placement_tolerance_mm)
@@ -109,12 +115,14 @@ def check_calibration(
     drifts = []
     for known in sorted(calibration.cameras, key=lambda camera: camera.camera):
         if known.camera in today:
-            drifts.append(drift_of(known, today[known.camera], tolerance_mm))
+            drift = drift_of(known, today[known.camera], tolerance_mm)
+            drifts.append(replace(drift, remark=seen.recognised[known.camera].contradiction or drift.remark))
         elif known.camera in filmed:
             drifts.append(Drift(known.camera, "not recognised", remark=seen.unrecognised[known.camera]))
         else:
             drifts.append(Drift(known.camera, "not in the capture"))
-    return drifts
+    known_ids = {known.camera for known in calibration.cameras}
+    return drifts + [Drift(camera, "not in the calibration") for camera in sorted(set(filmed) - known_ids)]
 
 
 def picture_of(folder: Path, refused: RefusedCapture) -> bytes:

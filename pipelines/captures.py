@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from footscan.frames.film import open_film
+from footscan.frames.film import film_files, open_film
 from footscan.frames.ingest import FRAME_SIZE
 from pipelines.recorded import film_path, recorded_folder
 from schemas.documents import inside, read_yaml
@@ -32,6 +32,12 @@ class RecordedCapture:
     def reference_file(self) -> Path:
         """The reference object's document."""
         return _reference_file(self.folder, self.document)
+
+    @property
+    def files(self) -> list[Path]:
+        """All that is read of it."""
+        films = [file for camera in self.document.cameras for file in film_files(self.film(camera))]
+        return [self.file, self.reference_file, *films]
 
     def film(self, camera: CaptureCamera) -> Path:
         """The film of a camera."""

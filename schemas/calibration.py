@@ -164,6 +164,8 @@ class Calibration(Document):
     created: AwareDatetime | None = None
     """When; None where it was made as a step of a pipeline, whose results depend on nothing but their inputs."""
     cameras: Annotated[list[CameraCalibration], Field(min_length=1)]
+    warnings: list[str] = Field(default_factory=list)
+    """What looked like a mistake in the sources, a line each."""
     pairs: list[PairAgreement] = Field(default_factory=list)
     """Disagreement of each two cameras that saw the same edges."""
 

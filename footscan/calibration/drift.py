@@ -19,7 +19,9 @@ FEWEST_POINTS = 20
 REACH_MM = 50.0
 """About the object's extent: it makes the field's terms alike."""
 
-Verdict = Literal["steady", "drifted", "not comparable", "not recognised", "not in the capture"]
+Verdict = Literal[
+    "steady", "drifted", "not comparable", "not recognised", "not in the capture", "not in the calibration"
+]
 
 
 @dataclass(frozen=True)

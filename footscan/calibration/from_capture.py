@@ -67,13 +67,15 @@ class Recognised:
             for number, (stripe, share) in enumerate(zip(self.view.stripes, self.first.explained, strict=True))
             if len(stripe) >= STRIPE and share < SEEN
         ]
-        said, seen = self.view.mounting, self.first.seen_from
-        if seen.contradicts(said):
-            found.append(
-                f"{camera} sees the object from {seen}, expected from {said}: is this its film, and do the placements, "
-                "the profile and `stands` say how it is?"
-            )
+        if self.contradiction:
+            found.append(f"{camera} {self.contradiction}")
         return found
+
+    @property
+    def contradiction(self) -> str | None:
+        """What of it speaks against this being the camera's own film, or against the placements, if anything does."""
+        said, seen = self.view.mounting, self.first.seen_from
+        return f"sees the object from {seen}, expected from {said}" if seen.contradicts(said) else None
 
 
 @dataclass(frozen=True)
@@ -151,12 +153,13 @@ def calibrate_view(
     return CalibratedView(calibration, trials, points, list(corners_in(calibration, view.stripes, edges, poses)))
 
 
-def assemble(views: Sequence[CalibratedView], sources: list[Source], software: str) -> Calibration:
+def assemble(views: Sequence[CalibratedView], sources: list[Source], software: str, warnings: list[str]) -> Calibration:
     """One calibration of all cameras, with how well each two of them agree."""
     cameras = {view.calibration.camera: view.calibration for view in views}
     return Calibration(
         sources=sources,
         software=software,
+        warnings=warnings,
         cameras=[cameras[camera] for camera in sorted(cameras)],
         pairs=pair_agreements(cameras, {view.calibration.camera: view.points for view in views}),
     )

@@ -135,6 +135,30 @@ def refuse_unrecognised(views: Mapping[int, CameraView], reasons: Mapping[int, s
     raise RefusedCapture(source, problem, field=f"camera {camera}", evidence=shown)
 
 
+def refuse_contradictions(recognised: Mapping[int, Recognised], source: str) -> None:
+    """Refuses cameras that see the object from another side than they stand on: their films are exchanged, or the
+    placements or the profile are mirrored.
+
+    Raises
+    ------
+    RefusedCapture
+        There is such a camera.
+    """
+    wrong = {camera: known for camera, known in sorted(recognised.items()) if known.contradiction}
+    if not wrong:
+        return
+    camera, first = next(iter(wrong.items()))
+    if len(wrong) == len(recognised) > 1:
+        cause = (
+            "and every other one another side than its own: check the signs and the order of placements_mm, profile_mm"
+        )
+    else:
+        others = f", and {_cameras([c for c in wrong if c != camera])} likewise" if len(wrong) > 1 else ""
+        cause = f"by its number or `stands`{others}: is this its film?"
+    shown = [Evidence(number, 0, known.view.stripes[0], *_NOTHING) for number, known in wrong.items()]
+    raise RefusedCapture(source, f"{first.contradiction}, {cause}", field=f"camera {camera}", evidence=shown)
+
+
 def _cameras(numbers: Iterable[int]) -> str:
     """Their numbers in words."""
     listed = ", ".join(map(str, sorted(numbers)))

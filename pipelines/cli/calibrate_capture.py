@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from pipelines.cli.calibration_file import print_pairs, tell_calibration, write_calibration
-from pipelines.cli.output import AsJson, message, print_json
+from pipelines.cli.output import AsJson, keep_inputs, message, print_json
 from pipelines.cli.refused_picture import Picture, drawn
 from schemas.errors import RefusedInput
 
@@ -32,21 +32,25 @@ def capture(
         Path | None, typer.Option(help="Write the corners that were found here, as a chart of control points (CSV).")
     ] = None,
     picture: Picture = None,
+    keep_going: Annotated[
+        bool,
+        typer.Option("--keep-going", help="Go on with cameras that see the object from another side than their own."),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Calibrate from the stripe over the reference object: nobody clicks."""
     from pipelines.archive import cores
     from pipelines.calibrate import calibrate_capture
+    from pipelines.captures import read_capture
     from pipelines.cli.trials import print_trials
     from schemas.parameters.calibration import CaptureCalibrationParameters
 
     if order is not None and model != "polynomial":
         raise RefusedInput("--order", "goes with --model polynomial alone")
+    keep_inputs([out, chart, picture], *read_capture(folder).files)
     parameters = CaptureCalibrationParameters(model=model, order=order, placement_tolerance_mm=tolerance_mm)
     with drawn(folder, picture):
-        made = calibrate_capture(folder, parameters, cores())
-    for warning in made.warnings:
-        message(f"{folder}: {warning}")
+        made = calibrate_capture(folder, parameters, cores(), keep_going=keep_going)
     calibration = made.calibration
     write_calibration(calibration, out)
     if chart is not None:
@@ -57,7 +61,7 @@ def capture(
                 "cameras": [camera.model_dump(mode="json") for camera in calibration.cameras],
                 "trials": [asdict(trial) for trial in made.trials],
                 "pairs": [pair.model_dump(mode="json") for pair in calibration.pairs],
-                "warnings": made.warnings,
+                "warnings": calibration.warnings,
                 "departures_mm": made.departures_mm.tolist(),
             }
         )
@@ -69,6 +73,8 @@ def capture(
             message(
                 f"frame {number}: the cameras agree that the object stood {y:+.2f}, {z:+.2f} mm from where it should"
             )
+    for warning in calibration.warnings:
+        message(f"{folder}: {warning}")
     tell_calibration(calibration, out)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from pipelines.cli.calibration_file import tell_calibration, write_calibration
-from pipelines.cli.output import AsJson, message, print_json, print_table
+from pipelines.cli.output import AsJson, keep_inputs, message, print_json, print_table
 from schemas.errors import RefusedInput
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ def chart(
 
     if order is not None and model != "polynomial":
         raise RefusedInput("--order", "goes with --model polynomial alone")
+    keep_inputs([out], file)
     charts, warnings = _checked(file, keep_going=keep_going)
     try:
         calibration, trials = calibrate_chart(

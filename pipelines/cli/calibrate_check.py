@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.output import AsJson, message, print_json, print_table
+from pipelines.cli.output import AsJson, keep_inputs, message, print_json, print_table
 from pipelines.cli.refused_picture import Picture, drawn
 
 if TYPE_CHECKING:
@@ -30,9 +30,11 @@ def check(
     """Measure how far each camera has drifted since its calibration; the exit status is 1 unless all are steady."""
     from pipelines.archive import cores
     from pipelines.calibrate import check_calibration
+    from pipelines.captures import read_capture
     from schemas.calibration import read_calibration
     from schemas.parameters.calibration import CaptureCalibrationParameters
 
+    keep_inputs([picture], calibration, *read_capture(capture).files)
     known = read_calibration(calibration)
     parameters = CaptureCalibrationParameters(placement_tolerance_mm=placement_tolerance_mm)
     with drawn(capture, picture):
@@ -73,7 +75,7 @@ def _alike(shifts: list[tuple[float, float]]) -> tuple[float, float] | None:
 def _said(drift: "Drift") -> str:
     if drift.rms_mm is None:
         return f"is {drift.verdict}" + (f" ({drift.remark})" if drift.remark else "")
-    return f"is off by {drift.rms_mm:.2f} mm"
+    return f"is off by {drift.rms_mm:.2f} mm" + (f" ({drift.remark})" if drift.remark else "")
 
 
 def _print_drifts(drifts: "list[Drift]") -> None:

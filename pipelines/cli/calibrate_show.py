@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from pipelines.cli.calibration_file import print_pairs
-from pipelines.cli.output import AsJson, message, print_json, print_table
+from pipelines.cli.output import AsJson, keep_inputs, message, print_json, print_table
 
 
 def show(
@@ -24,6 +24,7 @@ def show(
 
     known = read_calibration(calibration)
     picture = out or calibration.with_suffix(".png")
+    keep_inputs([picture], calibration)
     if as_json:
         print_json(known.model_dump(mode="json"))
     else:
@@ -43,8 +44,13 @@ def show(
         ]
         columns = ["camera", "model", "points", "own rms mm", "held-out rms mm", "worst mm", "condition", "region"]
         print_table("", columns, rows)
+        print(
+            "Condition: how much the fit magnifies errors of its data. Region: the hull of the pixels it was fitted to."
+        )
         print_pairs(known.pairs)
         made = f" at {known.created:%Y-%m-%d %H:%M} UTC" if known.created else ""
+        for warning in known.warnings:
+            print(f"Warning: {warning}")
         print(f"Made by {known.software}{made} from {len(known.sources)} files:")
         for source in known.sources:
             print(f"  {source.name}  {source.sha256[:16]}")

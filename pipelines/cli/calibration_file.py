@@ -24,7 +24,8 @@ def tell_calibration(calibration: "Calibration", out: Path | None) -> None:
     if out is None:
         message("nothing was written; --out FILE writes the calibration")
     else:
-        message(f"{out}: calibration of {len(calibration.cameras)} cameras")
+        count = len(calibration.cameras)
+        message(f"{out}: calibration of {count} camera{'s' * (count != 1)}")
 
 
 def print_pairs(pairs: "list[PairAgreement]") -> None:

@@ -59,7 +59,10 @@ def _explain(error: BaseException) -> tuple[str, int]:
         case typer.TyperException() if not error.format_message():
             return "", RefusedInput.exit_status  # its help was printed
         case typer.TyperException():
-            return f"{one_line(error.format_message())} (see 'footscan --help')", RefusedInput.exit_status
+            context = getattr(error, "ctx", None)  # of a wrong use; typer does not export its class
+            command = context.command_path if context else "footscan"
+            problem = one_line(error.format_message()).replace("Value error, ", "")
+            return f"{problem} (see '{command} --help')", RefusedInput.exit_status
         case OSError():
             return one_line(str(error)), Fault.exit_status
         case MemoryError():

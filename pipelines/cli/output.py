@@ -2,10 +2,13 @@
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+
+from schemas.errors import RefusedInput
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of a table.")]
 
@@ -13,6 +16,23 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document in
 def message(text: str) -> None:
     """A line for the person at the terminal."""
     print(text, file=sys.stderr)
+
+
+def keep_inputs(outputs: Iterable[Path | None], *inputs: Path) -> None:
+    """Refuses outputs that would overwrite an input.
+
+    Raises
+    ------
+    RefusedInput
+        There is one.
+    """
+    for output in outputs:
+        if output is None or not output.exists():
+            continue
+        if output.is_dir():
+            raise RefusedInput(output, "is a folder, expected the name of a file to write")
+        if output.resolve() in {source.resolve() for source in inputs}:
+            raise RefusedInput(output, "is an input, expected another file to write")
 
 
 def print_json(value: Any) -> None:

@@ -226,14 +226,62 @@ def test_one_camera_alone_is_calibrated(footscan: Footscan, capture: Path, camer
     assert "sees the object" not in done.stderr
 
 
-def test_exchanged_films_are_told(footscan: Footscan, capture: Path) -> None:
+def exchange(capture: Path, a: int, b: int) -> None:
+    (capture / f"cam{a}.avi").rename(capture / "kept.avi")
+    (capture / f"cam{b}.avi").rename(capture / f"cam{a}.avi")
+    (capture / "kept.avi").rename(capture / f"cam{b}.avi")
+
+
+def test_exchanged_films_are_refused(footscan: Footscan, calibrated: Path, capture: Path) -> None:
+    keep(capture, 1, 2, 5)
+    exchange(capture, 1, 5)
+    done = footscan("calibrate", "capture", capture, "--out", "c.json")
+    assert done.returncode == 2
+    assert "camera 1: sees the object from front, left, below, expected from front, left, above" in done.stderr
+    assert "and camera 5 likewise: is this its film?" in done.stderr
+    assert Path("capture-refused.png").exists()
+    assert not Path("c.json").exists()
+    assert footscan("calibrate", "capture", capture, "--out", "c.json", "--keep-going").returncode == 0
+    shown = footscan("calibrate", "show", "c.json")
+    assert "Warning: camera 5 sees the object from front, left, above, expected from" in shown.stdout
+    checked = footscan("calibrate", "check", calibrated, capture)
+    assert checked.returncode == 1
+    assert "(sees the object from front, left, below, expected from front, left, above)" in checked.stderr
+
+
+def test_mirrored_placements_are_refused(footscan: Footscan, capture: Path) -> None:
     keep(capture, 1, 5)
-    (capture / "cam1.avi").rename(capture / "kept.avi")
-    (capture / "cam5.avi").rename(capture / "cam1.avi")
-    (capture / "kept.avi").rename(capture / "cam5.avi")
+    place(capture, [[-y, z] for y, z in placements_of(capture)])
     done = footscan("calibrate", "capture", capture)
-    assert "camera 1 sees the object from front, left, below, expected from front, left, above" in done.stderr
-    assert "camera 5 sees the object from front, left, above, expected from front, left, below" in done.stderr
+    assert done.returncode == 2
+    assert "check the signs and the order of placements_mm" in done.stderr
+
+
+def test_outputs_never_overwrite_what_is_read(footscan: Footscan, calibrated: Path, capture: Path) -> None:
+    for arguments in (
+        ("capture", capture, "--out", capture / "capture.yaml"),
+        ("capture", capture, "--chart", capture / "reference.yaml"),
+        ("check", calibrated, capture, "--picture", capture / "cam1.avi"),
+        ("chart", capture / "chart.csv", "--out", capture / "chart.csv"),
+        ("show", calibrated, "--out", calibrated),
+    ):
+        done = footscan("calibrate", *arguments)
+        assert done.returncode == 2
+        assert f"{arguments[-1]}: is an input, expected another file to write" in done.stderr
+    assert "is a folder" in footscan("calibrate", "show", calibrated, "--out", capture).stderr
+
+
+def test_a_camera_that_the_calibration_lacks_is_part_of_the_verdict(
+    footscan: Footscan, calibrated: Path, capture: Path, tmp_path: Path
+) -> None:
+    keep(capture, 1, 2)
+    fewer = json.loads(calibrated.read_text())
+    fewer["cameras"] = [camera for camera in fewer["cameras"] if camera["camera"] == 1]
+    (tmp_path / "fewer.json").write_text(json.dumps(fewer))
+    done = footscan("calibrate", "check", tmp_path / "fewer.json", capture, "--json")
+    assert done.returncode == 1
+    verdicts = {camera["camera"]: camera["verdict"] for camera in json.loads(done.stdout)["cameras"]}
+    assert verdicts == {1: "steady", 2: "not in the calibration"}
 
 
 def test_a_camera_that_misses_the_object_in_one_frame_is_told(footscan: Footscan, capture: Path) -> None:
