@@ -23,6 +23,7 @@ from footscan.virtual.capture import record_capture
 from footscan.virtual.reference import standard_reference
 from footscan.virtual.scanner import VOLUME_MM, Camera, standard_scanner
 from pipelines.calibrate import CaptureCalibration, calibrate_capture
+from pipelines.captures import read_capture
 from schemas.calibration import Calibration, CameraCalibration, Source
 from schemas.parameters.calibration import CalibrationParameters, CaptureCalibrationParameters
 from schemas.parameters.simulation import SimulationSettings
@@ -88,7 +89,7 @@ def _from_clicks(charts: dict[int, Chart], model: str) -> Calibration:
 
 def _from_stripe(folder: Path, model: str, order: int | None = None) -> CaptureCalibration:
     parameters = CaptureCalibrationParameters.model_validate({"model": model, "order": order})
-    return calibrate_capture(folder, parameters, workers=2)
+    return calibrate_capture(read_capture(folder), parameters, workers=2)
 
 
 def _thesis_clicks(chart: Chart) -> Chart:

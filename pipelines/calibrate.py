@@ -30,7 +30,7 @@ from footscan.calibration.selection import ModelTrial
 from footscan.frames.film import film_files, open_film, pixel_frames
 from footscan.report.capture_figure import capture_figure
 from footscan.stripe.extract import extract_stripe
-from pipelines.captures import RecordedCapture, read_capture
+from pipelines.captures import RecordedCapture
 from pipelines.engine.digest import sha256
 from pipelines.version import SOFTWARE
 from schemas.calibration import Calibration, Source
@@ -56,19 +56,17 @@ class CaptureCalibration:
 
 
 def calibrate_capture(
-    folder: Path, parameters: CaptureCalibrationParameters, workers: int, *, keep_going: bool = False
+    capture: RecordedCapture, parameters: CaptureCalibrationParameters, workers: int, *, keep_going: bool = False
 ) -> CaptureCalibration:
-    """The calibration of all cameras of the capture in `folder`, with so many threads.
+    """The calibration of all cameras of a capture, with so many threads.
 
     With `keep_going` cameras that see the object from another side than they stand on are calibrated all the same.
 
     Raises
     ------
     RefusedInput
-        The capture breaks its format, or the object is not recognised or stood elsewhere than said; the latter two as
-        `RefusedCapture`.
+        Two cameras have one film; or the object is not recognised or stood elsewhere than said, as `RefusedCapture`.
     """
-    capture = read_capture(folder)
     sources = _sources(capture)
     with dask.config.set(scheduler="threads", num_workers=workers):
         seen = _see(capture, parameters)
@@ -88,22 +86,20 @@ def calibrate_capture(
 
 def check_calibration(
     calibration: Calibration,
-    folder: Path,
+    capture: RecordedCapture,
     parameters: CaptureCalibrationParameters,
     tolerance_mm: float,
     workers: int,
 ) -> list[Drift]:
-    """How far each camera of a scanner has drifted since its calibration, by the capture in `folder`.
+    """How far each camera of a scanner has drifted since its calibration, by a capture of today.
 
     A camera that does not recognise the object, or is in the capture or the calibration alone, is part of the result.
 
     Raises
     ------
     RefusedInput
-        The capture breaks its format, or the object stood elsewhere than said or is recognised by no camera; the latter
-        two as `RefusedCapture`.
+        The object stood elsewhere than said or is recognised by no camera, as `RefusedCapture`.
     """
-    capture = read_capture(folder)
     filmed = [camera.id for camera in capture.document.cameras]
     with dask.config.set(scheduler="threads", num_workers=workers):
         seen = _see(capture, parameters)
@@ -125,9 +121,8 @@ def check_calibration(
     return drifts + [Drift(camera, "not in the calibration") for camera in sorted(set(filmed) - known_ids)]
 
 
-def picture_of(folder: Path, refused: RefusedCapture) -> bytes:
-    """A PNG of what the capture in `folder` was refused for."""
-    capture = read_capture(folder)
+def picture_of(capture: RecordedCapture, refused: RefusedCapture) -> bytes:
+    """A PNG of what a capture was refused for."""
     films = {camera.id: capture.film(camera) for camera in capture.document.cameras}
     shown = [
         (evidence, next(islice(pixel_frames(open_film(films[evidence.camera])), evidence.frame, None), None))
@@ -222,12 +217,4 @@ def _sources(capture: RecordedCapture) -> list[Source]:
 
 
 def _source(file: Path, folder: Path) -> Source:
-    return Source(name=_name(file, folder), sha256=sha256(file.read_bytes()))
-
-
-def _name(file: Path, folder: Path) -> str:
-    """Its path within the capture; links are not followed, but those on the way to the capture."""
-    for root in (folder, folder.resolve()):
-        if file.is_relative_to(root):
-            return file.relative_to(root).as_posix()
-    return file.name
+    return Source(name=file.relative_to(folder).as_posix(), sha256=sha256(file.read_bytes()))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from footscan.calibration.edge_points import BLOCK_MM, EdgePoints
 from footscan.calibration.maps import to_world
+from footscan.calibration.selection import rms
 from schemas.calibration import CameraCalibration, PairAgreement
 
 Floats = NDArray[np.float64]
@@ -32,7 +33,7 @@ def pair_agreements(cameras: Mapping[int, CameraCalibration], points: Mapping[in
                 PairAgreement(
                     cameras=(a, b),
                     places=len(shared),
-                    rms_mm=float(np.sqrt(np.mean(apart**2))),
+                    rms_mm=rms(apart),
                     worst_mm=float(np.abs(apart).max()),
                 )
             )
@@ -41,7 +42,7 @@ def pair_agreements(cameras: Mapping[int, CameraCalibration], points: Mapping[in
 
 def _offsets(camera: CameraCalibration, points: EdgePoints) -> dict[Place, float]:
     """Where a camera places each stretch of an edge, across it: the median distance from the true edge, mm."""
-    across = np.sum(points.normals * to_world(camera, points.pixels), axis=1) - points.offsets
+    across = points.across(to_world(camera, points.pixels))
     stretch = np.floor(points.along / BLOCK_MM).astype(np.intp)
     places, number, count = np.unique(
         np.column_stack([points.placement, points.edge, stretch]), axis=0, return_inverse=True, return_counts=True

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.chart import Chart
-from footscan.calibration.from_chart import IMAGE_PX
+from footscan.calibration.maps import IMAGE_PX
 from footscan.calibration.plane_fit import (
     PASSED,
     ROBUST_POINTS,

@@ -5,14 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.maps import is_supported, model_of, to_world
+from footscan.calibration.maps import IMAGE_PX, is_supported, model_of, to_world
 from footscan.calibration.selection import rms
 from schemas.calibration import Calibration, CameraCalibration
 
 Floats = NDArray[np.float64]
 
-IMAGE_PX = (640, 480)
-"""What the scanner's cameras film; for calibrations that say neither their region nor their image."""
 MOST_A_SIDE = 800
 """Every pixel is looked at, or every second, third, ... where there are more a side."""
 FOLDS_EVERY = 7

@@ -52,7 +52,7 @@ def drift_of(calibration: CameraCalibration, today: CalibratedView, tolerance_mm
     if len(points) < FEWEST_POINTS:
         remark = f"{len(points)} of {len(today.points)} points of the stripe lie where data support the calibration"
         return Drift(camera, "not comparable", len(points), remark=remark)
-    across = np.sum(points.normals * to_world(calibration, points.pixels), axis=1) - points.offsets
+    across = points.across(to_world(calibration, points.pixels))
     place = to_world(today.calibration, points.pixels)
     terms = np.column_stack([np.ones(len(points)), (place - place.mean(axis=0)) / REACH_MM])
     design = np.concatenate([points.normals[:, [axis]] * terms for axis in (0, 1)], axis=1)

@@ -42,6 +42,10 @@ class EdgePoints:
     def __len__(self) -> int:
         return len(self.offsets)
 
+    def across(self, world: Floats) -> Floats:
+        """How far off their edges `world` (N, 2), mm, places them, (N,), positive outside."""
+        return np.asarray(np.sum(self.normals * world, axis=1) - self.offsets)
+
     def part(self, chosen: NDArray[np.bool_]) -> "EdgePoints":
         """Those that are chosen, (N,)."""
         return EdgePoints(
@@ -110,6 +114,12 @@ def to_object(world: Floats, poses: Floats) -> Floats:
     rest = world - poses[:, :2]
     cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     return np.column_stack([cos * rest[:, 0] + sin * rest[:, 1], cos * rest[:, 1] - sin * rest[:, 0]])
+
+
+def from_object(points: Floats, pose: Floats) -> Floats:
+    """Where points (N, 2) of the object are, mm, when it stands in `pose` (3,)."""
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    return np.asarray(points @ np.array([[cos, sin], [-sin, cos]]) + pose[:2])
 
 
 def edge_lines(

@@ -86,8 +86,7 @@ def predict(found: Fit, observations: Observations) -> Floats:
 
 
 def _residuals(model: Model, observations: Observations, parameters: Floats) -> Floats:
-    world = model.world(parameters, observations.pixels)
-    return np.asarray(np.einsum("nk,nk->n", observations.normals, world) - observations.offsets)
+    return observations.across(model.world(parameters, observations.pixels))
 
 
 def _jacobian(model: Model, observations: Observations, parameters: Floats) -> Floats:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.calibration.edge_points import from_object
 from footscan.calibration.lines import find_corners, find_lines
 from footscan.calibration.maps import to_world
 from footscan.calibration.reference import Edges
@@ -40,10 +41,9 @@ def corners_in(
     stripes : for each of K frames the stripe's points (N, 2), px.
     poses : (K, 3) of the object in each, mm, mm and radians.
     """
-    for frame, (stripe, (y, z, turn)) in enumerate(zip(stripes, poses, strict=True)):
+    for frame, (stripe, pose) in enumerate(zip(stripes, poses, strict=True)):
         pixels = np.array([corner.position for corner in find_corners(find_lines(stripe), stripe)]).reshape(-1, 2)
-        cos, sin = np.cos(turn), np.sin(turn)
-        true = edges.start @ np.array([[cos, sin], [-sin, cos]]) + (y, z)
+        true = from_object(edges.start, pose)
         distance = np.linalg.norm(to_world(camera, pixels)[:, np.newaxis] - true, axis=2)
         for k in np.flatnonzero(distance.min(axis=1, initial=np.inf) < NEAR_MM):
             i, j = pixels[k].tolist()

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from footscan.calibration.chart import Chart
 from footscan.calibration.fit import Fit
-from footscan.calibration.maps import Model
+from footscan.calibration.maps import IMAGE_PX, Model
 from footscan.calibration.observations import Observations, of_points
 from footscan.calibration.polynomial import PolynomialModel, terms
 from footscan.calibration.quadratic import ORDER as QUADRATIC
@@ -20,8 +20,6 @@ from schemas.errors import RefusedInput
 from schemas.parameters.calibration import CalibrationParameters
 from schemas.units import MILLIMETRES
 
-IMAGE_PX = (640, 480)
-"""Columns and rows of the cameras' images; a chart does not say."""
 PLAIN_QUADRATIC = PolynomialModel(QUADRATIC, (0.0, 0.0), 1.0)
 """The thesis's model: of pixels that are not normalised."""
 FEWEST_POINTS = 4
@@ -125,8 +123,7 @@ def calibrated(
 def _residuals(model: Model, parameters: NDArray[np.float64], observations: Observations) -> list[Residual]:
     """What the fit leaves at each place, in an order that does not depend on that of the observations."""
     known = observations.sorted()
-    across = np.sum(known.normals * model.world(parameters, known.pixels), axis=1) - known.offsets
-    pixels, errors = known.errors(across)
+    pixels, errors = known.errors(known.across(model.world(parameters, known.pixels)))
     rows = np.column_stack([pixels.round(2), errors.round(5)]).tolist()
     return [(i, j, y, z) for i, j, y, z in rows]
 

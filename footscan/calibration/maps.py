@@ -12,6 +12,8 @@ from schemas.calibration import CameraCalibration, HomographyMap, PolynomialMap
 Floats = NDArray[np.float64]
 Model = PolynomialModel | HomographyModel
 
+IMAGE_PX = (640, 480)
+"""Columns and rows of what the scanner's cameras film, where nothing says it."""
 STARTS = 12
 """Newton's method begins at the nearest of so many places a side in the region."""
 STEPS = 30
@@ -116,6 +118,6 @@ def _grid(camera: CameraCalibration) -> Floats:
     if camera.region_px:
         low, high = np.min(camera.region_px, axis=0), np.max(camera.region_px, axis=0)
     else:
-        low, high = np.zeros(2), np.array(camera.image_px or (640, 480)) - 1.0
+        low, high = np.zeros(2), np.array(camera.image_px or IMAGE_PX) - 1.0
     i, j = np.meshgrid(*(np.linspace(low[k], high[k], STARTS) for k in (0, 1)))
     return np.column_stack([i.ravel(), j.ravel()])

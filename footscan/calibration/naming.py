@@ -28,9 +28,7 @@ def facing_names(edges: Edges) -> Names:
     """(M, 4) edges that can all face one camera, in every order, one edge for each line on which edges lie."""
     names = _supporting_lines(edges)
     every = np.stack(np.meshgrid(*[names] * 4, indexing="ij"), axis=-1).reshape(-1, 4)
-    angles = np.sort(np.arctan2(edges.normal[every, 1], edges.normal[every, 0]), axis=1)
-    gaps = np.diff(np.column_stack([angles, angles[:, 0] + 2 * np.pi]), axis=1)
-    return np.asarray(every[gaps.max(axis=1) > np.pi + 1e-6])
+    return np.asarray(every[_on_one_side(edges.normal[every])])
 
 
 def named_maps(names: Names, pieces: Floats, ends: Floats, frames: Names, shifts: Floats, edges: Edges) -> Floats:
@@ -73,13 +71,19 @@ def misfits(maps: Floats, pixels: Floats, shift: Floats, edges: Edges, reach_mm:
 
 def can_be_seen(edges: Edges, seen: NDArray[np.bool_]) -> bool:
     """Whether the edges (E,) that are `seen` can all face one camera."""
-    angles = np.sort(np.arctan2(edges.normal[seen, 1], edges.normal[seen, 0]))
-    return bool(np.diff(np.append(angles, angles[0] + 2 * np.pi)).max() > np.pi + 1e-6)
+    return bool(_on_one_side(edges.normal[np.newaxis, seen])[0])
 
 
 def is_view(matrix: Floats, pixels: Floats) -> bool:
     """Whether a camera can see the plane so: all of it before the camera, and at a scale that a scanner has."""
     return bool(_are_views(matrix[np.newaxis], pixels)[0])
+
+
+def _on_one_side(normals: Floats) -> NDArray[np.bool_]:
+    """Whether some direction has all of the `normals` (M, n, 2) on its side, (M,)."""
+    angles = np.sort(np.arctan2(normals[:, :, 1], normals[:, :, 0]), axis=1)
+    gaps = np.diff(np.column_stack([angles, angles[:, 0] + 2 * np.pi]), axis=1)
+    return np.asarray(gaps.max(axis=1) > np.pi + 1e-6)
 
 
 def _supporting_lines(edges: Edges) -> Names:

@@ -47,6 +47,10 @@ class Observations:
         _, number, count = np.unique(self.block, return_inverse=True, return_counts=True)
         return np.asarray(1.0 / count[number])
 
+    def across(self, world: Floats) -> Floats:
+        """Residuals (N,), mm, where the pixels are mapped to `world` (N, 2)."""
+        return np.asarray(np.einsum("nk,nk->n", self.normals, world) - self.offsets)
+
     def part(self, chosen: NDArray[np.bool_]) -> "Observations":
         """Those that are chosen, (N,)."""
         return Observations(

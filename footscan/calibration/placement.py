@@ -127,7 +127,7 @@ def agreed_poses(cameras: Mapping[int, CameraFit], poses: Floats, without: int |
         model, parameters = known.fit.model, known.fit.parameters
         weights = points.observations().share
         world = model.world(parameters, points.pixels)
-        residuals = np.sum(points.normals * world, axis=1) - points.offsets
+        residuals = points.across(world)
         by_map = np.einsum("nk,nkp->np", points.normals, model.by_parameters(parameters, points.pixels))
         by_pose = _by_poses(points, world, poses)
         inner = by_map.T @ (weights[:, None] * by_map) + np.diag(model.prior_precision() + 1e-12)

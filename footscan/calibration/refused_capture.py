@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.calibration.edge_points import from_object
 from footscan.calibration.fit import UndeterminedError
 from footscan.calibration.from_capture import SEEN, CameraView, Recognised, as_said, fit_view
 from footscan.calibration.maps import to_pixels
@@ -90,17 +91,17 @@ def check_placements(
         allowed = tolerance_mm + SIGMAS * min(unsure.values())
         size = max(float(np.hypot(*found.pose[:2])), float(abs(found.pose[2])) * LEVER_MM)
         said, stood = poses[number], poses[number] + found.pose
-        problem = (
-            f"the object stood at ({stood[0]:.1f}, {stood[1]:.1f}) mm, turned by {np.degrees(stood[2]):.1f} degrees, "
-            f"expected ({said[0]:g}, {said[1]:g}) as placements_mm says"
-        )
-        if found.share < FOUND:
-            size, problem = (
-                np.inf,
-                (
-                    "the reference object is not recognised where it should stand, nor near to it, "
-                    f"by {_cameras(maps)}, which recognise it in the other frames"
-                ),
+        if found.share >= FOUND:
+            problem = (
+                f"the object stood at ({stood[0]:.1f}, {stood[1]:.1f}) mm, "
+                f"turned by {np.degrees(stood[2]):.1f} degrees, "
+                f"expected ({said[0]:g}, {said[1]:g}) as placements_mm says"
+            )
+        else:
+            size = np.inf
+            problem = (
+                "the reference object is not recognised where it should stand, nor near to it, "
+                f"by {_cameras(maps)}, which recognise it in the other frames"
             )
         if size > allowed and (worst is None or size > worst[0]):
             shown = [
@@ -188,8 +189,6 @@ def _outline(known: CameraFit, view: CameraView, edges: Edges, pose: Floats) -> 
     own = np.concatenate(
         [a + t[:, np.newaxis] * (b - a) for a, b, t in zip(edges.start, edges.end, steps, strict=True)]
     )
-    cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    world = own @ np.array([[cos, sin], [-sin, cos]]) + pose[:2]
     pixels = known.points.pixels
     camera = CameraCalibration(
         camera=view.camera,
@@ -198,6 +197,6 @@ def _outline(known: CameraFit, view: CameraView, edges: Edges, pose: Floats) -> 
         region_px=region_of(pixels),
         points=len(pixels),
     )
-    seen = to_pixels(camera, world)
+    seen = to_pixels(camera, from_object(own, pose))
     inside = ((seen >= 0) & (seen <= np.array(view.image_px) - 1)).all(axis=1)
     return np.asarray(seen[inside])

@@ -91,7 +91,7 @@ def select(
     say; the two are added as squares.
     """
     attempts = [try_model(model, observations, camera, robust=robust) for model in models]
-    trials = _with_a_lens([trial for _, trial in attempts])
+    trials = _with_a_lens(models, [trial for _, trial in attempts])
     judged = [k for k, trial in enumerate(trials) if np.isfinite(_expected(trial))]
     if not judged:
         return None, trials
@@ -102,10 +102,14 @@ def select(
     return attempts[chosen][0], trials
 
 
-def _with_a_lens(trials: list[ModelTrial]) -> list[ModelTrial]:
+def _with_a_lens(models: Sequence[Model], trials: list[ModelTrial]) -> list[ModelTrial]:
     """No model can be surer between the data than the homography with a lens, whose covariance knows what a lens may
     do there: a model without one leaves that out of its own."""
-    known = [t.region_sigma_mm for t in trials if t.model == "homography, distortion" and t.region_sigma_mm]
+    known = [
+        trial.region_sigma_mm
+        for model, trial in zip(models, trials, strict=True)
+        if model.kind == "homography-distortion" and trial.region_sigma_mm
+    ]
     return [
         replace(trial, region_sigma_mm=max([trial.region_sigma_mm, *known])) if trial.region_sigma_mm else trial
         for trial in trials

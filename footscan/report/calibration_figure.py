@@ -1,13 +1,13 @@
 """What a calibration knows, camera by camera: where it is supported, how sure it is there, and what the fit left."""
 
-import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.maps import is_supported, model_of, prediction_covariance
+from footscan.calibration.maps import IMAGE_PX, is_supported, model_of, prediction_covariance
+from footscan.report.panels import panels, png_of
 from schemas.calibration import Calibration, CameraCalibration
 
 if TYPE_CHECKING:
@@ -16,15 +16,12 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-COLUMNS = 4
 MOST_CAMERAS = 64
 """More are not drawn."""
-IMAGE_PX = (640, 480)
-"""For calibrations that do not say."""
 GRID_PX = 4
 """Spacing of the places at which the map's uncertainty is drawn."""
 LONG_PX = 30.0
-"""An arrow as long as this in the image stands for `_round(95 % of all residuals)`."""
+"""An arrow as long as this in the image stands for the length that 95 % of all residuals do not reach, rounded up."""
 INK, RESIDUAL, SUPPORT = "#222222", "#b3202c", "#b9d4e8"
 
 
@@ -33,33 +30,26 @@ def calibration_figure(calibration: Calibration) -> bytes:
     map there, and the residuals as arrows; one scale of colours and one of arrows for all."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
-    from matplotlib.figure import Figure
 
     cameras = calibration.cameras[:MOST_CAMERAS]
-    rows = -(-len(cameras) // COLUMNS)
     sigmas = {camera.camera: _sigma(camera) for camera in cameras}
     known = [sigma[np.isfinite(sigma)] for sigma in sigmas.values() if sigma is not None]
     all_sigmas = np.concatenate([np.empty(0), *known])
     colours = Normalize(0.0, round_up(float(np.quantile(all_sigmas, 0.95))) if all_sigmas.size else 1.0)
     unit_mm = _arrow_unit(cameras)
 
-    figure = Figure(figsize=(13, 0.5 + 2.65 * rows), dpi=110, layout="constrained")
-    panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
-    for panel, camera in zip(panels, cameras, strict=False):
+    figure, places = panels(len(cameras), 0.5)
+    for panel, camera in zip(places, cameras, strict=False):
         _draw_camera(panel, camera, sigmas[camera.camera], colours, unit_mm)
-    for panel in panels[len(cameras) :]:
-        panel.set_axis_off()
     figure.suptitle(
         f"Arrows: what the fit left, {LONG_PX:.0f} px long for {unit_mm:g} mm. Coloured: the region that data support.",
         fontsize=10,
         color=INK,
     )
     if all_sigmas.size:
-        bar = figure.colorbar(ScalarMappable(colours, "YlGnBu"), ax=panels.tolist(), shrink=0.8, extend="max")
+        bar = figure.colorbar(ScalarMappable(colours, "YlGnBu"), ax=places, shrink=0.8, extend="max")
         bar.set_label("standard deviation of the map, mm")
-    png = io.BytesIO()
-    figure.savefig(png, format="png", metadata={"Software": None})
-    return png.getvalue()
+    return png_of(figure)
 
 
 def round_up(value: float) -> float:

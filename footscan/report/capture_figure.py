@@ -1,32 +1,27 @@
 """What a refused capture of the reference object shows."""
 
-import io
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.refused_capture import Evidence
+from footscan.report.panels import panels, png_of
 
-COLUMNS = 4
 STRIPE, EXPECTED, FOUND = "#00d0ff", "#ffd000", "#ff3bd4"
 
 
 def capture_figure(reason: str, shown: Sequence[tuple[Evidence, NDArray[np.uint8] | None]]) -> bytes:
     """A PNG with one panel for each piece of evidence: the frame (rows, columns, 3), where it can be decoded, the
     stripe that was found in it, and the outline of the object where it should stand and where it stood."""
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    rows = -(-len(shown) // COLUMNS)
-    figure = Figure(figsize=(13, 0.9 + 2.65 * rows), dpi=110, layout="constrained")
-    panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
-    for panel in panels:
+    figure, places = panels(len(shown), 0.9)
+    for panel, (evidence, image) in zip(places, shown, strict=False):
         panel.set_axis_off()
-    for panel, (evidence, image) in zip(panels, shown, strict=False):
-        panel.set_title(f"Camera {evidence.camera}, frame {evidence.frame}: {_count(evidence)}", fontsize=8)
+        caption = "cannot be decoded" if image is None else _count(evidence)
+        panel.set_title(f"Camera {evidence.camera}, frame {evidence.frame}: {caption}", fontsize=8)
         if image is None:
-            panel.set_title(f"Camera {evidence.camera}, frame {evidence.frame}: cannot be decoded", fontsize=8)
             continue
         panel.imshow(image)
         panel.autoscale(False)
@@ -44,9 +39,7 @@ def capture_figure(reason: str, shown: Sequence[tuple[Evidence, NDArray[np.uint8
     keys = [Line2D([], [], color=colour, linewidth=2, label=name) for name, colour in names]
     figure.legend(handles=keys, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     figure.suptitle(reason.replace("$", r"\$"), fontsize=10, wrap=True)
-    png = io.BytesIO()
-    figure.savefig(png, format="png", metadata={"Software": None})
-    return png.getvalue()
+    return png_of(figure)
 
 
 def _count(evidence: Evidence) -> str:

@@ -47,10 +47,11 @@ def capture(
 
     if order is not None and model != "polynomial":
         raise RefusedInput("--order", "goes with --model polynomial alone")
-    keep_inputs([out, chart, picture], *read_capture(folder).files)
+    recorded = read_capture(folder)
+    keep_inputs([out, chart, picture], *recorded.files)
     parameters = CaptureCalibrationParameters(model=model, order=order, placement_tolerance_mm=tolerance_mm)
-    with drawn(folder, picture):
-        made = calibrate_capture(folder, parameters, cores(), keep_going=keep_going)
+    with drawn(recorded, picture):
+        made = calibrate_capture(recorded, parameters, cores(), keep_going=keep_going)
     calibration = made.calibration
     write_calibration(calibration, out)
     if chart is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.output import AsJson, keep_inputs, message, print_json, print_table
+from pipelines.cli.output import AsJson, figure, keep_inputs, message, print_json, print_table
 from pipelines.cli.refused_picture import Picture, drawn
 
 if TYPE_CHECKING:
@@ -34,11 +34,12 @@ def check(
     from schemas.calibration import read_calibration
     from schemas.parameters.calibration import CaptureCalibrationParameters
 
-    keep_inputs([picture], calibration, *read_capture(capture).files)
+    today = read_capture(capture)
+    keep_inputs([picture], calibration, *today.files)
     known = read_calibration(calibration)
     parameters = CaptureCalibrationParameters(placement_tolerance_mm=placement_tolerance_mm)
-    with drawn(capture, picture):
-        drifts = check_calibration(known, capture, parameters, tolerance_mm, cores())
+    with drawn(today, picture):
+        drifts = check_calibration(known, today, parameters, tolerance_mm, cores())
     moved = [drift for drift in drifts if drift.verdict != "steady"]
     if as_json:
         print_json(
@@ -84,7 +85,8 @@ def _print_drifts(drifts: "list[Drift]") -> None:
             str(drift.camera),
             str(drift.points),
             *(["-", "-"] if drift.shift_mm is None else [f"{mm:+.3f}" for mm in drift.shift_mm]),
-            *("-" if mm is None else f"{mm:.3f}" for mm in (drift.rms_mm, drift.worst_mm)),
+            figure(drift.rms_mm),
+            figure(drift.worst_mm),
             drift.verdict,
         ]
         for drift in drifts

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.output import AsJson, message, print_json, print_table
+from pipelines.cli.output import AsJson, figure, message, print_json, print_table
 from schemas.errors import one_line
 
 if TYPE_CHECKING:
@@ -66,14 +66,10 @@ def _row(found: "CameraComparison") -> list[str]:
         str(found.camera),
         str(found.model_a) if same_model else f"A: {found.model_a}; B: {found.model_b}",
         "-" if found.shared_fraction is None else f"{100 * found.shared_fraction:.1f}",
-        _mm(found.mean_y_mm, "+.3f"),
-        _mm(found.mean_z_mm, "+.3f"),
-        _mm(found.rms_mm, ".3f"),
-        _mm(found.largest_mm, ".3f"),
+        figure(found.mean_y_mm, "+.3f"),
+        figure(found.mean_z_mm, "+.3f"),
+        figure(found.rms_mm),
+        figure(found.largest_mm),
         "-" if at is None else f"{at[0]:.0f}, {at[1]:.0f}",
-        _mm(found.left_rms_mm, ".3f"),
+        figure(found.left_rms_mm),
     ]
-
-
-def _mm(value: float | None, form: str) -> str:
-    return "-" if value is None else format(value, form)

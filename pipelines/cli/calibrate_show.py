@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from pipelines.cli.calibration_file import print_pairs
-from pipelines.cli.output import AsJson, keep_inputs, message, print_json, print_table
+from pipelines.cli.output import AsJson, figure, keep_inputs, message, print_json, print_table
 
 
 def show(
@@ -33,11 +33,8 @@ def show(
                 str(camera.camera),
                 model_of(camera.map)[0].name,
                 str(camera.points),
-                *(
-                    "-" if mm is None else f"{mm:.3f}"
-                    for mm in (camera.rms_mm, camera.held_out_rms_mm, camera.worst_mm)
-                ),
-                "-" if camera.condition is None else f"{camera.condition:.3g}",
+                *(figure(mm) for mm in (camera.rms_mm, camera.held_out_rms_mm, camera.worst_mm)),
+                figure(camera.condition, ".3g"),
                 f"{len(camera.region_px)} corners" if camera.region_px else "unknown",
             ]
             for camera in known.cameras

@@ -58,6 +58,11 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
     console.print(table)
 
 
+def figure(value: float | None, form: str = ".3f") -> str:
+    """A cell of a table; a dash where the value is not known."""
+    return "-" if value is None else format(value, form)
+
+
 def _is_number(cell: str) -> bool:
     try:
         float(cell or "0")

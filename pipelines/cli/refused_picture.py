@@ -3,11 +3,14 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from schemas.errors import RefusedInput
+
+if TYPE_CHECKING:
+    from pipelines.captures import RecordedCapture
 
 Picture = Annotated[
     Path | None,
@@ -16,8 +19,8 @@ Picture = Annotated[
 
 
 @contextmanager
-def drawn(folder: Path, picture: Path | None) -> Iterator[None]:
-    """Around work on the capture in `folder`: where it is refused for what it shows, that is drawn and the file named.
+def drawn(capture: "RecordedCapture", picture: Path | None) -> Iterator[None]:
+    """Around work on a capture: where it is refused for what it shows, that is drawn and the file named.
 
     Raises
     ------
@@ -31,9 +34,9 @@ def drawn(folder: Path, picture: Path | None) -> Iterator[None]:
     try:
         yield
     except RefusedCapture as refused:
-        picture = picture or Path(f"{folder.resolve().name}-refused.png")
+        picture = picture or Path(f"{capture.folder.name}-refused.png")
         try:
-            write_atomically(picture, picture_of(folder, refused))
+            write_atomically(picture, picture_of(capture, refused))
         except OSError as error:
             seen = f"(not drawn: {error})"
         else:

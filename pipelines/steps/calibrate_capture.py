@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pipelines.archive import cores
 from pipelines.calibrate import calibrate_capture
-from pipelines.captures import CAPTURE_FILE
+from pipelines.captures import CAPTURE_FILE, read_capture
 from pipelines.engine.digest import sha256
 from schemas.errors import DamagedError
 from schemas.parameters.calibration import CaptureCalibrationParameters
@@ -20,5 +20,5 @@ def run(inputs: Mapping[str, bytes], parameters: CaptureCalibrationParameters, p
         if not file.is_file() or sha256(file.read_bytes()) != digest:
             (folder / CAPTURE_FILE).unlink(missing_ok=True)  # without it the capture is none, and is filmed anew
             raise DamagedError(f"{file}: is not what was filmed; run again to film it anew")
-    calibration = calibrate_capture(folder, parameters, cores()).calibration
+    calibration = calibrate_capture(read_capture(folder), parameters, cores()).calibration
     return (calibration.model_dump_json(indent=2) + "\n").encode()
