@@ -1,10 +1,12 @@
-"""Extraction of the stripe: its time beside that of decoding, and both beside a plain method of library calls.
+"""What extracting a whole scan costs beside decoding it: time, memory, and the first call of a process.
 
     .venv/bin/python -m benchmarks.extraction [SCAN]
 
-SCAN is a folder that the virtual scanner filmed with its standard settings; its truth.stl gives the exact stripe.
+Each camera is a task, on a pool of two threads. Beside footscan's methods stands a plain one of library calls.
 """
 
+import os
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -12,43 +14,72 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import grey_closing
-from scipy.spatial import cKDTree
 from skimage.measure import label
 
 from benchmarks.compare import interleave, print_ratios
 from footscan.frames.film import decode_or_none, encoded_frames, open_film
-from footscan.frames.image import Rgb
+from footscan.frames.image import Rgb, pixel_buffer
+from footscan.frames.ingest import ingest_film
+from footscan.frames.reader import read_frames
 from footscan.stripe.film import extract_film
-from footscan.surface.export import read_mesh
-from footscan.virtual.renderers import Shot
-from footscan.virtual.scanner import standard_scanner
-from footscan.virtual.scene import SKIN, Mesh
-from footscan.virtual.stripe_truth import write_stripe_truth
-from pipelines.recorded import read_scan
+from pipelines.recorded import RecordedScan, read_scan
+from schemas.frames import FrameManifest
 from schemas.parameters.extraction import ExtractionParameters
-from schemas.parameters.simulation import SimulationSettings
-from schemas.scan import Travel
 
 DEFAULT = Path("demo/archive/P0001/demo-R")
-CAMERAS = range(1, 9)
-TRUE_FRAMES = 4
-"""The exact stripe is worked out for one frame in so many."""
-NEAR_PX = 4.0
-"""A point this close to the exact stripe is a point of it; a true point with a found one this close is found."""
-LOCAL_POINTS = 8
-"""So many true points around a found one tell where the exact stripe runs."""
+THREADS = 2
+ROUNDS = 3
+PROCESSES = 5
+
+_Camera = TypeVar("_Camera")
+
+# ru_maxrss would do elsewhere, but on Linux a process inherits that of the one that started it.
+MEMORY = """
+import re, sys
+from pathlib import Path
+from footscan.frames.reader import read_frames
+from footscan.stripe.film import extract_film
+from schemas.frames import FrameManifest
+from schemas.parameters.extraction import ExtractionParameters
+what, array, manifest = sys.argv[1:]
+frames = read_frames(Path(array), FrameManifest.model_validate_json(Path(manifest).read_bytes()))
+if what == "decode":
+    for frame in frames:
+        pass
+if what == "extract":
+    extract_film(frames, ExtractionParameters())
+print(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1])
+"""
+FIRST_CALL = """
+import sys, time
+from itertools import islice
+from pathlib import Path
+from footscan.frames.film import open_film, pixel_frames
+from footscan.stripe.film import extract_film
+from schemas.parameters.extraction import ExtractionParameters
+film = open_film(Path(sys.argv[1]))
+frames = [frame.copy() for frame in islice(pixel_frames(film), film.frames // 2, film.frames // 2 + 3)]
+for _ in range(2):
+    start = time.perf_counter()
+    extract_film(frames, ExtractionParameters())
+    print(time.perf_counter() - start)
+"""
 
 
 def main() -> None:
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT
-    films = {camera: _load(folder / f"cam{camera}.avi") for camera in CAMERAS}
-    _compare_times(films[1], films[2])
-    _compare_accuracy(folder, films)
+    scan = read_scan(Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT)
+    films = [scan.film(camera) for camera in scan.document.cameras]
+    _compare_methods([load(film) for film in films])
+    with tempfile.TemporaryDirectory() as place:
+        stored = _ingest(scan, Path(place))
+        _compare_from_store(stored)
+        _print_memory(stored[0], Path(place) / "manifest.json")
+    _print_first_call(films[0])
 
 
 @dataclass(frozen=True)
@@ -56,30 +87,27 @@ class Packets:
     """A film's JPEG frames in memory: no disk is timed."""
 
     frames: list[bytes | None]
-    shape: tuple[int, int, int]
+    size: tuple[int, int]
+    """Rows and columns."""
 
     def decoded(self) -> Iterator[Rgb | None]:
-        buffer = np.empty(self.shape, np.uint8)
+        buffer = pixel_buffer(*self.size)
         return (decode_or_none(frame, buffer) for frame in self.frames)
 
 
-def _load(film: Path) -> Packets:
+def load(film: Path) -> Packets:
+    """The packets of a film."""
     opened = open_film(film)
-    return Packets(list(encoded_frames(opened)), (opened.height, opened.width, 3))
+    return Packets(list(encoded_frames(opened)), (opened.height, opened.width))
 
 
-def _decode(film: Packets) -> None:
-    for _ in film.decoded():
-        pass
-
-
-def _extract(film: Packets) -> NDArray[np.float64]:
-    """(N, 3): frame, i, j."""
-    points = extract_film(film.decoded(), ExtractionParameters())
+def extract(film: Packets, parameters: ExtractionParameters | None = None) -> NDArray[np.float64]:
+    """(N, 3): frame, i, j; with footscan's defaults where there are no parameters."""
+    points = extract_film(film.decoded(), parameters or ExtractionParameters())
     return np.column_stack([points["frame"], points["i"], points["j"]])
 
 
-def _extract_plainly(film: Packets, every: int = 1) -> NDArray[np.float64]:
+def extract_plainly(film: Packets, every: int = 1) -> NDArray[np.float64]:
     """(N, 3): frame, i, j, by `plain_stripe`, of one frame in so many."""
     parts = [np.empty((0, 3))]
     for number, frame in enumerate(film.decoded()):
@@ -129,100 +157,96 @@ def _medians(
     return np.column_stack([line[first], middle])
 
 
-def _compare_times(one: Packets, other: Packets) -> None:
-    count = len(one.frames)
-    seconds = interleave(
-        {
-            "decoding alone": lambda: _decode(one),
-            "decoding, and footscan's extraction": lambda: _extract(one),
-            "decoding, and the plain method": lambda: _extract_plainly(one),
-        },
-        rounds=3,
-    )
-    print_ratios(f"One film of {count} frames, one thread", seconds, count, "frame")
-    with ThreadPoolExecutor(2) as pool:
-        seconds = interleave(
-            {
-                "decoding alone, two threads": lambda: list(pool.map(_decode, (one, other))),
-                "decoding and extraction, two threads": lambda: list(pool.map(_extract, (one, other))),
-                "decoding and extraction, one thread": lambda: list(map(_extract, (one, other))),
-            },
-            rounds=4,
-        )
-    print_ratios("Two films, a film a thread", seconds, count + len(other.frames), "frame")
-
-
-def _compare_accuracy(folder: Path, films: dict[int, Packets]) -> None:
-    truth = _exact_stripe(folder, len(films[1].frames))
-    print(f"\nAgainst the exact stripe in one frame of {TRUE_FRAMES}, eight cameras")
-    print(f"  {'':<20}{'rms px':>8}{'median px':>11}{'true found':>12}{'mirrored':>10}{'false':>8}")
-    methods: dict[str, Callable[[Packets], NDArray[np.float64]]] = {
-        "footscan": _extract,
-        "the plain method": partial(_extract_plainly, every=TRUE_FRAMES),
+def _compare_methods(films: list[Packets]) -> None:
+    default = ExtractionParameters()
+    methods = get_args(ExtractionParameters.model_fields["centre_method"].annotation)
+    others = [method for method in methods if method != default.centre_method]
+    tasks: dict[str, Callable[[Packets], object]] = {
+        "decoding alone": _decode,
+        f"decoding and extraction, {default.centre_method}": extract,
     }
-    for name, method in methods.items():
-        parts = [_hold_against(method(films[camera]), truth[camera], camera) for camera in CAMERAS]
-        errors, mirrored, found = (np.concatenate(part) for part in zip(*parts, strict=True))
-        near = errors[errors <= NEAR_PX]
-        false = np.isinf(errors) & ~mirrored
-        print(
-            f"  {name:<20}{np.sqrt(np.mean(near**2)):8.3f}{np.median(near):11.3f}{found.mean():12.2%}"
-            f"{mirrored.mean():10.2%}{false.mean():8.2%}"
-        )
+    for method in others:
+        parameters = ExtractionParameters.model_validate({"centre_method": method})
+        tasks[f"decoding and extraction, {method}"] = partial(extract, parameters=parameters)
+    tasks["decoding and the plain method"] = extract_plainly
+    frames = sum(len(film.frames) for film in films)
+    with ThreadPoolExecutor(THREADS) as pool:
+        runs = {name: partial(_each, pool, task, films) for name, task in tasks.items()}
+        title = f"{len(films)} films, {frames} frames, packets in memory, {THREADS} threads"
+        print_ratios(title, interleave(runs, ROUNDS), frames, "frame")
 
 
-class Held(NamedTuple):
-    """Found points beside the exact stripe."""
-
-    errors: NDArray[np.float64]
-    """(N,) px across the stripe; infinite for points that are not near it."""
-    mirrored: NDArray[np.bool_]
-    """(N,) not near it, and below the glass: red light all the same, the foot's mirror image. Its height drops it."""
-    found: NDArray[np.bool_]
-    """For each true point, whether a found one is near."""
+def _each(pool: ThreadPoolExecutor, task: Callable[[_Camera], object], cameras: list[_Camera]) -> None:
+    list(pool.map(task, cameras))
 
 
-def _exact_stripe(folder: Path, frames: int) -> dict[int, NDArray[np.float64]]:
-    """For each camera (N, 3) frame, i, j of the exact stripe where it is lit and seen."""
-    vertices, faces = read_mesh(folder / "truth.stl")
-    travel = read_scan(folder).document.travel or Travel(start_mm=0, step_mm=2)
-    shots = [Shot(frame, travel.start_mm + travel.step_mm * frame, 0) for frame in range(0, frames, TRUE_FRAMES)]
-    mesh = Mesh(vertices, faces.astype(np.int64))
-    with tempfile.TemporaryDirectory() as place:
-        write_stripe_truth(mesh, SKIN, shots, Path(place), SimulationSettings())
-        return {
-            camera: np.loadtxt(Path(place) / f"cam{camera}.csv", delimiter=",", skiprows=1, usecols=(0, 1, 2))
-            for camera in CAMERAS
+def _decode(film: Packets) -> None:
+    for _ in film.decoded():
+        pass
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A camera's frames in the store that a run reads them from."""
+
+    array: Path
+    manifest: FrameManifest
+
+    def read(self) -> Iterator[Rgb | None]:
+        return read_frames(self.array, self.manifest)
+
+
+def _ingest(scan: RecordedScan, place: Path) -> list[Stored]:
+    arrays = {scan.film(camera): place / "frames.zarr" / f"cam{camera.id}" for camera in scan.document.cameras}
+    return [Stored(array, ingest_film(film, array)) for film, array in arrays.items()]
+
+
+def _compare_from_store(cameras: list[Stored]) -> None:
+    frames = sum(len(camera.manifest.frames) for camera in cameras)
+    with ThreadPoolExecutor(THREADS) as pool:
+        runs = {
+            "reading, checking digests, decoding": partial(_each, pool, _read, cameras),
+            "the same, and extraction": partial(_each, pool, _read_and_extract, cameras),
         }
+        title = f"The same frames from the Zarr store, {THREADS} threads"
+        print_ratios(title, interleave(runs), frames, "frame")
 
 
-def _hold_against(points: NDArray[np.float64], truth: NDArray[np.float64], camera: int) -> Held:
-    points = points[points[:, 0] % TRUE_FRAMES == 0]
-    errors, found = np.full(len(points), np.inf), np.zeros(len(truth), np.bool_)
-    for frame in np.unique(points[:, 0]):
-        here, true = points[:, 0] == frame, truth[:, 0] == frame
-        if np.count_nonzero(true) < LOCAL_POINTS:
-            continue
-        exact, centres = truth[true, 1:], points[here, 1:]
-        distance, nearest = map(np.asarray, cKDTree(exact).query(centres, LOCAL_POINTS))
-        across = _distance_across(centres, exact[nearest])
-        errors[here] = np.where(distance[:, 0] <= NEAR_PX, across, np.inf)
-        found[true] = np.asarray(cKDTree(centres).query(exact)[0]) <= NEAR_PX
-    return Held(errors, np.isinf(errors) & (_height(points[:, 1:], camera) < 0.0), found)
+def _read(camera: Stored) -> None:
+    for _ in camera.read():
+        pass
 
 
-def _height(pixels: NDArray[np.float64], camera: int) -> NDArray[np.float64]:
-    """(N,) Z in mm at which the rays of (N, 2) pixels meet the laser plane."""
-    origins, directions = standard_scanner().camera(camera).rays(pixels)
-    return origins[:, 2] - origins[:, 0] / directions[:, 0] * directions[:, 2]
+def _read_and_extract(camera: Stored) -> None:
+    extract_film(camera.read(), ExtractionParameters())
 
 
-def _distance_across(centres: NDArray[np.float64], around: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distance of (N, 2) points from the straight lines through (N, K, 2) true points around each."""
-    middle = around.mean(axis=1)
-    spread = np.einsum("nki,nkj->nij", around - middle[:, None], around - middle[:, None])
-    normal = np.linalg.eigh(spread)[1][:, :, 0]
-    return np.asarray(np.abs(np.einsum("ni,ni->n", centres - middle, normal)))
+def _print_memory(camera: Stored, manifest: Path) -> None:
+    manifest.write_text(camera.manifest.model_dump_json())
+    print(f"\nPeak memory of a process, one camera of {len(camera.manifest.frames)} frames")
+    names = {"import": "imports alone", "decode": "reading and decoding", "extract": "the same, and extraction"}
+    for what, name in names.items():
+        [kilobytes] = _process(MEMORY, what, str(camera.array), str(manifest))
+        print(f"  {name:<44}{kilobytes * 1024 / 1e6:9.1f} MB")
+
+
+def _print_first_call(film: Path) -> None:
+    """With a cache of compiled loops of its own, first empty, then filled."""
+    print("\nExtraction of three frames in a new process")
+    with tempfile.TemporaryDirectory() as cache:
+        compiling = _process(FIRST_CALL, str(film), cache=cache)[0]
+        times = np.array([_process(FIRST_CALL, str(film), cache=cache) for _ in range(PROCESSES)])
+    print(f"  {'first, nothing compiled yet':<44}{1e3 * compiling:9.1f} ms")
+    print(f"  {'first, compiled by another process':<44}{1e3 * np.median(times[:, 0]):9.1f} ms")
+    print(f"  {'second':<44}{1e3 * np.median(times[:, 1]):9.1f} ms")
+
+
+def _process(script: str, *arguments: str, cache: str | None = None) -> list[float]:
+    """The numbers that a script prints in a process of its own."""
+    environment = os.environ | ({} if cache is None else {"NUMBA_CACHE_DIR": cache})
+    command = [sys.executable, "-c", script, *arguments]
+    ended = subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
+    return [float(line) for line in ended.stdout.split()]
 
 
 if __name__ == "__main__":

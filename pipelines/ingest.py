@@ -8,12 +8,13 @@ from typing import Any
 from footscan.frames.film import film_files
 from footscan.frames.ingest import ingest_film
 from pipelines.recorded import SCAN_FILE, read_scan, scan_folders
+from pipelines.steps.ingest_background import ingest_background
 from schemas.errors import FootscanError
 
 
 @dataclass(frozen=True)
 class CameraIngest:
-    """What became of one camera's film; of a whole scan where that could not be read."""
+    """What became of one camera's film and background; of a whole scan where that could not be read."""
 
     scan: str
     camera: int | None
@@ -21,6 +22,7 @@ class CameraIngest:
     lost: int = 0
     """Frames that the film has a place for, but no picture."""
     film_bytes: int = 0
+    """Of the film and its background, as `store_bytes`."""
     store_bytes: int = 0
     problem: str | None = None
     exit_status: int = 0
@@ -48,15 +50,18 @@ def _ingest_scan(folder: Path, archive: Path | None) -> list[CameraIngest]:
         return [CameraIngest(str(folder), None, problem=str(error), exit_status=error.exit_status)]
     ends = []
     for camera in scan.document.cameras:
-        film = scan.film(camera)
-        array = scan.array(camera)
+        arrays = {scan.film(camera): scan.array(camera)}
+        background = scan.background(camera)
         try:
-            manifest = ingest_film(film, array)
-            size = sum(file.stat().st_size for file in film_files(film))
+            manifest = ingest_film(scan.film(camera), scan.array(camera))
+            if background is not None:
+                arrays[background] = scan.background_array(camera)
+                ingest_background(background, arrays[background], len(manifest.frames))
+            size = sum(file.stat().st_size for film in arrays for file in film_files(film))
         except FootscanError as error:
             ends.append(CameraIngest(scan.name, camera.id, problem=str(error), exit_status=error.exit_status))
             continue
-        store = sum(file.stat().st_size for file in array.iterdir())
+        store = sum(file.stat().st_size for array in arrays.values() for file in array.iterdir())
         lost = manifest.frames.count(None)
         ends.append(CameraIngest(scan.name, camera.id, len(manifest.frames), lost, size, store))
     return ends

@@ -40,23 +40,30 @@ class RecordedScan:
         """The Zarr array of a camera's frames, which may not be there yet."""
         return self.folder / GROUP / f"cam{camera.id}"
 
+    def background(self, camera: CameraFilm) -> Path | None:
+        """The film of a camera with the laser off, which may be missing."""
+        return self._optional(camera.background, f"background of camera {camera.id}")
+
+    def background_array(self, camera: CameraFilm) -> Path:
+        """The Zarr array of a camera's laser-off frames, which may not be there yet."""
+        return self.folder / GROUP / f"cam{camera.id}-background"
+
     def positions(self, camera: CameraFilm) -> Path | None:
         """The file with the positions of a camera's frames."""
-        if camera.positions is None:
-            return None
-        return inside(self.archive, self.file, camera.positions, f"positions of camera {camera.id}")
+        return self._optional(camera.positions, f"positions of camera {camera.id}")
 
     @property
     def calibration(self) -> Path | None:
         """The calibration that the scan names."""
-        named = self.document.calibration
-        return None if named is None else inside(self.archive, self.file, named, "calibration")
+        return self._optional(self.document.calibration, "calibration")
 
     @property
     def truth(self) -> Path | None:
         """The reference model that the scan names."""
-        named = self.document.truth
-        return None if named is None else inside(self.archive, self.file, named, "truth")
+        return self._optional(self.document.truth, "truth")
+
+    def _optional(self, named: str | None, field: str) -> Path | None:
+        return None if named is None else inside(self.archive, self.file, named, field)
 
 
 def read_scan(folder: Path, archive: Path | None = None) -> RecordedScan:
@@ -71,6 +78,7 @@ def read_scan(folder: Path, archive: Path | None = None) -> RecordedScan:
     scan = RecordedScan(folder, (archive or folder.parent.parent).resolve(), read_yaml(folder / SCAN_FILE, Scan))
     for camera in scan.document.cameras:
         scan.film(camera)  # refused here, before any work, where they leave the archive
+        scan.background(camera)
         scan.positions(camera)
     return scan
 

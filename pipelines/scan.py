@@ -16,6 +16,7 @@ from pipelines.steps import (
     foot_stl,
     fuse,
     ingest,
+    ingest_background,
     map_points,
     measure,
     orient,
@@ -57,7 +58,7 @@ def scan_steps(
     Raises
     ------
     RefusedInput
-        A film, a file of positions or the truth is missing, or the calibration lacks a camera.
+        A film, a background, a file of positions or the truth is missing, or the calibration lacks a camera.
     """
     steps: list[Step] = []
 
@@ -78,12 +79,18 @@ def scan_steps(
                 places={"film": film, "array": array}, writes=array / "zarr.json",
             )
         )  # fmt: skip
-        stripe = add(
-            Step(
-                scan.name, "extract", extract, parameters.extraction, {"manifest": manifest}, camera.id,
-                places={"array": array},
-            )
-        )  # fmt: skip
+        filmed: dict[str, Input] = {"manifest": manifest}
+        places = {"array": array}
+        if (background := scan.background(camera)) is not None:
+            places["background"] = laser_off = scan.background_array(camera)
+            filmed["background"] = add(
+                Step(
+                    scan.name, "background", ingest_background, None,
+                    {"manifest": manifest, "background": source_files(background, digests)}, camera.id,
+                    places={"background": background, "array": laser_off}, writes=laser_off / "zarr.json",
+                )
+            )  # fmt: skip
+        stripe = add(Step(scan.name, "extract", extract, parameters.extraction, filmed, camera.id, places=places))
         model = _document(calibration.content.camera(camera.id, calibration.path))
         inputs: dict[str, Input] = {
             "stripe": stripe,

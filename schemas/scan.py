@@ -28,6 +28,8 @@ class CameraSource(Document):
 class CameraFilm(CameraSource):
     """One camera of a scan."""
 
+    background: RelativePath | None = None
+    """A film, a folder of frames or an image with the laser off: one frame for all, or one for each of the film's."""
     travel: Travel | None = None
     """The camera's own travel; the scan's where absent."""
     positions: RelativePath | None = None

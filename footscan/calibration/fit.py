@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.maps import Model
 from footscan.calibration.observations import Observations
+from footscan.compiled import compiled
 from schemas.calibration import LARGEST
 
 Floats = NDArray[np.float64]
@@ -138,7 +138,7 @@ def _minimise(model: Model, observations: Observations, weights: Floats, start: 
     return parameters
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _normal_equations(jacobian: Floats, weights: Floats, residuals: Floats) -> tuple[Floats, Floats]:
     """J^T W J and J^T W r. Not by BLAS, whose sums depend on the number of its threads."""
     unknowns = jacobian.shape[1]

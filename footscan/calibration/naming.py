@@ -3,10 +3,10 @@
 from itertools import combinations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from footscan.calibration.reference import Edges
+from footscan.compiled import compiled
 
 Floats = NDArray[np.float64]
 Names = NDArray[np.intp]
@@ -117,7 +117,7 @@ def _are_views(maps: Floats, pixels: Floats) -> NDArray[np.bool_]:
     return np.asarray(ahead & np.all(fitting, axis=1) & np.isfinite(maps).all(axis=(1, 2)))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _misfits(maps: Floats, pixels: Floats, shift: Floats, start: Floats, end: Floats, reach: float) -> Floats:
     mean = np.zeros(len(maps))
     for m in range(len(maps)):

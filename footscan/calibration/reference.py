@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from footscan.compiled import compiled
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -97,7 +98,7 @@ def _true_corners(corners: Floats) -> Floats:
     return np.ascontiguousarray(corners[height > STRAIGHT_MM])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _nearest(
     start: Floats, normal: Floats, offset: Floats, length: Floats, points: Floats
 ) -> tuple[Indices, Floats, Floats]:

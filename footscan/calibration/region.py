@@ -1,10 +1,10 @@
 """The region of the image that data support."""
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from footscan.compiled import compiled
 from schemas.units import Point
 
 LEAST_WIDTH_PX = 0.1
@@ -46,7 +46,7 @@ def supported(region: list[Point], pixels: NDArray[np.floating], margin_px: floa
     return inside
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _inside(
     pixels: NDArray[np.float64], inward: NDArray[np.float64], offsets: NDArray[np.float64]
 ) -> NDArray[np.bool_]:

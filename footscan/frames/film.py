@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from footscan.frames.image import SUFFIXES, Rgb, decode_image, image_size
+from footscan.frames.image import SUFFIXES, Rgb, decode_image, image_size, pixel_buffer
 from schemas.errors import Fault, RefusedInput
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def pixel_frames(film: Film) -> Iterator[Rgb | None]:
     if film.kind == "raw":
         yield from _fill_gaps(_raw_frames(film), film.frames)
         return
-    buffer = np.empty((film.height, film.width, 3), np.uint8)
+    buffer = pixel_buffer(film.height, film.width)
     for data in encoded_frames(film):
         yield decode_or_none(data, buffer)
 

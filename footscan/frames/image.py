@@ -23,6 +23,27 @@ SUFFIXES = (".jpg", ".jpeg", ".png")
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
+def pixel_buffer(rows: int, columns: int) -> Rgb:
+    """Memory for frames: (rows, columns, 3), a view of (rows, columns, 4), in which a pixel is one word of memory."""
+    return np.zeros((rows, columns, 4), np.uint8)[..., :3]
+
+
+def padded_pixels(image: Rgb) -> NDArray[np.uint8] | None:
+    """The (rows, columns, 4) memory of an image that fills a `pixel_buffer`; None for any other image."""
+    rows, columns, _ = image.shape
+    padded = image.base
+    if (
+        isinstance(padded, np.ndarray)
+        and padded.dtype == np.uint8
+        and padded.shape == (rows, columns, 4)
+        and padded.flags.c_contiguous
+        and image.strides == padded.strides
+        and image.__array_interface__["data"] == padded.__array_interface__["data"]
+    ):
+        return padded
+    return None
+
+
 def decode_image(data: bytes, buffer: Rgb | None = None) -> Rgb:
     """The pixels of a JPEG or PNG image.
 
@@ -31,7 +52,7 @@ def decode_image(data: bytes, buffer: Rgb | None = None) -> Rgb:
     data : bytes
         The encoded image. Huffman tables may be missing, as they do in Motion-JPEG.
     buffer : (rows, columns, 3) uint8, optional
-        Written to and returned where its shape fits, so that a film is decoded into one place.
+        A `pixel_buffer`, written to and returned where its shape fits, so that a film is decoded into one place.
 
     Raises
     ------
@@ -86,13 +107,16 @@ def _is_jpeg(data: bytes) -> bool:
 
 
 def _decode_jpeg(data: bytes, buffer: Rgb | None) -> Rgb:
+    padded = None if buffer is None else padded_pixels(buffer)
+    colours = "RGB" if padded is None else "RGBA"
     try:
-        return np.asarray(simplejpeg.decode_jpeg(data, buffer=buffer))
+        pixels = simplejpeg.decode_jpeg(data, colours, buffer=padded)
     except ValueError as error:
         # Webcams pad their entropy-coded data; every pixel is there nevertheless.
         if "extraneous" not in str(error):
             raise
-        return np.asarray(simplejpeg.decode_jpeg(data, strict=False, buffer=buffer))
+        pixels = simplejpeg.decode_jpeg(data, colours, strict=False, buffer=padded)
+    return np.asarray(pixels) if buffer is None or padded is None else buffer
 
 
 def _eight_bit(image: Image.Image) -> Image.Image:

@@ -7,7 +7,7 @@ import numpy as np
 import zarr
 
 from footscan.frames.film import decode_or_none, frame_digest
-from footscan.frames.image import Rgb
+from footscan.frames.image import Rgb, pixel_buffer
 from footscan.frames.ingest import chunk_name
 from schemas.errors import DamagedError
 from schemas.frames import FrameManifest
@@ -26,14 +26,14 @@ def read_frames(array: Path, manifest: FrameManifest) -> Iterator[Rgb | None]:
         A frame is not the one that was stored.
     """
     read = _chunk_reader(array, manifest)
-    buffer = np.empty((manifest.height, manifest.width, 3), np.uint8)
+    buffer = pixel_buffer(manifest.height, manifest.width)
     for number in range(len(manifest.frames)):
         yield _frame(array, manifest, number, read, buffer)
 
 
 def read_frame(array: Path, manifest: FrameManifest, number: int) -> Rgb | None:
     """One frame of a camera, as `read_frames` gives it."""
-    buffer = np.empty((manifest.height, manifest.width, 3), np.uint8)
+    buffer = pixel_buffer(manifest.height, manifest.width)
     return _frame(array, manifest, number, _chunk_reader(array, manifest), buffer)
 
 

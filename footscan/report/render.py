@@ -1,8 +1,9 @@
 """Pictures of a triangle mesh: orthographic, hidden parts removed by depth, smoothly shaded."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from footscan.compiled import compiled
 
 _SAMPLES = 2  # a pixel is the mean of 2 x 2 samples: smooth outlines
 _LIGHT = np.array([-0.35, 0.5, 0.79]) / np.linalg.norm([-0.35, 0.5, 0.79])
@@ -75,7 +76,7 @@ def vertex_normals(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -
     return normals
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def rasterise(
     projected: NDArray[np.float64],
     faces: NDArray[np.int64],

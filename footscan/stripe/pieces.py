@@ -1,139 +1,147 @@
-"""Pieces of the stripe: points that hang together, and which of the pieces are the stripe."""
+"""Which pieces of a frame's points are the stripe: not spots, not ghosts of it, not far and weak reflections."""
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.stripe.profile import CENTRE_I, CENTRE_J, CONTRAST, CURVATURE, NORMAL_I, NORMAL_J, WIDTH
-from schemas.parameters.extraction import ExtractionParameters
+from footscan.compiled import compiled
+from footscan.stripe.profile import CONTRAST, LIGHT, WIDTH
+from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SPACING_PX, I, J
 
-SECTION_PX = 0.5
-"""Half thickness in px of the cross-section of a point."""
-SHARPER = 4.0
-"""How many times as sharp a ridge is as the spurs that noise puts on its shoulders."""
 BESIDE_PX = 1.5
 """How far from the normal of a point a point of the stripe beside it may lie."""
+COPY = 0.5
+"""A ghost has less than this part of the stripe's light, as far as that is not saturated."""
+APART_PX, APART = 1.0, 0.05
+"""Standard deviation of a ghost's distance from the stripe, px and as a part of that distance."""
 LENGTH_TO_WIDTH = 2.0
 """A piece that is not longer than this many widths is a spot."""
 
 
-def drop_repeated(profiles: NDArray[np.float64], parameters: ExtractionParameters) -> NDArray[np.float64]:
-    """The (N, 8) profiles without those that a sharper one beside them explains: the stripe is crossed once."""
-    if len(profiles) == 0:
-        return profiles
-    sharpest: NDArray[np.bool_] = _is_sharpest(profiles, *_grid(profiles, 0.5 * parameters.largest_width_px))
-    return profiles[sharpest]
-
-
-def keep_stripe(profiles: NDArray[np.float64], parameters: ExtractionParameters) -> NDArray[np.bool_]:
-    """Which of (N, 8) profiles belong to the stripe: not to spots, to ghosts, or to far and weak reflections."""
-    keep = np.ones(len(profiles), np.bool_)
-    if len(profiles) == 0:
-        return keep
-    piece = connect(profiles, parameters.gap_px)
-    count = np.bincount(piece)
-    width = np.bincount(piece, profiles[:, WIDTH]) / np.maximum(count, 1)
-    keep &= (count >= np.maximum(parameters.shortest_piece_px, LENGTH_TO_WIDTH * width))[piece]
-
-    strength = profiles[:, CONTRAST] * profiles[:, WIDTH]
-    members = np.flatnonzero(keep)
-    if len(members):
-        cells = _grid(profiles[members], max(parameters.ghost_reach_px, 1.0))
-        beside = np.zeros(len(members), np.bool_)
-        for brightness in (
-            profiles[:, CONTRAST],
-            strength,
-        ):  # a saturated stripe is wider, not brighter, than its ghost
-            beside |= _is_beside_stronger(
-                profiles[members],
-                brightness[members],
-                parameters.ghost_strength,
-                parameters.ghost_reach_px,
-                *cells,
-            )
-        ghosts = np.bincount(piece[members], beside, minlength=len(count))
-        keep &= (ghosts <= 0.5 * count)[piece]
-
-    members = np.flatnonzero(keep)
-    if len(members):
-        group = connect(profiles[members], parameters.group_gap_px)
-        total = np.bincount(group, strength[members])
-        keep[members] = (total >= parameters.smallest_group * total.max())[group]
-    return keep
-
-
-def connect(profiles: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
-    """A number (N,) for each point, the same for points that are linked by steps of at most `distance` px.
-
-    Of `profiles`, only the first two columns count: i and j of the centre, px.
-    """
-    parent = _link(profiles, distance, *_grid(profiles, distance))
-    return np.unique(parent, return_inverse=True)[1]
-
-
-def _grid(profiles: NDArray[np.float64], side: float) -> tuple[NDArray[np.intp], NDArray[np.intp], int]:
-    """Points sorted into square cells: their indices by cell, where each cell begins, and how many cells are in a row.
-
-    A border of empty cells runs around, so that every point's cell has eight neighbours.
-    """
-    cells = np.floor(profiles[:, [CENTRE_I, CENTRE_J]] / side).astype(np.intp)
-    cells -= cells.min(axis=0) - 1
-    across, down = cells.max(axis=0) + 2
-    number = cells[:, 1] * across + cells[:, 0]
-    return np.argsort(number, kind="stable"), np.r_[0, np.cumsum(np.bincount(number, minlength=across * down))], across
-
-
-@numba.njit(cache=True, nogil=True)
-def _cell_of(start: NDArray[np.intp], rank: int) -> int:
-    return int(np.searchsorted(start, rank, side="right")) - 1
-
-
-@numba.njit(cache=True, nogil=True)
-def _is_sharpest(
-    profiles: NDArray[np.float64], order: NDArray[np.intp], start: NDArray[np.intp], across: int
+@compiled
+def keep_stripe(
+    profiles: NDArray[np.float64],
+    piece: NDArray[np.int32],
+    count: int,
+    smallest_contrast: float,
+    shortest: float,
+    ghost_reach: float,
+    ghost_strength: float,
+    group_gap: float,
+    smallest_group: float,
 ) -> NDArray[np.bool_]:
-    """Which points lie neither in the cross-section of a sharper one nor on its shoulder."""
-    sharpest = np.ones(len(profiles), np.bool_)
-    for rank in range(len(order)):
-        a, cell = order[rank], _cell_of(start, rank)
-        for row in (cell - across, cell, cell + across):
-            for b in order[start[row - 1] : start[row + 2]]:
-                # Of equals, the one that was found first.
-                if (profiles[b, CURVATURE], -b) > (profiles[a, CURVATURE], -a):
-                    d_i = profiles[a, CENTRE_I] - profiles[b, CENTRE_I]
-                    d_j = profiles[a, CENTRE_J] - profiles[b, CENTRE_J]
-                    off = abs(d_i * profiles[b, NORMAL_J] - d_j * profiles[b, NORMAL_I])
-                    beside = abs(d_i * profiles[b, NORMAL_I] + d_j * profiles[b, NORMAL_J])
-                    half = 0.5 * profiles[b, WIDTH]
-                    spur = (
-                        profiles[b, CURVATURE] > SHARPER * profiles[a, CURVATURE] and math.hypot(d_i, d_j) <= 2 * half
-                    )
-                    if spur or (off <= SECTION_PX and beside <= half):
-                        sharpest[a] = False
-    return sharpest
+    """Which of (N, 10) profiles, each in one of `count` pieces, belong to the stripe.
+
+    Contrasts in levels of the signal, the rest in px and shares, as `ExtractionParameters` have it.
+    """
+    length, strong, width = np.zeros(count), np.zeros(count), np.zeros(count)
+    for a in range(len(profiles)):
+        length[piece[a]] += SPACING_PX
+        strong[piece[a]] += SPACING_PX * (profiles[a, CONTRAST] >= smallest_contrast)
+        width[piece[a]] += SPACING_PX * profiles[a, WIDTH]
+    kept = np.empty(count, np.bool_)
+    for p in range(count):
+        # Faint ends hang on a piece that is strong somewhere.
+        kept[p] = length[p] >= max(shortest, LENGTH_TO_WIDTH * width[p] / length[p]) and strong[p] >= 0.5 * shortest
+    if kept.sum() > 1:
+        _drop_ghosts(profiles, piece, kept, length / SPACING_PX, ghost_reach, ghost_strength)
+    if kept.sum() > 1:
+        _drop_weak_groups(profiles, piece, kept, group_gap, smallest_group)
+    return kept[piece]
 
 
-@numba.njit(cache=True, nogil=True)
-def _link(
-    profiles: NDArray[np.float64], distance: float, order: NDArray[np.intp], start: NDArray[np.intp], across: int
-) -> NDArray[np.intp]:
-    """The first point of each point's piece."""
-    parent = np.arange(len(profiles))
-    for rank in range(len(order)):
-        a, cell = order[rank], _cell_of(start, rank)
-        for row in (cell - across, cell, cell + across):
-            for b in order[start[row - 1] : start[row + 2]]:
-                if b < a and _distance(profiles[a], profiles[b]) <= distance:
-                    root_a, root_b = _root(parent, a), _root(parent, b)
-                    parent[max(root_a, root_b)] = min(root_a, root_b)
-    for a in range(len(parent)):
-        parent[a] = _root(parent, a)
-    return parent
+@compiled
+def _drop_ghosts(
+    profiles: NDArray[np.float64],
+    piece: NDArray[np.int32],
+    kept: NDArray[np.bool_],
+    points: NDArray[np.float64],
+    reach: float,
+    part: float,
+) -> None:
+    """Drops pieces most of which runs beside a stronger one: with less than `part` of its light, or parallel to it.
+
+    Both the stripe and its ghost may be saturated, so that their true light is not known; but a ghost is a copy, and
+    lies at one distance all along.
+    """
+    distance, weaker = _beside_stronger(profiles, piece, kept, reach, part)
+    for p in range(len(kept)):
+        if not kept[p]:
+            continue
+        own = piece == p
+        apart = distance[own & (distance <= reach)]
+        parallel = apart.size > 0.5 * points[p] and apart.std() <= APART_PX + APART * apart.mean()
+        if parallel or weaker[own].sum() > 0.5 * points[p]:
+            kept[p] = False
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
+def _beside_stronger(
+    profiles: NDArray[np.float64], piece: NDArray[np.int32], kept: NDArray[np.bool_], reach: float, part: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """For each point, how far the nearest one across the stripe is that a ghost would be a copy of; infinite for none.
+
+    And whether there is one of which it has less than `part` of the light.
+    """
+    distance, weaker = np.full(len(profiles), math.inf), np.zeros(len(profiles), np.bool_)
+    most = 0.0
+    for a in range(len(profiles)):
+        if kept[piece[a]]:
+            most = max(most, profiles[a, LIGHT])
+    order, start, across = _grid(profiles, piece, kept, max(reach, 1.0))
+    for cell in range(start.size - 1):
+        for a in order[start[cell] : start[cell + 1]]:
+            light = profiles[a, LIGHT]
+            if light >= COPY * most:
+                continue
+            i, j, normal_i, normal_j = profiles[a, I], profiles[a, J], profiles[a, NORMAL_I], profiles[a, NORMAL_J]
+            for row in (cell - across, cell, cell + across):
+                for b in order[start[row - 1] : start[row + 2]]:
+                    if light >= COPY * profiles[b, LIGHT] or piece[b] == piece[a]:
+                        continue
+                    d_i, d_j = profiles[b, I] - i, profiles[b, J] - j
+                    off = abs(d_i * normal_i + d_j * normal_j)
+                    if off <= reach and abs(d_i * normal_j - d_j * normal_i) <= BESIDE_PX:
+                        distance[a] = min(distance[a], off)
+                        weaker[a] |= light < part * profiles[b, LIGHT]
+    return distance, weaker
+
+
+@compiled
+def _drop_weak_groups(
+    profiles: NDArray[np.float64], piece: NDArray[np.int32], kept: NDArray[np.bool_], gap: float, smallest: float
+) -> None:
+    """Drops pieces that lie far from the stripe and are weak beside it."""
+    count = len(kept)
+    order, start, across = _grid(profiles, piece, kept, gap)
+    group = np.arange(count)
+    groups = kept.sum()
+    for cell in range(start.size - 1):
+        for a in order[start[cell] : start[cell + 1]]:
+            own = _root(group, piece[a])
+            for row in (cell - across, cell, cell + across):
+                for b in order[start[row - 1] : start[row + 2]]:
+                    if group[piece[b]] == own:
+                        continue
+                    d_i, d_j = profiles[b, I] - profiles[a, I], profiles[b, J] - profiles[a, J]
+                    if d_i * d_i + d_j * d_j <= gap * gap:
+                        other = _root(group, piece[b])
+                        if other != own:
+                            group[max(own, other)] = own = min(own, other)
+                            groups -= 1
+            if groups == 1:
+                return
+    strength = np.zeros(count)
+    for a in range(len(profiles)):
+        if kept[piece[a]]:
+            strength[_root(group, piece[a])] += profiles[a, LIGHT]
+    for p in range(count):
+        if strength[_root(group, p)] < smallest * strength.max():
+            kept[p] = False
+
+
+@compiled
 def _root(parent: NDArray[np.intp], a: int) -> int:
     while parent[a] != a:
         parent[a] = parent[parent[a]]
@@ -141,31 +149,32 @@ def _root(parent: NDArray[np.intp], a: int) -> int:
     return a
 
 
-@numba.njit(cache=True, nogil=True)
-def _distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    return math.hypot(a[CENTRE_I] - b[CENTRE_I], a[CENTRE_J] - b[CENTRE_J])
+@compiled
+def _grid(
+    profiles: NDArray[np.float64], piece: NDArray[np.int32], kept: NDArray[np.bool_], side: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp], int]:
+    """The points of kept pieces by square cells: their numbers, where each cell begins, and the cells of a row.
 
-
-@numba.njit(cache=True, nogil=True)
-def _is_beside_stronger(
-    profiles: NDArray[np.float64],
-    strength: NDArray[np.float64],
-    part: float,
-    reach: float,
-    order: NDArray[np.intp],
-    start: NDArray[np.intp],
-    across: int,
-) -> NDArray[np.bool_]:
-    """Which points have less than `part` of the strength of another on their normal, within `reach` px."""
-    beside = np.zeros(len(profiles), np.bool_)
-    for rank in range(len(order)):
-        a, cell = order[rank], _cell_of(start, rank)
-        normal_i, normal_j = profiles[a, NORMAL_I], profiles[a, NORMAL_J]
-        for row in (cell - across, cell, cell + across):
-            for b in order[start[row - 1] : start[row + 2]]:
-                if strength[a] < part * strength[b]:
-                    d_i = profiles[b, CENTRE_I] - profiles[a, CENTRE_I]
-                    d_j = profiles[b, CENTRE_J] - profiles[a, CENTRE_J]
-                    off = abs(d_i * normal_j - d_j * normal_i)
-                    beside[a] |= off <= BESIDE_PX and abs(d_i * normal_i + d_j * normal_j) <= reach
-    return beside
+    A border of empty cells runs around, so that every point's cell has eight neighbours.
+    """
+    least_i = least_j = math.inf
+    most_i = most_j = -math.inf
+    for a in range(len(profiles)):
+        least_i, most_i = min(least_i, profiles[a, I]), max(most_i, profiles[a, I])
+        least_j, most_j = min(least_j, profiles[a, J]), max(most_j, profiles[a, J])
+    across = int((most_i - least_i) / side) + 3
+    down = int((most_j - least_j) / side) + 3
+    start = np.zeros(across * down + 2, np.intp)
+    cells = np.empty(len(profiles), np.intp)
+    for a in range(len(profiles)):
+        cells[a] = (int((profiles[a, J] - least_j) / side) + 1) * across + int((profiles[a, I] - least_i) / side) + 1
+        if kept[piece[a]]:
+            start[cells[a] + 2] += 1
+    for cell in range(start.size - 1):
+        start[cell + 1] += start[cell]
+    order = np.empty(start[-1], np.intp)
+    for a in range(len(profiles)):
+        if kept[piece[a]]:
+            order[start[cells[a] + 1]] = a
+            start[cells[a] + 1] += 1
+    return order, start[:-1], across

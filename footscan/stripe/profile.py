@@ -1,163 +1,305 @@
-"""The profile across the stripe: its sub-pixel centre, width, height and symmetry."""
+"""The profile across the stripe: what stands out of it, how wide, how even, and where its centre is.
+
+A profile is sampled where the normal meets the rows (or the columns, where the stripe runs along these): there it lies
+between pixels of one line alone, and the stripe is not smeared across itself. It begins midway between two columns, and
+so is the mean of both where the stripe runs along the rows.
+"""
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-STEP = 0.5
-"""Distance in px of the samples across the stripe."""
-ALONG = 2.0
-"""Half length in px over which the profile is averaged along the stripe, against speckle."""
-OUTWARD = 2.0
-"""Distance in px of the samples that the level beside the stripe is taken from."""
-CENTRE_I, CENTRE_J, NORMAL_I, NORMAL_J, CURVATURE, WIDTH, CONTRAST, SYMMETRY = range(8)
-"""Columns of what `measure_profiles` writes."""
+from footscan.compiled import compiled
+from footscan.stripe.centre import centre_of
+from footscan.stripe.limits import Limits
+from footscan.stripe.redness import SIGNAL_SCALE, WHITE_SCALE, light_of, lights_of, red_of, redness_of
+from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SHARPNESS, I, J
+
+WIDTH, CONTRAST, SYMMETRY, SATURATION, LIGHT = range(SHARPNESS + 1, SHARPNESS + 6)
+"""Columns of what `measure_profiles` writes, after those of the ridge."""
+COLUMNS = LIGHT + 1
+VALLEY = 0.3
+"""Rise, relative to the fall before it, at which the foot of the stripe is passed."""
+FLAT = 0.05
+"""Fall over `FLAT_SAMPLES`, relative to that from the top, that is the foot of the stripe."""
+FLAT_SAMPLES = 4
+RINGING = 0.06
+"""What compression makes of a saturated level is less than this part of it, and no foot."""
+LEVEL_SAMPLES = 8
+"""What has not fallen after so many samples is no stripe, unless it is saturated."""
+NEARLY = 40
+"""Levels below saturation at which red has no room left to tell a laser from a lamp."""
+WHITE_RISE = 60.0
+"""Levels of R + 3 G + B by which a core must be whiter than its rim, and than what lies beside it, to count."""
+BESIDE = 1.5
+"""Samples beyond half height that still belong to the stripe when its redness is held against that beside it."""
+FOOT_SAMPLES = 4
+"""So many samples at the foot tell how red it is."""
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def measure_profiles(
-    signal: NDArray[np.uint16],
-    excess: NDArray[np.uint8],
+    words: NDArray[np.uint32],
+    light: NDArray[np.uint32],
     ridges: NDArray[np.float64],
-    limits: tuple[float, float, float, float],
+    limits: Limits,
     profiles: NDArray[np.float64],
 ) -> int:
-    """Writes what stands out from both its sides, of `ridges` (N, 5), into `profiles` (N, 8); how many these are.
+    """Writes what stands out from both its sides, of `ridges` (N, 5), into `profiles` (N, 10); how many these are.
 
-    `limits` are the largest width in px, the smallest contrast in levels of the signal, the smallest contrast in grey
-    levels of `excess`, and the part of the height above which the centre of gravity is taken.
+    `words` are the frame's pixels, (rows, columns), and `light` the same without what the room lights, if known.
+    Contrasts are in levels of the signal; i, j and widths in px; the laser's light, summed over the width, in px of the
+    light that a white pixel has.
     """
-    samples = np.empty(2 * math.ceil(limits[0] / STEP) + 1)
+    rows, columns = words.shape
+    reach = math.ceil(limits.largest_width)
+    samples, white = np.empty(2 * reach + 1), np.empty(2 * reach + 1)
+    clipped, cells = np.empty(2 * reach + 1, np.bool_), np.empty(2 * reach + 1, np.uint64)
+    words, light = words.ravel(), light.ravel()
     count = 0
-    for ridge in ridges:
-        profile = profiles[count]
-        profile[: ridge.size] = ridge
-        if _measure(signal, excess, limits, samples, profile):
-            count += 1
+    for n in range(len(ridges)):
+        normal_i, normal_j = ridges[n, NORMAL_I], ridges[n, NORMAL_J]
+        upright = abs(normal_j) >= abs(normal_i)
+        if upright:
+            slope, step = normal_i / normal_j, 1 / abs(normal_j)
+            at = round(ridges[n, J])
+            beside = ridges[n, I] + (at - ridges[n, J]) * slope
+            back, ahead = _steps_inside(at, rows, beside, columns, slope, reach)
+            first, last = _walk(light, columns, 1, at, beside, slope, reach, back, ahead, limits, samples, white, cells)
+        else:
+            slope, step = normal_j / normal_i, 1 / abs(normal_i)
+            at = round(ridges[n, I])
+            beside = ridges[n, J] + (at - ridges[n, I]) * slope
+            back, ahead = _steps_inside(at, columns, beside, rows, slope, reach)
+            first, last = _walk(light, 1, columns, at, beside, slope, reach, back, ahead, limits, samples, white, cells)
+        if first == last:
+            continue
+        centre = _measure(words, light, samples, white, cells, clipped, first, last, step, limits, profiles, count)
+        if math.isnan(centre):
+            continue
+        along, across = at + centre - reach, beside + (centre - reach) * slope
+        profiles[count, I], profiles[count, J] = (across, along) if upright else (along, across)
+        profiles[count, NORMAL_I], profiles[count, NORMAL_J] = normal_i, normal_j
+        profiles[count, SHARPNESS] = ridges[n, SHARPNESS]
+        count += 1
     return count
 
 
-@numba.njit(cache=True, nogil=True)
-def _measure(
-    signal: NDArray[np.uint16],
-    excess: NDArray[np.uint8],
-    limits: tuple[float, float, float, float],
+@compiled
+def _steps_inside(at: int, lines: int, beside: float, pixels: int, slope: float, reach: int) -> tuple[int, int]:
+    """How many steps back and ahead, at most `reach`, stay inside the image; -1 where the ridge itself is outside."""
+    if not (0 <= at < lines and 0 <= beside <= pixels - 1):
+        return -1, -1
+    back, ahead = min(at, reach), min(lines - 1 - at, reach)
+    if slope != 0:
+        to_start, to_end = int(beside / abs(slope)), int((pixels - 1 - beside) / abs(slope))
+        back = min(back, to_start if slope > 0 else to_end)
+        ahead = min(ahead, to_end if slope > 0 else to_start)
+    return back, ahead
+
+
+@compiled
+def _walk(
+    light: NDArray[np.uint32],
+    line: int,
+    pixel: int,
+    at: int,
+    beside: float,
+    slope: float,
+    middle: int,
+    back: int,
+    ahead: int,
+    limits: Limits,
     samples: NDArray[np.float64],
-    profile: NDArray[np.float64],
-) -> bool:
-    """Moves the centre to the centre of gravity of what stands out, and measures it; False where nothing does."""
-    largest_width, smallest_contrast, smallest_redness, centre_level = limits
+    white: NDArray[np.float64],
+    cells: NDArray[np.uint64],
+) -> tuple[int, int]:
+    """Samples outward from the ridge to both feet of the stripe; the first and the last one, equal where there is none.
+
+    `line` and `pixel` are the distances, in `light` (rows * columns,), of two lines and of two pixels of one.
+    """
+    if back < 1 or ahead < 1:
+        return 0, 0
+    smallest = SIGNAL_SCALE * limits.faintest
+    ends = (0, 0)
+    here = 0.0
+    for direction in (-1, 1):
+        lowest = math.inf
+        end = 0
+        for n in range(direction + 1 >> 1, (ahead if direction > 0 else back) + 1):
+            across = beside + direction * n * slope
+            whole = int(across)
+            part = np.uint64((across - whole) * 256 + 0.5)
+            cell = np.uint64((at + direction * n) * line + whole * pixel)
+            lights = lights_of(light[cell]) * (np.uint64(256) - part)
+            if part > 0:
+                lights += lights_of(light[cell + np.uint64(pixel)]) * part
+            value = (lights & np.uint64(0xFFFFFFFF)) / 256
+            end = middle + direction * n
+            samples[end] = value
+            white[end] = (lights >> np.uint64(32)) / 256
+            cells[end] = cell + np.uint64(pixel) if part > 128 else cell
+            if n == 0:
+                here = value
+            lowest = min(lowest, value)
+            fall = here - lowest
+            if n >= FLAT_SAMPLES:
+                if fall >= max(smallest, RINGING * here):
+                    if value - lowest > VALLEY * fall:
+                        break
+                    if value < here - 0.5 * fall and samples[end - direction * FLAT_SAMPLES] - value < FLAT * fall:
+                        break
+                elif n >= LEVEL_SAMPLES and here < SIGNAL_SCALE * limits.saturation:
+                    break
+        if here - lowest < smallest:
+            return 0, 0
+        ends = (end, end) if direction < 0 else (ends[0], end)
+    return ends
+
+
+@compiled
+def _measure(
+    words: NDArray[np.uint32],
+    light: NDArray[np.uint32],
+    samples: NDArray[np.float64],
+    white: NDArray[np.float64],
+    cells: NDArray[np.uint64],
+    clipped: NDArray[np.bool_],
+    first: int,
+    last: int,
+    step: float,
+    limits: Limits,
+    profiles: NDArray[np.float64],
+    n: int,
+) -> float:
+    """The centre in samples, and width, contrast, symmetry and saturation of profile `n`; NaN where it is no stripe."""
     middle = samples.size // 2
-    here = _average(signal, profile, 0.0)
-    # The higher of the two sides: what lies above it is the laser's, whatever edge runs beside the stripe.
-    base = max(_lowest(signal, profile, -OUTWARD, largest_width), _lowest(signal, profile, OUTWARD, largest_width))
-    if not here - base >= smallest_contrast:
-        return False
-    floor = base + min(centre_level, 0.5) * (here - base)
-    first = _fall(signal, profile, floor, -1, samples)
-    last = _fall(signal, profile, floor, 1, samples)
-    if first < 0 or last >= samples.size:
-        return False
-    samples[middle] = here
-    top = first + int(np.argmax(samples[first : last + 1]))
-    contrast = samples[top] - base
-    half = base + 0.5 * contrast
-    left, right = _reach(samples, top, -1, half), _reach(samples, top, 1, half)
-    width = (left + right) * STEP
-    if width > largest_width:
-        return False
-    level = base + centre_level * contrast
-    first, last = top - int(_reach(samples, top, -1, level)), top + int(_reach(samples, top, 1, level))
-    weight = moment = reddest = 0.0
-    for n in range(first, last + 1):
-        weight += samples[n] - level
-        moment += (samples[n] - level) * (n - top)
-        t = (n - middle) * STEP
-        reddest = max(
-            reddest,
-            _sample(excess, profile[CENTRE_I] + t * profile[NORMAL_I], profile[CENTRE_J] + t * profile[NORMAL_J]),
-        )
-    own_red = max(_lowest(excess, profile, -OUTWARD, largest_width), _lowest(excess, profile, OUTWARD, largest_width))
-    if reddest - own_red < smallest_redness:
-        return False
-    centre = moment / weight  # in samples from the top
-    shift = STEP * (top - middle + centre)
-    profile[CENTRE_I] += shift * profile[NORMAL_I]
-    profile[CENTRE_J] += shift * profile[NORMAL_J]
-    profile[WIDTH] = width
-    profile[CONTRAST] = contrast
-    profile[SYMMETRY] = max(0.0, 1 - abs((right - centre) - (left + centre)) / (left + right))
-    return bool(abs(shift) <= 1 + 0.5 * width)
+    here = samples[middle]
+    # The higher of the two feet: what lies above it is the laser's, whatever edge runs beside the stripe.
+    base = max(_lowest(samples, first, middle), _lowest(samples, middle, last))
+    left, right, top = _half_height(samples, middle, base + 0.5 * (here - base), first, last)
+    contrast = top - base
+    if contrast < 2 * (here - base):  # otherwise the ridge is on a shoulder
+        left, right, top = _half_height(samples, middle, base + 0.5 * contrast, first, last)
+    width = (right - left) * step
+    if left < 0 or width > limits.largest_width:
+        return math.nan
+    saturation = _saturation(words, light, cells, clipped, first, last, left, right, limits)
+    if saturation < 0:
+        return math.nan
+    centre = math.nan
+    if saturation > 0:
+        centre = _white_centre(white, clipped, first, last, left, right, limits)
+    if math.isnan(centre):
+        centre = centre_of(samples, clipped, first, last, left, right, base, contrast, limits)
+    if not abs(centre - middle) * step <= 1 + 0.5 * width:
+        return math.nan
+    profiles[n, WIDTH], profiles[n, CONTRAST], profiles[n, SATURATION] = width, contrast, saturation
+    foot = max(light_of(words[cells[first]]), light_of(words[cells[last]]))
+    profiles[n, LIGHT] = max(light_of(words[cells[middle]]) - foot, 0.0) * width
+    profiles[n, SYMMETRY] = max(0.0, 1 - abs((right - centre) - (centre - left)) / (right - left))
+    return centre
 
 
-@numba.njit(cache=True, nogil=True)
-def _lowest(signal: NDArray[np.integer], profile: NDArray[np.float64], step: float, reach: float) -> float:
-    """The lowest level on one side of the ridge; infinite where that side lies outside the image."""
-    lowest: float = math.inf
-    for n in range(1, int(reach / abs(step)) + 1):
-        value = _sample(
-            signal,
-            profile[CENTRE_I] + n * step * profile[NORMAL_I],
-            profile[CENTRE_J] + n * step * profile[NORMAL_J],
-        )
-        if math.isnan(value):
-            break
-        lowest = min(lowest, value)
+@compiled
+def _white_centre(
+    white: NDArray[np.float64],
+    clipped: NDArray[np.bool_],
+    first: int,
+    last: int,
+    left: float,
+    right: float,
+    limits: Limits,
+) -> float:
+    """The centre of the white core of a stripe whose red is saturated from `left` to `right`; NaN where it has none.
+
+    Around the core the light that skin and lens scatter saturates red as well, more on one side than on the other.
+    """
+    top = max(math.ceil(left), first)
+    for k in range(top + 1, min(math.floor(right), last) + 1):
+        if white[k] > white[top]:
+            top = k
+    base = max(_lowest(white, first, top), _lowest(white, top, last))
+    rim = max(white[max(math.floor(left), first)], white[min(math.ceil(right), last)], white[first], white[last])
+    contrast = white[top] - base
+    if white[top] - rim < WHITE_RISE:
+        return math.nan
+    left, right, _ = _half_height(white, top, base + 0.5 * contrast, first, last)
+    if left < 0:
+        return math.nan
+    for k in range(first, last + 1):
+        clipped[k] = white[k] >= WHITE_SCALE * limits.saturation
+    return centre_of(white, clipped, first, last, left, right, base, contrast, limits)
+
+
+@compiled
+def _lowest(samples: NDArray[np.float64], first: int, last: int) -> float:
+    lowest: float = samples[first]
+    for k in range(first + 1, last + 1):
+        lowest = min(lowest, samples[k])
     return lowest
 
 
-@numba.njit(cache=True, nogil=True)
-def _fall(
-    signal: NDArray[np.uint16],
-    profile: NDArray[np.float64],
-    floor: float,
-    direction: int,
-    samples: NDArray[np.float64],
-) -> int:
-    """Samples outward from the ridge until the profile falls to `floor`; the index of that sample, or one outside."""
-    n = samples.size // 2 + direction
-    while 0 <= n < samples.size:
-        samples[n] = _average(signal, profile, (n - samples.size // 2) * STEP)
-        if samples[n] <= floor:
-            return n
-        if math.isnan(samples[n]):
-            break
-        n += direction
-    return -1 if direction < 0 else samples.size
+@compiled
+def _half_height(
+    samples: NDArray[np.float64], middle: int, level: float, first: int, last: int
+) -> tuple[float, float, float]:
+    """Where the profile falls to the level on either side, in samples, -1 where it does not; the highest between."""
+    left, right = middle, middle
+    top = samples[middle]
+    while left > first and samples[left] > level:
+        left -= 1
+        top = max(top, samples[left])
+    while right < last and samples[right] > level:
+        right += 1
+        top = max(top, samples[right])
+    if samples[left] > level or samples[right] > level or left == right:
+        return -1.0, -1.0, top
+    return (
+        left + (level - samples[left]) / (samples[left + 1] - samples[left]),
+        right - (level - samples[right]) / (samples[right - 1] - samples[right]),
+        top,
+    )
 
 
-@numba.njit(cache=True, nogil=True)
-def _average(signal: NDArray[np.uint16], profile: NDArray[np.float64], t: float) -> float:
-    """The signal at distance `t` across the ridge, averaged along it; not a number outside the image."""
-    i, j = profile[CENTRE_I] + t * profile[NORMAL_I], profile[CENTRE_J] + t * profile[NORMAL_J]
-    along_i, along_j = -ALONG * profile[NORMAL_J], ALONG * profile[NORMAL_I]
-    here: float = _sample(signal, i, j)
-    before: float = _sample(signal, i - along_i, j - along_j)
-    after: float = _sample(signal, i + along_i, j + along_j)
-    # At the border of the image the average must stay symmetric.
-    return here if math.isnan(before) or math.isnan(after) else 0.5 * here + 0.25 * (before + after)
+@compiled
+def _saturation(
+    words: NDArray[np.uint32],
+    light: NDArray[np.uint32],
+    cells: NDArray[np.uint64],
+    clipped: NDArray[np.bool_],
+    first: int,
+    last: int,
+    left: float,
+    right: float,
+    limits: Limits,
+) -> float:
+    """The part of the stripe's width in which red is saturated; -1 where the light is not the laser's.
 
-
-@numba.njit(cache=True, nogil=True)
-def _sample(signal: NDArray[np.integer], i: float, j: float) -> float:
-    """The level between pixels, bilinear; not a number outside the image."""
-    rows, columns = signal.shape
-    if not (0 <= i <= columns - 1 and 0 <= j <= rows - 1):
-        return math.nan
-    i0, j0 = min(int(i), max(columns - 2, 0)), min(int(j), max(rows - 2, 0))
-    i1, j1 = min(i0 + 1, columns - 1), min(j0 + 1, rows - 1)
-    u, v = i - i0, j - j0
-    upper = (1 - u) * signal[j0, i0] + u * signal[j0, i1]
-    lower = (1 - u) * signal[j1, i0] + u * signal[j1, i1]
-    return float((1 - v) * upper + v * lower)
-
-
-@numba.njit(cache=True, nogil=True)
-def _reach(samples: NDArray[np.float64], top: int, direction: int, level: float) -> float:
-    """How many samples from the top, with a fraction, the profile falls to `level`."""
-    n = top
-    while samples[n] > level:
-        n += direction
-    return abs(n - top) - float((level - samples[n]) / (samples[n - direction] - samples[n]))
+    The laser's light is redder than what lies beside it, in the flanks at least. Where red is saturated in the stripe
+    and has no room left beside it either, any light may be the laser's. Fills `clipped` with whether it is saturated.
+    """
+    reddest = saturated = inside = 0
+    for k in range(max(first, math.ceil(left - BESIDE)), min(last, math.floor(right + BESIDE)) + 1):
+        clipped[k] = red_of(words[cells[k]]) >= limits.saturation
+        reddest = max(reddest, redness_of(light[cells[k]]))
+        if left <= k <= right:
+            inside += 1
+            saturated += clipped[k]
+    share = saturated / max(inside, 1)
+    redness_beside, red_beside = 0, 255
+    for end, direction in ((first, 1), (last, -1)):
+        redness, level = 255, 0
+        for n in range(FOOT_SAMPLES):
+            k = end + direction * n
+            if left - BESIDE <= k <= right + BESIDE:
+                break
+            redness = min(redness, redness_of(light[cells[k]]))
+            level = max(level, red_of(words[cells[k]]))
+        if redness < 255:
+            redness_beside = max(redness_beside, redness)
+        red_beside = min(red_beside, level)
+    if reddest - redness_beside >= limits.red_threshold:
+        return share
+    return share if share > 0.5 and red_beside >= limits.saturation - NEARLY else -1.0

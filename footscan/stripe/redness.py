@@ -1,115 +1,108 @@
-"""What is red against what is merely bright, or red all over: the pixels where the stripe may lie."""
+"""What a pixel says of the laser: how bright it is, and how much redder than white.
 
-import numba
+A pixel is one word here, red in its lowest byte, then green, blue and one that counts for nothing: one load tells all.
+"""
+
+import sys
+
 import numpy as np
 from numpy.typing import NDArray
 
-BLOCK = 32
-"""Side in px of the blocks whose own redness a pixel must exceed: wider than a stripe, narrower than a red thing."""
-BACKGROUND_PART = 0.1
-"""The quantile of redness that is a block's own: the widest stripe leaves more of the block uncovered."""
+from footscan.compiled import compiled
+from footscan.frames.image import padded_pixels
+
 SIGNAL_SCALE = 4
 """Levels of the signal for one grey level: it is 2 R + G + B, for the laser's red and a saturated core's white."""
+WHITE_SCALE = 5
+"""The same of R + 3 G + B."""
+SATURATED = np.int32(1 << 12)
+"""More than the redness of four pixels."""
+_BYTE, _TWO_BYTES, _RED_AND_BLUE = np.uint32(0xFF), np.uint32(0xFFFF), np.uint32(0x00FF00FF)
+_THREE, _EIGHT, _SIXTEEN = np.uint32(3), np.uint32(8), np.uint32(16)
 
 
-@numba.njit(cache=True, nogil=True)
-def find_red(
-    image: NDArray[np.uint8],
-    red_threshold: int,
-    saturation: int,
-    largest_core: int,
-    excess: NDArray[np.uint8],
-    signal: NDArray[np.uint16],
-    mask: NDArray[np.uint8],
-    active: NDArray[np.uint8],
-) -> int:
-    """Fills `excess`, `signal` and `mask`, (rows, columns), and `active`, (blocks,), for an RGB image; the mask's size.
+def as_words(image: NDArray[np.uint8]) -> NDArray[np.uint32]:
+    """(rows, columns) of words: the memory of an image that lies in a `pixel_buffer`, otherwise a copy."""
+    padded = padded_pixels(image)
+    if padded is None:
+        padded = np.empty((*image.shape[:2], 4), np.uint8)
+        padded[..., :3] = image
+    words: NDArray[np.uint32] = padded.view("<u4")[..., 0]
+    return words if sys.byteorder == "little" else words.astype(np.uint32)
 
-    `excess` is R - max(G, B), `signal` 2 R + G + B; `mask` is 1 where the stripe may lie: where the excess is larger
-    than that of its surroundings, and in saturated runs between two such pixels of a row or a column.
+
+@compiled
+def red_of(word: np.uint32) -> int:
+    """The level of red."""
+    return int(np.int64(word & _BYTE))  # of the word itself, int() would be without a sign
+
+
+@compiled
+def redness_of(word: np.uint32) -> int:
+    """R - max(G, B), not below 0."""
+    red, green, blue = word & _BYTE, (word >> _EIGHT) & _BYTE, (word >> _SIXTEEN) & _BYTE
+    return max(int(np.int64(red)) - int(np.int64(max(green, blue))), 0)
+
+
+@compiled
+def lights_of(word: np.uint32) -> np.uint64:
+    """The signal 2 R + G + B, and in the upper half R + 3 G + B.
+
+    The second tells the core of an over-exposed stripe: green is saturated last, and the mosaic samples it most.
     """
-    background = np.zeros(active.shape, np.float32)
-    _measure_blocks(image, excess, signal, background)
-    mask[:] = 0
-    _exceed_background(excess, background, red_threshold, mask)
-    _fill_cores(image, saturation, largest_core, mask)
-    active[:] = 0
-    count = 0
-    for j in range(mask.shape[0]):
-        for i in range(mask.shape[1]):
-            if mask[j, i]:
-                count += 1
-                active[j // BLOCK, i // BLOCK] = 1
-    return count
+    red, green, blue = word & _BYTE, (word >> _EIGHT) & _BYTE, (word >> _SIXTEEN) & _BYTE
+    return np.uint64(red + red + green + blue) | (np.uint64(red + green * _THREE + blue) << np.uint64(32))
 
 
-@numba.njit(cache=True, nogil=True)
-def _measure_blocks(
-    image: NDArray[np.uint8],
-    excess: NDArray[np.uint8],
-    signal: NDArray[np.uint16],
-    background: NDArray[np.float32],
-) -> None:
-    rows, columns = excess.shape
-    counts = np.zeros(256, np.int32)
-    for block_j in range(background.shape[0]):
-        for block_i in range(background.shape[1]):
-            counts[:] = 0
-            j_end, i_end = min(rows, (block_j + 1) * BLOCK), min(columns, (block_i + 1) * BLOCK)
-            for j in range(block_j * BLOCK, j_end):
-                for i in range(block_i * BLOCK, i_end):
-                    red, green, blue = np.int32(image[j, i, 0]), np.int32(image[j, i, 1]), np.int32(image[j, i, 2])
-                    redness = np.int32(np.maximum(red - np.maximum(green, blue), 0))
-                    excess[j, i] = redness
-                    signal[j, i] = 2 * red + green + blue
-                    counts[redness] += 1
-            wanted = BACKGROUND_PART * (j_end - block_j * BLOCK) * (i_end - block_i * BLOCK)
-            level, below = 0, counts[0]
-            while below < wanted:
-                level += 1
-                below += counts[level]
-            background[block_j, block_i] = level
+@compiled
+def light_of(word: np.uint32) -> float:
+    """The light of a pixel, 1 for white: a camera's levels are about its root."""
+    red, green, blue = float(word & _BYTE), float((word >> _EIGHT) & _BYTE), float((word >> _SIXTEEN) & _BYTE)
+    return (red * red + green * green + blue * blue) / (3.0 * 255.0 * 255.0)
 
 
-@numba.njit(cache=True, nogil=True)
-def _exceed_background(
-    excess: NDArray[np.uint8], background: NDArray[np.float32], red_threshold: int, mask: NDArray[np.uint8]
-) -> None:
-    """Marks what exceeds the background, which is interpolated between the centres of the blocks."""
-    last_j, last_i = background.shape[0] - 1, background.shape[1] - 1
-    for j in range(excess.shape[0]):
-        v = min(max((j + 0.5) / BLOCK - 0.5, 0.0), float(last_j))
-        j0 = min(int(v), max(last_j - 1, 0))
-        j1, weight_j = min(j0 + 1, last_j), v - j0
-        for i in range(excess.shape[1]):
-            if excess[j, i] < red_threshold:
-                continue
-            u = min(max((i + 0.5) / BLOCK - 0.5, 0.0), float(last_i))
-            i0 = min(int(u), max(last_i - 1, 0))
-            i1, weight_i = min(i0 + 1, last_i), u - i0
-            upper = (1 - weight_i) * background[j0, i0] + weight_i * background[j0, i1]
-            lower = (1 - weight_i) * background[j1, i0] + weight_i * background[j1, i1]
-            if excess[j, i] - ((1 - weight_j) * upper + weight_j * lower) >= red_threshold:
-                mask[j, i] = 1
+@compiled
+def take_away(image: NDArray[np.uint8], background: NDArray[np.uint8], light: NDArray[np.uint8]) -> None:
+    """Fills `light` with what `image` has more than `background`, byte by byte; all (N,)."""
+    for n in range(image.size):
+        light[n] = image[n] - min(image[n], background[n])
 
 
-@numba.njit(cache=True, nogil=True)
-def _fill_cores(image: NDArray[np.uint8], saturation: int, largest_core: int, mask: NDArray[np.uint8]) -> None:
-    """Marks the white core of a saturated stripe: a run of saturated pixels from one red flank to the other."""
-    rows, columns = mask.shape
-    # How many saturated pixels lie between this one and the last red one of its column; -1: some were not saturated.
-    above = np.full(columns, -1, np.int32)
-    for j in range(rows):
-        before = -1
-        for i in range(columns):
-            if mask[j, i]:
-                if 0 < before <= largest_core:
-                    mask[j, i - before : i] = 1
-                if 0 < above[i] <= largest_core:
-                    mask[j - above[i] : j, i] = 1
-                before = above[i] = 0
-            elif image[j, i, 0] >= saturation:
-                before += before >= 0
-                above[i] += above[i] >= 0
-            else:
-                before = above[i] = -1
+@compiled
+def halve(words: NDArray[np.uint32], saturation: int, excess: NDArray[np.uint16], signal: NDArray[np.uint16]) -> None:
+    """Fills redness and signal, both (ceil(rows / 2), ceil(columns / 2)), each of the sum of four pixels.
+
+    Where red is saturated in all four, `SATURATED` is added to the redness. What lies outside an image of odd size is
+    as its last row and column.
+    """
+    rows, columns = words.shape
+    whole = columns // 2
+    full = np.int32(4 * saturation)
+    for y in range(excess.shape[0]):
+        upper, lower = words[2 * y], words[min(2 * y + 1, rows - 1)]
+        reds, lights = excess[y], signal[y]
+        for x in range(whole):
+            reds[x], lights[x] = _of_four(upper[2 * x], upper[2 * x + 1], lower[2 * x], lower[2 * x + 1], full)
+        if columns % 2:
+            reds[whole], lights[whole] = _of_four(upper[-1], upper[-1], lower[-1], lower[-1], full)
+
+
+@compiled
+def _of_four(a: np.uint32, b: np.uint32, c: np.uint32, d: np.uint32, full: np.int32) -> tuple[np.uint16, np.uint16]:
+    """Redness and signal of the sum of four pixels; red and blue are added side by side in one word."""
+    red_blue = (a & _RED_AND_BLUE) + (b & _RED_AND_BLUE) + (c & _RED_AND_BLUE) + (d & _RED_AND_BLUE)
+    green = np.int32(
+        ((a >> _EIGHT) & _BYTE) + ((b >> _EIGHT) & _BYTE) + ((c >> _EIGHT) & _BYTE) + ((d >> _EIGHT) & _BYTE)
+    )
+    red, blue = np.int32(red_blue & _TWO_BYTES), np.int32(red_blue >> _SIXTEEN)
+    redness = max(red - max(green, blue), np.int32(0)) + (SATURATED if red >= full else np.int32(0))
+    return np.uint16(redness), np.uint16(2 * red + green + blue)
+
+
+@compiled
+def mark_saturated(words: NDArray[np.uint32], saturation: int, excess: NDArray[np.uint16]) -> None:
+    """Adds `SATURATED` to the redness of `halve` where red is saturated in another image, that of all light."""
+    for y in range(excess.shape[0]):
+        for x in range(excess.shape[1]):
+            if red_of(words[2 * y, 2 * x]) >= saturation and excess[y, x] < SATURATED:
+                excess[y, x] += np.uint16(SATURATED)

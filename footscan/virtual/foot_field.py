@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from footscan.compiled import compiled
 
 Floats = npt.NDArray[np.float64]
 
@@ -61,7 +62,7 @@ def without_toes(field: Field) -> Field:
     return field._replace(caps=caps)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def field_at(x: float, y: float, z: float, field: Field) -> float:
     """The function at one point."""
     toes = 1e3
@@ -80,7 +81,7 @@ def field_at(x: float, y: float, z: float, field: Field) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def field_values(points: Floats, field: Field) -> Floats:
     """The function at `points`, shape (N, 3), mm: shape (N,)."""
     values = np.empty(len(points))
@@ -89,7 +90,7 @@ def field_values(points: Floats, field: Field) -> Floats:
     return values
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def field_grid(x: Floats, y: Floats, z: Floats, field: Field) -> Floats:
     """The function on the grid of three axes, mm: shape (len(x), len(y), len(z)).
 
@@ -114,7 +115,7 @@ def field_grid(x: Floats, y: Floats, z: Floats, field: Field) -> Floats:
     return values
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def field_gradients(points: Floats, field: Field) -> Floats:
     """Central differences of the function at `points`, shape (N, 3)."""
     step = 1e-4
@@ -127,7 +128,7 @@ def field_gradients(points: Floats, field: Field) -> Floats:
     return gradients / (2 * step)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def first_hits(origins: Floats, directions: Floats, reach: float, field: Field) -> Floats:
     """Distance along each ray to the surface from outside, to 1e-7 mm; `reach` where a ray meets nothing.
 
@@ -162,7 +163,7 @@ def first_hits(origins: Floats, directions: Floats, reach: float, field: Field) 
     return distances
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _along(origin: Floats, direction: Floats, t: float, field: Field) -> float:
     value: float = field_at(
         origin[0] + t * direction[0], origin[1] + t * direction[1], origin[2] + t * direction[2], field
@@ -170,7 +171,7 @@ def _along(origin: Floats, direction: Floats, t: float, field: Field) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _tube(x: float, y: float, z: float, field: Field, tube: int) -> float:
     splines = field.splines[tube]
     interval, t = _place(x, field.starts[tube], field.steps[tube])
@@ -193,7 +194,7 @@ def _tube(x: float, y: float, z: float, field: Field, tube: int) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _leg(x: float, y: float, z: float, field: Field) -> float:
     knots = field.leg_knots
     interval, t = _place(z, knots[0], knots[1])
@@ -207,7 +208,7 @@ def _leg(x: float, y: float, z: float, field: Field) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _ellipsoid(x: float, y: float, z: float, ellipsoid: Floats) -> float:
     dx, dy, dz = x - ellipsoid[0], y - ellipsoid[1], z - ellipsoid[2]
     rho = np.sqrt((dx / ellipsoid[3]) ** 2 + (dy / ellipsoid[4]) ** 2 + (dz / ellipsoid[5]) ** 2)
@@ -215,7 +216,7 @@ def _ellipsoid(x: float, y: float, z: float, ellipsoid: Floats) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _distance(rho: float, radius: float, closing: float, slope: float) -> float:
     """rho^2 - s over the length of its gradient; the small last term keeps it finite in the middle of the tube."""
     boundary = radius / rho if rho > 1e-9 else 1e3
@@ -223,7 +224,7 @@ def _distance(rho: float, radius: float, closing: float, slope: float) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _cap(t: float, length: float) -> tuple[float, float]:
     """s and its slope |ds/dx| at the part t of a cap; negative s beyond the end."""
     if t >= 1:
@@ -231,35 +232,35 @@ def _cap(t: float, length: float) -> tuple[float, float]:
     return 1 - (1 - t) ** CAP_POWER, CAP_POWER * (1 - t) ** (CAP_POWER - 1) / length
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _arch_part(from_medial: float) -> float:
     """1 at the medial edge, 0 on the lateral side."""
     part: float = _smooth_step((ARCH_NONE - from_medial) / (ARCH_NONE - ARCH_FULL))
     return part
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _smooth_step(t: float) -> float:
     """From 0 at t = 0 to 1 at t = 1, constant beyond, with two continuous derivatives."""
     t = min(max(t, 0.0), 1.0)
     return t * t * t * (10 - 15 * t + 6 * t * t)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _place(at: float, start: float, step: float) -> tuple[int, float]:
     """The spline's interval and the distance into it; the ends go on as constants."""
     place = min(max((at - start) / step, 0.0), INTERVALS - 1e-9)
     return int(place), (place - int(place)) * step
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _cubic(splines: Floats, interval: int, profile: int, t: float) -> float:
     c = splines[interval, profile]
     value: float = ((c[0] * t + c[1]) * t + c[2]) * t + c[3]
     return value
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _union(a: float, b: float, blend: float) -> float:
     """Smooth minimum with two continuous derivatives; equal to the minimum where |a - b| >= blend."""
     h = max(blend - abs(a - b), 0.0) / blend

@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from footscan.compiled import compiled
 from footscan.virtual.glass import directions_from_below, exits_above, reflectance
 from footscan.virtual.scanner import FAN_DEGREES, HEIGHT, WIDTH, Laser
 from footscan.virtual.scene import Hits, Scene
@@ -141,7 +141,7 @@ def _pixels_near(patches: Floats, view: View) -> NDArray[np.int64]:
     return np.flatnonzero(covered.ravel() & (view.weights > 0.0))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _cover(covered: NDArray[np.bool_], least: NDArray[np.int64], most: NDArray[np.int64]) -> None:
     height, width = covered.shape
     for k in range(len(least)):
@@ -150,7 +150,7 @@ def _cover(covered: NDArray[np.bool_], least: NDArray[np.int64], most: NDArray[n
                 covered[j, i] = True
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _spread_along_x(
     distance: Floats,
     directions: Floats,

@@ -1,4 +1,4 @@
-"""Recording a scan: a mesh in, `scan.yaml` and eight films out."""
+"""Recording a scan: a mesh in, `scan.yaml` and eight films out, and eight more with the laser off where asked for."""
 
 import struct
 from collections.abc import Callable
@@ -23,6 +23,8 @@ Ints = NDArray[np.int64]
 Progress = Callable[[int, int], None]
 
 CAMERAS = range(1, 9)
+OFF = "-off"
+"""Behind the camera's number in the name of a film with the laser off."""
 
 
 def record_scan(
@@ -37,6 +39,7 @@ def record_scan(
     calibration: str | None = None,
     truth: bool = True,
     stripe_truth: bool = False,
+    laser_off: bool = False,
     surface: Surface = SKIN,
     progress: Progress | None = None,
     workers: int = 2,
@@ -51,7 +54,8 @@ def record_scan(
     calibration : path of the calibration file relative to `folder`, to be named in `scan.yaml`.
     truth : whether the mesh goes with it as `truth.stl`.
     stripe_truth : whether the exact stripe centres go with it as `truth/cam<n>.csv`.
-    progress : called with frames done and frames in all.
+    laser_off : whether each frame is taken again with the laser off, into `cam<n>-off.avi`, the camera's background.
+    progress : called with frames done and frames in all; films with the laser off are counted anew.
     workers : processes; the bytes do not depend on it.
 
     Raises
@@ -67,7 +71,10 @@ def record_scan(
         "travel": {"start_mm": settings.start_mm, "step_mm": settings.step_mm},
         **({"calibration": calibration} if calibration else {}),
         **({"truth": "truth.stl"} if truth else {}),
-        "cameras": [{"id": camera, "file": f"cam{camera}.avi"} for camera in CAMERAS],
+        "cameras": [
+            {"id": camera, "file": film_name(camera), **({"background": film_name(camera, OFF)} if laser_off else {})}
+            for camera in CAMERAS
+        ],
     }
     validate(folder / "scan.yaml", Scan, document)
     folder.mkdir(parents=True, exist_ok=True)
@@ -75,6 +82,11 @@ def record_scan(
     mesh = Mesh(np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64))
     shots = [Shot(frame, settings.start_mm + frame * settings.step_mm, 0) for frame in range(settings.frames)]
     film_cameras([mesh], surface, shots, folder, settings, progress, workers)
+    if laser_off:
+        # Second exposures: by numbers of their own they have noise and flicker of their own.
+        again = [shot._replace(frame=settings.frames + shot.frame) for shot in shots]
+        dark = settings.model_copy(update={"laser_exposure": 0.0})
+        film_cameras([mesh], surface, again, folder, dark, progress, workers, OFF)
     if stripe_truth:
         write_stripe_truth(mesh, surface, shots, folder / "truth", settings)
     if truth:
@@ -90,18 +102,24 @@ def film_cameras(
     settings: SimulationSettings,
     progress: Progress | None,
     workers: int,
+    ending: str = "",
 ) -> None:
-    """Writes `cam1.avi` to `cam8.avi`, each with one frame for each of `shots`."""
+    """Writes `cam1.avi` to `cam8.avi`, an `ending` behind the number, each with one frame for each of `shots`."""
     total, done = len(CAMERAS) * len(shots), 0
     pictures: list[bytes] = []
     for camera, part in shoot(meshes, surface, list(CAMERAS), shots, settings, workers):
         pictures += part
         done += len(part)
         if len(pictures) == len(shots):
-            write_film(folder / f"cam{camera}.avi", pictures, WIDTH, HEIGHT, settings.frames_per_second)
+            write_film(folder / film_name(camera, ending), pictures, WIDTH, HEIGHT, settings.frames_per_second)
             pictures = []
         if progress is not None:
             progress(done, total)
+
+
+def film_name(camera: int, ending: str = "") -> str:
+    """The film of a camera, as scan.yaml names it."""
+    return f"cam{camera}{ending}.avi"
 
 
 def write_yaml(path: Path, document: dict[str, Any]) -> None:

@@ -1,14 +1,14 @@
 """One frame of one camera: all light that falls on its sensor, and the JPEG that it makes of it."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from footscan.compiled import compiled
 from footscan.virtual.laser_light import stripe_picture
-from footscan.virtual.room import COARSE, LEVELS, backdrop, coarse_rays, lit_object
+from footscan.virtual.room import COARSE, LEVELS, Backdrop, backdrop, coarse_rays, lit_object
 from footscan.virtual.scanner import HEIGHT, WIDTH, VirtualScanner
-from footscan.virtual.scene import Scene
+from footscan.virtual.scene import Scene, Surface
 from footscan.virtual.sensor import compress, photograph
 from footscan.virtual.texture import Texture
 from footscan.virtual.views import camera_views
@@ -58,20 +58,42 @@ class CameraRenderer:
             stripe += settings.ghost * stripe_picture(scene, x, self._lasers, self._reflected, self._texture, settings)
         level = LEVELS[settings.ambient]
         brightness, coverage = lit_object(scene, x, self._coarse, self._coarse_mirrored, self._texture, level)
-        share = min(scene.surface.halo * settings.halo, 0.9)
-        glow, veil = _glow(stripe, coverage, share, settings.halo)
-        line = _line(stripe * (1.0 - share), settings, random)
-        room_flicker, white_flicker, red_flicker = 1.0 + settings.flicker * random.normal(0.0, (0.02, 0.15, 0.15))
-        albedo = np.array(scene.surface.albedo, dtype=np.float32)
-        colour = np.array([1.0, LASER_COLOUR[1] * settings.leak, LASER_COLOUR[2] * settings.leak], dtype=np.float32)
-        behind = self._backdrop
-        flickers = np.maximum(np.array([room_flicker, white_flicker, red_flicker]), 0.0).astype(np.float32)
-        return np.asarray(
-            _compose(
-                line, glow, veil, brightness, coverage, behind.room, behind.white_glints, behind.red_glints,
-                albedo, colour, flickers,
-            )
-        )  # fmt: skip
+        return light_on_sensor(stripe, brightness, coverage, scene.surface, self._backdrop, settings, random)
+
+
+def light_on_sensor(
+    stripe: Floats,
+    brightness: Singles,
+    coverage: Singles,
+    surface: Surface,
+    behind: Backdrop,
+    settings: SimulationSettings,
+    random: np.random.Generator,
+) -> Singles:
+    """All light of a frame, (480, 640, 3) float32, 1 being the sensor's white.
+
+    Parameters
+    ----------
+    stripe : (480, 640) laser light that the surface sends to each pixel, before speckle, halo and lens.
+    brightness, coverage : (240, 320) the object in the light of the room, and where it is; see `lit_object`.
+    """
+    share = min(surface.halo * settings.halo, 0.9)
+    glow, veil = _glow(stripe, coverage, share, settings.halo)
+    line = _line(stripe * (1.0 - share), settings, random)
+    room_flicker, white_flicker, red_flicker = 1.0 + settings.flicker * random.normal(0.0, (0.02, 0.15, 0.15))
+    albedo = np.array(surface.albedo, dtype=np.float32)
+    flickers = np.maximum(np.array([room_flicker, white_flicker, red_flicker]), 0.0).astype(np.float32)
+    return np.asarray(
+        _compose(
+            line, glow, veil, brightness, coverage, behind.room, behind.white_glints, behind.red_glints,
+            albedo, laser_colour(settings), flickers,
+        )
+    )  # fmt: skip
+
+
+def laser_colour(settings: SimulationSettings) -> Singles:
+    """(3,) what a red, green and blue pixel make of laser light 1."""
+    return np.array([1.0, LASER_COLOUR[1] * settings.leak, LASER_COLOUR[2] * settings.leak], dtype=np.float32)
 
 
 def _glow(stripe: Floats, coverage: Singles, share: float, veil: float) -> tuple[Singles, Singles]:
@@ -111,7 +133,7 @@ def _line(stripe: Floats, settings: SimulationSettings, random: np.random.Genera
     return line
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _compose(
     line: Singles,
     glow: Singles,
@@ -142,7 +164,7 @@ def _compose(
     return light
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _between(coarse: Singles, j: int, i: int, block: int) -> np.float32:
     """Value at pixel (i, j) of a picture in blocks of `block` x `block` pixels, bilinear between their middles."""
     rows, columns = coarse.shape

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from footscan.compiled import compiled
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -123,7 +124,7 @@ def _smooth_normals(faces: Ints, crossed: Floats, facet_normals: Floats, vertice
     )
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _mean_normals(
     faces: Ints, crossed: Floats, facet_normals: Floats, around: Ints, starts: Ints, least_cosine: float
 ) -> Floats:

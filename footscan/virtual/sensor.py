@@ -2,9 +2,9 @@
 
 import numpy as np
 import simplejpeg
-from numba import njit
 from numpy.typing import NDArray
 
+from footscan.compiled import compiled
 from schemas.parameters.simulation import SimulationSettings
 
 Singles = NDArray[np.float32]
@@ -51,7 +51,7 @@ def _codes(signal: Singles) -> NDArray[np.int64]:
     return np.rint(signal * (_CODES - 1)).astype(np.int64)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _expose_mosaic(light: Singles, normal: Singles, noise: np.float32) -> Singles:
     """What the sensor reads: one colour a pixel, RG over GB, with shot and read noise, clipped at its white."""
     height, width, _ = light.shape
@@ -64,7 +64,7 @@ def _expose_mosaic(light: Singles, normal: Singles, noise: np.float32) -> Single
     return mosaic
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _develop(mosaic: Singles, tone: Bytes) -> Bytes:
     """Bilinear interpolation of the mosaic's missing colours, mirrored at the borders, and the tone curve."""
     height, width = mosaic.shape

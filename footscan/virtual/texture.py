@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
+
+from footscan.compiled import compiled
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -36,7 +37,7 @@ def random_texture(seed: int, unevenness: float) -> Texture:
     return Texture(np.maximum(1.0 + unevenness / np.sqrt(2.0) * field, 0.2).astype(np.float32))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _interpolated(points: Floats, field: Singles) -> Floats:
     cells = field.shape[0]
     factors = np.empty(len(points))

@@ -1,6 +1,5 @@
-"""`footscan simulate`, `footscan ingest` and `footscan extract`."""
+"""`footscan simulate` and `footscan ingest`."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -129,30 +128,6 @@ def ingest(
     if any(end.exit_status == Fault.exit_status for end in failed):
         return Fault.exit_status
     return RefusedInput.exit_status if len(folders) == 1 and len({end.scan for end in ends}) == 1 else 1
-
-
-def extract(
-    file: Annotated[Path, typer.Argument(help="An image, a film (AVI) or a folder of frames.")],
-    out: Annotated[Path | None, typer.Option(help="CSV to write; standard output where absent.")] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Find the laser stripe: one sub-pixel point a row of frame,i,j,width,peak,score."""
-    from footscan.frames.film import open_film, pixel_frames
-    from footscan.stripe.film import extract_film, points_csv
-    from pipelines.engine.atomic import write_atomically
-    from schemas.parameters.extraction import ExtractionParameters
-
-    film = open_film(file)
-    points = extract_film(pixel_frames(film), ExtractionParameters())
-    if out is not None:
-        write_atomically(out, points_csv(points).encode())
-    elif not as_json:
-        sys.stdout.write(points_csv(points))
-    if as_json:
-        print_json(
-            {"file": str(file), "frames": film.frames, "points": len(points), "out": None if out is None else str(out)}
-        )
-    message(f"{file}: {len(points)} stripe points in {film.frames} frames")
 
 
 def _settings(

@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from pipelines.cli import calibration, demo, films, results, runs
+from pipelines.cli import calibration, demo, extract, films, results, runs
 from schemas.errors import Fault, FootscanError, RefusedInput, one_line
 
 INTERRUPTED = 130
@@ -23,7 +23,7 @@ app = typer.Typer(
 app.command("demo")(demo.demo)
 app.add_typer(films.simulate, name="simulate")
 app.command("ingest")(films.ingest)
-app.command("extract")(films.extract)
+app.command("extract")(extract.extract)
 app.add_typer(calibration.calibrate, name="calibrate")
 app.command("map")(calibration.map_pixels)
 app.command("run")(runs.run)

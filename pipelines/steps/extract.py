@@ -1,6 +1,7 @@
 """Frames to stripe points of one camera."""
 
 from collections.abc import Iterator, Mapping
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +17,27 @@ from schemas.parameters.extraction import ExtractionParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: ExtractionParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `manifest`; `places`: the `array` of frames."""
+    """`inputs`: `manifest` and, where the camera has one, that of its `background`; `places`: the `array` of the
+    frames, and the one of the `background`."""
     manifest = FrameManifest.model_validate_json(inputs["manifest"])
     lost: list[int] = []
-    try:
-        stripe = extract_film(_noting_lost(read_frames(places["array"], manifest), lost), parameters)
-    except DamagedError:
-        discard(places["array"])  # so that it is ingested anew
-        raise
+    frames = _noting_lost(_frames(places["array"], manifest), lost)
+    if "background" in inputs:
+        laser_off = FrameManifest.model_validate_json(inputs["background"])
+        backgrounds = _backgrounds(places["background"], laser_off, len(manifest.frames))
+        stripe = extract_film(frames, parameters, backgrounds)
+    else:
+        stripe = extract_film(frames, parameters)
     return pack(stripe=stripe, lost=np.array(lost, np.int32))
+
+
+def _frames(array: Path, manifest: FrameManifest) -> Iterator[Rgb | None]:
+    """The frames of an array; one that is found damaged is ingested anew."""
+    try:
+        yield from read_frames(array, manifest)
+    except DamagedError:
+        discard(array)
+        raise
 
 
 def _noting_lost(frames: Iterator[Rgb | None], lost: list[int]) -> Iterator[Rgb | None]:
@@ -33,3 +46,12 @@ def _noting_lost(frames: Iterator[Rgb | None], lost: list[int]) -> Iterator[Rgb 
         if frame is None:
             lost.append(number)
         yield frame
+
+
+def _backgrounds(array: Path, manifest: FrameManifest, count: int) -> Iterator[Rgb | None]:
+    """The laser-off frame of each of `count` frames; where there is but one, it stands for all."""
+    backgrounds = _frames(array, manifest)
+    if len(manifest.frames) == count:
+        return backgrounds
+    only = next(backgrounds)
+    return repeat(None if only is None else only.copy(), count)

@@ -1,5 +1,7 @@
 """What the extraction of the stripe can be told."""
 
+from typing import Literal
+
 from pydantic import Field
 
 from schemas.documents import Document
@@ -20,32 +22,49 @@ class ExtractionParameters(Document):
         le=255,
         description="grey level of red from which a white pixel between two red flanks is the core of the stripe",
     )
-    smoothing_px: float = Field(
-        default=2.0,
+    ridge_px: float = Field(
+        default=2.5,
         ge=0.5,
-        le=8.0,
+        le=4.0,
         description="standard deviation in px of the Gaussian under which the ridge of the stripe is sought",
     )
     smallest_contrast: float = Field(
-        default=12.0,
+        default=8.0,
         ge=1.0,
         le=255.0,
         description="grey levels by which the stripe must stand out from both its sides",
     )
+    faintest_contrast: float = Field(
+        default=4.0,
+        ge=1.0,
+        le=255.0,
+        description="grey levels by which the ends of a piece must stand out that is stronger elsewhere",
+    )
     largest_width_px: float = Field(
-        default=28.0,
+        default=40.0,
         ge=2.0,
         le=100.0,
         description="full width at half height in px beyond which a red thing is no stripe",
     )
+    centre_method: Literal["threshold-median", "gravity", "gaussian", "ridge", "fir"] = Field(
+        default="gravity",
+        description="how the centre is taken from the profile across the stripe",
+    )
     centre_level: float = Field(
-        default=0.25,
+        default=0.5,
         ge=0.05,
         le=0.9,
         description="part of the stripe's height above which its centre of gravity is taken",
     )
-    gap_px: float = Field(
+    smoothing_widths: float = Field(
         default=3.0,
+        ge=0.0,
+        le=20.0,
+        description="widths of the stripe on either side over which a centre is smoothed along it, but not round "
+        "corners; 0 smooths nothing",
+    )
+    gap_px: float = Field(
+        default=5.0,
         ge=1.5,
         le=20.0,
         description="distance in px that points of one piece of the stripe may have from each other",
@@ -81,6 +100,18 @@ class ExtractionParameters(Document):
         le=1000.0,
         description="extent in px from which a piece is no glint, however long it stands still",
     )
+    follow_reach_px: float = Field(
+        default=12.0,
+        ge=2.0,
+        le=200.0,
+        description="distance in px that the stripe may move from one frame to the next",
+    )
+    lonely_length_px: float = Field(
+        default=60.0,
+        ge=0.0,
+        le=1000.0,
+        description="extent in px below which a piece is dropped that nothing lies near in the frame before and after",
+    )
     ghost_reach_px: float = Field(
         default=60.0,
         ge=0.0,
@@ -88,9 +119,9 @@ class ExtractionParameters(Document):
         description="distance in px across the stripe within which its weaker, parallel image in a glass plate may lie",
     )
     ghost_strength: float = Field(
-        default=0.25,
+        default=0.05,
         ge=0.0,
         le=1.0,
-        description="contrast, or contrast times width, relative to the stripe beside it below which a piece is a "
-        "ghost",
+        description="light, relative to the stripe beside it, below which a piece is a ghost; one that is parallel to "
+        "the stripe is so at half its light",
     )

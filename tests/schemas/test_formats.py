@@ -57,6 +57,17 @@ def test_scan_is_accepted(tmp_path: Path) -> None:
     assert (scan.cameras[2].positions, scan.cameras[3].file) == ("cam3.csv", "cam4/")
 
 
+def test_a_camera_of_a_scan_may_have_a_background(tmp_path: Path) -> None:
+    assert [camera.background for camera in read_yaml(write(tmp_path, SCAN), Scan).cameras] == [None] * 4
+    text = SCAN.replace("file: cam1.avi", "file: cam1.avi, background: off/cam1.png")
+    assert read_yaml(write(tmp_path, text), Scan).cameras[0].background == "off/cam1.png"
+    with pytest.raises(RefusedInput) as caught:
+        read_yaml(write(tmp_path, text.replace("off/cam1.png", "''")), Scan)
+    assert str(caught.value).endswith("cameras.0.background: expected a path relative to this file, found ''")
+    with pytest.raises(RefusedInput, match=r"cameras.0.background: unknown field"):
+        read_yaml(write(tmp_path, CAPTURE.replace("cam1.avi", "cam1.avi, background: off.avi")), Capture)
+
+
 def test_each_camera_may_bring_its_own_travel(tmp_path: Path) -> None:
     text = "\n".join(line for line in SCAN.splitlines() if not line.startswith("travel:"))
     with pytest.raises(RefusedInput, match=r"camera 1 has no travel, expected travel or positions$"):

@@ -11,7 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from footscan.frames.image import MAX_PIXELS, decode_image, encode_png, image_size, read_image
+from footscan.frames.image import (
+    MAX_PIXELS,
+    decode_image,
+    encode_png,
+    image_size,
+    padded_pixels,
+    pixel_buffer,
+    read_image,
+)
 from schemas.errors import RefusedInput
 
 RAMP = np.arange(8 * 9 * 3, dtype=np.uint8).reshape(8, 9, 3)
@@ -41,15 +49,88 @@ def test_png_is_lossless() -> None:
     assert image_size(PNG) == (8, 9)
 
 
-def test_jpeg_is_decoded_by_libjpeg_turbo_into_the_buffer() -> None:
-    expected = simplejpeg.decode_jpeg(JPEG, "RGB")
-    buffer = np.zeros((8, 9, 3), np.uint8)
-    assert np.shares_memory(decode_image(JPEG, buffer), buffer)
-    np.testing.assert_array_equal(buffer, expected)
-    other = np.zeros((9, 8, 3), np.uint8)
-    np.testing.assert_array_equal(decode_image(JPEG, other), expected)
-    assert not other.any()
+def test_jpeg_is_decoded_by_libjpeg_turbo() -> None:
+    np.testing.assert_array_equal(decode_image(JPEG), simplejpeg.decode_jpeg(JPEG, "RGB"))
     assert image_size(JPEG) == (8, 9)
+
+
+def test_a_pixel_buffer_holds_a_pixel_in_a_word() -> None:
+    buffer = pixel_buffer(8, 9)
+    assert buffer.shape == (8, 9, 3)
+    assert buffer.dtype == np.uint8
+    assert buffer.strides == (36, 4, 1)
+    assert not buffer.any()
+    buffer[2, 3] = [1, 2, 3]
+    padded = padded_pixels(buffer)
+    assert padded is not None
+    assert padded.shape == (8, 9, 4)
+    assert np.shares_memory(padded, buffer)
+    assert padded[2, 3, :3].tolist() == [1, 2, 3]
+    padded[7, 8] = [4, 5, 6, 255]
+    assert buffer[7, 8].tolist() == [4, 5, 6]
+
+
+def test_only_what_fills_a_pixel_buffer_is_padded() -> None:
+    buffer = pixel_buffer(8, 9)
+    padded = np.zeros((8, 9, 4), np.uint8)
+    others = [
+        RAMP,
+        buffer.copy(),
+        buffer[1:],
+        buffer[:, :8],
+        buffer[::-1],
+        buffer[:, ::-1],
+        buffer[..., ::-1],
+        padded[..., 1:],  # green, blue and what counts for nothing
+        np.zeros((8, 4, 9), np.uint8).transpose(0, 2, 1)[..., :3],
+        np.zeros((16, 9, 4), np.uint8)[::2, :, :3],
+        np.zeros((1, 8, 9, 4), np.uint8)[0, ..., :3],
+    ]
+    assert [padded_pixels(other) for other in others[:-1]] == [None] * (len(others) - 1)
+    last = padded_pixels(others[-1])
+    assert last is None or np.shares_memory(last, others[-1])
+    assert padded_pixels(padded[..., :3]) is not None
+
+
+@pytest.mark.parametrize("shape", [(0, 0), (0, 9), (8, 0), (1, 1)])
+def test_pixel_buffers_of_any_size(shape: tuple[int, int]) -> None:
+    buffer = pixel_buffer(*shape)
+    assert buffer.shape == (*shape, 3)
+    padded = padded_pixels(buffer)
+    assert padded is None or padded.shape == (*shape, 4)
+
+
+def test_a_jpeg_is_decoded_into_a_pixel_buffer() -> None:
+    expected = decode_image(JPEG)
+    buffer = pixel_buffer(8, 9)
+    for _ in range(2):
+        assert decode_image(JPEG, buffer) is buffer
+        np.testing.assert_array_equal(buffer, expected)
+        buffer[...] = 7
+    extraneous = JPEG[:-2] + bytes(5) + JPEG[-2:]  # as webcams pad their entropy-coded data
+    assert decode_image(extraneous, buffer) is buffer
+    np.testing.assert_array_equal(buffer, expected)
+
+
+def test_a_buffer_of_another_shape_or_kind_is_left_alone() -> None:
+    for other in (pixel_buffer(9, 8), pixel_buffer(16, 9), pixel_buffer(8, 10)[:, :9], np.zeros((8, 9, 3), np.uint8)):
+        decoded = decode_image(JPEG, other)
+        np.testing.assert_array_equal(decoded, decode_image(JPEG))
+        assert not np.shares_memory(decoded, other)
+        assert not other.any()
+
+
+def test_a_png_needs_no_buffer() -> None:
+    np.testing.assert_array_equal(decode_image(PNG, pixel_buffer(8, 9)), RAMP)
+
+
+def test_an_image_is_the_same_with_and_without_a_buffer() -> None:
+    generator = np.random.default_rng(3)
+    for subsampling in ("444", "422", "420", "Gray"):
+        pixels = generator.integers(0, 256, (33, 50, 1 if subsampling == "Gray" else 3), dtype=np.uint8)
+        space = "Gray" if subsampling == "Gray" else "RGB"
+        data = bytes(simplejpeg.encode_jpeg(pixels, 80, space, subsampling))
+        np.testing.assert_array_equal(decode_image(data, pixel_buffer(33, 50)), decode_image(data))
 
 
 def test_chroma_is_interpolated_not_repeated() -> None:

@@ -6,6 +6,7 @@ import av
 import numpy as np
 import pytest
 import trimesh
+from numpy.typing import NDArray
 
 from footscan.virtual.record import record_scan
 from footscan.virtual.scanner import standard_scanner
@@ -62,6 +63,41 @@ def test_workers_do_not_change_bytes_but_seeds_do(folder: Path, tmp_path: Path) 
     other = record(tmp_path / "other", SETTINGS.model_copy(update={"seed": 2}))
     assert other["cam1.avi"] != alone["cam1.avi"]
     assert other["truth/cam1.csv"] == alone["truth/cam1.csv"]
+
+
+def test_laser_off_is_a_second_exposure(folder: Path, tmp_path: Path) -> None:
+    record_scan(
+        VERTICES,
+        FACES,
+        tmp_path,
+        patient="P0001",
+        scan="off",
+        side="right",
+        settings=SETTINGS,
+        laser_off=True,
+        workers=1,
+    )
+    cameras = read_yaml(tmp_path / "scan.yaml", Scan).cameras
+    assert [camera.background for camera in cameras] == [f"cam{camera}-off.avi" for camera in range(1, 9)]
+    assert (tmp_path / "cam1.avi").read_bytes() == (folder / "cam1.avi").read_bytes()
+    on, off = pictures(tmp_path / "cam1.avi"), pictures(tmp_path / "cam1-off.avi")
+    assert on.shape == off.shape == (2, 480, 640, 3)
+    redness = on[..., 0] - on[..., 1:].max(axis=-1)
+    without = off[..., 0] - off[..., 1:].max(axis=-1)
+    stripe = redness > 60
+    assert (stripe.sum(axis=(1, 2)) > 500).all()
+    assert not (without > 60).any()
+    # What the room lights is there both times, with another noise: that of two exposures is sqrt(2) that of one.
+    dark = ~stripe & (on.max(axis=-1) < 100)
+    difference = (on - off)[dark]
+    assert abs(np.median(difference)) <= 2
+    assert 0.5 < difference[:, 1].std() < 6
+
+
+def pictures(film: Path) -> NDArray[np.int_]:
+    """(frames, rows, columns, 3) as wide as differences need."""
+    with av.open(film) as container:
+        return np.array([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)], np.int_)
 
 
 def test_stripe_truth_lies_on_the_object(folder: Path) -> None:

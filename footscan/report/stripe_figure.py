@@ -1,0 +1,299 @@
+"""What the extraction found: stripe points over a frame, or over frames of a film, and what was measured along them."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from footscan.frames.image import Rgb
+from footscan.report.panels import png_of
+from footscan.stripe.points import StripePoints
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+
+MEASURED = {
+    "width": "width, px",
+    "peak": "peak, grey levels",
+    "saturation": "saturation, share",
+    "sigma": "expected sigma, px",
+}
+"""What is drawn of each point, with the label of its axis."""
+ENDS = {"peak": 260.0, "saturation": 1.03}
+"""Where axes of a known range end."""
+DIMMED = 0.7
+"""Brightness of a frame under its points: the stripe is seen, and so are they."""
+GROUND = "#262626"
+"""Below points alone: their colours look as they do over a dark frame."""
+LINE, BAND, COLUMNS, ROWS, LOST = "#1f4e79", "#b9d4e8", "#2a9d6f", "#d9822b", "#c9c9c9"
+
+DPI = 150
+PICTURE_INCHES = 8.5
+"""Longer side of the picture of a single frame."""
+LEAST_INCHES = 2.8
+"""Its shorter side at least: an image that is one pixel high is drawn stretched."""
+PANEL_INCHES, APART_INCHES = 1.35, 0.25
+LEFT, RIGHT, TOP, BOTTOM = 0.8, 1.0, 0.75, 0.6
+"""Margins of the figure of a single frame, inches. Its parts are placed by hand: rows and columns stand in line."""
+
+SHOWN_FRAMES, SHOWN_COLUMNS = 8, 4
+SHOWN_PX = 700
+"""Longer side of a film's frame as it is drawn; larger ones are scaled down."""
+
+
+def frame_figure(image: Rgb, points: StripePoints) -> bytes:
+    """A PNG of one frame with its stripe points, and of what was measured along the stripe.
+
+    Parameters
+    ----------
+    image : (rows, columns, 3) uint8, RGB.
+    points : (N,) of `STRIPE_DTYPE`, px, image frame.
+
+    Notes
+    -----
+    Points are coloured by score. What was measured of each stands beside the picture at the point's row where the
+    stripe runs down the image rather than across it, and below the picture at the point's column otherwise; where the
+    stripe ends, nothing is drawn. The same input gives the same bytes.
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
+    rows, columns = image.shape[:2]
+    scale = PICTURE_INCHES / max(rows, columns)
+    wide, high = max(columns * scale, LEAST_INCHES), max(rows * scale, LEAST_INCHES)
+    down = _lines(points["j"]) > _lines(points["i"])
+    beside = len(MEASURED) * (PANEL_INCHES + APART_INCHES)
+    width, height = LEFT + wide + beside * down + RIGHT, TOP + high + beside * (not down) + BOTTOM
+    figure = Figure(figsize=(width, height), dpi=DPI)
+
+    def place(left: float, top: float, wide: float, high: float) -> "Axes":
+        """Axes so many inches right of and below the picture's corner."""
+        bottom = height - TOP - top - high
+        return figure.add_axes(((LEFT + left) / width, bottom / height, wide / width, high / height))
+
+    colours = _score_colours()
+    picture = place(0, 0, wide, high)
+    _draw_frame(picture, _scaled_down(image, round(DPI * PICTURE_INCHES)), (rows, columns), points, colours, 0.8)
+    picture.set_ylabel("row j, px")
+    panels = []
+    for number, (name, label) in enumerate(MEASURED.items()):
+        offset = number * (PANEL_INCHES + APART_INCHES) + APART_INCHES
+        end = ENDS.get(name) or _end(points[name])
+        if down:
+            panel = place(wide + offset, 0, PANEL_INCHES, high)
+            _draw_points(panel, points[name], points["j"], points["score"], colours, 2.5)
+            panel.set(xlabel=label, xlim=(-0.03 * end, end), ylim=picture.get_ylim())
+            panel.tick_params(axis="x", labelsize=8)
+            panel.tick_params(axis="y", labelleft=False)
+        else:
+            panel = place(0, high + offset, wide, PANEL_INCHES)
+            _draw_points(panel, points["i"], points[name], points["score"], colours, 2.5)
+            panel.set(ylabel=label, ylim=(-0.03 * end, end), xlim=picture.get_xlim())
+            panel.yaxis.label.set_fontsize(8)
+        measured = panel.xaxis if down else panel.yaxis
+        measured.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
+        measured.set_major_formatter("{x:g}")
+        panel.set_facecolor(GROUND)
+        panel.grid(alpha=0.3, linewidth=0.5)
+        panels.append(panel)
+    if not down:
+        for panel in (picture, *panels[:-1]):
+            panel.tick_params(labelbottom=False)
+    (picture if down else panels[-1]).set_xlabel("column i, px")
+    figure.colorbar(colours, cax=place(wide + beside * down + APART_INCHES, 0, 0.16, high)).set_label("score")
+    figure.suptitle(_summary(points, (rows, columns)), fontsize=11, y=1 - 0.15 / height, va="top")
+    return png_of(figure)
+
+
+def film_figure(frames: Iterable[Rgb | None], count: int, points: StripePoints) -> bytes:
+    """A PNG of some frames of a film with their stripe points, and of what was found and measured over the travel.
+
+    Parameters
+    ----------
+    frames : iterable of (rows, columns, 3) uint8, RGB
+        Read once; None stands for a lost frame. Each needs to be valid until the next only.
+    count : int
+        Number of frames.
+    points : (N,) of `STRIPE_DTYPE`, px, image frame, in the order of the frames.
+
+    Notes
+    -----
+    The frames shown are spread over those that hold points. The share of the image's columns that hold a point tells
+    of a stripe across the image; one that runs down it fills rows. The same input gives the same bytes.
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
+    shown, lost, (rows, columns) = _sample(frames, _spread(points, count))
+    strips = -(-max(len(shown), 1) // SHOWN_COLUMNS)
+    aspect = float(np.clip(rows / columns, 0.4, 1.5))
+    heights = strips * (3.0 * aspect + 0.3), 4.6
+    figure = Figure(figsize=(13, sum(heights) + 0.7), dpi=110, layout="constrained")
+    above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=heights).ravel().tolist()
+    seen = f"{len(np.unique(points['frame']))} of " if len(points) else ""
+    gone = f"; {len(lost)} lost" if lost else ""
+    figure.suptitle(f"{_counted(len(points))} in {seen}{count} frame{'s' * (count != 1)}{gone}", fontsize=11)
+
+    colours = _score_colours()
+    pictures = above.subplots(strips, SHOWN_COLUMNS, squeeze=False).ravel().tolist()
+    for picture in pictures:
+        picture.set_axis_off()
+    for picture, (number, image) in zip(pictures, shown.items(), strict=False):
+        there = points[points["frame"] == number]
+        _draw_frame(picture, image, (rows, columns), there, colours, 0.5)
+        picture.set_box_aspect(aspect)
+        picture.set_title(f"frame {number}: {_counted(len(there))}", fontsize=9)
+    above.colorbar(colours, ax=pictures, shrink=0.9, pad=0.01).set_label("score")
+
+    panels = below.subplots(2, 3, sharex=True).ravel().tolist()
+    _draw_coverage(panels[0], points, count, (rows, columns), lost)
+    if shown:
+        panels[0].plot(
+            list(shown), [0] * len(shown), "^", color="black", ms=4, clip_on=False, label="frame shown above"
+        )
+    _draw_line(panels[1], np.bincount(points["frame"], minlength=count), lost, LINE, "")
+    panels[1].set(ylabel="points a frame", ylim=(0, None))
+    for panel, name in zip(panels[2:], MEASURED, strict=True):
+        _draw_quantiles(panel, name, points, count)
+    for panel in panels:
+        panel.grid(alpha=0.3, linewidth=0.5)
+        panel.set_xlim(-0.5, count - 0.5)
+        if lost:
+            panel.vlines(lost, 0, 1, transform=panel.get_xaxis_transform(), color=LOST, zorder=0, label="lost frame")
+    for panel in panels[3:]:
+        panel.set_xlabel("frame")
+        panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+    keys = {key.get_label(): key for panel in panels[:3] for key in panel.get_legend_handles_labels()[0]}
+    figure.legend(handles=list(keys.values()), loc="outside lower center", ncols=len(keys), fontsize=8, frameon=False)
+    return png_of(figure)
+
+
+def _score_colours() -> "ScalarMappable":
+    """Viridis without its dark end, which would not be seen over a dark frame."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+
+    return ScalarMappable(Normalize(0.0, 1.0), ListedColormap(colormaps["viridis"](np.linspace(0.25, 1.0, 256))))
+
+
+def _draw_frame(
+    panel: "Axes", image: Rgb, size: tuple[int, int], points: StripePoints, colours: "ScalarMappable", area: float
+) -> None:
+    """A frame of such a size (rows, columns), which may be scaled down, dimmed, under its points."""
+    rows, columns = size
+    panel.imshow(
+        np.rint(image * DIMMED).astype(np.uint8), extent=(-0.5, columns - 0.5, rows - 0.5, -0.5), aspect="auto"
+    )
+    panel.autoscale(False)
+    _draw_points(panel, points["i"], points["j"], points["score"], colours, area)
+
+
+def _draw_points(
+    panel: "Axes",
+    across: NDArray[np.floating],
+    along: NDArray[np.floating],
+    score: NDArray[np.floating],
+    colours: "ScalarMappable",
+    area: float,
+) -> None:
+    panel.scatter(across, along, c=score, s=area, linewidths=0, cmap=colours.cmap, vmin=0.0, vmax=1.0)
+
+
+def _summary(points: StripePoints, size: tuple[int, int]) -> str:
+    rows, columns = size
+    found = f"{_counted(len(points))} in {columns} x {rows} px"
+    if not len(points):
+        return found
+    filled = (
+        f"in {100 * _lines(points['i']) / columns:.0f} % of the columns"
+        f" and {100 * _lines(points['j']) / rows:.0f} % of the rows"
+    )
+    middle = {name: float(np.median(points[name])) for name in MEASURED}
+    return (
+        f"{found}, {filled}\n"
+        f"medians: width {middle['width']:.1f} px, peak {middle['peak']:.0f}, expected sigma {middle['sigma']:.3f} px"
+    )
+
+
+def _lines(coordinates: NDArray[np.floating]) -> int:
+    """How many columns, or rows, hold points with such coordinates."""
+    return len(np.unique(np.rint(coordinates)))
+
+
+def _counted(points: int) -> str:
+    return f"{points:,} point{'s' * (points != 1)}" if points else "no stripe"
+
+
+def _end(values: NDArray[np.floating]) -> float:
+    """Where an axis from 0 ends that shows all values."""
+    known = values[np.isfinite(values)]
+    return 1.05 * float(known.max()) if known.size and known.max() > 0 else 1.0
+
+
+def _scaled_down(image: Rgb, longest: int) -> Rgb:
+    """The image, or its means over blocks where a side of it is longer than so many px."""
+    rows, columns = image.shape[:2]
+    if max(rows, columns) <= longest:
+        return image
+    scale = longest / max(rows, columns)
+    size = max(round(columns * scale), 1), max(round(rows * scale), 1)
+    return np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BOX))
+
+
+def _spread(points: StripePoints, count: int) -> list[int]:
+    """Numbers of the frames to show."""
+    seen = np.unique(points["frame"]) if len(points) else np.arange(count)
+    places = np.linspace(0, len(seen) - 1, min(SHOWN_FRAMES, len(seen)))
+    return [int(number) for number in seen[np.rint(places).astype(np.intp)]]
+
+
+def _sample(frames: Iterable[Rgb | None], wanted: list[int]) -> tuple[dict[int, Rgb], list[int], tuple[int, int]]:
+    """The frames of such numbers, scaled down; the numbers of lost ones; rows and columns of a frame."""
+    shown: dict[int, Rgb] = {}
+    lost = []
+    size = (3, 4)  # of a film all of whose frames are lost
+    for number, frame in enumerate(frames):
+        if frame is None:
+            lost.append(number)
+            continue
+        size = frame.shape[0], frame.shape[1]
+        if number in wanted:
+            shown[number] = _scaled_down(frame, SHOWN_PX).copy()
+    return shown, lost, size
+
+
+def _draw_coverage(panel: "Axes", points: StripePoints, count: int, size: tuple[int, int], lost: list[int]) -> None:
+    """The shares of columns and of rows of each frame that hold a point."""
+    for name, lines, colour, label in (
+        ("i", size[1], COLUMNS, "columns that hold a point"),
+        ("j", size[0], ROWS, "rows that hold a point"),
+    ):
+        held = np.unique(np.column_stack([points["frame"], np.rint(points[name])]), axis=0)
+        share = np.bincount(held[:, 0].astype(np.intp), minlength=count) / lines
+        _draw_line(panel, 100 * share, lost, colour, label)
+    panel.set(ylabel="covered, % of the image", ylim=(0, None))
+
+
+def _draw_quantiles(panel: "Axes", name: str, points: StripePoints, count: int) -> None:
+    """Median and middle 80 % of what was measured of the points, frame by frame; a gap where there are none."""
+    quantiles = np.full((count, 3), np.nan)
+    numbers, starts = np.unique(points["frame"], return_index=True)
+    for number, values in zip(numbers, np.split(points[name], starts[1:]), strict=False):
+        quantiles[number] = np.quantile(values, (0.1, 0.5, 0.9))
+    low, middle, high = quantiles.T
+    panel.fill_between(np.arange(count), low, high, color=BAND, linewidth=0, label="middle 80 %")
+    _draw_line(panel, middle, [], LINE, "median")
+    panel.set(ylabel=MEASURED[name], ylim=(0, ENDS.get(name)))
+
+
+def _draw_line(
+    panel: "Axes", values: NDArray[np.floating | np.integer], lost: list[int], colour: str, label: str
+) -> None:
+    """A value a frame, joined by a line that has gaps where frames are lost."""
+    known = np.array(values, np.float64)
+    known[lost] = np.nan
+    panel.plot(known, color=colour, linewidth=1, marker=".", markersize=2, label=label or None)

@@ -1,0 +1,122 @@
+"""Noise of the centres along the stripe: how large it is, and smoothing that does not round corners.
+
+Each centre is moved to the parabola through its neighbours along the stripe, as many on either side as still agree with
+it: the window grows until the confidence intervals of its estimates have no common point (A. Goldenshluger and
+A. Nemirovski, "On spatially adaptive estimation of nonparametric regression", Mathematical Methods of Statistics 6(2),
+1997; V. Katkovnik, "A new method for varying adaptive bandwidth selection", IEEE Transactions on Signal Processing
+47(9), 1999, doi:10.1109/78.782208). At a corner the window is short, and nothing is smoothed.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.compiled import compiled
+from footscan.stripe.profile import WIDTH
+from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SPACING_PX, I, J
+
+APART = 2
+"""Steps along the stripe after which noise of one centre tells nothing of the next: speckle, mosaic and compression
+join neighbours."""
+JOINED = 1.5
+"""So many neighbours tell as much as one that stood apart."""
+INTERVAL = 1.6
+"""Half width of a confidence interval, in standard deviations."""
+SHORTEST, GROWTH = 2, 1.4
+"""Steps on either side of the first window, and how much longer the next ones are."""
+STRAIGHT = 0.9
+"""Cosine of the angle to which the stripe may turn within a window: a parabola follows no more."""
+FLOOR_PX = 0.02
+"""What remains when all noise is smoothed away: sampling, lens and compression."""
+PRIOR_PX = 0.06
+"""Noise of a centre, for a stripe of one px width, where too few points tell."""
+FEWEST = 12
+
+
+@compiled
+def smooth_along(
+    profiles: NDArray[np.float64], chain: NDArray[np.int32], widths: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How far each point is to be moved along its normal, px (N,), and its standard deviation then, px (N,).
+
+    Parameters
+    ----------
+    profiles : (N, 9), in their order along the stripe.
+    chain : (N,) a number for each point, the same for those that follow each other.
+    widths : how many widths of the stripe are looked at on either side; 0 moves nothing.
+    """
+    count = len(profiles)
+    unit = _noise(profiles, chain)
+    moves, sigmas = np.zeros(count), np.empty(count)
+    for a in range(count):
+        own = unit * math.sqrt(profiles[a, WIDTH])
+        sigmas[a] = math.sqrt(own * own + FLOOR_PX * FLOOR_PX)
+        normal_i, normal_j = profiles[a, NORMAL_I], profiles[a, NORMAL_J]
+        centre_i, centre_j = profiles[a, I], profiles[a, J]
+        reach = int(widths * profiles[a, WIDTH] / SPACING_PX)
+        low, high = -math.inf, math.inf
+        n = 1.0
+        s1 = s2 = s3 = s4 = t0 = t1 = t2 = 0.0
+        window = min(SHORTEST, reach)
+        for m in range(1, reach + 1):
+            if a < m or a + m >= count or chain[a - m] != chain[a] or chain[a + m] != chain[a]:
+                break
+            before = abs(normal_i * profiles[a - m, NORMAL_I] + normal_j * profiles[a - m, NORMAL_J])
+            after = abs(normal_i * profiles[a + m, NORMAL_I] + normal_j * profiles[a + m, NORMAL_J])
+            if min(before, after) < STRAIGHT:
+                break
+            for b in (a - m, a + m):
+                d_i, d_j = profiles[b, I] - centre_i, profiles[b, J] - centre_j
+                x, y = d_j * normal_i - d_i * normal_j, d_i * normal_i + d_j * normal_j
+                square = x * x
+                s1 += x
+                s2 += square
+                s3 += square * x
+                s4 += square * square
+                t0 += y
+                t1 += x * y
+                t2 += square * y
+            n += 2
+            if m < window:
+                continue
+            window = min(math.ceil(m * GROWTH), reach)
+            # The parabola's value at 0, and its variance for unit noise: the first row of the inverse normal matrix.
+            c0, c1, c2 = s2 * s4 - s3 * s3, s2 * s3 - s1 * s4, s1 * s3 - s2 * s2
+            determinant = n * c0 + s1 * c1 + s2 * c2
+            if not determinant > 0:
+                break
+            estimate = (c0 * t0 + c1 * t1 + c2 * t2) / determinant
+            sigma = own * min(1.0, math.sqrt(JOINED * c0 / determinant))
+            low, high = max(low, estimate - INTERVAL * sigma), min(high, estimate + INTERVAL * sigma)
+            if low > high:
+                break
+            moves[a] = estimate
+            sigmas[a] = math.sqrt(sigma * sigma + FLOOR_PX * FLOOR_PX)
+    return moves, sigmas
+
+
+@compiled
+def _noise(profiles: NDArray[np.float64], chain: NDArray[np.int32]) -> float:
+    """Standard deviation of the centres, px, for a stripe 1 px wide; it grows with the root of the width.
+
+    From how far a point lies off the line through two that are some steps away, which on a straight stripe is noise of
+    three: a median, for corners are few.
+    """
+    off = np.empty(len(profiles))
+    count = 0
+    half = APART // 2
+    for a in range(3 * half, len(profiles) - 3 * half):
+        b, c = a - 3 * half, a + 3 * half
+        if chain[b] != chain[a] or chain[c] != chain[a]:
+            continue
+        chord_i, chord_j = profiles[c, I] - profiles[b, I], profiles[c, J] - profiles[b, J]
+        d_i = chord_i - 3 * (profiles[a + half, I] - profiles[a - half, I])
+        d_j = chord_j - 3 * (profiles[a + half, J] - profiles[a - half, J])
+        length = math.sqrt(chord_i * chord_i + chord_j * chord_j)
+        if length > 0:
+            off[count] = abs(d_i * chord_j - d_j * chord_i) / (length * math.sqrt(20 * profiles[a, WIDTH]))
+            count += 1
+    if count < FEWEST:
+        return PRIOR_PX
+    return max(1.4826 * float(np.median(off[:count])), 1e-3)
