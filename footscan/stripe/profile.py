@@ -26,6 +26,9 @@ FLAT = 0.05
 FLAT_SAMPLES = 4
 RINGING = 0.06
 """What compression makes of a saturated level is less than this part of it, and no foot."""
+PART_BITS = 12
+PARTS = 1 << PART_BITS
+"""Of a pixel, to which the place of a sample is known."""
 LEVEL_SAMPLES = 8
 """What has not fallen after so many samples is no stripe, unless it is saturated."""
 NEARLY = 40
@@ -55,7 +58,7 @@ def measure_profiles(
     rows, columns = words.shape
     reach = math.ceil(limits.largest_width)
     samples, white = np.empty(2 * reach + 1), np.empty(2 * reach + 1)
-    clipped, cells = np.empty(2 * reach + 1, np.bool_), np.empty(2 * reach + 1, np.uint64)
+    clipped, cells = np.empty(2 * reach + 1, np.bool_), np.empty(2 * reach + 1, np.int64)
     words, light = words.ravel(), light.ravel()
     count = 0
     for n in range(len(ridges)):
@@ -66,16 +69,22 @@ def measure_profiles(
             at = round(ridges[n, J])
             beside = ridges[n, I] + (at - ridges[n, J]) * slope
             back, ahead = _steps_inside(at, rows, beside, columns, slope, reach)
-            first, last = _walk(light, columns, 1, at, beside, slope, reach, back, ahead, limits, samples, white, cells)
+            first, last, base = _walk(
+                light, columns, 1, at, beside, slope, reach, back, ahead, limits, samples, white, cells
+            )
         else:
             slope, step = normal_j / normal_i, 1 / abs(normal_i)
             at = round(ridges[n, I])
             beside = ridges[n, J] + (at - ridges[n, I]) * slope
             back, ahead = _steps_inside(at, columns, beside, rows, slope, reach)
-            first, last = _walk(light, 1, columns, at, beside, slope, reach, back, ahead, limits, samples, white, cells)
+            first, last, base = _walk(
+                light, 1, columns, at, beside, slope, reach, back, ahead, limits, samples, white, cells
+            )
         if first == last:
             continue
-        centre = _measure(words, light, samples, white, cells, clipped, first, last, step, limits, profiles, count)
+        centre = _measure(
+            words, light, samples, white, cells, clipped, first, last, base, step, limits, profiles, count
+        )
         if math.isnan(centre):
             continue
         along, across = at + centre - reach, beside + (centre - reach) * slope
@@ -93,7 +102,9 @@ def _steps_inside(at: int, lines: int, beside: float, pixels: int, slope: float,
         return -1, -1
     back, ahead = min(at, reach), min(lines - 1 - at, reach)
     if slope != 0:
-        to_start, to_end = int(beside / abs(slope)), int((pixels - 1 - beside) / abs(slope))
+        # A thousandth of a pixel short of the border, for `_walk` rounds.
+        to_start = int(max(beside - 0.01, 0) / abs(slope))
+        to_end = int(max(pixels - 1.01 - beside, 0) / abs(slope))
         back = min(back, to_start if slope > 0 else to_end)
         ahead = min(ahead, to_end if slope > 0 else to_start)
     return back, ahead
@@ -113,49 +124,56 @@ def _walk(
     limits: Limits,
     samples: NDArray[np.float64],
     white: NDArray[np.float64],
-    cells: NDArray[np.uint64],
-) -> tuple[int, int]:
+    cells: NDArray[np.int64],
+) -> tuple[int, int, float]:
     """Samples outward from the ridge to both feet of the stripe; the first and the last one, equal where there is none.
 
+    And the level of the higher foot: what lies above it is the laser's, whatever edge runs beside the stripe.
     `line` and `pixel` are the distances, in `light` (rows * columns,), of two lines and of two pixels of one.
     """
     if back < 1 or ahead < 1:
-        return 0, 0
+        return 0, 0, 0.0
     smallest = SIGNAL_SCALE * limits.faintest
-    ends = (0, 0)
-    here = 0.0
+    first = last = 0
+    here = base = least_fall = 0.0
     for direction in (-1, 1):
         lowest = math.inf
-        end = 0
-        for n in range(direction + 1 >> 1, (ahead if direction > 0 else back) + 1):
-            across = beside + direction * n * slope
-            whole = int(across)
-            part = np.uint64((across - whole) * 256 + 0.5)
-            cell = np.uint64((at + direction * n) * line + whole * pixel)
-            lights = lights_of(light[cell]) * (np.uint64(256) - part)
+        end = start = middle if direction < 0 else middle + 1
+        # Where the normal meets each line, in parts of a pixel: whole numbers are several times as fast.
+        across = round(beside * PARTS) + (start - middle) * round(slope * PARTS)
+        turn = direction * round(slope * PARTS)
+        offset = (at + start - middle) * line
+        for n in range(start - middle if direction > 0 else 0, (ahead if direction > 0 else back) + 1):
+            cell, part = offset + (across >> PART_BITS) * pixel, across & (PARTS - 1)
+            lights = lights_of(light[cell]) * (PARTS - part)
             if part > 0:
-                lights += lights_of(light[cell + np.uint64(pixel)]) * part
-            value = (lights & np.uint64(0xFFFFFFFF)) / 256
+                lights += lights_of(light[cell + pixel]) * part
+            value = (lights & 0xFFFFFFFF) * (1.0 / PARTS)
             end = middle + direction * n
             samples[end] = value
-            white[end] = (lights >> np.uint64(32)) / 256
-            cells[end] = cell + np.uint64(pixel) if part > 128 else cell
+            white[end] = (lights >> 32) * (1.0 / PARTS)
+            cells[end] = cell + pixel if 2 * part > PARTS else cell
             if n == 0:
                 here = value
+                least_fall = max(smallest, RINGING * here)
             lowest = min(lowest, value)
+            across += turn
+            offset += direction * line
+            if n < FLAT_SAMPLES:
+                continue
             fall = here - lowest
-            if n >= FLAT_SAMPLES:
-                if fall >= max(smallest, RINGING * here):
-                    if value - lowest > VALLEY * fall:
-                        break
-                    if value < here - 0.5 * fall and samples[end - direction * FLAT_SAMPLES] - value < FLAT * fall:
-                        break
-                elif n >= LEVEL_SAMPLES and here < SIGNAL_SCALE * limits.saturation:
+            if fall >= least_fall:
+                if value - lowest > VALLEY * fall:
                     break
+                if value < here - 0.5 * fall and samples[end - direction * FLAT_SAMPLES] - value < FLAT * fall:
+                    break
+            elif n >= LEVEL_SAMPLES and fall < smallest and here < SIGNAL_SCALE * limits.saturation:
+                break
         if here - lowest < smallest:
-            return 0, 0
-        ends = (end, end) if direction < 0 else (ends[0], end)
-    return ends
+            return 0, 0, 0.0
+        base = max(base, lowest)
+        first, last = (end, last) if direction < 0 else (first, end)
+    return first, last, base
 
 
 @compiled
@@ -164,10 +182,11 @@ def _measure(
     light: NDArray[np.uint32],
     samples: NDArray[np.float64],
     white: NDArray[np.float64],
-    cells: NDArray[np.uint64],
+    cells: NDArray[np.int64],
     clipped: NDArray[np.bool_],
     first: int,
     last: int,
+    base: float,
     step: float,
     limits: Limits,
     profiles: NDArray[np.float64],
@@ -176,8 +195,6 @@ def _measure(
     """The centre in samples, and width, contrast, symmetry and saturation of profile `n`; NaN where it is no stripe."""
     middle = samples.size // 2
     here = samples[middle]
-    # The higher of the two feet: what lies above it is the laser's, whatever edge runs beside the stripe.
-    base = max(_lowest(samples, first, middle), _lowest(samples, middle, last))
     left, right, top = _half_height(samples, middle, base + 0.5 * (here - base), first, last)
     contrast = top - base
     if contrast < 2 * (here - base):  # otherwise the ridge is on a shoulder
@@ -267,7 +284,7 @@ def _half_height(
 def _saturation(
     words: NDArray[np.uint32],
     light: NDArray[np.uint32],
-    cells: NDArray[np.uint64],
+    cells: NDArray[np.int64],
     clipped: NDArray[np.bool_],
     first: int,
     last: int,

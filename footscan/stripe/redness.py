@@ -18,7 +18,7 @@ WHITE_SCALE = 5
 SATURATED = np.int32(1 << 12)
 """More than the redness of four pixels."""
 _BYTE, _TWO_BYTES, _RED_AND_BLUE = np.uint32(0xFF), np.uint32(0xFFFF), np.uint32(0x00FF00FF)
-_THREE, _EIGHT, _SIXTEEN = np.uint32(3), np.uint32(8), np.uint32(16)
+_EIGHT, _SIXTEEN = np.uint32(8), np.uint32(16)
 
 
 def as_words(image: NDArray[np.uint8]) -> NDArray[np.uint32]:
@@ -45,13 +45,13 @@ def redness_of(word: np.uint32) -> int:
 
 
 @compiled
-def lights_of(word: np.uint32) -> np.uint64:
+def lights_of(word: np.uint32) -> int:
     """The signal 2 R + G + B, and in the upper half R + 3 G + B.
 
     The second tells the core of an over-exposed stripe: green is saturated last, and the mosaic samples it most.
     """
-    red, green, blue = word & _BYTE, (word >> _EIGHT) & _BYTE, (word >> _SIXTEEN) & _BYTE
-    return np.uint64(red + red + green + blue) | (np.uint64(red + green * _THREE + blue) << np.uint64(32))
+    red, green, blue = np.int64(word & _BYTE), np.int64((word >> _EIGHT) & _BYTE), np.int64((word >> _SIXTEEN) & _BYTE)
+    return int((2 * red + green + blue) | ((red + 3 * green + blue) << 32))
 
 
 @compiled

@@ -45,10 +45,7 @@ def extract(
     if overlay is not None:
         _check_overlay(overlay, out, [path for path in (file, background) if path is not None])
 
-    if backgrounds is None:
-        points = extract_film(pixel_frames(film), parameters)
-    else:
-        points = extract_film(pixel_frames(film), parameters, backgrounds)
+    points = extract_film(pixel_frames(film), parameters, backgrounds)
     if out is not None:
         write_atomically(out, points_csv(points).encode())
     elif not as_json:

@@ -36,6 +36,7 @@ def simulate_scan(
     seed: Seed = 1,
     scanner_seed: ScannerSeed = 1,
     stripe_truth: Annotated[bool, typer.Option("--stripe-truth", help="Also write the true stripe centres.")] = False,
+    laser_off: Annotated[bool, typer.Option("--laser-off", help="Also film with the laser off: backgrounds.")] = False,
 ) -> None:
     """Film a mesh that stands on the glass, in the middle of the travel."""
     from footscan.virtual.record import record_scan
@@ -60,6 +61,7 @@ def simulate_scan(
             settings=settings,
             calibration=calibration,
             stripe_truth=stripe_truth,
+            laser_off=laser_off,
             progress=progress,
         )
     message(f"{out}: filmed {settings.frames} frames by each of 8 cameras")

@@ -22,12 +22,11 @@ def run(inputs: Mapping[str, bytes], parameters: ExtractionParameters, places: M
     manifest = FrameManifest.model_validate_json(inputs["manifest"])
     lost: list[int] = []
     frames = _noting_lost(_frames(places["array"], manifest), lost)
+    backgrounds = None
     if "background" in inputs:
         laser_off = FrameManifest.model_validate_json(inputs["background"])
         backgrounds = _backgrounds(places["background"], laser_off, len(manifest.frames))
-        stripe = extract_film(frames, parameters, backgrounds)
-    else:
-        stripe = extract_film(frames, parameters)
+    stripe = extract_film(frames, parameters, backgrounds)
     return pack(stripe=stripe, lost=np.array(lost, np.int32))
 
 
@@ -53,5 +52,4 @@ def _backgrounds(array: Path, manifest: FrameManifest, count: int) -> Iterator[R
     backgrounds = _frames(array, manifest)
     if len(manifest.frames) == count:
         return backgrounds
-    only = next(backgrounds)
-    return repeat(None if only is None else only.copy(), count)
+    return repeat(next(backgrounds), count)  # it stays as it is: no other is asked for
