@@ -73,6 +73,7 @@ def find_stripe(
             background is not None,
             buffers.excess,
             buffers.signal,
+            buffers.ridges,
             gaussian(0.5 * parameters.ridge_px),
             limits_of(parameters),
             (
@@ -113,6 +114,7 @@ class _Buffers(threading.local):
         self.shape = rows, columns
         half = math.ceil(rows / 2), math.ceil(columns / 2)
         self.excess, self.signal = np.empty(half, np.uint16), np.empty(half, np.uint16)
+        self.ridges = np.empty((8 * sum(half), 5))
 
 
 _BUFFERS = _Buffers()
@@ -131,6 +133,7 @@ def _find_points(
     has_background: bool,
     excess: NDArray[np.uint16],
     signal: NDArray[np.uint16],
+    ridges: NDArray[np.float64],
     kernel: NDArray[np.float32],
     limits: Limits,
     piece_limits: tuple[float, float, float, float, float, float],
@@ -141,7 +144,6 @@ def _find_points(
     halve(light, limits.saturation, excess, signal)
     if has_background:
         mark_saturated(words, limits.saturation, excess)
-    ridges = np.empty((8 * sum(signal.shape), 5))
     count = find_ridges(excess, signal, kernel, limits, ridges)
     if count > len(ridges):
         ridges = np.empty((count, 5))

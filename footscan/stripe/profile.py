@@ -21,7 +21,7 @@ WIDTH, CONTRAST, SYMMETRY, SATURATION, LIGHT = range(SHARPNESS + 1, SHARPNESS + 
 COLUMNS = LIGHT + 1
 VALLEY = 0.3
 """Rise, relative to the fall before it, at which the foot of the stripe is passed."""
-FLAT = 0.05
+FLAT = 0.1
 """Fall over `FLAT_SAMPLES`, relative to that from the top, that is the foot of the stripe."""
 FLAT_SAMPLES = 4
 RINGING = 0.06
