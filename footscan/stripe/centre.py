@@ -25,6 +25,8 @@ where the flanks of a saturated one are. Steger asks for 0.29 at least."""
 CUT = 2.6
 """Where the smoothing of `ridge` ends, in its standard deviations."""
 PASSES = 3
+CAP = 0.9
+"""Of the height of a saturated stripe, what `gravity` counts no more: its top is cut off, and may be so askew."""
 LEAST, BEYOND, FEWEST = 0.2, 1.5, 4
 """Of the fit of a Gaussian: what it counts of the height, how many samples beyond half height, and how few will do."""
 
@@ -52,12 +54,12 @@ def centre_of(
     contrast : height of the profile above it.
     """
     if limits.method == GRAVITY:
-        return _gravity(samples, first, last, left, right, base + limits.centre_level * contrast)
+        return _gravity(samples, clipped, first, last, left, right, base, contrast, limits.centre_level)
     if limits.method == GAUSSIAN:
         fitted = _gaussian(samples, clipped, first, last, left, right, base, contrast)
         if not math.isnan(fitted):
             return fitted
-        return _gravity(samples, first, last, left, right, base + limits.centre_level * contrast)
+        return _gravity(samples, clipped, first, last, left, right, base, contrast, limits.centre_level)
     if limits.method == RIDGE:
         return _ridge(samples, first, last, left, right)
     if limits.method == FIR:
@@ -66,14 +68,34 @@ def centre_of(
 
 
 @compiled
-def _gravity(samples: NDArray[np.float64], first: int, last: int, left: float, right: float, level: float) -> float:
-    """Of the polygon through the samples, as far as it lies above the level around the stripe: exact integrals."""
+def _gravity(
+    samples: NDArray[np.float64],
+    clipped: NDArray[np.bool_],
+    first: int,
+    last: int,
+    left: float,
+    right: float,
+    base: float,
+    contrast: float,
+    level: float,
+) -> float:
+    """Of what lies above a level around the stripe; where it is saturated, also below another: of its flanks."""
     a, b = math.floor(left), math.ceil(right)
-    while a > first and samples[a] > level:
+    while a > first and samples[a] > base + level * contrast:
         a -= 1
-    while b < last and samples[b] > level:
+    while b < last and samples[b] > base + level * contrast:
         b += 1
     origin = 0.5 * (left + right)
+    area, moment = _above(samples, a, b, base + level * contrast, origin)
+    if clipped[round(origin)] and level < CAP:
+        cut_area, cut_moment = _above(samples, a, b, base + CAP * contrast, origin)
+        area, moment = area - cut_area, moment - cut_moment
+    return origin + moment / area if area > 0 else math.nan
+
+
+@compiled
+def _above(samples: NDArray[np.float64], a: int, b: int, level: float, origin: float) -> tuple[float, float]:
+    """Area above a level of the polygon through samples a to b, and its first moment around `origin`, exactly."""
     area = moment = 0.0
     for k in range(a, b):
         low, high = samples[k] - level, samples[k + 1] - level
@@ -91,7 +113,7 @@ def _gravity(samples: NDArray[np.float64], first: int, last: int, left: float, r
         area += part
         # Of a trapezoid: the middle of its base, and off it by the difference of its sides.
         moment += part * (k + 0.5 * (start + end) - origin) + length * length * (high - low) / 12
-    return origin + moment / area if area > 0 else math.nan
+    return area, moment
 
 
 @compiled

@@ -31,6 +31,8 @@ PARTS = 1 << PART_BITS
 """Of a pixel, to which the place of a sample is known."""
 LEVEL_SAMPLES = 8
 """What has not fallen after so many samples is no stripe, unless it is saturated."""
+EDGE = 0.25
+"""Difference of the feet, relative to the height of the stripe, from which an edge runs along it."""
 NEARLY = 40
 """Levels below saturation at which red has no room left to tell a laser from a lamp."""
 WHITE_RISE = 60.0
@@ -194,6 +196,7 @@ def _measure(
 ) -> float:
     """The centre in samples, and width, contrast, symmetry and saturation of profile `n`; NaN where it is no stripe."""
     middle = samples.size // 2
+    base = _level(samples, first, middle, last, base)
     here = samples[middle]
     left, right, top = _half_height(samples, middle, base + 0.5 * (here - base), first, last)
     contrast = top - base
@@ -220,6 +223,18 @@ def _measure(
 
 
 @compiled
+def _level(samples: NDArray[np.float64], first: int, top: int, last: int, base: float) -> float:
+    """Takes the slope of the light beside the stripe out of the samples, where it is no edge; the level of the feet."""
+    rise = samples[last] - samples[first]
+    if abs(rise) >= EDGE * (samples[top] - base):
+        return base
+    slope = rise / (last - first)
+    for k in range(first, last + 1):
+        samples[k] -= slope * (k - top)
+    return max(_lowest(samples, first, top), _lowest(samples, top, last))
+
+
+@compiled
 def _white_centre(
     white: NDArray[np.float64],
     clipped: NDArray[np.bool_],
@@ -238,6 +253,7 @@ def _white_centre(
         if white[k] > white[top]:
             top = k
     base = max(_lowest(white, first, top), _lowest(white, top, last))
+    base = _level(white, first, top, last, base)
     rim = max(white[max(math.floor(left), first)], white[min(math.ceil(right), last)], white[first], white[last])
     contrast = white[top] - base
     if white[top] - rim < WHITE_RISE:
@@ -294,8 +310,8 @@ def _saturation(
 ) -> float:
     """The part of the stripe's width in which red is saturated; -1 where the light is not the laser's.
 
-    The laser's light is redder than what lies beside it, in the flanks at least. Where red is saturated in the stripe
-    and has no room left beside it either, any light may be the laser's. Fills `clipped` with whether it is saturated.
+    The laser's light is redder than what lies beside it, in the flanks at least. On a side where red has no room left
+    above it, any light may be the laser's. Fills `clipped` with whether it is saturated.
     """
     reddest = saturated = inside = 0
     for k in range(max(first, math.ceil(left - BESIDE)), min(last, math.floor(right + BESIDE)) + 1):
@@ -305,7 +321,6 @@ def _saturation(
             inside += 1
             saturated += clipped[k]
     share = saturated / max(inside, 1)
-    redness_beside, red_beside = 0, 255
     for end, direction in ((first, 1), (last, -1)):
         redness, level = 255, 0
         for n in range(FOOT_SAMPLES):
@@ -314,9 +329,7 @@ def _saturation(
                 break
             redness = min(redness, redness_of(light[cells[k]]))
             level = max(level, red_of(words[cells[k]]))
-        if redness < 255:
-            redness_beside = max(redness_beside, redness)
-        red_beside = min(red_beside, level)
-    if reddest - redness_beside >= limits.red_threshold:
-        return share
-    return share if share > 0.5 and red_beside >= limits.saturation - NEARLY else -1.0
+        has_no_room = share > 0.5 and level >= limits.saturation - NEARLY
+        if redness < 255 and reddest - redness < limits.red_threshold and not has_no_room:
+            return -1.0
+    return share

@@ -29,13 +29,13 @@ class ExtractionParameters(Document):
         description="standard deviation in px of the Gaussian under which the ridge of the stripe is sought",
     )
     smallest_contrast: float = Field(
-        default=8.0,
+        default=12.0,
         ge=1.0,
         le=255.0,
         description="grey levels by which the stripe must stand out from both its sides",
     )
     faintest_contrast: float = Field(
-        default=4.0,
+        default=6.0,
         ge=1.0,
         le=255.0,
         description="grey levels by which the ends of a piece must stand out that is stronger elsewhere",

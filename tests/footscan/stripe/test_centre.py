@@ -123,7 +123,7 @@ def test_gaussian_leaves_saturated_samples_out():
 def test_a_gaussian_of_too_few_samples_is_a_centre_of_gravity():
     samples = gaussian(0.3, sigma=1.5)
     clipped = np.abs(X - MIDDLE) <= 1
-    assert centre(samples, "gaussian", clipped=clipped) == centre(samples, "gravity")
+    assert centre(samples, "gaussian", clipped=clipped) == centre(samples, "gravity", clipped=clipped)
 
 
 def test_where_a_method_finds_nothing():
