@@ -71,7 +71,7 @@ def measure_profiles(
             at = round(ridges[n, J])
             beside = ridges[n, I] + (at - ridges[n, J]) * slope
             back, ahead = _steps_inside(at, rows, beside, columns, slope, reach)
-            first, last, base = _walk(
+            first, last, base, is_even = _walk(
                 light, columns, 1, at, beside, slope, reach, back, ahead, limits, samples, white, cells
             )
         else:
@@ -79,13 +79,13 @@ def measure_profiles(
             at = round(ridges[n, I])
             beside = ridges[n, J] + (at - ridges[n, I]) * slope
             back, ahead = _steps_inside(at, columns, beside, rows, slope, reach)
-            first, last, base = _walk(
+            first, last, base, is_even = _walk(
                 light, 1, columns, at, beside, slope, reach, back, ahead, limits, samples, white, cells
             )
         if first == last:
             continue
         centre = _measure(
-            words, light, samples, white, cells, clipped, first, last, base, step, limits, profiles, count
+            words, light, samples, white, cells, clipped, first, last, base, is_even, step, limits, profiles, count
         )
         if math.isnan(centre):
             continue
@@ -127,16 +127,18 @@ def _walk(
     samples: NDArray[np.float64],
     white: NDArray[np.float64],
     cells: NDArray[np.int64],
-) -> tuple[int, int, float]:
+) -> tuple[int, int, float, bool]:
     """Samples outward from the ridge to both feet of the stripe; the first and the last one, equal where there is none.
 
-    And the level of the higher foot: what lies above it is the laser's, whatever edge runs beside the stripe.
+    And the level of the higher foot: what lies above it is the laser's, whatever edge runs beside the stripe; and
+    whether both feet are even, not valleys before other light.
     `line` and `pixel` are the distances, in `light` (rows * columns,), of two lines and of two pixels of one.
     """
     if back < 1 or ahead < 1:
-        return 0, 0, 0.0
+        return 0, 0, 0.0, False
     smallest = SIGNAL_SCALE * limits.faintest
     first = last = 0
+    is_even = True
     here = base = least_fall = 0.0
     for direction in (-1, 1):
         lowest = math.inf
@@ -166,16 +168,17 @@ def _walk(
             fall = here - lowest
             if fall >= least_fall:
                 if value - lowest > VALLEY * fall:
+                    is_even = False
                     break
                 if value < here - 0.5 * fall and samples[end - direction * FLAT_SAMPLES] - value < FLAT * fall:
                     break
             elif n >= LEVEL_SAMPLES and fall < smallest and here < SIGNAL_SCALE * limits.saturation:
                 break
         if here - lowest < smallest:
-            return 0, 0, 0.0
+            return 0, 0, 0.0, False
         base = max(base, lowest)
         first, last = (end, last) if direction < 0 else (first, end)
-    return first, last, base
+    return first, last, base, is_even
 
 
 @compiled
@@ -189,6 +192,7 @@ def _measure(
     first: int,
     last: int,
     base: float,
+    is_even: bool,
     step: float,
     limits: Limits,
     profiles: NDArray[np.float64],
@@ -196,7 +200,8 @@ def _measure(
 ) -> float:
     """The centre in samples, and width, contrast, symmetry and saturation of profile `n`; NaN where it is no stripe."""
     middle = samples.size // 2
-    base = _level(samples, first, middle, last, base)
+    if is_even:
+        base = _level(samples, first, middle, last, base)
     here = samples[middle]
     left, right, top = _half_height(samples, middle, base + 0.5 * (here - base), first, last)
     contrast = top - base
@@ -210,7 +215,7 @@ def _measure(
         return math.nan
     centre = math.nan
     if saturation > 0:
-        centre = _white_centre(white, clipped, first, last, left, right, limits)
+        centre = _white_centre(white, clipped, first, last, left, right, is_even, limits)
     if math.isnan(centre):
         centre = centre_of(samples, clipped, first, last, left, right, base, contrast, limits)
     if not abs(centre - middle) * step <= 1 + 0.5 * width:
@@ -224,9 +229,12 @@ def _measure(
 
 @compiled
 def _level(samples: NDArray[np.float64], first: int, top: int, last: int, base: float) -> float:
-    """Takes the slope of the light beside the stripe out of the samples, where it is no edge; the level of the feet."""
-    rise = samples[last] - samples[first]
-    if abs(rise) >= EDGE * (samples[top] - base):
+    """Takes the slope of the room's light out of the samples; the level of the feet then.
+
+    Where the room is darker than the stripe it is left alone: a slope is an edge there, or light of another stripe.
+    """
+    rise, height = samples[last] - samples[first], samples[top] - base
+    if base < height or abs(rise) >= EDGE * height:
         return base
     slope = rise / (last - first)
     for k in range(first, last + 1):
@@ -242,6 +250,7 @@ def _white_centre(
     last: int,
     left: float,
     right: float,
+    is_even: bool,
     limits: Limits,
 ) -> float:
     """The centre of the white core of a stripe whose red is saturated from `left` to `right`; NaN where it has none.
@@ -253,7 +262,8 @@ def _white_centre(
         if white[k] > white[top]:
             top = k
     base = max(_lowest(white, first, top), _lowest(white, top, last))
-    base = _level(white, first, top, last, base)
+    if is_even:
+        base = _level(white, first, top, last, base)
     rim = max(white[max(math.floor(left), first)], white[min(math.ceil(right), last)], white[first], white[last])
     contrast = white[top] - base
     if white[top] - rim < WHITE_RISE:
