@@ -177,8 +177,9 @@ def _rows(
     rows, columns = words.shape
     for a in range(len(profiles)):
         i, j = profiles[a, I], profiles[a, J]
-        found[a, 0] = i + moves[a] * profiles[a, NORMAL_I]
-        found[a, 1] = j + moves[a] * profiles[a, NORMAL_J]
+        # Short of the border by a little: the line half a pixel on is still one of the image's.
+        found[a, 0] = min(max(i + moves[a] * profiles[a, NORMAL_I], -0.49), columns - 0.51)
+        found[a, 1] = min(max(j + moves[a] * profiles[a, NORMAL_J], -0.49), rows - 0.51)
         found[a, 2] = profiles[a, WIDTH]
         found[a, 3] = red_of(words[min(max(round(j), 0), rows - 1), min(max(round(i), 0), columns - 1)])
         found[a, 4] = profiles[a, CONTRAST] / (profiles[a, CONTRAST] + faintest) * profiles[a, SYMMETRY]
@@ -224,6 +225,7 @@ def _on_lines(found: NDArray[np.float64], frame: NDArray[np.int32]) -> tuple[NDA
             for column in range(len(FOUND)):
                 inside = part if column < 2 else min(max(part, 0.0), 1.0)
                 points[filled, column] = (1 - inside) * found[a - 1, column] + inside * found[a, column]
+            points[filled, axis] = line
             filled += 1
             line += way
     return points[:filled], frames[:filled]
