@@ -58,6 +58,23 @@ def open_film(path: Path, size: tuple[int, int] | None = None) -> Film:
     return film
 
 
+def open_background(path: Path, size: tuple[int, int], frames: int, whose: str = "the film") -> Film:
+    """`open_film` for the laser-off frames of a film of so many `frames`: one for all of them, or as many.
+
+    Raises
+    ------
+    RefusedInput
+        As in `open_film`; there are neither one frame nor as many as `whose` has, or the only one is torn.
+    """
+    background = open_film(path, size)
+    if background.frames not in {1, frames}:
+        expected = f"expected one frame or {frames}, as many as {whose} has, found {background.frames}"
+        raise RefusedInput(path, expected, field="frames")
+    if background.frames == 1 and next(pixel_frames(background)) is None:
+        raise RefusedInput(path, "expected a whole frame, found one that is torn", field="frames")
+    return background
+
+
 def encoded_frames(film: Film) -> Iterator[bytes | None]:
     """The frames of a film of kind `mjpeg` or `images` as they were encoded, None for each that is lost."""
     if film.kind == "images":

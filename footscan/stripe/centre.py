@@ -3,9 +3,8 @@
 threshold-median : the median of the samples above half height, as in the thesis
 gravity : the centre of gravity of what lies above a level
 gaussian : the Gaussian through the samples that are not saturated, their logarithms a parabola; where too few are
-    left, as `gravity` (H. Guo, "A simple
-    algorithm for fitting a Gaussian function", IEEE Signal Processing Magazine 28(5), 2011,
-    doi:10.1109/MSP.2011.941846)
+    left, as `gravity` (H. Guo, "A simple algorithm for fitting a Gaussian function", IEEE Signal Processing Magazine
+    28(5), 2011, doi:10.1109/MSP.2011.941846)
 ridge : where the first derivative of the profile, smoothed by a Gaussian as wide as the stripe, is zero (Steger 1998)
 fir : the zero crossing of a difference of two boxes, each as long as the stripe is wide (F. Blais and M. Rioux,
     "Real-time numerical peak detector", Signal Processing 11(2), 1986, doi:10.1016/0165-1684(86)90033-2)
@@ -53,12 +52,11 @@ def centre_of(
     base : the level beside the stripe, on the side where it is higher.
     contrast : height of the profile above it.
     """
-    if limits.method == GRAVITY:
-        return _gravity(samples, clipped, first, last, left, right, base, contrast, limits.centre_level)
     if limits.method == GAUSSIAN:
         fitted = _gaussian(samples, clipped, first, last, left, right, base, contrast)
         if not math.isnan(fitted):
             return fitted
+    if limits.method in (GRAVITY, GAUSSIAN):
         return _gravity(samples, clipped, first, last, left, right, base, contrast, limits.centre_level)
     if limits.method == RIDGE:
         return _ridge(samples, first, last, left, right)

@@ -66,22 +66,18 @@ def measure_profiles(
     for n in range(len(ridges)):
         normal_i, normal_j = ridges[n, NORMAL_I], ridges[n, NORMAL_J]
         upright = abs(normal_j) >= abs(normal_i)
-        if upright:
-            slope, step = normal_i / normal_j, 1 / abs(normal_j)
-            at = round(ridges[n, J])
-            beside = ridges[n, I] + (at - ridges[n, J]) * slope
-            back, ahead = _steps_inside(at, rows, beside, columns, slope, reach)
-            first, last, base, is_even = _walk(
-                light, columns, 1, at, beside, slope, reach, back, ahead, limits, samples, white, cells
-            )
-        else:
-            slope, step = normal_j / normal_i, 1 / abs(normal_i)
-            at = round(ridges[n, I])
-            beside = ridges[n, J] + (at - ridges[n, I]) * slope
-            back, ahead = _steps_inside(at, columns, beside, rows, slope, reach)
-            first, last, base, is_even = _walk(
-                light, 1, columns, at, beside, slope, reach, back, ahead, limits, samples, white, cells
-            )
+        # Lines are the rows where the stripe runs along these, otherwise the columns.
+        lines, pixels = (rows, columns) if upright else (columns, rows)
+        line, pixel = (columns, 1) if upright else (1, columns)
+        across, along = (normal_j, normal_i) if upright else (normal_i, normal_j)
+        ridge, other = (ridges[n, J], ridges[n, I]) if upright else (ridges[n, I], ridges[n, J])
+        slope, step = along / across, 1 / abs(across)
+        at = round(ridge)
+        beside = other + (at - ridge) * slope
+        back, ahead = _steps_inside(at, lines, beside, pixels, slope, reach)
+        first, last, base, is_even = _walk(
+            light, line, pixel, at, beside, slope, reach, back, ahead, limits, samples, white, cells
+        )
         if first == last:
             continue
         centre = _measure(
@@ -89,8 +85,8 @@ def measure_profiles(
         )
         if math.isnan(centre):
             continue
-        along, across = at + centre - reach, beside + (centre - reach) * slope
-        profiles[count, I], profiles[count, J] = (across, along) if upright else (along, across)
+        ridge, other = at + centre - reach, beside + (centre - reach) * slope
+        profiles[count, I], profiles[count, J] = (other, ridge) if upright else (ridge, other)
         profiles[count, NORMAL_I], profiles[count, NORMAL_J] = normal_i, normal_j
         profiles[count, SHARPNESS] = ridges[n, SHARPNESS]
         count += 1
@@ -104,7 +100,7 @@ def _steps_inside(at: int, lines: int, beside: float, pixels: int, slope: float,
         return -1, -1
     back, ahead = min(at, reach), min(lines - 1 - at, reach)
     if slope != 0:
-        # A thousandth of a pixel short of the border, for `_walk` rounds.
+        # A hundredth of a pixel short of the border, for `_walk` rounds.
         to_start = int(max(beside - 0.01, 0) / abs(slope))
         to_end = int(max(pixels - 1.01 - beside, 0) / abs(slope))
         back = min(back, to_start if slope > 0 else to_end)

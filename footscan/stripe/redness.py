@@ -15,8 +15,10 @@ SIGNAL_SCALE = 4
 """Levels of the signal for one grey level: it is 2 R + G + B, for the laser's red and a saturated core's white."""
 WHITE_SCALE = 5
 """The same of R + 3 G + B."""
+SUMMED = 4
+"""Pixels that one of the half-size image is the sum of."""
 SATURATED = np.int32(1 << 12)
-"""More than the redness of four pixels."""
+"""More than the redness of these."""
 _BYTE, _TWO_BYTES, _RED_AND_BLUE = np.uint32(0xFF), np.uint32(0xFFFF), np.uint32(0x00FF00FF)
 _EIGHT, _SIXTEEN = np.uint32(8), np.uint32(16)
 
@@ -77,7 +79,7 @@ def halve(words: NDArray[np.uint32], saturation: int, excess: NDArray[np.uint16]
     """
     rows, columns = words.shape
     whole = columns // 2
-    full = np.int32(4 * saturation)
+    full = np.int32(SUMMED * saturation)
     for y in range(excess.shape[0]):
         upper, lower = words[2 * y], words[min(2 * y + 1, rows - 1)]
         reds, lights = excess[y], signal[y]

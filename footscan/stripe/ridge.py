@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from footscan.compiled import compiled
 from footscan.stripe.limits import Limits
-from footscan.stripe.redness import SATURATED, SIGNAL_SCALE
+from footscan.stripe.redness import SATURATED, SIGNAL_SCALE, SUMMED
 
 SIDE = 16
 """Blocks and a border of one pixel, in px of the half-size image: as many numbers as the widest instructions take."""
@@ -31,8 +31,6 @@ ROUND = 0.5
 """Curvature along the ridge, relative to that across, from which it is a spot or the end of a stripe."""
 DOWN, ACROSS = 1, 2
 """Of a summit: highest down its column, across its row."""
-SUMMED = 4
-"""Pixels that one of the half-size image is the sum of."""
 SPACING_PX = 2
 """Distance of crossings along the stripe, as far as that runs along rows or columns."""
 I, J, NORMAL_I, NORMAL_J, SHARPNESS = range(5)  # noqa: E741 (the name of the axis)
@@ -58,8 +56,8 @@ def find_ridges(
 
     Ridges are looked for in the half-size image of `halve`, which `kernel` smooths: mosaic and JPEG tell the colour of
     four pixels together. A stripe that runs along the rows is crossed once in two columns of the whole image, between
-    these, and one that runs along the columns once in two rows. Looked at are pixels that are
-    redder than the block they lie in by the red threshold, and those whose red is saturated and can tell nothing.
+    these, and one that runs along the columns once in two rows. Looked at are pixels that are redder than the block
+    they lie in by the red threshold, and those whose red is saturated and can tell nothing.
     Of the rows written, i and j are the crossing in px, then the unit normal and the curvature across, levels of the
     signal per px^2. Crossings beyond the capacity are counted and not written.
     """

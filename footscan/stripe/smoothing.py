@@ -39,7 +39,7 @@ def smooth_along(
 
     Parameters
     ----------
-    profiles : (N, 9), in their order along the stripe.
+    profiles : (N, 10), in their order along the stripe.
     chain : (N,) a number for each point, the same for those that follow each other.
     widths : how many widths of the stripe are looked at on either side; 0 moves nothing.
     """

@@ -83,18 +83,11 @@ def _parameters(settings: Sequence[str]) -> "ExtractionParameters":
 
 def _backgrounds(path: Path, film: "Film") -> "Iterable[Rgb | None]":
     """A laser-off frame for each frame of the film: of its own, or one and the same."""
-    from footscan.frames.film import open_film, pixel_frames
+    from footscan.frames.film import open_background, pixel_frames
 
-    background = open_film(path, size=(film.height, film.width))
-    if background.frames not in {1, film.frames}:
-        expected = f"expected one frame or {film.frames}, as many as {film.path} has, found {background.frames}"
-        raise RefusedInput(path, expected, field="frames")
-    if background.frames > 1:
-        return pixel_frames(background)
-    frame = next(pixel_frames(background))
-    if frame is None:
-        raise RefusedInput(path, "expected a whole frame, found one that is torn", field="frames")
-    return repeat(frame, film.frames)
+    background = open_background(path, (film.height, film.width), film.frames, str(film.path))
+    frames = pixel_frames(background)
+    return frames if background.frames > 1 else repeat(next(frames), film.frames)
 
 
 def _check_overlay(overlay: Path, out: Path | None, sources: Sequence[Path]) -> None:

@@ -3,10 +3,9 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from footscan.frames.film import open_film, pixel_frames
+from footscan.frames.film import open_background
 from footscan.frames.ingest import FRAME_SIZE, ingest_film
 from schemas.documents import canonical_json
-from schemas.errors import RefusedInput
 from schemas.frames import FrameManifest
 
 
@@ -24,12 +23,7 @@ def ingest_background(background: Path, array: Path, frames: int) -> FrameManife
     Raises
     ------
     RefusedInput
-        As in `ingest_film`; the background has neither one frame nor as many as the film, or its only one is torn.
+        As in `ingest_film` and `open_background`.
     """
-    film = open_film(background, FRAME_SIZE)
-    if film.frames not in {1, frames}:
-        problem = f"expected one frame or {frames}, as many as the film has, found {film.frames}"
-        raise RefusedInput(background, problem, field="frames")
-    if film.frames == 1 and next(pixel_frames(film)) is None:
-        raise RefusedInput(background, "expected a whole frame, found one that is torn", field="frames")
+    open_background(background, FRAME_SIZE, frames)
     return ingest_film(background, array)
