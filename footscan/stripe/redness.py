@@ -74,6 +74,7 @@ def take_away(image: NDArray[np.uint8], background: NDArray[np.uint8], light: ND
 def halve(words: NDArray[np.uint32], saturation: int, excess: NDArray[np.uint16], signal: NDArray[np.uint16]) -> None:
     """Fills redness and signal, both (ceil(rows / 2), ceil(columns / 2)), each of the sum of four pixels.
 
+
     Where red is saturated in all four, `SATURATED` is added to the redness. What lies outside an image of odd size is
     as its last row and column.
     """
@@ -104,7 +105,12 @@ def _of_four(a: np.uint32, b: np.uint32, c: np.uint32, d: np.uint32, full: np.in
 @compiled
 def mark_saturated(words: NDArray[np.uint32], saturation: int, excess: NDArray[np.uint16]) -> None:
     """Adds `SATURATED` to the redness of `halve` where red is saturated in another image, that of all light."""
+    rows, columns = words.shape
     for y in range(excess.shape[0]):
+        below = min(2 * y + 1, rows - 1)
         for x in range(excess.shape[1]):
-            if red_of(words[2 * y, 2 * x]) >= saturation and excess[y, x] < SATURATED:
+            beside = min(2 * x + 1, columns - 1)
+            red = red_of(words[2 * y, 2 * x]) + red_of(words[2 * y, beside])
+            red += red_of(words[below, 2 * x]) + red_of(words[below, beside])
+            if red >= SUMMED * saturation and excess[y, x] < SATURATED:
                 excess[y, x] += np.uint16(SATURATED)
