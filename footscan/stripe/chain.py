@@ -167,7 +167,10 @@ def _step_from(profiles: NDArray[np.float64], nearest: NDArray[np.int32], a: int
 
 @compiled
 def pieces_of(profiles: NDArray[np.float64], gap: float, cells: Cells) -> tuple[NDArray[np.int32], int]:
-    """A number (N,) for each point, the same for points linked by steps of at most `gap` px; how many numbers."""
+    """A number (N,) for each point, the same for points linked by steps of at most `gap` px; how many numbers.
+
+    Of two points of a wide stripe, by steps of at most half its width.
+    """
     heads, others = cells
     piece = np.full(len(profiles), NONE, np.int32)
     waiting = np.empty(len(profiles), np.int32)
@@ -180,15 +183,16 @@ def pieces_of(profiles: NDArray[np.float64], gap: float, cells: Cells) -> tuple[
         while length:
             length -= 1
             a = waiting[length]
-            i, j = profiles[a, I], profiles[a, J]
-            top, bottom, left, right = _window(i, j, gap, *heads.shape)
+            i, j, width = profiles[a, I], profiles[a, J], profiles[a, WIDTH]
+            top, bottom, left, right = _window(i, j, max(gap, 0.5 * width), *heads.shape)
             for row in range(top, bottom):
                 for column in range(left, right):
                     b = heads[row, column]
                     while b != NONE:
                         if piece[b] == NONE:
                             d_i, d_j = profiles[b, I] - i, profiles[b, J] - j
-                            if d_i * d_i + d_j * d_j <= gap * gap:
+                            reach = max(gap, 0.5 * min(width, profiles[b, WIDTH]))
+                            if d_i * d_i + d_j * d_j <= reach * reach:
                                 piece[b] = count
                                 waiting[length] = b
                                 length += 1

@@ -13,7 +13,7 @@ from footscan.stripe.pieces import keep_stripe
 from footscan.stripe.points import STRIPE_DTYPE, StripePoints
 from footscan.stripe.profile import COLUMNS, CONTRAST, SATURATION, SYMMETRY, WIDTH, measure_profiles
 from footscan.stripe.redness import SIGNAL_SCALE, as_words, halve, mark_saturated, red_of, take_away
-from footscan.stripe.ridge import BLOCK, NORMAL_I, NORMAL_J, REACH, I, J, find_ridges, gaussian
+from footscan.stripe.ridge import NORMAL_I, NORMAL_J, I, J, find_ridges, gaussian
 from footscan.stripe.smoothing import smooth_along
 from schemas.parameters.extraction import ExtractionParameters
 
@@ -48,9 +48,6 @@ def extract_stripe(
 FOUND = ("i", "j", "width", "peak", "score", "saturation", "sigma")
 """Columns of what `find_stripe` gives, before the numbers of the piece and of the chain."""
 PIECE, CHAIN = len(FOUND), len(FOUND) + 1
-BAND = 4 * BLOCK
-"""Rows of the half-size image after which profiles are measured, while the frame's pixels there are at hand."""
-FIRST_PROFILES = 512
 
 
 def find_stripe(
@@ -117,7 +114,7 @@ class _Buffers(threading.local):
         self.shape = rows, columns
         half = math.ceil(rows / 2), math.ceil(columns / 2)
         self.excess, self.signal = np.empty(half, np.uint16), np.empty(half, np.uint16)
-        self.ridges = np.empty((BAND * half[1], 5))
+        self.ridges = np.empty((8 * sum(half), 5))
 
 
 _BUFFERS = _Buffers()
@@ -144,22 +141,15 @@ def _find_points(
     smoothing_widths: float,
 ) -> NDArray[np.float64]:
     rows, columns = words.shape
-    profiles, count = np.empty((FIRST_PROFILES, COLUMNS)), 0
-    ready = 0
-    for top in range(0, len(excess), BAND):
-        bottom = min(top + BAND, len(excess))
-        wanted = min(bottom + REACH, len(excess))
-        halve(light[2 * ready : 2 * wanted], limits.saturation, excess[ready:wanted], signal[ready:wanted])
-        if has_background:
-            mark_saturated(words[2 * ready : 2 * wanted], limits.saturation, excess[ready:wanted])
-        ready = wanted
-        found = find_ridges(excess, signal, top, bottom, kernel, limits, ridges)
-        if count + found > len(profiles):
-            more = np.empty((2 * (count + found), COLUMNS))
-            more[:count] = profiles[:count]
-            profiles = more
-        count += measure_profiles(words, light, ridges[:found], limits, profiles[count:])
-    profiles = profiles[:count]
+    halve(light, limits.saturation, excess, signal)
+    if has_background:
+        mark_saturated(words, limits.saturation, excess)
+    count = find_ridges(excess, signal, kernel, limits, ridges)
+    if count > len(ridges):
+        ridges = np.empty((count, 5))
+        count = find_ridges(excess, signal, kernel, limits, ridges)
+    profiles = np.empty((count + 1, COLUMNS))
+    profiles = profiles[: measure_profiles(words, light, ridges[:count], limits, profiles)]
 
     profiles = profiles[is_sharpest(profiles, place(profiles, rows, columns))]
     piece, pieces = pieces_of(profiles, gap, place(profiles, rows, columns))

@@ -28,8 +28,6 @@ RINGING = 0.06
 """What compression makes of a saturated level is less than this part of it, and no foot."""
 PART_BITS = 12
 PARTS = 1 << PART_BITS
-LOWER = (1 << 32) - 1
-LARGE = 1 << 32
 """Of a pixel, to which the place of a sample is known."""
 LEVEL_SAMPLES = 8
 """What has not fallen after so many samples is no stripe, unless it is saturated."""
@@ -61,9 +59,8 @@ def measure_profiles(
     """
     rows, columns = words.shape
     reach = math.ceil(limits.largest_width)
-    lights, cells = np.empty(2 * reach + 1, np.int64), np.empty(2 * reach + 1, np.int64)
     samples, white = np.empty(2 * reach + 1), np.empty(2 * reach + 1)
-    clipped = np.empty(2 * reach + 1, np.bool_)
+    clipped, cells = np.empty(2 * reach + 1, np.bool_), np.empty(2 * reach + 1, np.int64)
     words, light = words.ravel(), light.ravel()
     count = 0
     for n in range(len(ridges)):
@@ -79,12 +76,12 @@ def measure_profiles(
         beside = other + (at - ridge) * slope
         back, ahead = _steps_inside(at, lines, beside, pixels, slope, reach)
         first, last, base, is_even = _walk(
-            light, line, pixel, at, beside, slope, reach, back, ahead, limits, lights, cells
+            light, line, pixel, at, beside, slope, reach, back, ahead, limits, samples, white, cells
         )
         if first == last:
             continue
         centre = _measure(
-            words, light, lights, cells, samples, white, clipped, first, last, base, is_even, step, limits, profiles, count
+            words, light, samples, white, cells, clipped, first, last, base, is_even, step, limits, profiles, count
         )
         if math.isnan(centre):
             continue
@@ -123,7 +120,8 @@ def _walk(
     back: int,
     ahead: int,
     limits: Limits,
-    lights: NDArray[np.int64],
+    samples: NDArray[np.float64],
+    white: NDArray[np.float64],
     cells: NDArray[np.int64],
 ) -> tuple[int, int, float, bool]:
     """Samples outward from the ridge to both feet of the stripe; the first and the last one, equal where there is none.
@@ -134,33 +132,32 @@ def _walk(
     """
     if back < 1 or ahead < 1:
         return 0, 0, 0.0, False
-    smallest = round(PARTS * SIGNAL_SCALE * limits.faintest)
-    saturated = round(PARTS * SIGNAL_SCALE * limits.saturation)
-    turn = round(slope * PARTS)
-    first = last = here = base = least_fall = 0
+    smallest = SIGNAL_SCALE * limits.faintest
+    first = last = 0
     is_even = True
+    here = base = least_fall = 0.0
     for direction in (-1, 1):
-        start, steps = (0, back) if direction < 0 else (1, ahead)
+        lowest = math.inf
+        end = start = middle if direction < 0 else middle + 1
         # Where the normal meets each line, in parts of a pixel: whole numbers are several times as fast.
-        across = round(beside * PARTS) + start * turn
-        offset = (at + start) * line
-        lowest = value = LARGE
-        end = middle
-        for n in range(start, steps + 1):
+        across = round(beside * PARTS) + (start - middle) * round(slope * PARTS)
+        turn = direction * round(slope * PARTS)
+        offset = (at + start - middle) * line
+        for n in range(start - middle if direction > 0 else 0, (ahead if direction > 0 else back) + 1):
             cell, part = offset + (across >> PART_BITS) * pixel, across & (PARTS - 1)
-            both = lights_of(light[cell]) * (PARTS - part)
+            lights = lights_of(light[cell]) * (PARTS - part)
             if part > 0:
-                both += lights_of(light[cell + pixel]) * part
-            value = both & LOWER
+                lights += lights_of(light[cell + pixel]) * part
+            value = (lights & 0xFFFFFFFF) * (1.0 / PARTS)
             end = middle + direction * n
-            lights[end] = both
+            samples[end] = value
+            white[end] = (lights >> 32) * (1.0 / PARTS)
             cells[end] = cell + pixel if 2 * part > PARTS else cell
             if n == 0:
                 here = value
-                least_fall = max(smallest, round(RINGING * here))
-            if value < lowest:
-                lowest = value
-            across += direction * turn
+                least_fall = max(smallest, RINGING * here)
+            lowest = min(lowest, value)
+            across += turn
             offset += direction * line
             if n < FLAT_SAMPLES:
                 continue
@@ -169,26 +166,24 @@ def _walk(
                 if value - lowest > VALLEY * fall:
                     is_even = False
                     break
-                before = lights[end - direction * FLAT_SAMPLES] & LOWER
-                if 2 * value < 2 * here - fall and before - value < FLAT * fall:
+                if value < here - 0.5 * fall and samples[end - direction * FLAT_SAMPLES] - value < FLAT * fall:
                     break
-            elif n >= LEVEL_SAMPLES and fall < smallest and here < saturated:
+            elif n >= LEVEL_SAMPLES and fall < smallest and here < SIGNAL_SCALE * limits.saturation:
                 break
         if here - lowest < smallest:
             return 0, 0, 0.0, False
         base = max(base, lowest)
         first, last = (end, last) if direction < 0 else (first, end)
-    return first, last, base / PARTS, is_even
+    return first, last, base, is_even
 
 
 @compiled
 def _measure(
     words: NDArray[np.uint32],
     light: NDArray[np.uint32],
-    lights: NDArray[np.int64],
-    cells: NDArray[np.int64],
     samples: NDArray[np.float64],
     white: NDArray[np.float64],
+    cells: NDArray[np.int64],
     clipped: NDArray[np.bool_],
     first: int,
     last: int,
@@ -201,8 +196,6 @@ def _measure(
 ) -> float:
     """The centre in samples, and width, contrast, symmetry and saturation of profile `n`; NaN where it is no stripe."""
     middle = samples.size // 2
-    for k in range(first, last + 1):
-        samples[k] = (lights[k] & LOWER) * (1.0 / PARTS)
     if is_even:
         base = _level(samples, first, middle, last, base)
     here = samples[middle]
@@ -218,7 +211,7 @@ def _measure(
         return math.nan
     centre = math.nan
     if saturation > 0:
-        centre = _white_centre(lights, white, clipped, first, last, left, right, is_even, limits)
+        centre = _white_centre(white, clipped, first, last, left, right, is_even, limits)
     if math.isnan(centre):
         centre = centre_of(samples, clipped, first, last, left, right, base, contrast, limits)
     if not abs(centre - middle) * step <= 1 + 0.5 * width:
@@ -247,7 +240,6 @@ def _level(samples: NDArray[np.float64], first: int, top: int, last: int, base: 
 
 @compiled
 def _white_centre(
-    lights: NDArray[np.int64],
     white: NDArray[np.float64],
     clipped: NDArray[np.bool_],
     first: int,
@@ -261,8 +253,6 @@ def _white_centre(
 
     Around the core the light that skin and lens scatter saturates red as well, more on one side than on the other.
     """
-    for k in range(first, last + 1):
-        white[k] = (lights[k] >> 32) * (1.0 / PARTS)
     top = max(math.ceil(left), first)
     for k in range(top + 1, min(math.floor(right), last) + 1):
         if white[k] > white[top]:
@@ -286,8 +276,7 @@ def _white_centre(
 def _lowest(samples: NDArray[np.float64], first: int, last: int) -> float:
     lowest: float = samples[first]
     for k in range(first + 1, last + 1):
-        if samples[k] < lowest:  # min() would look after what is not a number
-            lowest = samples[k]
+        lowest = min(lowest, samples[k])
     return lowest
 
 
@@ -338,6 +327,9 @@ def _saturation(
             inside += 1
             saturated += clipped[k]
     share = saturated / max(inside, 1)
+    if share > 0.5:  # the flanks are whitish, and reddest is the halo around them
+        for k in range(first + FOOT_SAMPLES, last - FOOT_SAMPLES + 1):
+            reddest = max(reddest, redness_of(light[cells[k]]))
     for end, direction in ((first, 1), (last, -1)):
         redness, level = 255, 0
         for n in range(FOOT_SAMPLES):

@@ -74,7 +74,6 @@ def take_away(image: NDArray[np.uint8], background: NDArray[np.uint8], light: ND
 def halve(words: NDArray[np.uint32], saturation: int, excess: NDArray[np.uint16], signal: NDArray[np.uint16]) -> None:
     """Fills redness and signal, both (ceil(rows / 2), ceil(columns / 2)), each of the sum of four pixels.
 
-
     Where red is saturated in all four, `SATURATED` is added to the redness. What lies outside an image of odd size is
     as its last row and column.
     """

@@ -19,11 +19,10 @@ SIDE = 16
 BLOCK = SIDE - 2
 """Side of the blocks whose own light a pixel must exceed: wider than a stripe, narrower than a red thing."""
 RADIUS = 4
+PATCH = SIDE + 2 * RADIUS
+"""Pixels that the smoothed block and its border are made of."""
 TAPS = 2 * RADIUS + 1
 """Weights of the smoothing: a number that the compiler knows lets it unroll the loops."""
-REACH = RADIUS + 1
-"""How far beyond a block the smoothed signal of its border depends on pixels."""
-PATCH = BLOCK + 2 * REACH
 BACKGROUND_PART = 0.1
 """The quantile of its pixels that is a block's own light: the widest stripe leaves more of the block uncovered."""
 SAMPLED = 2
@@ -51,25 +50,23 @@ def gaussian(sigma: float) -> NDArray[np.float32]:
 def find_ridges(
     excess: NDArray[np.uint16],
     signal: NDArray[np.uint16],
-    top: int,
-    bottom: int,
     kernel: NDArray[np.float32],
     limits: Limits,
     ridges: NDArray[np.float64],
 ) -> int:
-    """Writes the ridge crossings of rows `top` to `bottom`, whole blocks, into `ridges`, (pixels, 5); how many these are.
+    """Writes the ridge crossings of a frame into `ridges`, (capacity, 5); how many there are.
 
     Ridges are looked for in the half-size image of `halve`, which `kernel` smooths: mosaic and JPEG tell the colour of
     four pixels together. A stripe that runs along the rows is crossed once in two columns of the whole image, between
     these, and one that runs along the columns once in two rows. Looked at are pixels that are redder than the block
     they lie in by the red threshold, and those whose red is saturated and can tell nothing.
     Of the rows written, i and j are the crossing in px, then the unit normal and the curvature across, levels of the
-    signal per px^2. Of the half-size image `REACH` rows beyond these are read.
+    signal per px^2. Crossings beyond the capacity are counted and not written.
     """
     patch = np.empty((PATCH, PATCH), np.float32)
     along = np.empty((PATCH, SIDE), np.float32)
     smooth = np.empty((SIDE, SIDE), np.float32)
-    summits = np.empty((SIDE, SIDE), np.int32)
+    summits = np.empty((SIDE, SIDE), np.uint8)
     counts = np.empty(SUMMED * 255 + 1, np.int32)
     crossing = np.empty(5)
     threshold, brighter = SUMMED * limits.red_threshold, SUMMED * SIGNAL_SCALE * limits.faintest
@@ -77,35 +74,36 @@ def find_ridges(
     least = 4 * 8 * SUMMED * SIGNAL_SCALE * limits.faintest / limits.largest_width**2
     lowest_red, highest_red = np.empty(excess.shape[1], np.uint16), np.empty(excess.shape[1], np.uint16)
     count = 0
-    for upper in range(top, bottom, BLOCK):
-        lower = min(bottom, upper + BLOCK)
-        _measure_range(excess[upper:lower], lowest_red, highest_red)
+    for top in range(0, excess.shape[0], BLOCK):
+        bottom = min(excess.shape[0], top + BLOCK)
+        _measure_range(excess[top:bottom], lowest_red, highest_red)
         for left in range(0, excess.shape[1], BLOCK):
             right = min(excess.shape[1], left + BLOCK)
             least_red, most_red = lowest_red[left], highest_red[left]
             for u in range(left + 1, right):
                 least_red, most_red = min(least_red, lowest_red[u]), max(most_red, highest_red[u])
             if int(most_red) - int(least_red) < threshold and (
-                most_red < SATURATED or _contrast(signal[upper:lower, left:right]) < brighter
+                most_red < SATURATED or _contrast(signal[top:bottom, left:right]) < brighter
             ):
                 continue
-            redder = threshold + _own_redness(excess[upper:lower, left:right], counts)
-            _cut_out(signal, upper - REACH, left - REACH, patch)
+            redder = threshold + _own_redness(excess[top:bottom, left:right], counts)
+            _cut_out(signal, top - 1 - RADIUS, left - 1 - RADIUS, patch)
             _smooth(patch, kernel, along, smooth)
             _mark_summits(smooth, summits)
-            for y in range(1, lower - upper + 1):
+            for y in range(1, bottom - top + 1):
                 for x in range(1, right - left + 1):
                     if not summits[y, x]:
                         continue
-                    v, u = upper + y - 1, left + x - 1
+                    v, u = top + y - 1, left + x - 1
                     if excess[v, u] < redder:
                         continue
                     if not _cross(smooth, x, y, summits[y, x], least, crossing):
                         continue
-                    ridges[count] = crossing
-                    ridges[count, I] = 2 * (u + crossing[I]) + 0.5
-                    ridges[count, J] = 2 * (v + crossing[J]) + 0.5
-                    ridges[count, SHARPNESS] = crossing[SHARPNESS] / (4 * SUMMED)
+                    if count < len(ridges):
+                        ridges[count] = crossing
+                        ridges[count, I] = 2 * (u + crossing[I]) + 0.5
+                        ridges[count, J] = 2 * (v + crossing[J]) + 0.5
+                        ridges[count, SHARPNESS] = crossing[SHARPNESS] / (4 * SUMMED)
                     count += 1
     return count
 
@@ -116,9 +114,10 @@ def _measure_range(band: NDArray[np.integer], lowest: NDArray[np.integer], highe
     lowest[:] = band[0]
     highest[:] = band[0]
     for j in range(1, band.shape[0]):
-        for i in range(band.shape[1]):
-            lowest[i] = min(lowest[i], band[j, i])
-            highest[i] = max(highest[i], band[j, i])
+        row = band[j]
+        for i in range(row.size):
+            lowest[i] = min(lowest[i], row[i])
+            highest[i] = max(highest[i], row[i])
 
 
 @compiled
@@ -180,13 +179,13 @@ def _smooth(
 
 
 @compiled
-def _mark_summits(smooth: NDArray[np.float32], summits: NDArray[np.int32]) -> None:
+def _mark_summits(smooth: NDArray[np.float32], summits: NDArray[np.uint8]) -> None:
     for y in range(1, SIDE - 1):
         for x in range(1, SIDE - 1):
             here = smooth[y, x]
-            down = np.int32(here >= smooth[y - 1, x]) & np.int32(here > smooth[y + 1, x])
-            across = np.int32(here >= smooth[y, x - 1]) & np.int32(here > smooth[y, x + 1])
-            summits[y, x] = down * np.int32(DOWN) + across * np.int32(ACROSS)
+            down = np.uint8(here >= smooth[y - 1, x]) & np.uint8(here > smooth[y + 1, x])
+            across = np.uint8(here >= smooth[y, x - 1]) & np.uint8(here > smooth[y, x + 1])
+            summits[y, x] = down * np.uint8(DOWN) + across * np.uint8(ACROSS)
 
 
 @compiled

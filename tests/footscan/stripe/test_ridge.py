@@ -21,7 +21,7 @@ def ridges_of(image, capacity=4000, limits=LIMITS):
     excess, signal = np.empty(half, np.uint16), np.empty(half, np.uint16)
     halve(as_words(image), limits.saturation, excess, signal)
     ridges = np.full((capacity, 5), np.nan)
-    count = find_ridges(excess, signal, 0, len(excess), gaussian(1.0), limits, ridges)
+    count = find_ridges(excess, signal, gaussian(1.0), limits, ridges)
     return ridges[:count] if count <= capacity else count
 
 
