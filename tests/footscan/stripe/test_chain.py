@@ -197,3 +197,14 @@ def test_no_points():
     assert [len(part) for part in in_order(none, neighbours(none, GAP, cells(none)))] == [0, 0]
     piece, pieces = pieces_of(none, GAP, cells(none))
     assert (len(piece), pieces) == (0, 0)
+
+
+@pytest.mark.parametrize(("width", "pieces"), [(4.0, 2), (15.0, 2), (17.0, 1)])
+def test_a_wide_stripe_hangs_together_over_gaps_of_half_its_width(width, pieces):
+    profiles = np.concatenate([row(100, 140, 50, width=width), row(146, 180, 50, width=width)])  # 138 to 146: 8 px
+    assert pieces_of(profiles, GAP, cells(profiles))[1] == pieces
+
+
+def test_of_a_wide_stripe_and_a_narrow_one_the_narrow_one_counts():
+    profiles = np.concatenate([row(100, 140, 50, width=20), row(146, 180, 50, width=4)])
+    assert pieces_of(profiles, GAP, cells(profiles))[1] == 2

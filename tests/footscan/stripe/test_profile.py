@@ -156,6 +156,20 @@ def test_a_saturated_core_is_told_by_its_flanks():
     assert measure(white, 20.0, 14.5, 1.0, 0.0, largest_width=30.0) is None
 
 
+def test_a_saturated_core_with_a_ghost_beside_it_is_told_by_its_halo():
+    # red and green (blue as green) from the middle outward: core, whitish flank, halo; then on the left the valley
+    # before the ghost, which is as red as the halo, and on the right the skin
+    outward = [(255, 255)] * 9 + [(255, 230), (255, 205), (255, 180), (255, 150), (255, 125), (250, 120)]
+    valley, skin = [(250, 120)] * 10, [(220, 115), (200, 105)] + [(190, 95)] * 8
+    line = np.array([*reversed(outward + valley), *outward[1:], *skin])
+    image = np.broadcast_to(line[:, [0, 1, 1]], (30, len(line), 3))
+    profile = measure(image, 24.0, 14.5, 1.0, 0.0, largest_width=30.0, red_threshold=18)
+    assert profile[I] == pytest.approx(24, abs=0.5)
+    lamp = image.copy()
+    lamp[..., 1:] = np.maximum(lamp[..., 1:], lamp[..., :1] - 95)  # nothing redder than the skin
+    assert measure(lamp, 24.0, 14.5, 1.0, 0.0, largest_width=30.0, red_threshold=18) is None
+
+
 def test_the_background_is_held_against_redness():
     # a stripe over a red thing: against the frame alone it is as red as what lies beside, and without that it is not
     ground = np.full((30, 41, 3), [100, 20, 20])
