@@ -23,7 +23,7 @@ job = job_of_scan(*map(Path, sys.argv[1:]))
 for _ in range(2):
     start = time.perf_counter()
     planned = plan_job(job)
-    print(time.perf_counter() - start, len(planned.plan.steps), len(planned.plan.to_run))
+    print(time.perf_counter() - start, planned.steps, planned.to_run)
 """
 
 

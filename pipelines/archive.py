@@ -2,16 +2,18 @@
 
 import logging
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
 
 from pipelines.deliver import deliver
 from pipelines.engine.digest import FileDigests, sha256
 from pipelines.engine.plan import Plan, make_plan
 from pipelines.engine.run import OnStepEnd, run_plan
-from pipelines.engine.step import Failure, Outcome, Step
-from pipelines.engine.store import Store
+from pipelines.engine.step import Failure, Outcome, Step, Success
+from pipelines.engine.store import Store, open_store
 from pipelines.recorded import RecordedScan, read_scan, scan_folders
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
 from schemas.calibration import calibration_from_json
@@ -21,6 +23,8 @@ from schemas.measures import Measures
 from schemas.workflow import ScanParameters, Workflow
 
 CACHE = ".footscan"
+WINDOW = 8
+"""Scans for each worker whose steps are handed over at once: an archive's memory does not grow with its scans."""
 
 log = logging.getLogger("footscan.archive")
 
@@ -36,9 +40,36 @@ class Job:
     """Wins over the scans' own where `calibration_wins`, stands in for it otherwise."""
     calibration_wins: bool
     results: Path
-    cache: Path
+    cache: Path | str
+    """Folder of the store, or its URL."""
     parameters: ScanParameters
     workers: int
+
+
+class Waiting(NamedTuple):
+    """A step that a run would have to run, or to look at again."""
+
+    scan: str
+    kind: str
+    camera: int | None
+    name: str
+    """See `Step.name`."""
+    reason: str
+
+
+@dataclass(frozen=True)
+class PlannedScan:
+    """What is known of a scan before anything runs."""
+
+    scan: RecordedScan
+    steps: int
+    """How many it has."""
+    to_run: int
+    """How many of them are no hits."""
+    failure: Failure | None
+    """Why it is known that it cannot be measured."""
+    delivered: Mapping[str, str]
+    """Digests of the files in its results, as far as they are known."""
 
 
 @dataclass
@@ -46,11 +77,24 @@ class PlannedJob:
     """What a job has to do."""
 
     job: Job
-    plan: Plan
+    store: Store
     digests: FileDigests
+    calibrations: dict[Path, CalibrationFile] = field(default_factory=dict)
     refused: dict[str, RefusedInput] = field(default_factory=dict)
-    """Scans whose input breaks its format, by folder or name."""
-    scans: list[RecordedScan] = field(default_factory=list)
+    """Scans whose input breaks its format, by folder."""
+    scans: list[PlannedScan] = field(default_factory=list)
+    waiting: list[Waiting] = field(default_factory=list)
+    """Filled where reasons were asked for."""
+
+    @property
+    def steps(self) -> int:
+        """How many steps all scans have."""
+        return sum(planned.steps for planned in self.scans)
+
+    @property
+    def to_run(self) -> int:
+        """How many of them are no hits."""
+        return sum(planned.to_run for planned in self.scans)
 
 
 @dataclass(frozen=True)
@@ -80,7 +124,7 @@ def job_of_workflow(path: Path, workers: int | None = None) -> Job:
         calibration=base / workflow.calibration if workflow.calibration else None,
         calibration_wins=False,
         results=results,
-        cache=base / workflow.cache if workflow.cache else results / CACHE,
+        cache=_cache(base, workflow.cache) or results / CACHE,
         parameters=workflow.parameters,
         workers=workers or workflow.workers or cores(),
     )
@@ -102,12 +146,13 @@ def job_of_scan(folder: Path, calibration: Path | None, results: Path, workers: 
     )
 
 
-def plan_job(job: Job) -> PlannedJob:
-    """Draw the graph of all scans of a job and look every step up in the cache."""
-    digests = FileDigests.load(job.cache / "files.json")
-    steps: list[Step] = []
-    planned = PlannedJob(job, Plan([]), digests)
-    calibrations: dict[Path, CalibrationFile] = {}
+def plan_job(job: Job, *, reasons: bool = False) -> PlannedJob:
+    """Draw the graph of each scan of a job and look every step up in the cache.
+
+    With `reasons`, what would run is listed step by step; without, it is counted.
+    """
+    local = job.cache if isinstance(job.cache, Path) else job.results / CACHE
+    planned = PlannedJob(job, open_store(job.cache, local / "known.sqlite"), FileDigests.load(local / "files.json"))
     names: dict[str, Path] = {}
     for folder in job.folders:
         try:
@@ -115,30 +160,30 @@ def plan_job(job: Job) -> PlannedJob:
             if scan.name in names:
                 raise RefusedInput(scan.file, f"{scan.name} is also in {names[scan.name]}, expected each scan once")
             names[scan.name] = folder
-            calibration = _calibration(scan, job, calibrations)
-            steps += scan_steps(scan, calibration, job.parameters, digests)
-            planned.scans.append(scan)
+            plan = make_plan(_draw(scan, planned), planned.store)
         except RefusedInput as error:
             planned.refused[str(folder)] = error
-    planned.plan = make_plan(steps, Store(job.cache))
+            continue
+        planned.scans.append(_sum_up(scan, plan))
+        if reasons:
+            planned.waiting += [
+                Waiting(scan.name, p.step.kind, p.step.camera, p.step.name, p.reason) for p in plan.to_run
+            ]
     return planned
 
 
-def run_job(planned: PlannedJob, on_step_end: OnStepEnd) -> Iterable[ScanEnd]:
+def run_job(planned: PlannedJob, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
     """Run what is left of a planned job and deliver each scan's results; yields what became of each scan."""
-    job, store = planned.job, Store(planned.job.cache)
     for folder, error in planned.refused.items():
         yield ScanEnd(folder, None, str(error), "refused")
-    outcomes = _run_and_mend(planned.plan, store, job.workers, on_step_end)
-    for scan in planned.scans:
-        end = _end_scan(scan, outcomes, store, planned)
-        if end.kind == "damaged":
-            log.warning("%s", end.problem)
-            again = make_plan([p.step for p in planned.plan.steps], store)
-            outcomes = _run_and_mend(again, store, job.workers, on_step_end)
-            end = _end_scan(scan, outcomes, store, planned)
-        yield end
-    planned.digests.save()
+    waiting = iter(planned.scans)
+    try:
+        while window := list(islice(waiting, WINDOW * planned.job.workers)):
+            yield from _run_window(window, planned, on_step_end)
+    finally:
+        planned.digests.save()
+        if planned.store.memory is not None:
+            planned.store.memory.close()
 
 
 def cores() -> int:
@@ -146,35 +191,72 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _run_and_mend(plan: Plan, store: Store, workers: int, on_step_end: OnStepEnd) -> dict[str, Outcome]:
-    """Run a plan; what turns out to be damaged has been set aside then, and is made anew by another."""
-    outcomes = run_plan(plan, store, workers=workers, on_step_end=on_step_end)
+def _cache(base: Path, named: str | None) -> Path | str | None:
+    return named if named is None or "://" in named else base / named
+
+
+def _draw(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
+    calibration = _calibration(scan, planned.job, planned.calibrations)
+    return scan_steps(scan, calibration, planned.job.parameters, planned.digests)
+
+
+def _sum_up(scan: RecordedScan, plan: Plan) -> PlannedScan:
+    outcomes = {p.step.kind: p.outcome for p in plan.steps if p.step.camera is None}
+    failures = [p.outcome for p in plan.steps if isinstance(p.outcome, Failure)]
+    delivered = {
+        file: outcome.digest for file, kind in DELIVERED.items() if isinstance(outcome := outcomes[kind], Success)
+    }
+    return PlannedScan(scan, len(plan.steps), len(plan.to_run), failures[0] if failures else None, delivered)
+
+
+def _run_window(window: Sequence[PlannedScan], planned: PlannedJob, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
+    """Run some scans together; of those that are known as a whole, only the results are looked at."""
+    steps: list[Step] = []
+    for scan in window:
+        if scan.to_run:
+            steps += _draw(scan.scan, planned)
+    outcomes = _run_and_mend(steps, planned, on_step_end)
+    for scan in window:
+        end = _end_scan(scan, outcomes, planned)
+        if end.kind == "damaged":
+            log.warning("%s", end.problem)
+            again = _run_and_mend(_draw(scan.scan, planned), planned, on_step_end)
+            end = _end_scan(scan, again, planned)
+        yield end
+
+
+def _run_and_mend(steps: Sequence[Step], planned: PlannedJob, on_step_end: OnStepEnd) -> dict[str, Outcome]:
+    """Run steps; what turns out to be damaged has been set aside then, and is made anew by another run of them."""
     told: set[str] = set()
-    while damage := _damage(outcomes) - told:  # behind what was damaged there may be more
+    while True:  # behind what was damaged there may be more
+        plan = make_plan(steps, planned.store)
+        outcomes = run_plan(plan, planned.store, workers=planned.job.workers, on_step_end=on_step_end)
+        damage = _damage(outcomes) - told
+        if not damage:
+            return outcomes
         for problem in sorted(damage):
             log.warning("%s", problem)
         told |= damage
-        again = make_plan([p.step for p in plan.steps], store)
-        outcomes = run_plan(again, store, workers=workers, on_step_end=on_step_end)
-    return outcomes
 
 
 def _damage(outcomes: Mapping[str, Outcome]) -> set[str]:
     return {end.problem for end in outcomes.values() if isinstance(end, Failure) and end.kind == "damaged"}
 
 
-def _end_scan(scan: RecordedScan, outcomes: dict[str, Outcome], store: Store, planned: PlannedJob) -> ScanEnd:
+def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planned: PlannedJob) -> ScanEnd:
     """Deliver a scan's results, if it has them."""
+    scan = planned_scan.scan
     target = planned.job.results / scan.document.patient / scan.document.scan
     digests: dict[str, str] = {}
     for file, kind in DELIVERED.items():
-        outcome = outcomes[f"{scan.name}/{kind}"]
+        known = planned_scan.failure or Success(planned_scan.delivered.get(file, ""))
+        outcome = outcomes.get(f"{scan.name}/{kind}", known)
         if isinstance(outcome, Failure):
             return ScanEnd(scan.name, None, outcome.problem + _what_stays(target), outcome.kind)
         digests[file] = outcome.digest
-    problem = deliver(digests, store, planned.digests, target)
+    problem = deliver(digests, planned.store, planned.digests, target)
     if problem is not None:
-        whole = all(store.has(digest) for digest in digests.values())  # what is damaged has been set aside
+        whole = all(planned.store.has(digest) for digest in digests.values())  # what is damaged has been set aside
         return ScanEnd(scan.name, None, problem, "fault" if whole else "damaged")
     finding = Measures.model_validate_json((target / "measures.json").read_bytes()).finding
     return ScanEnd(scan.name, target, finding, None if finding is None else "finding")

@@ -10,19 +10,19 @@ from pathlib import Path
 from pipelines.archive import CACHE, Job, cores, plan_job, run_job
 from pipelines.deliver import deliver
 from pipelines.engine.digest import FileDigests
-from pipelines.engine.plan import Plan, make_plan
+from pipelines.engine.plan import make_plan
 from pipelines.engine.run import OnStepEnd, run_plan
 from pipelines.engine.step import Failure, Output, Step
-from pipelines.engine.store import Store
+from pipelines.engine.store import open_store
 from pipelines.recorded import SCAN_FILE, scan_folders
-from pipelines.steps import calibrate_capture, simulate_capture, simulate_scan
+from pipelines.scan import STEPS
 from schemas.errors import Fault
 from schemas.parameters.calibration import CaptureCalibrationParameters
 from schemas.parameters.demo import FilmedFoot
 from schemas.workflow import ScanParameters
 
-Watch = Callable[[str, Plan], AbstractContextManager[OnStepEnd]]
-"""Called with the name of a part and its plan; gives what shall hear of its steps."""
+Watch = Callable[[str, int, int], AbstractContextManager[OnStepEnd]]
+"""Called with the name of a part, how many steps are to run and how many it has; gives what shall hear of them."""
 
 
 @dataclass
@@ -46,19 +46,19 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
         The demo could not be run to its end.
     """
     results = folder / "results"
-    store = Store(results / CACHE)
+    store = open_store(results / CACHE)
     seconds: dict[str, float] = {}
 
     @contextmanager
-    def timed(part: str, plan: Plan) -> Iterator[OnStepEnd]:
+    def timed(part: str, to_run: int, steps: int) -> Iterator[OnStepEnd]:
         start = time.perf_counter()
-        with watch(part, plan) as on_step_end:
+        with watch(part, to_run, steps) as on_step_end:
             yield on_step_end
         seconds[part] = time.perf_counter() - start
 
     filming = _filming(folder, foot)
     plan = make_plan(filming, store)
-    with timed("filming and calibration", plan) as on_step_end:
+    with timed("filming and calibration", len(plan.to_run), len(plan.steps)) as on_step_end:
         outcomes = run_plan(plan, store, workers=1, on_step_end=on_step_end)
     digests: dict[str, str] = {}
     for step in filming:
@@ -66,14 +66,14 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
         if isinstance(outcome, Failure):
             raise Fault(f"{step.name}: {outcome.problem}")
         digests[step.kind] = outcome.digest
-    files = FileDigests.load(store.root / "files.json")
+    files = FileDigests.load(results / CACHE / "files.json")
     if problem := deliver(
         {"calibration.json": digests["calibrate"], "known.json": digests["film"]}, store, files, folder
     ):
         raise Fault(problem)
 
     planned = plan_job(_job(folder, results))
-    with timed("reconstruction", planned.plan) as on_step_end:
+    with timed("reconstruction", planned.to_run, planned.steps) as on_step_end:
         ends = list(run_job(planned, on_step_end))
     for end in ends:
         if end.problem is not None:
@@ -85,15 +85,15 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
 def _filming(folder: Path, foot: FilmedFoot) -> list[Step]:
     scan = folder / "archive" / foot.patient / foot.scan
     capture = folder / "capture"
-    film = Step("demo", "film", simulate_scan, foot, places={"folder": scan}, writes=scan / SCAN_FILE)
+    film = Step("demo", "film", f"{STEPS}.simulate_scan", foot, places={"folder": scan}, writes=scan / SCAN_FILE)
     ordinary_light = foot.settings.model_copy(update={"ambient": "ambient"})  # a scanner is calibrated once
     film_capture = Step(
-        "demo", "capture", simulate_capture, ordinary_light,
+        "demo", "capture", f"{STEPS}.simulate_capture", ordinary_light,
         places={"folder": capture}, writes=capture / "capture.yaml",
     )  # fmt: skip
     calibrate = Step(
-        "demo", "calibrate", calibrate_capture, CaptureCalibrationParameters(), {"capture": Output(film_capture.name)},
-        places={"capture": capture},
+        "demo", "calibrate", f"{STEPS}.calibrate_capture", CaptureCalibrationParameters(),
+        {"capture": Output(film_capture.name)}, places={"capture": capture},
     )  # fmt: skip
     return [film, film_capture, calibrate]
 

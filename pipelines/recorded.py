@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from footscan.frames.ingest import GROUP
 from schemas.documents import inside, read_yaml
 from schemas.errors import RefusedInput
+from schemas.frames import GROUP
 from schemas.scan import CameraFilm, CameraSource, Scan
 
 SCAN_FILE = "scan.yaml"

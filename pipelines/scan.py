@@ -1,36 +1,25 @@
 """A scan as the list of its steps."""
 
+import json
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from footscan.frames.film import film_files
 from footscan.frames.travel import read_positions
 from pipelines.engine.digest import FileDigests, sha256
+from pipelines.engine.key import parameters_text
 from pipelines.engine.step import Input, Output, SourceFile, Step, Value
 from pipelines.recorded import RecordedScan
-from pipelines.steps import (
-    clean,
-    cloud_ply,
-    extract,
-    foot_stl,
-    fuse,
-    ingest,
-    ingest_background,
-    map_points,
-    measure,
-    orient,
-    quality,
-    report,
-    surface,
-    verify,
-)
 from schemas.calibration import Calibration, Source
 from schemas.documents import Document, canonical_json
 from schemas.parameters.foot import FootParameters
 from schemas.scan import CameraFilm
 from schemas.workflow import ScanParameters
 
+STEPS = "pipelines.steps"
+"""Where the modules of the steps lie; they are imported when they run, for a plan needs none of their libraries."""
 DELIVERED = {
     "cloud.ply": "cloud.ply",
     "foot.stl": "foot.stl",
@@ -48,6 +37,27 @@ class CalibrationFile:
     path: Path
     content: Calibration
     digest: str
+    _drawn: dict[object, Value] = field(default_factory=dict, compare=False, repr=False)
+    """What its scans take of it: the same for many of them, and slow to write down."""
+
+    @property
+    def source(self) -> Value:
+        """Its name and digest."""
+        return self._once("source", lambda: Source(name=self.path.name, sha256=self.digest))
+
+    def camera(self, camera: int) -> Value:
+        """The map of one camera; RefusedInput where it has none."""
+        return self._once(camera, lambda: self.content.camera(camera, self.path))
+
+    def cameras(self, ids: frozenset[int]) -> Value:
+        """All of it, with the maps of these cameras alone."""
+        maps = [camera for camera in self.content.cameras if camera.camera in ids]
+        return self._once(ids, lambda: self.content.model_copy(update={"cameras": maps}))
+
+    def _once(self, what: object, draw: Callable[[], Document]) -> Value:
+        if what not in self._drawn:
+            self._drawn[what] = _document(draw())
+        return self._drawn[what]
 
 
 def scan_steps(
@@ -75,7 +85,7 @@ def scan_steps(
         array = scan.array(camera)
         manifest = add(
             Step(
-                scan.name, "ingest", ingest, None, {"film": source_files(film, digests)}, camera.id,
+                scan.name, "ingest", f"{STEPS}.ingest", None, {"film": source_files(film, digests)}, camera.id,
                 places={"film": film, "array": array}, writes=array / "zarr.json",
             )
         )  # fmt: skip
@@ -85,44 +95,46 @@ def scan_steps(
             places["background"] = laser_off = scan.background_array(camera)
             filmed["background"] = add(
                 Step(
-                    scan.name, "background", ingest_background, None,
+                    scan.name, "background", f"{STEPS}.ingest_background", None,
                     {"manifest": manifest, "background": source_files(background, digests)}, camera.id,
                     places={"background": background, "array": laser_off}, writes=laser_off / "zarr.json",
                 )
             )  # fmt: skip
-        stripe = add(Step(scan.name, "extract", extract, parameters.extraction, filmed, camera.id, places=places))
-        model = _document(calibration.content.camera(camera.id, calibration.path))
+        stripe = add(
+            Step(scan.name, "extract", f"{STEPS}.extract", parameters.extraction, filmed, camera.id, places=places)
+        )
+        model = calibration.camera(camera.id)
         inputs: dict[str, Input] = {
-            "stripe": stripe,
-            "manifest": manifest,
-            "calibration": model,
-            **_travel(scan, camera),
-        }
-        points[f"points-{camera.id}"] = add(Step(scan.name, "map", map_points, parameters.mapping, inputs, camera.id))
+            "stripe": stripe, "manifest": manifest, "calibration": model, **_travel(scan, camera)
+        }  # fmt: skip
+        points[f"points-{camera.id}"] = add(
+            Step(scan.name, "map", f"{STEPS}.map_points", parameters.mapping, inputs, camera.id)
+        )
         manifests[f"manifest-{camera.id}"] = manifest
         stripes[f"stripe-{camera.id}"] = stripe
         arrays[f"array-{camera.id}"] = array
 
+    maps = calibration.cameras(frozenset(camera.id for camera in scan.document.cameras))
     foot = FootParameters(side=scan.document.side)
-    fused = add(Step(scan.name, "fuse", fuse, parameters.fusion, points))
-    cleaned = add(Step(scan.name, "clean", clean, parameters.outliers, {"cloud": fused}))
-    oriented = add(Step(scan.name, "orient", orient, parameters.normals, {"clean": cleaned}))
-    mesh = add(Step(scan.name, "surface", surface, parameters.surface, {"oriented": oriented}))
-    measures = add(Step(scan.name, "measure", measure, foot, {"surface": mesh}))
+    fused = add(Step(scan.name, "fuse", f"{STEPS}.fuse", parameters.fusion, points))
+    cleaned = add(Step(scan.name, "clean", f"{STEPS}.clean", parameters.outliers, {"cloud": fused}))
+    oriented = add(Step(scan.name, "orient", f"{STEPS}.orient", parameters.normals, {"clean": cleaned}))
+    mesh = add(Step(scan.name, "surface", f"{STEPS}.surface", parameters.surface, {"oriented": oriented}))
+    measures = add(Step(scan.name, "measure", f"{STEPS}.measure", foot, {"surface": mesh}))
     verified: dict[str, Output] = {}
     if (truth := scan.truth) is not None:
         pair: dict[str, Input] = {"surface": mesh, "truth": source_files(truth, digests)}
-        verified = {"verified": add(Step(scan.name, "verify", verify, None, pair, places={"truth": truth}))}
+        verified = {"verified": add(Step(scan.name, "verify", f"{STEPS}.verify", None, pair, places={"truth": truth}))}
     of_cameras = {**manifests, **stripes, **verified}
-    judged: dict[str, Input] = {"clean": cleaned, "surface": mesh, "calibration": _source(calibration), **of_cameras}
-    qualities = add(Step(scan.name, "quality", quality, None, judged))
-    add(Step(scan.name, "cloud.ply", cloud_ply, None, {"oriented": oriented}))
-    add(Step(scan.name, "foot.stl", foot_stl, foot, {"surface": mesh}))
+    judged: dict[str, Input] = {"clean": cleaned, "surface": mesh, "calibration": calibration.source, **of_cameras}
+    qualities = add(Step(scan.name, "quality", f"{STEPS}.quality", None, judged))
+    add(Step(scan.name, "cloud.ply", f"{STEPS}.cloud_ply", None, {"oriented": oriented}))
+    add(Step(scan.name, "foot.stl", f"{STEPS}.foot_stl", foot, {"surface": mesh}))
     shown: dict[str, Input] = {
         "oriented": oriented, "surface": mesh, "measures": measures, "quality": qualities,
-        "calibration": _used(calibration, scan), "about": _about(scan, parameters), **of_cameras,
+        "calibration": maps, "about": _about(scan, parameters), **of_cameras,
     }  # fmt: skip
-    add(Step(scan.name, "report", report, foot, shown, places=arrays))
+    add(Step(scan.name, "report", f"{STEPS}.report", foot, shown, places=arrays))
     return steps
 
 
@@ -151,22 +163,14 @@ def _document(document: Document) -> Value:
     return Value(canonical_json(document.model_dump(mode="json")).encode())
 
 
-def _source(calibration: CalibrationFile) -> Value:
-    return _document(Source(name=calibration.path.name, sha256=calibration.digest))
-
-
-def _used(calibration: CalibrationFile, scan: RecordedScan) -> Value:
-    """The calibration, with the maps of the scan's cameras alone."""
-    ids = {camera.id for camera in scan.document.cameras}
-    cameras = [camera for camera in calibration.content.cameras if camera.camera in ids]
-    return _document(calibration.content.model_copy(update={"cameras": cameras}))
-
-
 def _about(scan: RecordedScan, parameters: ScanParameters) -> Value:
-    provenance = {
+    about = {"patient": scan.document.patient, "scan": scan.document.scan, "provenance": _provenance(parameters)}
+    return Value(canonical_json(about).encode())
+
+
+def _provenance(parameters: ScanParameters) -> dict[str, str]:
+    return {
         f"{step}.{name}": canonical_json(value)
-        for step, values in parameters.model_dump(mode="json").items()
+        for step, values in json.loads(parameters_text(parameters))["values"].items()
         for name, value in values.items()
     }
-    about = {"patient": scan.document.patient, "scan": scan.document.scan, "provenance": provenance}
-    return Value(canonical_json(about).encode())

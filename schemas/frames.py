@@ -6,6 +6,9 @@ from pydantic import Field
 
 from schemas.documents import Document
 
+GROUP = "frames.zarr"
+"""Name of the Zarr group of arrays beside a scan's films."""
+
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 

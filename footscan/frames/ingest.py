@@ -23,9 +23,6 @@ from schemas.frames import FrameManifest
 FRAME_SIZE = (480, 640)
 """(rows, columns) of a recorded scan's frames."""
 
-GROUP = "frames.zarr"
-"""Name of the group of arrays beside a scan's films."""
-
 
 def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SIZE) -> FrameManifest:
     """Write the frames of `film` as the Zarr array `array`, in place of what is there.

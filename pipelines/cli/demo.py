@@ -11,7 +11,6 @@ from pipelines.cli.output import message, print_table
 from pipelines.cli.results import print_measures
 
 if TYPE_CHECKING:
-    from pipelines.engine.plan import Plan
     from pipelines.engine.run import OnStepEnd
 
 
@@ -43,9 +42,9 @@ def demo(
 
 
 @contextmanager
-def _watch(part: str, plan: "Plan") -> "Iterator[OnStepEnd]":
+def _watch(part: str, to_run: int, steps: int) -> "Iterator[OnStepEnd]":
     from pipelines.cli.progress import StepProgress
 
-    message(f"{part}: {len(plan.to_run)} of {len(plan.steps)} steps to run")
-    with StepProgress(plan) as progress:
+    message(f"{part}: {to_run} of {steps} steps to run")
+    with StepProgress(to_run) as progress:
         yield progress.on_step_end

@@ -9,7 +9,6 @@ from typing import Self
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from pipelines.engine.plan import Plan
 from pipelines.engine.run import StepEnd
 
 
@@ -23,9 +22,9 @@ def frame_progress(what: str) -> Iterator[Callable[[int, int], None]]:
 
 
 class StepProgress:
-    """Counts the steps of a plan as they end; draws a bar where standard error is a terminal."""
+    """Counts steps as they end; draws a bar where standard error is a terminal."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, to_run: int) -> None:
         self.ran = 0
         """Steps that ran, those left out that turned out to be known."""
         self.seconds: dict[str, float] = {}
@@ -39,9 +38,9 @@ class StepProgress:
             TimeElapsedColumn(),
             console=console,
             transient=True,
-            disable=not plan.to_run or not console.is_terminal,
+            disable=not to_run or not console.is_terminal,
         )
-        self._task = self._bar.add_task("", total=len(plan.to_run))
+        self._task = self._bar.add_task("", total=to_run)
 
     def __enter__(self) -> Self:
         self._bar.start()

@@ -10,7 +10,6 @@ from schemas.errors import FootscanError, RefusedInput
 
 if TYPE_CHECKING:
     from pipelines.archive import Job, PlannedJob, ScanEnd
-    from pipelines.engine.plan import Plan
 
 WORKFLOW = Path("workflow.yaml")
 
@@ -44,9 +43,9 @@ def run(
 
     job = _job(workflow, scan, calibration, out, workers)
     planned = plan_job(job)
-    if planned.plan.steps:
-        message(_summary(planned.plan))
-    with StepProgress(planned.plan) as progress:
+    if planned.steps:
+        message(_summary(planned))
+    with StepProgress(planned.to_run) as progress:
         ends = list(run_job(planned, progress.on_step_end))
     if as_json:
         print_json(_ends_json(planned, ends, progress.ran))
@@ -68,22 +67,20 @@ def plan(
     """Say what `run` would do, and why, without doing it."""
     from pipelines.archive import plan_job
 
-    planned = plan_job(_job(workflow, scan, calibration, out, None))
+    planned = plan_job(_job(workflow, scan, calibration, out, None), reasons=True)
     if as_json:
         print_json(_plan_json(planned))
     else:
-        rows = [
-            [p.step.scan, p.step.kind, "" if p.step.camera is None else str(p.step.camera), p.reason]
-            for p in planned.plan.to_run
-        ]
+        rows = [[w.scan, w.kind, "" if w.camera is None else str(w.camera), w.reason] for w in planned.waiting]
         if rows:
             print_table("", ["scan", "step", "camera", "reason"], rows)
-        if planned.plan.steps:
-            print(_summary(planned.plan))
+        if planned.steps:
+            print(_summary(planned))
     for folder, error in planned.refused.items():
         _tell(folder, str(error))
-    for name, problem in planned.plan.known_failures.items():
-        _tell(name, problem)
+    for planned_scan in planned.scans:
+        if planned_scan.failure is not None:
+            _tell(planned_scan.scan.name, planned_scan.failure.problem)
     if planned.refused:
         return RefusedInput.exit_status if scan is not None else 1
     return 0
@@ -111,27 +108,25 @@ def _tell(scan: str, problem: str) -> None:
     message(f"footscan: {problem}" if scan in problem else f"footscan: {scan}: {problem}")
 
 
-def _summary(plan: "Plan") -> str:
-    return f"{len(plan.to_run)} of {len(plan.steps)} steps to run"
+def _summary(planned: "PlannedJob") -> str:
+    return f"{planned.to_run} of {planned.steps} steps to run"
 
 
 def _plan_json(planned: "PlannedJob") -> dict[str, object]:
-    waiting = planned.plan.to_run
+    failures = [(scan.scan.name, scan.failure) for scan in planned.scans]
     return {
-        "steps": len(planned.plan.steps),
-        "hits": len(planned.plan.steps) - len(waiting),
-        "misses": [
-            {"scan": p.step.scan, "step": p.step.kind, "camera": p.step.camera, "reason": p.reason} for p in waiting
-        ],
+        "steps": planned.steps,
+        "hits": planned.steps - planned.to_run,
+        "misses": [{"scan": w.scan, "step": w.kind, "camera": w.camera, "reason": w.reason} for w in planned.waiting],
         "refused": [{"scan": folder, "problem": str(error)} for folder, error in planned.refused.items()],
-        "failed": [{"scan": name, "problem": problem} for name, problem in planned.plan.known_failures.items()],
+        "failed": [{"scan": name, "problem": failure.problem} for name, failure in failures if failure is not None],
     }
 
 
 def _ends_json(planned: "PlannedJob", ends: "list[ScanEnd]", ran: int) -> dict[str, object]:
     return {
-        "steps": len(planned.plan.steps),
-        "planned": len(planned.plan.to_run),
+        "steps": planned.steps,
+        "planned": planned.to_run,
         "ran": ran,
         "scans": [
             {

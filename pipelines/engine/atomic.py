@@ -9,14 +9,26 @@ from schemas.errors import Fault
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write `data` to a file beside `path`, then give it that name. Fault where the disk refuses."""
+    """Write `data` to a file beside `path`, then give it that name. Fault where the disk refuses.
+
+    A symbolic link stays one: what it points to is written. A device or a pipe is written into.
+    """
+    try:
+        path = path.resolve()
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            path.write_bytes(data)
+        else:
+            _replace(path, data)
+    except OSError as error:
+        raise Fault(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+def _replace(path: Path, data: bytes) -> None:
     partial = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         partial.write_bytes(data)
         partial.replace(path)
-    except OSError as error:
-        raise Fault(f"{path}: cannot be written ({error.strerror or error})") from None
     finally:
         with contextlib.suppress(OSError):
             partial.unlink()  # there after a failure or an interruption only

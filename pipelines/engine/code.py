@@ -1,22 +1,32 @@
 """The identity of a step's code: the syntax trees of all project modules that it reaches by import.
 
-Comments, docstrings and layout do not count. Libraries whose arithmetic it uses count by their versions.
+Comments, docstrings and layout do not count. Libraries whose arithmetic it uses count by their versions, and so does
+Python's own.
 """
 
 import ast
+import contextlib
 import gc
-import hashlib
 import importlib.metadata
 import importlib.util
+import json
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
-ROOMS = ("schemas", "footscan", "pipelines")
+from pipelines.engine.atomic import write_atomically
+from pipelines.engine.digest import file_state, is_settled, sha256
+from schemas.documents import canonical_json
+from schemas.errors import Fault
+
+OWN = ROOMS = ("schemas", "footscan", "pipelines")
 """The project's own packages."""
+MEMORY = Path(__file__).parent / "__pycache__" / f"code.{sys.implementation.cache_tag}.json"
 
 DISTRIBUTIONS = {
     "PIL": ("pillow",),
@@ -41,29 +51,58 @@ class CodeIdentity:
     libraries: dict[str, str]
     """Version of each library imported by one of them."""
 
+    @cached_property
+    def document(self) -> bytes:
+        """All of it, as canonical JSON."""
+        return canonical_json({"modules": self.modules, "libraries": self.libraries}).encode()
 
-def code_identity(module: ModuleType) -> CodeIdentity:
-    """The identity of `module` and of everything in this project that it reaches by import."""
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the document."""
+        return sha256(self.document)
+
+    @property
+    def texts(self) -> list[bytes]:
+        """The modules' syntax trees, as Python writes them down: what their digests are those of."""
+        with _parsing():
+            return [_text(name).encode() for name in self.modules]
+
+
+def code_identity(module: str) -> CodeIdentity:
+    """The identity of the module of this name and of everything in this project that it reaches by import."""
+    known = _KNOWN.get(module)
+    if known is not None:
+        return known
+    with _parsing():
+        identity = _KNOWN[module] = _identity(module)
+        _remember()
+    return identity
+
+
+_KNOWN: dict[str, CodeIdentity] = {}
+
+
+@contextmanager
+def _parsing() -> Iterator[None]:
     with _PARSING:
         collecting = gc.isenabled()
         gc.disable()
         try:
-            return _identity(module)
+            yield
         finally:
             if collecting:
                 gc.enable()
 
 
-@cache
-def _identity(module: ModuleType) -> CodeIdentity:
+def _identity(module: str) -> CodeIdentity:
     modules: dict[str, str] = {}
-    libraries: dict[str, str] = {}
-    waiting = [module.__name__]
+    libraries = {"python": ".".join(map(str, sys.version_info[:2]))}
+    waiting = [module]
     while waiting:
         name = waiting.pop()
         if name in modules:
             continue
-        source = _parse(name)
+        source = _source(name)
         modules[name] = source.digest
         for imported in source.imports:
             if imported.split(".")[0] in ROOMS:
@@ -76,20 +115,60 @@ def _identity(module: ModuleType) -> CodeIdentity:
 @dataclass(frozen=True)
 class _Source:
     digest: str
+    """Of the text."""
     imports: frozenset[str]
     """Project modules by full name, others by the first part of theirs."""
 
 
 @cache
-def _parse(name: str) -> _Source:
+def _source(name: str) -> _Source:
+    state = file_state(_file(name))
+    known = _remembered().get(name)
+    if known is not None and known[0] == list(state):
+        return _Source(known[1], frozenset(known[2]))
+    source = _Source(sha256(_text(name).encode()), frozenset(_imports(_tree(name))))
+    if name.split(".", maxsplit=1)[0] in OWN and is_settled(state):
+        _remembered()[name] = [list(state), source.digest, sorted(source.imports)]
+        _CHANGED.add(name)
+    return source
+
+
+@cache
+def _remembered() -> dict[str, list[Any]]:
+    """What is known of modules that have not been touched since: their states, digests and imports."""
+    try:
+        return dict(json.loads(MEMORY.read_bytes()))
+    except (OSError, ValueError, TypeError, RecursionError):
+        return {}
+
+
+_CHANGED: set[str] = set()
+
+
+def _remember() -> None:
+    if _CHANGED:
+        _CHANGED.clear()
+        with contextlib.suppress(Fault):
+            write_atomically(MEMORY, canonical_json(_remembered()).encode())
+
+
+def _text(name: str) -> str:
+    """The syntax tree of a module without docstrings, as Python writes it down."""
+    tree = _tree(name)
+    for node in ast.walk(tree):
+        _drop_docstring(node)
+    return ast.unparse(tree)
+
+
+def _tree(name: str) -> ast.Module:
+    return ast.parse(_file(name).read_bytes())
+
+
+def _file(name: str) -> Path:
     spec = importlib.util.find_spec(name)
     if spec is None or spec.origin is None:
         raise ModuleNotFoundError(name)
-    tree = ast.parse(Path(spec.origin).read_bytes())
-    imports = frozenset(_imports(tree))
-    for node in ast.walk(tree):
-        _drop_docstring(node)
-    return _Source(hashlib.sha256(ast.dump(tree).encode()).hexdigest(), imports)
+    return Path(spec.origin)
 
 
 def _imports(tree: ast.Module) -> set[str]:

@@ -36,6 +36,11 @@ def file_state(path: Path) -> FileState:
     return FileState(status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino)
 
 
+def is_settled(state: FileState) -> bool:
+    """Whether a further change of the file would change its state, too."""
+    return time.time_ns() - max(state.mtime_ns, state.ctime_ns) > SETTLED_NS
+
+
 @dataclass
 class FileDigests:
     """Digests of files by path, remembered in one file of the cache."""
@@ -74,7 +79,7 @@ class FileDigests:
         except OSError as error:
             problem = "no such file" if isinstance(error, FileNotFoundError) else f"cannot be read ({error.strerror})"
             raise RefusedInput(path, problem) from None
-        if time.time_ns() - max(state.mtime_ns, state.ctime_ns) > SETTLED_NS:
+        if is_settled(state):
             self._known[str(path)] = (state, digest)
             self._changed = True
         return digest, state

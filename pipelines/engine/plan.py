@@ -1,13 +1,16 @@
 """What would run, and why: a pure function of the graph and the action cache."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from pipelines.engine.key import difference, key_of, pre_image
+from pipelines.engine.explain import changes, reason
+from pipelines.engine.key import image_text, key_of
+from pipelines.engine.memory import Known
 from pipelines.engine.step import Failure, Outcome, Output, Step, Success
-from pipelines.engine.store import Row, Store
+from pipelines.engine.store import Store
 
 
 class State(Enum):
@@ -42,12 +45,6 @@ class Plan:
         """All that is no hit."""
         return [planned for planned in self.steps if planned.state is not State.HIT]
 
-    @property
-    def known_failures(self) -> dict[str, str]:
-        """Scans of which it is known that they cannot be measured, and why."""
-        failures = {p.step.scan: p.outcome for p in reversed(self.steps) if isinstance(p.outcome, Failure)}
-        return {scan: failure.problem for scan, failure in sorted(failures.items())}
-
 
 def make_plan(steps: Sequence[Step], store: Store) -> Plan:
     """Look each step up in the action cache.
@@ -63,15 +60,14 @@ def make_plan(steps: Sequence[Step], store: Store) -> Plan:
     return Plan(list(planned.values()))
 
 
-def cached_outcome(step: Step, row: Row | None) -> Outcome | None:
-    """What a row of the action cache says of a step; None where the step must run."""
-    if row is None:
+def cached_outcome(step: Step, known: Known | None) -> Outcome | None:
+    """What the action cache says of a step; None where the step must run."""
+    if known is None:
         return None
-    if row.failure is not None:
-        kind, problem = row.failure
-        return Failure(with_places(problem, step.places), kind, step.name)
+    if known.digest is None:
+        return Failure(with_places(known.problem or "", step.places), known.kind or "", step.name)
     is_there = step.writes is None or step.writes.exists()
-    return Success(row.digest) if row.digest is not None and is_there else None
+    return Success(known.digest) if is_there else None
 
 
 def without_places(problem: str, places: Mapping[str, Path]) -> str:
@@ -100,14 +96,19 @@ def _plan_step(step: Step, planned: dict[str, PlannedStep], store: Store) -> Pla
         if before.outcome is None:
             return PlannedStep(step, State.WAITS, None, f"waits for {_label(before.step)}")
         digests[name] = before.outcome.digest
-    image = pre_image(step, digests)
+    image = image_text(step, digests)
     outcome = cached_outcome(step, store.lookup(key_of(image)))
     if outcome is not None:
         return PlannedStep(step, State.HIT, outcome, "")
+    return PlannedStep(step, State.MISS, None, _reason(step, image, store))
+
+
+def _reason(step: Step, image: str, store: Store) -> str:
     if step.writes is not None and not step.writes.exists():
-        return PlannedStep(step, State.MISS, None, f"{step.writes.parent.name} is not there")
+        return f"{step.writes.parent.name} is not there"
     latest = store.latest(step.name)
-    return PlannedStep(step, State.MISS, None, "never run" if latest is None else difference(latest.image, image))
+    row = None if latest is None else store.row(latest.key)
+    return "never run" if row is None else reason(changes(step, row.image, json.loads(image), store))
 
 
 def _label(step: Step) -> str:

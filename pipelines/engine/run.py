@@ -1,13 +1,16 @@
 """Carrying out a plan with Dask: only what is no hit becomes a task, and tasks pass digests, never arrays."""
 
+import importlib
+import json
 import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pipelines.engine.code import code_identity
 from pipelines.engine.digest import file_state
-from pipelines.engine.key import PreImage, key_of, pre_image
+from pipelines.engine.key import image_text, key_of
 from pipelines.engine.plan import Plan, State, cached_outcome, without_places
 from pipelines.engine.step import Failure, Outcome, Output, SourceFile, Step, Success, Value
 from pipelines.engine.store import Row, Store
@@ -62,7 +65,7 @@ def run_plan(plan: Plan, store: Store, *, workers: int, on_step_end: OnStepEnd) 
 
 def execute(step: Step, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, bool]:
     """The outcome of a step with inputs of these digests, from the cache or by running it; whether it ran."""
-    image = pre_image(step, inputs)
+    image = image_text(step, inputs)
     known = cached_outcome(step, store.lookup(key_of(image)))
     if known is not None:
         return known, False
@@ -96,20 +99,34 @@ def _run_step(step: Step, before: Mapping[str, Outcome], store: Store, on_step_e
     return outcome
 
 
-def _run(step: Step, image: PreImage, inputs: Mapping[str, str], store: Store) -> Outcome:
+def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> Outcome:
     """Run a step and record what came out, unless its files were changed meanwhile."""
     content = {name: _content(step, source, inputs[name], store) for name, source in step.inputs.items()}
     try:
-        result = step.module.run(content, step.parameters, step.places)
+        result = importlib.import_module(step.module).run(content, step.parameters, step.places)
     except (RefusedInput, Finding) as error:
         _check_sources(step)
         kind, problem = "finding" if isinstance(error, Finding) else "refused", str(error)
-        store.record(step.name, Row(image, None, (kind, without_places(problem, step.places))))
+        _record(step, image, None, (kind, without_places(problem, step.places)), store)
         return Failure(problem, kind, step.name)
     _check_sources(step)
     digest = store.put(result)
-    store.record(step.name, Row(image, digest))
+    _record(step, image, digest, None, store)
     return Success(digest)
+
+
+def _record(step: Step, image: str, digest: str | None, failure: tuple[str, str] | None, store: Store) -> None:
+    """Write an action's row, after all that it names: its code and the values that it took."""
+    identity = code_identity(step.module)
+    if not store.has(identity.digest):
+        for text in identity.texts:
+            store.put(text)
+        store.put(identity.document)
+    for source in step.inputs.values():
+        if isinstance(source, Value) and not store.has(source.digest):
+            store.put(source.content)
+    sources = {name: str(source.path) for name, source in step.inputs.items() if isinstance(source, SourceFile)}
+    store.record(step.name, Row(json.loads(image), digest, failure), sources)
 
 
 def _content(step: Step, source: Value | Output | SourceFile, digest: str, store: Store) -> bytes:

@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from types import ModuleType
+from typing import ClassVar
 
 from pydantic import BaseModel
 
@@ -16,6 +17,7 @@ class Output:
 
     step: str
     """Name of that step, see `Step.name`."""
+    source: ClassVar[str] = "result"
 
 
 @dataclass(frozen=True)
@@ -23,8 +25,9 @@ class Value:
     """An input that is known when the graph is drawn, small enough to be handed over as it is."""
 
     content: bytes
+    source: ClassVar[str] = "value"
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """SHA-256 of the content."""
         return sha256(self.content)
@@ -38,6 +41,7 @@ class SourceFile:
     digest: str
     states: tuple[tuple[Path, FileState], ...]
     """The state of each file when its digest was taken: a file that changes meanwhile is noticed."""
+    source: ClassVar[str] = "file"
 
 
 Input = Output | Value | SourceFile
@@ -51,8 +55,8 @@ class Step:
     """The scan it belongs to, as `patient/scan`."""
     kind: str
     """What it does, e.g. `extract`."""
-    module: ModuleType
-    """Holds `run(inputs, parameters, places) -> bytes` and the docstring that says what the step does."""
+    module: str
+    """Name of the one that holds `run(inputs, parameters, places) -> bytes`; imported when the step runs."""
     parameters: BaseModel | None = None
     inputs: Mapping[str, Input] = field(default_factory=dict)
     camera: int | None = None
@@ -61,7 +65,7 @@ class Step:
     writes: Path | None = None
     """A file outside the store that the step leaves behind and without which it must run again."""
 
-    @property
+    @cached_property
     def name(self) -> str:
         """Unique within a graph, and the same in every run: `patient/scan/extract-3`."""
         return f"{self.scan}/{self.kind}" + (f"-{self.camera}" if self.camera is not None else "")

@@ -1,22 +1,27 @@
 """The content store (blobs by their digest) and the action cache (which action gave which blob).
 
-Every write is atomic; an action's row is written after its blob. Nothing in here is trusted: a blob is checked against
-its digest whenever it is read, and a damaged one counts as missing.
+Every write is atomic; an action's row is written after its blob. Nothing in here is trusted: a row bears a seal, a blob
+is checked against its digest whenever it is read, and what is damaged counts as missing. What has not been touched
+since it was checked is not read again (`memory`).
 """
 
 import contextlib
 import json
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pipelines.engine.atomic import write_atomically
 from pipelines.engine.digest import sha256
+from pipelines.engine.files import Files, open_files
 from pipelines.engine.key import PreImage, key_of
+from pipelines.engine.memory import Known, Memory
 from schemas.documents import canonical_json
 
 log = logging.getLogger("footscan.store")
+
+KINDS = ("refused", "finding")
+"""Of failures that are remembered."""
 
 
 @dataclass(frozen=True)
@@ -32,88 +37,176 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Store:
-    """A content store and an action cache in one folder."""
+class Latest:
+    """The last action of a step."""
 
-    root: Path
+    step: str
+    key: str
+    sources: dict[str, str]
+    """Where the files lay that it took, by the name of the input."""
+
+
+@dataclass(frozen=True)
+class Store:
+    """A content store and an action cache in one place."""
+
+    files: Files
+    memory: Memory | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Store, (self.files,)  # what one machine remembers does not go to another
 
     def put(self, data: bytes) -> str:
         """Keep `data`; returns its digest."""
         digest = sha256(data)
         if self.get(digest) is None:
-            write_atomically(self._blob(digest), data)
+            self.files.write(blob_name(digest), data)
         return digest
 
     def get(self, digest: str) -> bytes | None:
         """The blob with this digest; None where it is missing or damaged."""
+        name = blob_name(digest)
         try:
-            data = self._blob(digest).read_bytes()
+            data = self.files.read(name)
         except OSError:
             return None
         if sha256(data) != digest:
-            log.warning("%s: damaged, will be made again", self._blob(digest))
+            log.warning("%s: damaged, will be made again", self.files.path(name))
             with contextlib.suppress(OSError):
-                self._blob(digest).unlink()
+                self.files.remove(name)
             return None
         return data
 
     def has(self, digest: str) -> bool:
         """Whether the blob is there; whether it is sound is seen on reading."""
-        return self._blob(digest).is_file()
+        return self.files.state(blob_name(digest)) is not None
 
-    def lookup(self, key: str) -> Row | None:
-        """The action cache's row for a key, if its result is there."""
-        row = self._read_row(key)
-        if row is None:
+    def lookup(self, key: str) -> Known | None:
+        """What an action came to, if its result is there and sound."""
+        row_state = self.files.state(row_name(key))
+        if row_state is None:
             return None
-        return row if row.failure is not None or (row.digest is not None and self.has(row.digest)) else None
+        known = None if self.memory is None else self.memory.get(key)
+        if known is None or known.row != row_state:
+            row = self.row(key)
+            if row is None:
+                return None
+            known = _known(row_state, row, None)
+        if known.digest is None:
+            self._remember(key, known)
+            return known
+        blob_state = self.files.state(blob_name(known.digest))
+        if blob_state is None:
+            return None
+        if known.blob != blob_state:
+            if self.get(known.digest) is None:
+                return None
+            known = known._replace(blob=blob_state)
+            self._remember(key, known)
+        return known
 
-    def record(self, step_name: str, row: Row) -> None:
+    def record(self, step_name: str, row: Row, sources: dict[str, str] | None = None) -> None:
         """Write the row of an action, and remember it as the last one of its step."""
-        content = canonical_json({"image": row.image, "digest": row.digest, "failure": row.failure}).encode()
         key = key_of(row.image)
-        write_atomically(self._action(key), content)
-        write_atomically(self._latest(step_name), key.encode())
+        self.files.write(row_name(key), _sealed({"image": row.image, "digest": row.digest, "failure": row.failure}))
+        latest = {"step": step_name, "key": key, "sources": sources or {}}
+        self.files.write(latest_name(step_name), _sealed(latest))
+        state = self.files.state(row_name(key))
+        if self.memory is not None and state is not None:
+            blob = None if row.digest is None else self.files.state(blob_name(row.digest))
+            self.memory.put(key, _known(state, row, blob))
 
-    def latest(self, step_name: str) -> Row | None:
+    def latest(self, step_name: str) -> Latest | None:
         """The last action of a step, whatever its key."""
+        latest = self.read_latest(latest_name(step_name))
+        return latest if latest is not None and latest.step == step_name else None
+
+    def read_latest(self, name: str) -> Latest | None:
+        """The last action of a step by the name of its file."""
+        value = self._read_sealed(name)
         try:
-            return self._read_row(self._latest(step_name).read_text())
-        except (OSError, ValueError):
+            return None if value is None else Latest(value["step"], plain_hex(value["key"]), dict(value["sources"]))
+        except (KeyError, TypeError, ValueError):
             return None
 
-    def _blob(self, digest: str) -> Path:
-        return self.root / "blobs" / _plain_hex(digest)[:2] / digest
-
-    def _action(self, key: str) -> Path:
-        return self.root / "actions" / _plain_hex(key)[:2] / f"{key}.json"
-
-    def _latest(self, step_name: str) -> Path:
-        digest = sha256(step_name.encode())
-        return self.root / "latest" / digest[:2] / f"{digest}.json"
-
-    def _read_row(self, key: str) -> Row | None:
-        path = self._action(key)
+    def row(self, key: str) -> Row | None:
+        """The row of an action, whether its result is there or not."""
+        value = self._read_sealed(row_name(key))
+        if value is None:
+            return None
         try:
-            value: dict[str, Any] = json.loads(path.read_bytes())
             image, digest, failure = value["image"], value["digest"], value["failure"]
             if key_of(image) != key:
                 raise ValueError("the row of another action")
             if failure is None:
-                return Row(image, _plain_hex(digest))
+                return Row(image, plain_hex(digest))
             kind, problem = failure
-            if digest is not None or kind not in {"refused", "finding"} or not isinstance(problem, str):
+            if digest is not None or kind not in KINDS or not isinstance(problem, str):
                 raise ValueError("neither a result nor a failure")
             return Row(image, None, (kind, problem))
+        except (ValueError, KeyError, TypeError, RecursionError):
+            log.warning("%s: damaged, will be made again", self.files.path(row_name(key)))
+            return None
+
+    def _remember(self, key: str, known: Known) -> None:
+        if self.memory is not None:
+            self.memory.put(key, known)
+
+    def _read_sealed(self, name: str) -> dict[str, Any] | None:
+        """The content of a small file, if its seal is right."""
+        try:
+            value = json.loads(self.files.read(name))
+            seal = value.pop("seal")
+            if seal != sha256(canonical_json(value).encode()):
+                raise ValueError("broken seal")
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, KeyError, TypeError, RecursionError):
-            log.warning("%s: damaged, will be made again", path)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            log.warning("%s: damaged, will be made again", self.files.path(name))
             return None
+        return dict(value)
 
 
-def _plain_hex(digest: Any) -> str:
-    """`digest` where it is one: a name out of a file of the cache must not become a path."""
-    if not isinstance(digest, str) or len(digest) != 64 or not set(digest) <= set("0123456789abcdef"):
+def open_store(place: Path | str, memory: Path | None = None) -> Store:
+    """The store at a path or URL, with what the file `memory` remembers of it."""
+    return Store(open_files(place), None if memory is None else Memory(memory))
+
+
+def without_memory(store: Store) -> Store:
+    """The same store, read anew at every turn."""
+    return replace(store, memory=None)
+
+
+def blob_name(digest: str) -> str:
+    """The file of a blob."""
+    return f"blobs/{plain_hex(digest)[:2]}/{digest}"
+
+
+def row_name(key: str) -> str:
+    """The file of an action's row."""
+    return f"actions/{plain_hex(key)[:2]}/{key}.json"
+
+
+def latest_name(step_name: str) -> str:
+    """The file that names the last action of a step."""
+    digest = sha256(step_name.encode())
+    return f"latest/{digest[:2]}/{digest}.json"
+
+
+_HEX = frozenset("0123456789abcdef")
+
+
+def plain_hex(digest: Any) -> str:
+    """`digest` where it is one: a name out of a file of the store must not become a path."""
+    if not isinstance(digest, str) or len(digest) != 64 or not _HEX.issuperset(digest):
         raise ValueError(f"{str(digest)[:80]!r} is no SHA-256 digest")
     return digest
+
+
+def _known(state: str, row: Row, blob_state: str | None) -> Known:
+    kind, problem = row.failure or (None, None)
+    return Known(state, row.digest, kind, problem, blob_state)
+
+
+def _sealed(value: dict[str, Any]) -> bytes:
+    return canonical_json({**value, "seal": sha256(canonical_json(value).encode())}).encode()

@@ -53,10 +53,10 @@ class Archive:
 
     def plan(self) -> tuple[int, dict[str, str]]:
         """Number of steps; reason of each that is to run, by its name within the scan."""
-        planned = plan_job(self.job())
+        planned = plan_job(self.job(), reasons=True)
         assert planned.refused == {}
-        reasons = {p.step.name.removeprefix("P0001/S1/"): p.reason for p in planned.plan.to_run}
-        return len(planned.plan.steps), reasons
+        reasons = {w.name.removeprefix("P0001/S1/"): w.reason for w in planned.waiting}
+        return planned.steps, reasons
 
     def run(self) -> tuple[list[ScanEnd], set[str]]:
         """What became of the scans; names of the steps that ran."""

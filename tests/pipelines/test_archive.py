@@ -122,7 +122,7 @@ def test_own_calibration_of_a_scan_comes_before_the_workflows(
     document.write_text(document.read_text().replace("cameras:", "calibration: ../own.json\ncameras:"))
     assert done.plan()[1]["map-1"] == "input calibration changed"
     job = job_of_scan(done.scan, done.root / "calibration.json", done.root / "results", 1)
-    assert "P0001/S1/map-1" not in [planned.step.name for planned in plan_job(job).plan.to_run]
+    assert "P0001/S1/map-1" not in [waiting.name for waiting in plan_job(job, reasons=True).waiting]
 
 
 def test_calibration_without_a_camera_is_refused(done: Any, calibration: Callable[..., Calibration]) -> None:

@@ -6,12 +6,12 @@ import pytest
 
 from pipelines.deliver import deliver
 from pipelines.engine.digest import FileDigests
-from pipelines.engine.store import Store
+from pipelines.engine.store import Store, blob_name, open_store
 
 
 @pytest.fixture
 def store(tmp_path: Path) -> Store:
-    return Store(tmp_path / "store")
+    return open_store(tmp_path / "store")
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def test_writes_what_is_missing_or_differs_and_nothing_else(tmp_path: Path, stor
 
 def test_damaged_content_is_said(tmp_path: Path, store: Store, digests: FileDigests) -> None:
     digest = store.put(b"foot")
-    (store.root / "blobs" / digest[:2] / digest).write_bytes(b"feet")
+    store.files.write(blob_name(digest), b"feet")
     problem = deliver({"foot.stl": digest}, store, digests, tmp_path / "results")
     assert problem is not None
     assert problem.startswith(f"{tmp_path / 'results/foot.stl'}: ")

@@ -60,7 +60,8 @@ def test_second_run_does_nothing(done: Any) -> None:
     assert (scan.problem, ran) == (None, set())
     after = {path: path.stat().st_mtime_ns for path in done.root.rglob("*") if path.is_file()}
     assert {path for path in before | after if before.get(path) != after.get(path)} <= {
-        done.root / "results/.footscan/files.json"
+        done.root / "results/.footscan/files.json",
+        done.root / "results/.footscan/known.sqlite",
     }
 
 

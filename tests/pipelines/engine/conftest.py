@@ -5,7 +5,6 @@ import itertools
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
@@ -13,7 +12,7 @@ from pipelines.engine import code
 from pipelines.engine.plan import make_plan
 from pipelines.engine.run import StepEnd, run_plan
 from pipelines.engine.step import Outcome, Step
-from pipelines.engine.store import Store
+from pipelines.engine.store import Store, open_store
 
 PACKAGES = itertools.count()
 
@@ -38,19 +37,19 @@ class MadeUpPackage:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(source.replace("PACKAGE", self.name))
 
-    def load(self, module: str) -> ModuleType:
-        """The module as a new process would have it."""
+    def load(self, module: str) -> str:
+        """The name of the module, which will be imported as a new process would."""
         self.forget()
-        return importlib.import_module(f"{self.name}.{module}")
+        return f"{self.name}.{module}"
 
     def forget(self) -> None:
         for name in [name for name in sys.modules if name.split(".")[0] == self.name]:
             del sys.modules[name]
         importlib.invalidate_caches()
-        code._identity.cache_clear()
-        code._parse.cache_clear()
+        code._KNOWN.clear()
+        code._source.cache_clear()
 
-    def step_module(self, name: str, source: str = JOIN) -> ModuleType:
+    def step_module(self, name: str, source: str = JOIN) -> str:
         self.write(name, source)
         return self.load(name)
 
@@ -67,7 +66,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[MadeUpP
 
 @pytest.fixture
 def store(tmp_path: Path) -> Store:
-    return Store(tmp_path / "store")
+    return open_store(tmp_path / "store", tmp_path / "known.sqlite")
 
 
 RunSteps = Callable[..., tuple[dict[str, Outcome], list[str]]]

@@ -1,5 +1,6 @@
 """A reader meets the old content or the new."""
 
+import os
 import threading
 from pathlib import Path
 
@@ -15,6 +16,32 @@ def test_writes_and_replaces(tmp_path: Path) -> None:
     write_atomically(path, b"new")
     assert path.read_bytes() == b"new"
     assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_link_stays_and_what_it_points_to_is_written(tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "folder/file")
+    for data in (b"first", b"second"):
+        write_atomically(tmp_path / "link", data)
+        assert (tmp_path / "link").is_symlink()
+        assert (tmp_path / "folder/file").read_bytes() == data
+
+
+def test_devices_and_pipes_are_written_into(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    read: list[bytes] = []
+    reader = threading.Thread(target=lambda: read.append(pipe.read_bytes()))
+    reader.start()
+    write_atomically(pipe, b"data")
+    reader.join(10)
+    assert read == [b"data"]
+    assert pipe.is_fifo()
+    link = tmp_path / "link"
+    link.symlink_to("/dev/full")  # never by its own name: a mistake here would cost the machine its device
+    with pytest.raises(Fault, match=r"cannot be written \(No space left"):
+        write_atomically(link, b"data")
+    assert link.is_char_device()
 
 
 def test_refusal_of_the_disk_is_a_fault_and_leaves_no_part(tmp_path: Path) -> None:

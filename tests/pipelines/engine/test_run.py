@@ -12,7 +12,7 @@ from pipelines.engine.key import key_of
 from pipelines.engine.plan import make_plan
 from pipelines.engine.run import StepEnd, run_plan
 from pipelines.engine.step import Failure, Output, SourceFile, Step, Success, Value
-from pipelines.engine.store import Row, Store
+from pipelines.engine.store import Row, Store, blob_name
 from schemas.documents import Document
 from schemas.errors import Fault
 
@@ -131,7 +131,7 @@ def test_result_that_is_no_bytes_is_a_fault_of_its_step(diamond: Any, package: A
 def test_full_disk_is_a_fault_of_each_step_whether_it_failed_or_not(
     diamond: Any, package: Any, run_steps: RunSteps, monkeypatch: pytest.MonkeyPatch, error: str | None
 ) -> None:
-    def full(_: Store, step_name: str, row: Row) -> None:
+    def full(_: Store, step_name: str, row: Row, _sources: object) -> None:
         raise Fault(f"{step_name}: disk full, {row.digest}")
 
     monkeypatch.setattr(Store, "record", full)
@@ -145,12 +145,12 @@ def test_row_is_written_after_its_result(diamond: Any, run_steps: RunSteps) -> N
     recorded = []
     original = Store.record
 
-    def record(self: Store, step_name: str, row: Row) -> None:
+    def record(self: Store, step_name: str, row: Row, sources: dict[str, str]) -> None:
         assert row.digest is not None
         assert self.get(row.digest) is not None
         assert self.lookup(key_of(row.image)) is None
         recorded.append(step_name)
-        original(self, step_name, row)
+        original(self, step_name, row, sources)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Store, "record", record)
@@ -158,18 +158,30 @@ def test_row_is_written_after_its_result(diamond: Any, run_steps: RunSteps) -> N
     assert len(recorded) == 3
 
 
-def test_damaged_result_is_made_anew(
+def test_damaged_result_is_noticed_by_the_plan_and_made_anew(
     diamond: Any, store: Store, run_steps: RunSteps, caplog: pytest.LogCaptureFixture
 ) -> None:
     outcomes, _ = run_steps(*diamond())
-    digest = outcomes["left"].digest
-    (store.root / "blobs" / digest[:2] / digest).write_bytes(b"A")
-    changed = diamond(b=b"B")
+    store.files.write(blob_name(outcomes["left"].digest), b"A")
     with caplog.at_level(logging.WARNING):
-        broken, ran = run_steps(*changed)
-    assert broken["both"].kind == "damaged"
-    assert broken["both"].problem == "P/S/both: the result of P/S/left is damaged, expected what was stored"
+        mended, ran = run_steps(*diamond(b=b"B"))
     assert "damaged, will be made again" in caplog.text
+    assert ran == ["both", "left", "right"]
+    assert store.get(mended["both"].digest) == b"a+B*2"
+    assert store.get(outcomes["left"].digest) == b"a"
+
+
+def test_result_that_is_damaged_after_the_plan_is_made_anew_by_the_next(
+    diamond: Any, store: Store, run_steps: RunSteps
+) -> None:
+    outcomes, _ = run_steps(*diamond())
+    changed = diamond(b=b"B")
+    plan = make_plan(changed, store)
+    store.files.write(blob_name(outcomes["left"].digest), b"A")
+    both = run_plan(plan, store, workers=2, on_step_end=lambda _: None)["P/S/both"]
+    assert isinstance(both, Failure)
+    assert both.kind == "damaged"
+    assert both.problem == "P/S/both: the result of P/S/left is damaged, expected what was stored"
     mended, ran = run_steps(*changed)
     assert ran == ["both", "left"]
     assert store.get(mended["both"].digest) == b"a+B*2"
