@@ -11,7 +11,8 @@ from typing import NamedTuple
 from pipelines.deliver import deliver
 from pipelines.engine.digest import FileDigests, sha256
 from pipelines.engine.plan import Plan, make_plan
-from pipelines.engine.run import OnStepEnd, run_plan
+from pipelines.engine.pool import OnStepEnd, Pool
+from pipelines.engine.run import run_plan
 from pipelines.engine.step import Failure, Outcome, Step, Success
 from pipelines.engine.store import Store, open_store
 from pipelines.recorded import RecordedScan, read_scan, scan_folders
@@ -43,7 +44,8 @@ class Job:
     cache: Path | str
     """Folder of the store, or its URL."""
     parameters: ScanParameters
-    workers: int
+    threads: int
+    """Steps that run at once where no other pool is given."""
 
 
 class Waiting(NamedTuple):
@@ -107,16 +109,20 @@ class ScanEnd:
     problem: str | None
     kind: str | None
     """`refused`, `finding`, `fault` or `damaged`, as in `Failure`."""
+    digests: Mapping[str, str] = field(default_factory=dict)
+    """Of the files in its results."""
+    known: bool = False
+    """Whether nothing had to run for it."""
 
 
-def job_of_workflow(path: Path, workers: int | None = None) -> Job:
-    """The job that a workflow.yaml describes."""
+def job_of_workflow(path: Path, threads: int | None = None, *, may_be_empty: bool = False) -> Job:
+    """The job that a workflow.yaml describes; RefusedInput where the archive is empty and may not be so."""
     workflow = read_yaml(path, Workflow)
     base = path.resolve().parent
     archive = base / workflow.archive
     results = base / workflow.results
     folders = list(scan_folders(archive))
-    if not folders:
+    if not folders and not may_be_empty:
         raise RefusedInput(path, f"expected folders with a scan.yaml below {archive}, found none", field="archive")
     return Job(
         folders=folders,
@@ -126,11 +132,11 @@ def job_of_workflow(path: Path, workers: int | None = None) -> Job:
         results=results,
         cache=_cache(base, workflow.cache) or results / CACHE,
         parameters=workflow.parameters,
-        workers=workers or workflow.workers or cores(),
+        threads=threads or workflow.workers or cores(),
     )
 
 
-def job_of_scan(folder: Path, calibration: Path | None, results: Path, workers: int | None = None) -> Job:
+def job_of_scan(folder: Path, calibration: Path | None, results: Path, threads: int | None = None) -> Job:
     """The job of one scan without a workflow."""
     if results.exists() and not results.is_dir():
         raise RefusedInput(results, "is a file, expected a folder for the results")
@@ -142,7 +148,7 @@ def job_of_scan(folder: Path, calibration: Path | None, results: Path, workers: 
         results=results,
         cache=results / CACHE,
         parameters=ScanParameters(),
-        workers=workers or cores(),
+        threads=threads or cores(),
     )
 
 
@@ -172,14 +178,14 @@ def plan_job(job: Job, *, reasons: bool = False) -> PlannedJob:
     return planned
 
 
-def run_job(planned: PlannedJob, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
+def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
     """Run what is left of a planned job and deliver each scan's results; yields what became of each scan."""
     for folder, error in planned.refused.items():
         yield ScanEnd(folder, None, str(error), "refused")
     waiting = iter(planned.scans)
     try:
-        while window := list(islice(waiting, WINDOW * planned.job.workers)):
-            yield from _run_window(window, planned, on_step_end)
+        while window := list(islice(waiting, WINDOW * pool.count)):
+            yield from _run_window(window, planned, pool, on_step_end)
     finally:
         planned.digests.save()
         if planned.store.memory is not None:
@@ -209,28 +215,30 @@ def _sum_up(scan: RecordedScan, plan: Plan) -> PlannedScan:
     return PlannedScan(scan, len(plan.steps), len(plan.to_run), failures[0] if failures else None, delivered)
 
 
-def _run_window(window: Sequence[PlannedScan], planned: PlannedJob, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
+def _run_window(
+    window: Sequence[PlannedScan], planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd
+) -> Iterator[ScanEnd]:
     """Run some scans together; of those that are known as a whole, only the results are looked at."""
     steps: list[Step] = []
     for scan in window:
         if scan.to_run:
             steps += _draw(scan.scan, planned)
-    outcomes = _run_and_mend(steps, planned, on_step_end)
+    outcomes = _run_and_mend(steps, planned, pool, on_step_end)
     for scan in window:
         end = _end_scan(scan, outcomes, planned)
         if end.kind == "damaged":
             log.warning("%s", end.problem)
-            again = _run_and_mend(_draw(scan.scan, planned), planned, on_step_end)
+            again = _run_and_mend(_draw(scan.scan, planned), planned, pool, on_step_end)
             end = _end_scan(scan, again, planned)
         yield end
 
 
-def _run_and_mend(steps: Sequence[Step], planned: PlannedJob, on_step_end: OnStepEnd) -> dict[str, Outcome]:
+def _run_and_mend(steps: Sequence[Step], planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> dict[str, Outcome]:
     """Run steps; what turns out to be damaged has been set aside then, and is made anew by another run of them."""
     told: set[str] = set()
     while True:  # behind what was damaged there may be more
         plan = make_plan(steps, planned.store)
-        outcomes = run_plan(plan, planned.store, workers=planned.job.workers, on_step_end=on_step_end)
+        outcomes = run_plan(plan, planned.store, pool=pool, on_step_end=on_step_end)
         damage = _damage(outcomes) - told
         if not damage:
             return outcomes
@@ -259,7 +267,8 @@ def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planne
         whole = all(planned.store.has(digest) for digest in digests.values())  # what is damaged has been set aside
         return ScanEnd(scan.name, None, problem, "fault" if whole else "damaged")
     finding = Measures.model_validate_json((target / "measures.json").read_bytes()).finding
-    return ScanEnd(scan.name, target, finding, None if finding is None else "finding")
+    ended = None if finding is None else "finding"
+    return ScanEnd(scan.name, target, finding, ended, digests, known=not planned_scan.to_run)
 
 
 def _what_stays(target: Path) -> str:

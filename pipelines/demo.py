@@ -11,7 +11,8 @@ from pipelines.archive import CACHE, Job, cores, plan_job, run_job
 from pipelines.deliver import deliver
 from pipelines.engine.digest import FileDigests
 from pipelines.engine.plan import make_plan
-from pipelines.engine.run import OnStepEnd, run_plan
+from pipelines.engine.pool import OnStepEnd, Threads
+from pipelines.engine.run import run_plan
 from pipelines.engine.step import Failure, Output, Step
 from pipelines.engine.store import open_store
 from pipelines.recorded import SCAN_FILE, scan_folders
@@ -59,7 +60,7 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
     filming = _filming(folder, foot)
     plan = make_plan(filming, store)
     with timed("filming and calibration", len(plan.to_run), len(plan.steps)) as on_step_end:
-        outcomes = run_plan(plan, store, workers=1, on_step_end=on_step_end)
+        outcomes = run_plan(plan, store, pool=Threads(1), on_step_end=on_step_end)
     digests: dict[str, str] = {}
     for step in filming:
         outcome = outcomes[step.name]
@@ -74,7 +75,7 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
 
     planned = plan_job(_job(folder, results))
     with timed("reconstruction", planned.to_run, planned.steps) as on_step_end:
-        ends = list(run_job(planned, on_step_end))
+        ends = list(run_job(planned, Threads(planned.job.threads), on_step_end))
     for end in ends:
         if end.problem is not None:
             raise Fault(f"{end.scan}: {end.problem}")
@@ -109,5 +110,5 @@ def _job(folder: Path, results: Path) -> Job:
         results=results,
         cache=results / CACHE,
         parameters=ScanParameters(),
-        workers=cores(),
+        threads=cores(),
     )

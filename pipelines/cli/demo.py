@@ -11,7 +11,7 @@ from pipelines.cli.output import message, print_table
 from pipelines.cli.results import print_measures
 
 if TYPE_CHECKING:
-    from pipelines.engine.run import OnStepEnd
+    from pipelines.engine.pool import OnStepEnd
 
 
 def demo(

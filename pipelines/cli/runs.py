@@ -1,15 +1,20 @@
 """`footscan run` and `footscan plan`."""
 
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
 from pipelines.cli.output import AsJson, message, print_json, print_table
-from schemas.errors import FootscanError, RefusedInput
+from schemas.errors import Fault, FootscanError, RefusedInput
 
 if TYPE_CHECKING:
     from pipelines.archive import Job, PlannedJob, ScanEnd
+    from pipelines.engine.pool import Pool
 
 WORKFLOW = Path("workflow.yaml")
 
@@ -21,9 +26,20 @@ CalibrationFile = Annotated[
     Path | None, typer.Option("--calibration", help="Calibration for --scan; the one that the scan names where absent.")
 ]
 ResultsFolder = Annotated[Path | None, typer.Option("--out", help="Folder of the results, for --scan.")]
-Workers = Annotated[
-    int | None, typer.Option("--workers", min=1, help="Steps that run at once; as many as cores where absent.")
+Threads = Annotated[
+    int | None, typer.Option("--threads", min=1, help="Steps that run at once; as many as cores where absent.")
 ]
+Workers = Annotated[
+    int | None, typer.Option("--workers", min=1, help="Run the steps in so many processes of this machine instead.")
+]
+ClusterAddress = Annotated[
+    str | None, typer.Option("--cluster", metavar="ADDRESS", help="Run them on the workers of this Dask scheduler.")
+]
+JsonLog = Annotated[Path | None, typer.Option("--log-json", help="Write what happens here, a JSON object a line.")]
+WatchArchive = Annotated[
+    bool, typer.Option("--watch", help="Stay, and run scans as they arrive in the archive; Ctrl-C ends it.")
+]
+POLL_S = 2.0
 
 
 def run(
@@ -31,22 +47,47 @@ def run(
     scan: ScanFolder = None,
     calibration: CalibrationFile = None,
     out: ResultsFolder = None,
+    threads: Threads = None,
     workers: Workers = None,
+    cluster: ClusterAddress = None,
+    watch: WatchArchive = False,
+    log_json: JsonLog = None,
     as_json: AsJson = False,
 ) -> int:
     """Reconstruct and measure: all scans of a workflow, or one scan folder.
 
     Nothing that has been computed before is computed again.
     """
+    if sum(given is not None for given in (threads, workers, cluster)) > 1:
+        raise RefusedInput("--threads, --workers, --cluster", "exclude each other, expected one of them")
+    if watch and (scan is not None or as_json):
+        raise RefusedInput("--watch", "goes with a workflow alone, not with --scan or --json")
+    with ExitStack() as stack:
+        log = None if log_json is None else stack.enter_context(_log(log_json))
+        pool = _LazyPool(stack, workers, cluster)
+        if watch:
+            return _watch(workflow or WORKFLOW, threads, pool, log)
+        job = _job(workflow, scan, calibration, out, threads)
+        return _run(job, pool, log, as_json=as_json, table=scan is None)
+
+
+def _run(job: "Job", pool: "_LazyPool", log: TextIO | None, *, as_json: bool = False, table: bool = False) -> int:
+    """Run a job and tell what became of it; the exit status."""
     from pipelines.archive import plan_job, run_job
     from pipelines.cli.progress import StepProgress
 
-    job = _job(workflow, scan, calibration, out, workers)
     planned = plan_job(job)
     if planned.steps:
         message(_summary(planned))
-    with StepProgress(planned.to_run) as progress:
-        ends = list(run_job(planned, progress.on_step_end))
+    ends = []
+    with StepProgress(planned.to_run, len(job.folders), log) as progress:
+        for end in run_job(planned, pool.open(job.threads, planned.to_run), progress.on_step_end):
+            progress.on_scan_end(end)
+            ends.append(end)
+    if table:
+        from pipelines.results_table import write_results_table
+
+        write_results_table(ends, job.results)
     if as_json:
         print_json(_ends_json(planned, ends, progress.ran))
     for end in ends:
@@ -54,7 +95,50 @@ def run(
             _tell(end.scan, end.problem)
         elif not as_json:
             print(f"{end.scan}: {end.folder}")
-    return _status(ends, single=scan is not None)
+    return _status(ends, single=not table)
+
+
+def _watch(workflow: Path, threads: int | None, pool: "_LazyPool", log: TextIO | None) -> int:
+    """Run scans as they are complete, until interrupted."""
+    from pipelines.archive import job_of_workflow
+    from pipelines.watch import Arrivals
+
+    job = job_of_workflow(workflow, threads, may_be_empty=True)
+    assert job.archive is not None, "of a workflow"
+    arrivals = Arrivals(job.archive)
+    message(f"watching {job.archive}")
+    while True:
+        if folders := arrivals.complete():
+            _run(replace(job, folders=folders), pool, log)
+        time.sleep(POLL_S)
+
+
+class _LazyPool:
+    """Where steps run; opened when some do, for a cluster takes seconds to start."""
+
+    def __init__(self, stack: ExitStack, workers: int | None, cluster: str | None) -> None:
+        self._stack, self._workers, self._cluster = stack, workers, cluster
+        self._pool: Pool | None = None
+
+    def open(self, threads: int, to_run: int) -> "Pool":
+        """The pool of `--workers` or `--cluster`, otherwise so many threads."""
+        from pipelines.engine.pool import Cluster, Threads, joined_cluster, local_cluster
+
+        if self._pool is None and to_run and (self._workers is not None or self._cluster is not None):
+            opening = joined_cluster(self._cluster) if self._cluster else local_cluster(self._workers or 1)
+            self._pool = self._stack.enter_context(opening)
+            if isinstance(self._pool, Cluster):
+                message(f"dashboard: {self._pool.client.dashboard_link}")
+        return self._pool or Threads(threads)
+
+
+@contextmanager
+def _log(path: Path) -> Iterator[TextIO]:
+    try:
+        with path.open("a", encoding="utf-8") as log:
+            yield log
+    except OSError as error:
+        raise Fault(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
 def plan(
@@ -87,7 +171,7 @@ def plan(
 
 
 def _job(
-    workflow: Path | None, scan: Path | None, calibration: Path | None, out: Path | None, workers: int | None
+    workflow: Path | None, scan: Path | None, calibration: Path | None, out: Path | None, threads: int | None
 ) -> "Job":
     from pipelines.archive import job_of_scan, job_of_workflow
 
@@ -95,12 +179,12 @@ def _job(
         for name, value in (("--calibration", calibration), ("--out", out)):
             if value is not None:
                 raise RefusedInput(name, "goes with --scan, expected it in the workflow")
-        return job_of_workflow(workflow or WORKFLOW, workers)
+        return job_of_workflow(workflow or WORKFLOW, threads)
     if workflow is not None:
         raise RefusedInput(workflow, "a workflow and --scan exclude each other, expected one of them")
     if out is None:
         raise RefusedInput("--out", "is missing, expected a folder for the results of --scan")
-    return job_of_scan(scan, calibration, out, workers)
+    return job_of_scan(scan, calibration, out, threads)
 
 
 def _tell(scan: str, problem: str) -> None:

@@ -1,17 +1,18 @@
-"""Carrying out a plan with Dask: only what is no hit becomes a task, and tasks pass digests, never arrays."""
+"""Carrying out a plan: only what is no hit becomes a task of Dask."""
 
 import importlib
 import json
 import logging
+import platform
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from functools import partial
 
 from pipelines.engine.code import code_identity
 from pipelines.engine.digest import file_state
 from pipelines.engine.key import image_text, key_of
-from pipelines.engine.plan import Plan, State, cached_outcome, without_places
+from pipelines.engine.plan import Plan, cached_outcome, without_places
+from pipelines.engine.pool import OnStepEnd, Pool, StepEnd, Task
 from pipelines.engine.step import Failure, Outcome, Output, SourceFile, Step, Success, Value
 from pipelines.engine.store import Row, Store
 from schemas.errors import DamagedError, Fault, Finding, RefusedInput, one_line
@@ -19,22 +20,8 @@ from schemas.errors import DamagedError, Fault, Finding, RefusedInput, one_line
 log = logging.getLogger("footscan.run")
 
 
-@dataclass(frozen=True)
-class StepEnd:
-    """Told when a step of a run has ended."""
-
-    step: Step
-    outcome: Outcome
-    ran: bool
-    """False where the step's inputs turned out to be those of an earlier run."""
-    seconds: float
-
-
-OnStepEnd = Callable[[StepEnd], None]
-
-
-def run_plan(plan: Plan, store: Store, *, workers: int, on_step_end: OnStepEnd) -> dict[str, Outcome]:
-    """Run what a plan has left to run, on threads of this machine.
+def run_plan(plan: Plan, store: Store, *, pool: Pool, on_step_end: OnStepEnd) -> dict[str, Outcome]:
+    """Run what a plan has left to run.
 
     Returns
     -------
@@ -42,25 +29,35 @@ def run_plan(plan: Plan, store: Store, *, workers: int, on_step_end: OnStepEnd) 
         Result or failure of every step by its name, the hits included.
     """
     outcomes = {p.step.name: p.outcome for p in plan.steps if p.outcome is not None}
-    if not plan.to_run:
-        return outcomes
-    import dask  # not needed, and not waited for, when all is there
+    tasks: dict[str, Task] = {}
+    for planned in plan.to_run:
+        before = [source.step for source in planned.step.inputs.values() if isinstance(source, Output)]
+        known = {name: outcomes[name] for name in before if name not in tasks}
+        code = code_identity(planned.step.module).digest
+        waits_for = tuple(name for name in before if name in tasks)
+        tasks[planned.step.name] = Task(planned.step, code, known, waits_for)
+    return outcomes | pool.run(tasks, partial(run_step, store), on_step_end) if tasks else outcomes
 
-    tasks: dict[str, Any] = {}
-    for planned in plan.steps:
-        if planned.state is State.HIT:
+
+def run_step(store: Store, task: Task, ended: Mapping[str, StepEnd]) -> StepEnd:
+    """Run one step, unless its inputs turn out to be those of an earlier run, or one of them has failed."""
+    start = time.perf_counter()
+    step = task.step
+    if code_identity(step.module).digest != task.code:
+        problem = f"{step.name}: {platform.node()} has another version of footscan, expected the one that planned it"
+        return StepEnd(step, Failure(problem, "fault", step.name), False, time.perf_counter() - start)
+    results = {**task.before, **{name: end.outcome for name, end in ended.items()}}
+    digests: dict[str, str] = {}
+    for name, source in step.inputs.items():
+        if not isinstance(source, Output):
+            digests[name] = source.digest
             continue
-        step = planned.step
-        before = {
-            source.step: tasks[source.step] if source.step in tasks else outcomes[source.step]
-            for source in step.inputs.values()
-            if isinstance(source, Output)
-        }
-        tasks[step.name] = dask.delayed(_run_step, pure=False)(
-            step, before, store, on_step_end, dask_key_name=step.name
-        )
-    results = dask.compute(*tasks.values(), scheduler="threads", num_workers=workers)
-    return outcomes | dict(zip(tasks, results, strict=True))
+        result = results[source.step]
+        if isinstance(result, Failure):
+            return StepEnd(step, result, False, time.perf_counter() - start)
+        digests[name] = result.digest
+    outcome, ran = execute(step, digests, store)
+    return StepEnd(step, outcome, ran, time.perf_counter() - start)
 
 
 def execute(step: Step, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, bool]:
@@ -77,26 +74,6 @@ def execute(step: Step, inputs: Mapping[str, str], store: Store) -> tuple[Outcom
         log.debug("%s", step.name, exc_info=True)
         problem = one_line(f"{step.name}: {type(error).__name__}: {error}")
         return Failure(problem, "fault", step.name), True
-
-
-def _run_step(step: Step, before: Mapping[str, Outcome], store: Store, on_step_end: OnStepEnd) -> Outcome:
-    start = time.perf_counter()
-    digests: dict[str, str] = {}
-    outcome: Outcome | None = None
-    for name, source in step.inputs.items():
-        if isinstance(source, Output):
-            result = before[source.step]
-            if isinstance(result, Failure):
-                outcome = result
-                break
-            digests[name] = result.digest
-        else:
-            digests[name] = source.digest
-    ran = False
-    if outcome is None:
-        outcome, ran = execute(step, digests, store)
-    on_step_end(StepEnd(step, outcome, ran, time.perf_counter() - start))
-    return outcome
 
 
 def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> Outcome:

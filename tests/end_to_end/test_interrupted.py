@@ -20,7 +20,7 @@ def steps_done(bench: Path) -> int:
 def test_two_runs_from_nothing_give_the_same_bytes(
     command: Footscan, fresh: Path, measured: Path, results: Results
 ) -> None:
-    done = command("run", fresh / "workflow.yaml", "--workers", 1)
+    done = command("run", fresh / "workflow.yaml", "--threads", 1)
     assert done.returncode == 0
     assert results(fresh) == results(measured)
 

@@ -12,7 +12,7 @@ import simplejpeg
 from numpy.typing import NDArray
 
 from pipelines.archive import Job, ScanEnd, job_of_workflow, plan_job, run_job
-from pipelines.engine.run import StepEnd
+from pipelines.engine.pool import StepEnd, Threads
 from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
 
 FRAMES, STEP_MM = 20, 10.0
@@ -61,7 +61,7 @@ class Archive:
     def run(self) -> tuple[list[ScanEnd], set[str]]:
         """What became of the scans; names of the steps that ran."""
         ends: list[StepEnd] = []
-        scans = list(run_job(plan_job(self.job()), ends.append))
+        scans = list(run_job(plan_job(self.job()), Threads(2), ends.append))
         return scans, {end.step.name.removeprefix("P0001/S1/") for end in ends if end.ran}
 
     def set_parameters(self, parameters: str) -> None:

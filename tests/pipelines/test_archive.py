@@ -9,6 +9,7 @@ import pytest
 
 from pipelines.archive import job_of_scan, plan_job, run_job
 from pipelines.engine import run as engine_run
+from pipelines.engine.pool import Threads
 from pipelines.steps import measure
 from schemas.calibration import Calibration
 from schemas.documents import read_yaml
@@ -90,15 +91,15 @@ def test_equal_films_of_two_scans_are_computed_once(done: Any) -> None:
 
 
 def test_interrupted_run_goes_on_from_what_is_complete(archive: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    original = engine_run._run_step
+    original = engine_run.run_step
 
-    def interrupted(step: Any, *others: Any) -> Any:
-        if step.kind == "fuse":
+    def interrupted(store: Any, task: Any, *others: Any) -> Any:
+        if task.step.kind == "fuse":
             raise KeyboardInterrupt
-        return original(step, *others)
+        return original(store, task, *others)
 
     with monkeypatch.context() as patch:
-        patch.setattr(engine_run, "_run_step", interrupted)
+        patch.setattr(engine_run, "run_step", interrupted)
         with pytest.raises(KeyboardInterrupt):
             archive.run()
     [scan], ran = archive.run()
@@ -135,7 +136,7 @@ def test_calibration_without_a_camera_is_refused(done: Any, calibration: Callabl
 
 def test_one_scan_without_a_workflow(done: Any, tmp_path: Path) -> None:
     job = job_of_scan(done.scan, done.root / "calibration.json", tmp_path / "out", 2)
-    [scan] = run_job(plan_job(job), lambda _: None)
+    [scan] = run_job(plan_job(job), Threads(2), lambda _: None)
     assert (scan.problem, scan.folder) == (None, tmp_path / "out/P0001/S1")
     assert (tmp_path / "out/P0001/S1/foot.stl").read_bytes() == (done.results / "foot.stl").read_bytes()
     with pytest.raises(RefusedInput, match="no such file"):

@@ -10,7 +10,8 @@ import pytest
 
 from pipelines.engine import code
 from pipelines.engine.plan import make_plan
-from pipelines.engine.run import StepEnd, run_plan
+from pipelines.engine.pool import StepEnd, Threads
+from pipelines.engine.run import run_plan
 from pipelines.engine.step import Outcome, Step
 from pipelines.engine.store import Store, open_store
 
@@ -78,7 +79,7 @@ def run_steps(store: Store) -> RunSteps:
 
     def run(*steps: Step, workers: int = 2) -> tuple[dict[str, Outcome], list[str]]:
         ends: list[StepEnd] = []
-        outcomes = run_plan(make_plan(steps, store), store, workers=workers, on_step_end=ends.append)
+        outcomes = run_plan(make_plan(steps, store), store, pool=Threads(workers), on_step_end=ends.append)
         assert sorted(outcomes) == sorted(step.name for step in steps)
         assert len({end.step.name for end in ends}) == len(ends)
         return {step.kind: outcomes[step.name] for step in steps}, sorted(end.step.kind for end in ends if end.ran)

@@ -10,7 +10,8 @@ import pytest
 from pipelines.engine.digest import FileDigests
 from pipelines.engine.key import key_of
 from pipelines.engine.plan import make_plan
-from pipelines.engine.run import StepEnd, run_plan
+from pipelines.engine.pool import StepEnd, Threads
+from pipelines.engine.run import run_plan
 from pipelines.engine.step import Failure, Output, SourceFile, Step, Success, Value
 from pipelines.engine.store import Row, Store, blob_name
 from schemas.documents import Document
@@ -73,7 +74,7 @@ def test_same_result_stops_the_change(package: Any, store: Store, run_steps: Run
     plan = make_plan(steps(b"xyz"), store)
     assert [planned.state.value for planned in plan.steps] == ["miss", "waits"]
     ends: list[StepEnd] = []
-    outcomes = run_plan(plan, store, workers=1, on_step_end=ends.append)
+    outcomes = run_plan(plan, store, pool=Threads(1), on_step_end=ends.append)
     assert [(end.step.kind, end.ran) for end in ends] == [("length", True), ("join", False)]
     assert outcomes["P/S/join"] == make_plan(steps(b"abc"), store).steps[1].outcome
     assert run_steps(*steps(b"xyz"))[1] == []
@@ -178,7 +179,7 @@ def test_result_that_is_damaged_after_the_plan_is_made_anew_by_the_next(
     changed = diamond(b=b"B")
     plan = make_plan(changed, store)
     store.files.write(blob_name(outcomes["left"].digest), b"A")
-    both = run_plan(plan, store, workers=2, on_step_end=lambda _: None)["P/S/both"]
+    both = run_plan(plan, store, pool=Threads(2), on_step_end=lambda _: None)["P/S/both"]
     assert isinstance(both, Failure)
     assert both.kind == "damaged"
     assert both.problem == "P/S/both: the result of P/S/left is damaged, expected what was stored"
@@ -263,7 +264,7 @@ def test_scans_do_not_cost_each_other(package: Any, store: Store) -> None:
             ("b", {"a": Output(f"P/{number}/a")}),
         )
     ]
-    outcomes = run_plan(make_plan(steps, store), store, workers=4, on_step_end=lambda _: None)
+    outcomes = run_plan(make_plan(steps, store), store, pool=Threads(4), on_step_end=lambda _: None)
     for number in range(40):
         outcome = outcomes[f"P/{number}/b"]
         if number % 7 == 3:

@@ -1,0 +1,97 @@
+"""All results of an archive as one table: a row a scan."""
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pipelines.archive import ScanEnd
+from pipelines.engine.atomic import write_atomically
+from pipelines.version import SOFTWARE
+
+CSV, PARQUET = "results.csv", "results.parquet"
+
+Cell = str | int | float | None
+
+
+def write_results_table(ends: Sequence[ScanEnd], folder: Path) -> None:
+    """Write `results.csv` and `results.parquet` into the folder of the results; not again what is there.
+
+    A row holds the scan and what became of it, the foot's side, its measures (their unit in the name of the column),
+    quality figures, the version of this program and the digests of the scan's files.
+    """
+    rows = [_row(end) for end in ends]
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    table = _as_csv(columns, rows).encode()
+    if (folder / PARQUET).exists() and _is(folder / CSV, table):
+        return
+    write_atomically(folder / PARQUET, _as_parquet(columns, rows))
+    write_atomically(folder / CSV, table)
+
+
+def _row(end: ScanEnd) -> dict[str, Cell]:
+    row: dict[str, Cell] = {"scan": end.scan, "status": end.kind or "done", "problem": end.problem}
+    if end.folder is None:
+        return row
+    measures = _read(end.folder / "measures.json")
+    row["side"] = measures.get("side")
+    for name, measure in measures.get("measures", {}).items():
+        unit = measure["unit"]
+        row[name if unit == "1" else f"{name}_{unit}"] = measure["value"]
+    quality = _read(end.folder / "quality.json")
+    cameras = quality.get("cameras", [])
+    row["cameras"] = len(cameras)
+    row["frames_lost"] = sum(camera["frames_lost"] for camera in cameras)
+    row["stripe_points"] = sum(camera["points"] for camera in cameras)
+    row["cloud_points"] = quality.get("cloud_points")
+    row |= {f"mesh_{name}": value for name, value in quality.get("mesh", {}).items()}
+    truth = quality.get("truth") or {}
+    row |= {f"truth_{name}_mm": truth[name] for name in ("mean", "p95", "max") if name in truth}
+    row["calibration_sha256"] = quality.get("calibration", {}).get("sha256")
+    row["software"] = SOFTWARE
+    row |= {f"{file}_sha256": digest for file, digest in sorted(end.digests.items())}
+    return row
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        value = json.loads(path.read_bytes())
+    except (OSError, ValueError):  # a person may have moved it meanwhile
+        return {}
+    return value if isinstance(value, dict) else {}
+
+
+def _is(path: Path, content: bytes) -> bool:
+    try:
+        return path.read_bytes() == content
+    except OSError:
+        return False
+
+
+def _as_csv(columns: Sequence[str], rows: Sequence[dict[str, Cell]]) -> str:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _as_parquet(columns: Sequence[str], rows: Sequence[dict[str, Cell]]) -> bytes:
+    import pyarrow
+    from pyarrow import parquet
+
+    table = pyarrow.table({column: _column([row.get(column) for row in rows]) for column in columns})
+    out = io.BytesIO()
+    parquet.write_table(table, out)
+    return out.getvalue()
+
+
+def _column(cells: list[Cell]) -> Any:
+    """Numbers of one column are of one type, whether they happen to be whole or not."""
+    import pyarrow
+
+    if any(isinstance(cell, float) for cell in cells):
+        return pyarrow.array(cells, pyarrow.float64())
+    return pyarrow.array(cells)

@@ -1,0 +1,59 @@
+"""Scans that arrive while footscan runs: which of them are complete."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from footscan.frames.film import film_files
+from pipelines.recorded import read_scan, scan_folders
+from schemas.errors import FootscanError
+
+QUIET_S = 5.0
+"""A scan is complete when none of its files has changed for so long: a film that is being copied still grows."""
+
+State = tuple[tuple[str, int, int], ...]
+"""Name, size and time of each file of a scan."""
+
+
+@dataclass
+class Arrivals:
+    """The scans of an archive, and in which state each was handed over."""
+
+    archive: Path
+    _handed_over: dict[Path, State] = field(default_factory=dict)
+
+    def complete(self) -> list[Path]:
+        """Folders of scans that are complete, and new or changed since they were handed over last."""
+        found = []
+        for folder in scan_folders(self.archive):
+            state = _state(folder, self.archive)
+            if state is not None and state != self._handed_over.get(folder):
+                self._handed_over[folder] = state
+                found.append(folder)
+        return found
+
+
+def _state(folder: Path, archive: Path) -> State | None:
+    """None while a film is missing or a file is still young. What breaks its format is handed over, to be refused."""
+    files = [folder / "scan.yaml"]
+    try:
+        files += _named_files(folder, archive)
+        states = [(str(file), file.stat()) for file in files]
+    except OSError:
+        return None
+    if any(time.time() - status.st_mtime < QUIET_S for _, status in states):
+        return None
+    return tuple((name, status.st_size, status.st_mtime_ns) for name, status in states)
+
+
+def _named_files(folder: Path, archive: Path) -> Iterator[Path]:
+    try:
+        scan = read_scan(folder, archive)
+    except FootscanError:
+        return
+    for camera in scan.document.cameras:
+        for named in (scan.film(camera), scan.background(camera), scan.positions(camera)):
+            if named is not None:
+                named.stat()
+                yield from film_files(named) if named.is_dir() else [named]

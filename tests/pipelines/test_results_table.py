@@ -1,0 +1,70 @@
+"""A row a scan, for people's spreadsheets and for programs alike."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pyarrow import parquet
+
+from pipelines.archive import ScanEnd
+from pipelines.engine.digest import sha256
+from pipelines.results_table import CSV, PARQUET, write_results_table
+from pipelines.version import SOFTWARE
+
+
+def rows(folder: Path) -> list[dict[str, Any]]:
+    with (folder / CSV).open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture
+def ends(done: Any) -> list[ScanEnd]:
+    scans, _ = done.run()
+    return [*scans, ScanEnd("P0002/S1", None, "cam3.avi: truncated, with a comma", "refused")]
+
+
+def test_rows_hold_measures_quality_versions_and_digests(ends: list[ScanEnd], tmp_path: Path) -> None:
+    write_results_table(ends, tmp_path)
+    good, bad = rows(tmp_path)
+    folder = ends[0].folder
+    assert folder is not None
+    measures = json.loads((folder / "measures.json").read_bytes())["measures"]
+    for name, measure in measures.items():
+        value = good[name if measure["unit"] == "1" else f"{name}_{measure['unit']}"]
+        assert value == ("" if measure["value"] is None else repr(measure["value"]))
+    quality = json.loads((folder / "quality.json").read_bytes())
+    assert int(good["cloud_points"]) == quality["cloud_points"]
+    assert int(good["stripe_points"]) == sum(camera["points"] for camera in quality["cameras"])
+    assert int(good["mesh_open_edges"]) == quality["mesh"]["open_edges"]
+    assert good["software"] == SOFTWARE
+    assert good["foot.stl_sha256"] == sha256((folder / "foot.stl").read_bytes())
+    assert (good["scan"], good["status"], good["problem"]) == ("P0001/S1", "done", "")
+    assert (bad["scan"], bad["status"], bad["problem"]) == ("P0002/S1", "refused", ends[1].problem)
+    assert set(bad.values()) == {"P0002/S1", "refused", ends[1].problem, ""}
+
+
+def test_parquet_holds_the_same(ends: list[ScanEnd], tmp_path: Path) -> None:
+    write_results_table(ends, tmp_path)
+    table = parquet.read_table(tmp_path / PARQUET).to_pylist()
+    for of_parquet, of_csv in zip(table, rows(tmp_path), strict=True):
+        assert {name: "" if cell is None else str(cell) for name, cell in of_parquet.items()} == of_csv
+
+
+def test_what_is_there_is_not_written_again(ends: list[ScanEnd], tmp_path: Path) -> None:
+    write_results_table(ends, tmp_path)
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    write_results_table(ends, tmp_path)
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
+    write_results_table(ends[:1], tmp_path)
+    assert len(rows(tmp_path)) == 1
+    (tmp_path / PARQUET).unlink()
+    write_results_table(ends[:1], tmp_path)
+    assert parquet.read_table(tmp_path / PARQUET).num_rows == 1
+
+
+def test_no_scan_is_an_empty_table(tmp_path: Path) -> None:
+    write_results_table([], tmp_path)
+    assert rows(tmp_path) == []
+    assert parquet.read_table(tmp_path / PARQUET).num_rows == 0

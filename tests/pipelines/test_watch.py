@@ -1,0 +1,70 @@
+"""Scans are handed over once they are complete, and again only when they have changed."""
+
+import os
+import shutil
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipelines.watch import QUIET_S, Arrivals
+
+
+@pytest.fixture
+def arriving(archive: Any, tmp_path: Path) -> tuple[Path, Path]:
+    """An empty archive, and a scan that is not in it yet."""
+    empty = tmp_path / "arriving"
+    empty.mkdir()
+    return empty, archive.scan
+
+
+def age(folder: Path, seconds: float = 2 * QUIET_S) -> None:
+    """As if nothing had been written to the files for a while."""
+    for path in folder.rglob("*"):
+        if path.is_file():
+            os.utime(path, (time.time() - seconds,) * 2)
+
+
+def test_nothing_is_there_yet(arriving: tuple[Path, Path]) -> None:
+    assert Arrivals(arriving[0]).complete() == []
+
+
+def test_a_scan_waits_until_its_last_film_is_there_and_quiet(arriving: tuple[Path, Path]) -> None:
+    archive, scan = arriving
+    folder = archive / "P0001/S1"
+    arrivals = Arrivals(archive)
+    shutil.copytree(scan, folder, ignore=shutil.ignore_patterns("cam5.avi", "frames.zarr"))
+    age(folder)
+    assert arrivals.complete() == []
+    film = (scan / "cam5.avi").read_bytes()
+    (folder / "cam5.avi").write_bytes(film[: len(film) // 2])  # still being copied
+    assert arrivals.complete() == []
+    (folder / "cam5.avi").write_bytes(film)
+    assert arrivals.complete() == []
+    age(folder)
+    assert arrivals.complete() == [folder]
+    assert arrivals.complete() == []
+
+
+def test_a_scan_that_changes_comes_again(arriving: tuple[Path, Path]) -> None:
+    archive, scan = arriving
+    folder = archive / "P0001/S1"
+    shutil.copytree(scan, folder)
+    age(folder)
+    arrivals = Arrivals(archive)
+    assert arrivals.complete() == [folder]
+    document = folder / "scan.yaml"
+    document.write_text(document.read_text() + "# a remark\n")
+    assert arrivals.complete() == []
+    age(folder, 3 * QUIET_S)
+    assert arrivals.complete() == [folder]
+
+
+def test_a_broken_document_is_handed_over_to_be_refused(arriving: tuple[Path, Path]) -> None:
+    archive, _ = arriving
+    folder = archive / "P0001/S1"
+    folder.mkdir(parents=True)
+    (folder / "scan.yaml").write_text("side: [right")
+    age(folder)
+    assert Arrivals(archive).complete() == [folder]
