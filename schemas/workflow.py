@@ -35,7 +35,7 @@ class Workflow(Document):
     results: Annotated[str, Field(min_length=1)]
     """Folder for `<patient>/<scan>/`."""
     cache: str | None = None
-    """Folder of the content store; `.footscan` in the results where absent."""
+    """Folder of the content store, or its URL as fsspec has it; `.footscan` in the results where absent."""
     workers: Annotated[int, Field(ge=1, le=256)] | None = None
     """How many steps run at once; as many as there are cores where absent."""
     parameters: ScanParameters = ScanParameters()
