@@ -1,6 +1,7 @@
 """What the extraction found: stripe points over a frame, or over frames of a film, and what was measured along them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,8 +13,10 @@ from footscan.report.panels import png_of
 from footscan.stripe.points import StripePoints
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
+    from matplotlib.figure import SubFigure
 
 MEASURED = {
     "width": "width, px",
@@ -36,27 +39,37 @@ PICTURE_INCHES = 8.5
 LEAST_INCHES = 2.8
 """Its shorter side at least: an image that is one pixel high is drawn stretched."""
 PANEL_INCHES, APART_INCHES = 1.35, 0.25
-LEFT, RIGHT, TOP, BOTTOM = 0.8, 1.0, 0.75, 0.6
+LEFT, RIGHT, TOP, BOTTOM = 0.8, 1.0, 0.37, 0.6
 """Margins of the figure of a single frame, inches. Its parts are placed by hand: rows and columns stand in line."""
+TITLE_POINTS, LINE_INCHES, LETTER_INCHES = 11, 0.19, 0.095
+"""The title's letters, and how high a line and how wide a letter of it is; its lines add to the margin above."""
+NOTE_INCHES = 0.6
+"""Where the panels would be, for the words that there is no stripe."""
 
 SHOWN_FRAMES, SHOWN_COLUMNS = 8, 4
+SHOWN_BARE = 2
+"""So many of the frames shown may be such in which nothing was found, although there is a stripe in others."""
+FILM_INCHES = 13.0
+"""Width of the figure of a film."""
 SHOWN_PX = 700
 """Longer side of a film's frame as it is drawn; larger ones are scaled down."""
 
 
-def frame_figure(image: Rgb, points: StripePoints) -> bytes:
+def frame_figure(image: Rgb, points: StripePoints, about: str = "") -> bytes:
     """A PNG of one frame with its stripe points, and of what was measured along the stripe.
 
     Parameters
     ----------
     image : (rows, columns, 3) uint8, RGB.
     points : (N,) of `STRIPE_DTYPE`, px, image frame.
+    about : str
+        First line of the title: whose frame this is, and how it was extracted.
 
     Notes
     -----
     Points are coloured by score. What was measured of each stands beside the picture at the point's row where the
     stripe runs down the image rather than across it, and below the picture at the point's column otherwise; where the
-    stripe ends, nothing is drawn. The same input gives the same bytes.
+    stripe ends, nothing is drawn. Without points, words stand for the panels. The same input gives the same bytes.
     """
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
@@ -65,13 +78,16 @@ def frame_figure(image: Rgb, points: StripePoints) -> bytes:
     scale = PICTURE_INCHES / max(rows, columns)
     wide, high = max(columns * scale, LEAST_INCHES), max(rows * scale, LEAST_INCHES)
     down = _lines(points["j"]) > _lines(points["i"])
-    beside = len(MEASURED) * (PANEL_INCHES + APART_INCHES)
-    width, height = LEFT + wide + beside * down + RIGHT, TOP + high + beside * (not down) + BOTTOM
+    beside = len(MEASURED) * (PANEL_INCHES + APART_INCHES) if len(points) else NOTE_INCHES
+    width = LEFT + wide + beside * down + RIGHT
+    title = _fitting([about, *_summary(points, (rows, columns))], width)
+    top = TOP + LINE_INCHES * len(title)
+    height = top + high + beside * (not down) + BOTTOM
     figure = Figure(figsize=(width, height), dpi=DPI)
 
-    def place(left: float, top: float, wide: float, high: float) -> "Axes":
+    def place(left: float, below: float, wide: float, high: float) -> "Axes":
         """Axes so many inches right of and below the picture's corner."""
-        bottom = height - TOP - top - high
+        bottom = height - top - below - high
         return figure.add_axes(((LEFT + left) / width, bottom / height, wide / width, high / height))
 
     colours = _score_colours()
@@ -79,7 +95,7 @@ def frame_figure(image: Rgb, points: StripePoints) -> bytes:
     _draw_frame(picture, _scaled_down(image, round(DPI * PICTURE_INCHES)), (rows, columns), points, colours, 0.8)
     picture.set_ylabel("row j, px")
     panels = []
-    for number, (name, label) in enumerate(MEASURED.items()):
+    for number, (name, label) in enumerate(MEASURED.items() if len(points) else ()):
         offset = number * (PANEL_INCHES + APART_INCHES) + APART_INCHES
         end = ENDS.get(name) or _end(points[name])
         if down:
@@ -99,16 +115,21 @@ def frame_figure(image: Rgb, points: StripePoints) -> bytes:
         panel.set_facecolor(GROUND)
         panel.grid(alpha=0.3, linewidth=0.5)
         panels.append(panel)
-    if not down:
+    if panels and not down:
         for panel in (picture, *panels[:-1]):
             panel.tick_params(labelbottom=False)
-    (picture if down else panels[-1]).set_xlabel("column i, px")
-    figure.colorbar(colours, cax=place(wide + beside * down + APART_INCHES, 0, 0.16, high)).set_label("score")
-    figure.suptitle(_summary(points, (rows, columns)), fontsize=11, y=1 - 0.15 / height, va="top")
+    (picture if down or not panels else panels[-1]).set_xlabel("column i, px")
+    if panels:
+        figure.colorbar(colours, cax=place(wide + beside * down + APART_INCHES, 0, 0.16, high)).set_label("score")
+    else:
+        figure.text((LEFT + wide / 2) / width, 0.5 * NOTE_INCHES / height, _counted(0), ha="center", va="center")
+    figure.suptitle("\n".join(title), fontsize=TITLE_POINTS, y=1 - 0.15 / height, va="top", parse_math=False)
     return png_of(figure)
 
 
-def film_figure(frames: Iterable[Rgb | None], count: int, points: StripePoints) -> bytes:
+def film_figure(
+    frames: Iterable[Rgb | None], count: int, points: StripePoints, lost: Sequence[int] = (), about: str = ""
+) -> bytes:
     """A PNG of some frames of a film with their stripe points, and of what was found and measured over the travel.
 
     Parameters
@@ -118,24 +139,31 @@ def film_figure(frames: Iterable[Rgb | None], count: int, points: StripePoints) 
     count : int
         Number of frames.
     points : (N,) of `STRIPE_DTYPE`, px, image frame, in the order of the frames.
+    lost : sequence of int
+        Numbers of the frames that are None.
+    about : str
+        First line of the title: which film this is, and how it was extracted.
 
     Notes
     -----
-    The frames shown are spread over those that hold points. The share of the image's columns that hold a point tells
-    of a stripe across the image; one that runs down it fills rows. The same input gives the same bytes.
+    The frames shown are spread over those that hold points; up to two without any are among them, from between them or
+    else from beside them. The share of the image's columns that hold a point tells of a stripe across the image; one
+    that runs down it fills rows. Without points, words stand for the panels. The same input gives the same bytes.
     """
     from matplotlib.figure import Figure
-    from matplotlib.ticker import MaxNLocator
 
-    shown, lost, (rows, columns) = _sample(frames, _spread(points, count))
-    strips = -(-max(len(shown), 1) // SHOWN_COLUMNS)
-    aspect = float(np.clip(rows / columns, 0.4, 1.5))
-    heights = strips * (3.0 * aspect + 0.3), 4.6
-    figure = Figure(figsize=(13, sum(heights) + 0.7), dpi=110, layout="constrained")
-    above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=heights).ravel().tolist()
+    shown, (rows, columns) = _sample(frames, _frames_to_show(points, count, lost))
     seen = f"{len(np.unique(points['frame']))} of " if len(points) else ""
     gone = f"; {len(lost)} lost" if lost else ""
-    figure.suptitle(f"{_counted(len(points))} in {seen}{count} frame{'s' * (count != 1)}{gone}", fontsize=11)
+    summary = f"{_counted(len(points))} in {seen}{count} frame{'s' * (count != 1)}{gone}"
+    title = _fitting([about, summary], FILM_INCHES)
+    strips = -(-max(len(shown), 1) // SHOWN_COLUMNS)
+    aspect = float(np.clip(rows / columns, 0.4, 1.5))
+    heights = strips * (3.0 * aspect + 0.3), 4.6 if len(points) else NOTE_INCHES
+    size = FILM_INCHES, sum(heights) + 0.5 + LINE_INCHES * len(title)
+    figure = Figure(figsize=size, dpi=110, layout="constrained")
+    above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=heights).ravel().tolist()
+    figure.suptitle("\n".join(title), fontsize=TITLE_POINTS, parse_math=False)
 
     colours = _score_colours()
     pictures = above.subplots(strips, SHOWN_COLUMNS, squeeze=False).ravel().tolist()
@@ -146,28 +174,12 @@ def film_figure(frames: Iterable[Rgb | None], count: int, points: StripePoints) 
         _draw_frame(picture, image, (rows, columns), there, colours, 0.5)
         picture.set_box_aspect(aspect)
         picture.set_title(f"frame {number}: {_counted(len(there))}", fontsize=9)
-    above.colorbar(colours, ax=pictures, shrink=0.9, pad=0.01).set_label("score")
-
-    panels = below.subplots(2, 3, sharex=True).ravel().tolist()
-    _draw_coverage(panels[0], points, count, (rows, columns), lost)
-    if shown:
-        panels[0].plot(
-            list(shown), [0] * len(shown), "^", color="black", ms=4, clip_on=False, label="frame shown above"
-        )
-    _draw_line(panels[1], np.bincount(points["frame"], minlength=count), lost, LINE, "")
-    panels[1].set(ylabel="points a frame", ylim=(0, None))
-    for panel, name in zip(panels[2:], MEASURED, strict=True):
-        _draw_quantiles(panel, name, points, count)
-    for panel in panels:
-        panel.grid(alpha=0.3, linewidth=0.5)
-        panel.set_xlim(-0.5, count - 0.5)
-        if lost:
-            panel.vlines(lost, 0, 1, transform=panel.get_xaxis_transform(), color=LOST, zorder=0, label="lost frame")
-    for panel in panels[3:]:
-        panel.set_xlabel("frame")
-        panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-    keys = {key.get_label(): key for panel in panels[:3] for key in panel.get_legend_handles_labels()[0]}
-    figure.legend(handles=list(keys.values()), loc="outside lower center", ncols=len(keys), fontsize=8, frameon=False)
+    if len(points):
+        above.colorbar(colours, ax=pictures, shrink=0.9, pad=0.01).set_label("score")
+        keys = _draw_travel(below, points, count, (rows, columns), list(lost), list(shown))
+        figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), fontsize=8, frameon=False)
+    else:
+        below.text(0.5, 0.5, _counted(0), ha="center", va="center")
     return png_of(figure)
 
 
@@ -203,20 +215,29 @@ def _draw_points(
     panel.scatter(across, along, c=score, s=area, linewidths=0, cmap=colours.cmap, vmin=0.0, vmax=1.0)
 
 
-def _summary(points: StripePoints, size: tuple[int, int]) -> str:
+def _fitting(lines: Iterable[str], inches: float) -> list[str]:
+    """Lines of a title, broken where they would be wider than the figure, without what its font cannot draw."""
+    from matplotlib.font_manager import findfont, get_font
+
+    known = get_font(findfont("DejaVu Sans")).get_charmap()
+    drawable = ("".join(c if ord(c) in known else "\N{REPLACEMENT CHARACTER}" for c in line) for line in lines)
+    return [part for line in drawable for part in wrap(line, int(inches / LETTER_INCHES))]
+
+
+def _summary(points: StripePoints, size: tuple[int, int]) -> list[str]:
     rows, columns = size
     found = f"{_counted(len(points))} in {columns} x {rows} px"
     if not len(points):
-        return found
+        return [found]
     filled = (
         f"in {100 * _lines(points['i']) / columns:.0f} % of the columns"
         f" and {100 * _lines(points['j']) / rows:.0f} % of the rows"
     )
     middle = {name: float(np.median(points[name])) for name in MEASURED}
-    return (
-        f"{found}, {filled}\n"
-        f"medians: width {middle['width']:.1f} px, peak {middle['peak']:.0f}, expected sigma {middle['sigma']:.3f} px"
-    )
+    return [
+        f"{found}, {filled}",
+        f"medians: width {middle['width']:.1f} px, peak {middle['peak']:.0f}, expected sigma {middle['sigma']:.3f} px",
+    ]
 
 
 def _lines(coordinates: NDArray[np.floating]) -> int:
@@ -244,26 +265,63 @@ def _scaled_down(image: Rgb, longest: int) -> Rgb:
     return np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BOX))
 
 
-def _spread(points: StripePoints, count: int) -> list[int]:
-    """Numbers of the frames to show."""
-    seen = np.unique(points["frame"]) if len(points) else np.arange(count)
-    places = np.linspace(0, len(seen) - 1, min(SHOWN_FRAMES, len(seen)))
-    return [int(number) for number in seen[np.rint(places).astype(np.intp)]]
+def _frames_to_show(points: StripePoints, count: int, lost: Sequence[int]) -> list[int]:
+    held = np.unique(points["frame"])
+    bare = np.setdiff1d(np.arange(count), [*held, *lost])
+    if not len(held):
+        return _spread(bare, SHOWN_FRAMES)
+    between = bare[(bare > held[0]) & (bare < held[-1])]
+    beside = bare[(bare == held[0] - 1) | (bare == held[-1] + 1)]
+    without = _spread(between if len(between) else beside, SHOWN_BARE)
+    return sorted(_spread(held, SHOWN_FRAMES - len(without)) + without)
 
 
-def _sample(frames: Iterable[Rgb | None], wanted: list[int]) -> tuple[dict[int, Rgb], list[int], tuple[int, int]]:
-    """The frames of such numbers, scaled down; the numbers of lost ones; rows and columns of a frame."""
+def _spread(numbers: NDArray[np.integer], most: int) -> list[int]:
+    """At most so many of the numbers, from the first to the last."""
+    places = np.linspace(0, len(numbers) - 1, min(most, len(numbers)))
+    return [int(number) for number in numbers[np.rint(places).astype(np.intp)]]
+
+
+def _sample(frames: Iterable[Rgb | None], wanted: list[int]) -> tuple[dict[int, Rgb], tuple[int, int]]:
+    """The frames of such numbers, scaled down; rows and columns of a frame."""
     shown: dict[int, Rgb] = {}
-    lost = []
     size = (3, 4)  # of a film all of whose frames are lost
     for number, frame in enumerate(frames):
         if frame is None:
-            lost.append(number)
             continue
         size = frame.shape[0], frame.shape[1]
         if number in wanted:
             shown[number] = _scaled_down(frame, SHOWN_PX).copy()
-    return shown, lost, size
+    return shown, size
+
+
+def _draw_travel(
+    below: "SubFigure",
+    points: StripePoints,
+    count: int,
+    size: tuple[int, int],
+    lost: list[int],
+    shown: list[int],
+) -> "list[Artist]":
+    """Six panels over the frames of a film; the handles of their legend."""
+    from matplotlib.ticker import MaxNLocator
+
+    panels = below.subplots(2, 3, sharex=True).ravel().tolist()
+    _draw_coverage(panels[0], points, count, size, lost)
+    panels[0].plot(shown, [0] * len(shown), "^", color="black", ms=4, clip_on=False, label="frame shown above")
+    _draw_line(panels[1], np.bincount(points["frame"], minlength=count), lost, LINE, "")
+    panels[1].set(ylabel="points a frame", ylim=(0, None))
+    for panel, name in zip(panels[2:], MEASURED, strict=True):
+        _draw_quantiles(panel, name, points, count)
+    for panel in panels:
+        panel.grid(alpha=0.3, linewidth=0.5)
+        panel.set_xlim(-0.5, count - 0.5)
+        if lost:
+            panel.vlines(lost, 0, 1, transform=panel.get_xaxis_transform(), color=LOST, zorder=0, label="lost frame")
+    for panel in panels[3:]:
+        panel.set_xlabel("frame")
+        panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+    return list({key.get_label(): key for panel in panels[:3] for key in panel.get_legend_handles_labels()[0]}.values())
 
 
 def _draw_coverage(panel: "Axes", points: StripePoints, count: int, size: tuple[int, int], lost: list[int]) -> None:

@@ -1,10 +1,12 @@
 """`footscan extract`."""
 
 import sys
-from collections.abc import Iterable, Sequence
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import repeat
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,14 +19,37 @@ if TYPE_CHECKING:
     from footscan.stripe.points import StripePoints
     from schemas.parameters.extraction import ExtractionParameters
 
+STREAMS = {Path("/dev"), Path("/dev/fd")}
+"""Folders of names that stand for what is open already, as /dev/stdout does."""
+
+
+def _path(name: str) -> Callable[[str], Path]:
+    """How an argument of such a name becomes a path: '', of a shell variable that is not set, would be this folder."""
+
+    def path(text: str) -> Path:
+        if not text:
+            raise RefusedInput(name, "expected a path, found ''")
+        return Path(text)
+
+    return path
+
 
 def extract(
-    file: Annotated[Path, typer.Argument(help="An image, a film (AVI) or a folder of frames.")],
-    out: Annotated[Path | None, typer.Option(help="CSV to write; standard output where absent.")] = None,
-    overlay: Annotated[Path | None, typer.Option(help="Draw the points over the frames here (PNG).")] = None,
+    file: Annotated[
+        Path, typer.Argument(parser=_path("FILE"), help="An image, a film (AVI) or a folder of frames, of any size.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(parser=_path("--out"), help="CSV to write; standard output where absent.")
+    ] = None,
+    overlay: Annotated[
+        Path | None, typer.Option(parser=_path("--overlay"), help="Draw the points over the frames here (PNG).")
+    ] = None,
     background: Annotated[
         Path | None,
-        typer.Option(help="The same with the laser off: an image for all frames, or as many frames as FILE has."),
+        typer.Option(
+            parser=_path("--background"),
+            help="The same with the laser off: an image for all frames, or as many frames as FILE has.",
+        ),
     ] = None,
     settings: Annotated[
         list[str] | None,
@@ -35,34 +60,39 @@ def extract(
     """Find the laser stripe: one sub-pixel point a row of frame,i,j,width,peak,score."""
     from footscan.frames.film import film_files, open_film, pixel_frames
     from footscan.stripe.film import extract_film, points_csv
-    from pipelines.engine.atomic import write_atomically
 
     parameters = _parameters(settings or [])
     film = open_film(file)
+    if file.is_file() and film.kind == "images" and next(pixel_frames(film)) is None:
+        raise RefusedInput(file, "expected a whole image, found one that is torn")
     backgrounds = None if background is None else _backgrounds(background, film)
     inputs = [path for source in (file, background) if source is not None for path in film_files(source)]
     keep_inputs([out, overlay], *inputs)
-    if overlay is not None:
-        _check_overlay(overlay, out, [path for path in (file, background) if path is not None])
+    _check_outputs(out, overlay, [path for path in (file, background) if path is not None])
 
-    points = extract_film(pixel_frames(film), parameters, backgrounds)
+    seen = _Seen()
+    points = extract_film(seen.watch(pixel_frames(film)), parameters, backgrounds)
+    picture = None if overlay is None else _drawn(film, points, seen.lost, _about(film, background, parameters))
     if out is not None:
-        write_atomically(out, points_csv(points).encode())
+        _write(out, points_csv(points).encode())
     elif not as_json:
         sys.stdout.write(points_csv(points))
-    if overlay is not None:
-        write_atomically(overlay, _drawn(film, points))
+    if overlay is not None and picture is not None:
+        _write(overlay, picture)
     if as_json:
         print_json(
             {
                 "file": str(file),
+                "background": None if background is None else str(background),
+                "parameters": parameters.model_dump(mode="json"),
                 "frames": film.frames,
-                "points": len(points),
+                "lost": seen.lost,
+                **_figures(film, points),
                 "out": None if out is None else str(out),
                 "overlay": None if overlay is None else str(overlay),
             }
         )
-    message(f"{file}: {len(points)} stripe points in {film.frames} frame{'s' * (film.frames != 1)}")
+    message(_summary(film, points, seen))
 
 
 def _parameters(settings: Sequence[str]) -> "ExtractionParameters":
@@ -90,19 +120,111 @@ def _backgrounds(path: Path, film: "Film") -> "Iterable[Rgb | None]":
     return frames if background.frames > 1 else repeat(next(frames), film.frames)
 
 
-def _check_overlay(overlay: Path, out: Path | None, sources: Sequence[Path]) -> None:
-    """Refuses a picture that would replace the CSV, or that the next run would take for a frame."""
+def _check_outputs(out: Path | None, overlay: Path | None, sources: Sequence[Path]) -> None:
+    """Refuses what cannot be written, or would replace the other output, or be a frame to the next run."""
+    if out is not None and not _is_stream(out):
+        if out.suffix.lower() not in {".csv", ""}:
+            raise RefusedInput(out, f"expected a file that ends in .csv, found {out.suffix!r}")
+        _check_folder(out)
+    if overlay is None:
+        return
+    if overlay.suffix.lower() != ".png":
+        raise RefusedInput(overlay, f"expected a file that ends in .png, found {overlay.suffix!r}")
+    _check_folder(overlay)
     if out is not None and overlay.resolve() == out.resolve():
         raise RefusedInput(overlay, "is the file of --out, expected another file to write")
     if overlay.resolve().parent in {source.resolve() for source in sources}:
         raise RefusedInput(overlay, "lies among the frames, expected a file in another folder")
 
 
-def _drawn(film: "Film", points: "StripePoints") -> bytes:
+def _check_folder(output: Path) -> None:
+    """Refuses a file in a folder that can be neither written nor made. Rights tell little: it has to be tried."""
+    folder = output.parent
+    try:
+        folder = output.resolve().parent
+        while not folder.exists():
+            folder = folder.parent
+        tempfile.TemporaryFile(dir=folder).close()
+    except (OSError, RuntimeError) as error:  # before Python 3.13 a circle of links is a RuntimeError
+        problem = getattr(error, "strerror", None) or "leads nowhere"
+        raise RefusedInput(output, f"cannot be written ({folder}: {problem})") from None
+
+
+def _is_stream(path: Path) -> bool:
+    """Whether a path is a device or a pipe, which may have any name."""
+    return path.parent in STREAMS or (path.exists() and not path.is_file() and not path.is_dir())
+
+
+@dataclass
+class _Seen:
+    """What is noticed of the frames while they are read."""
+
+    lost: list[int] = field(default_factory=list)
+    """Numbers of those that are not there, or torn."""
+    colour: bool = False
+    """Whether R, G and B differ anywhere."""
+
+    def watch(self, frames: "Iterable[Rgb | None]") -> "Iterator[Rgb | None]":
+        for number, frame in enumerate(frames):
+            if frame is None:
+                self.lost.append(number)
+            else:
+                self.colour = self.colour or bool((frame != frame[..., :1]).any())
+            yield frame
+
+
+def _drawn(film: "Film", points: "StripePoints", lost: list[int], about: str) -> bytes:
     from footscan.frames.film import pixel_frames
     from footscan.report.stripe_figure import film_figure, frame_figure
 
     frames = pixel_frames(film)
     if film.frames == 1 and (frame := next(frames)) is not None:
-        return frame_figure(frame, points)
-    return film_figure(pixel_frames(film), film.frames, points)
+        return frame_figure(frame, points, about)
+    return film_figure(pixel_frames(film), film.frames, points, lost, about)
+
+
+def _about(film: "Film", background: Path | None, parameters: "ExtractionParameters") -> str:
+    """What an overlay is of, and made with: names, and the parameters that are not the defaults."""
+    names = [_name(film.path)] + ([] if background is None else [f"background {_name(background)}"])
+    return ", ".join(
+        names + [f"{name}={value}" for name, value in parameters.model_dump(exclude_defaults=True).items()]
+    )
+
+
+def _name(path: Path) -> str:
+    return path.name or path.resolve().name
+
+
+def _write(file: Path, data: bytes) -> None:
+    """Writes a file as a whole, or into a device or a pipe."""
+    from pipelines.engine.atomic import write_atomically
+
+    if not _is_stream(file):
+        write_atomically(file, data)
+        return
+    with file.open("ab") as stream:
+        stream.write(data)
+
+
+def _figures(film: "Film", points: "StripePoints") -> dict[str, Any]:
+    """What was found and measured, for programs."""
+    import numpy as np
+
+    return {
+        "points": len(points),
+        "points_per_frame": np.bincount(points["frame"], minlength=film.frames).tolist(),
+        "median_width_px": round(float(np.median(points["width"])), 3) if len(points) else None,
+        "median_sigma_px": round(float(np.median(points["sigma"])), 4) if len(points) else None,
+    }
+
+
+def _summary(film: "Film", points: "StripePoints", seen: _Seen) -> str:
+    """What was found, in one line for persons."""
+    with_points = len(set(points["frame"].tolist()))
+    of = f"{with_points} of " if 0 < with_points < film.frames else ""
+    lost = f", {len(seen.lost)} lost" if seen.lost else ""
+    found = f"{film.path}: {len(points)} stripe points in {of}{film.frames} frame{'s' * (film.frames != 1)}{lost}"
+    if seen.colour or len(seen.lost) == film.frames:
+        return found
+    so = "what was found is bright, not red" if len(points) else "no red stripe can be found in it"
+    return f"{found}; it has no colour (R = G = B in every pixel), so that {so}"

@@ -14,11 +14,10 @@ def write_atomically(path: Path, data: bytes) -> None:
     A symbolic link stays one: what it points to is written. A device or a pipe is written into.
     """
     try:
-        path = path.resolve()
         if path.exists() and not (path.is_file() or path.is_dir()):
             path.write_bytes(data)
         else:
-            _replace(path, data)
+            _replace(path.resolve(), data)
     except OSError as error:
         raise Fault(f"{path}: cannot be written ({error.strerror or error})") from None
 

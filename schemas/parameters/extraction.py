@@ -1,8 +1,8 @@
 """What the extraction of the stripe can be told."""
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from schemas.documents import Document
 
@@ -38,7 +38,8 @@ class ExtractionParameters(Document):
         default=6.0,
         ge=1.0,
         le=255.0,
-        description="grey levels by which the ends of a piece must stand out that is stronger elsewhere",
+        description="grey levels by which the ends of a piece must stand out that is stronger elsewhere; at most "
+        "`smallest_contrast`",
     )
     largest_width_px: float = Field(
         default=40.0,
@@ -91,8 +92,8 @@ class ExtractionParameters(Document):
         default=0.1,
         ge=0.01,
         le=1.0,
-        description="share of a film's frames in which a short piece must stand in one place to be a glint: the foot "
-        "moves, the hardware does not",
+        description="share of a film's frames, and eight of them at least, in which a short piece must stand in one "
+        "place to be a glint: the foot moves, the hardware does not; of no use in films of fewer than eight frames",
     )
     glint_length_px: float = Field(
         default=40.0,
@@ -125,3 +126,10 @@ class ExtractionParameters(Document):
         description="light, relative to the stripe beside it, below which a piece is a ghost; one that is parallel to "
         "the stripe is so at half its light",
     )
+
+    @model_validator(mode="after")
+    def _ends_are_fainter(self) -> Self:
+        strong, faint = self.smallest_contrast, self.faintest_contrast
+        if faint > strong:
+            raise ValueError(f"faintest_contrast: expected at most smallest_contrast, {strong:g}, found {faint:g}")
+        return self

@@ -1,7 +1,7 @@
 """Pictures of what the extraction found, read back as pixels and as the data of their axes."""
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -170,8 +170,10 @@ def test_frames_shown_are_spread_over_those_with_a_stripe(drawn: list[Figure]) -
     points = np.concatenate([points_at([3, 4], [5, 5], frame=number) for number in range(10, 25)])
     film_figure(film(40), 40, points)
     shown = {axes.get_title(): np.asarray(axes.images[0].get_array()) for axes in drawn[0].axes if axes.images}
-    numbers = [10, 12, 14, 16, 18, 20, 22, 24]
-    assert list(shown) == [f"frame {number}: 2 points" for number in numbers]
+    numbers = [9, 10, 13, 16, 18, 21, 24, 25]  # without points: the one before and the one behind
+    assert list(shown) == [f"frame {number}: {'2 points' if 10 <= number < 25 else 'no stripe'}" for number in numbers]
+    marks = next(line for axes in drawn[0].axes for line in axes.lines if line.get_label() == "frame shown above")
+    assert list(marks.get_xdata()) == numbers
     for number, pixels in zip(numbers, shown.values(), strict=True):
         assert np.unique(pixels).tolist() == [round(grey_of(number) * 0.7)]
     assert title_of(drawn[0]) == "30 points in 15 of 40 frames"
@@ -184,12 +186,72 @@ def test_a_film_without_stripe_shows_frames_from_end_to_end(drawn: list[Figure])
     assert title_of(drawn[0]) == "no stripe in 15 frames"
 
 
+def frames_shown(figure: Figure) -> list[int]:
+    return [int(axes.get_title().split(":")[0].removeprefix("frame ")) for axes in figure.axes if axes.images]
+
+
+@pytest.mark.parametrize(
+    ("held", "lost", "shown"),
+    [
+        (range(8), (), [0, 1, 2, 3, 4, 5, 6, 7]),
+        (range(9), (), [0, 1, 2, 3, 5, 6, 7, 8]),
+        ([4], (), [3, 4, 5]),
+        ([4], (3, 5), [4]),
+        ([0, 1, 3, 4], (), [0, 1, 2, 3, 4]),
+        ([0, 1, 3, 4], (2,), [0, 1, 3, 4, 5]),
+        ([1, 8], (3,), [1, 2, 7, 8]),
+        ([], (0, 8), [1, 2, 3, 4, 5, 6, 7]),
+    ],
+    ids=["all", "all of more", "beside", "lost beside", "between", "lost between", "many between", "none"],
+)
+def test_frames_without_a_stripe_are_shown_too(
+    drawn: list[Figure], held: Sequence[int], lost: tuple[int, ...], shown: list[int]
+) -> None:
+    count = len(held) if len(held) > 7 else 9
+    points = np.concatenate([points_at([], []), *(points_at([3, 4], [5, 5], frame=number) for number in held)])
+    film_figure(film(count, lost), count, points, lost)
+    assert frames_shown(drawn[0]) == shown
+
+
+def test_without_points_there_are_words_and_no_axes(drawn: list[Figure]) -> None:
+    frame_figure(red_line(), points_at([], []))
+    film_figure(film(15), 15, points_at([], []))
+    for figure, pictures in zip(drawn, (1, 8), strict=True):
+        assert [len(axes.images) for axes in figure.axes] == [1] * pictures
+        parts = [figure, *figure.subfigs]
+        assert [text.get_text() for part in parts for text in part.texts if text is not part._suptitle] == ["no stripe"]
+    assert panel_of(drawn[0], "row j, px").get_xlabel() == "column i, px"
+
+
+@pytest.mark.parametrize("points", [points_at(np.arange(10), 5), points_at([], [])], ids=["stripe", "none"])
+def test_a_title_begins_with_whose_it_is(drawn: list[Figure], points: StripePoints) -> None:
+    about = "a$x$_\u8db3.png, gap_px=4.0"  # mathematics to matplotlib, and a letter that its font has not
+    frame_figure(np.zeros((300, 300, 3), np.uint8), points, about)
+    film_figure(film(4), 4, points, about=about)
+    for figure in drawn:
+        assert title_of(figure).splitlines()[0] == "a$x$_\N{REPLACEMENT CHARACTER}.png, gap_px=4.0"
+        assert len(title_of(figure).splitlines()) > 1
+
+
+@pytest.mark.parametrize("size", [(300, 300), (3000, 20), (20, 3000)], ids=str)
+def test_a_long_title_stands_above_the_picture(drawn: list[Figure], size: tuple[int, int]) -> None:
+    about = "film-of-a-foot.avi, " + ", ".join(f"parameter_{number}_px={number}.0" for number in range(15))
+    frame_figure(np.zeros((*size, 3), np.uint8), points_at(np.arange(10), 5), about)
+    [figure] = drawn
+    box = figure._suptitle.get_window_extent()
+    assert " ".join(title_of(figure).splitlines()).startswith(about)
+    assert box.x0 > 0
+    assert box.x1 < figure.bbox.x1
+    assert box.y1 < figure.bbox.y1
+    assert box.y0 > panel_of(figure, "row j, px").get_window_extent().y1
+
+
 def test_what_was_found_over_the_travel(drawn: list[Figure]) -> None:
     """Frame 0: half of the 20 columns, one of the 10 rows; frame 1: none; frame 2: lost; frame 3: down a column."""
     across = points_at(np.arange(10), 3.2, frame=0, width=np.arange(10.0))
     twice = points_at([4.4, 4.4], [3.2, 9.0], frame=0, width=[4.0, 5.0])  # in the same column
     down = points_at(7.0, np.arange(8), frame=3, peak=np.arange(8.0))
-    film_figure(film(4, lost=(2,)), 4, np.concatenate([across, twice, down]))
+    film_figure(film(4, lost=(2,)), 4, np.concatenate([across, twice, down]), [2])
     [figure] = drawn
     nan = np.nan
     by_label = {line.get_label(): line.get_ydata() for line in panel_of(figure, "covered, % of the image").lines}
@@ -212,7 +274,9 @@ def test_what_was_found_over_the_travel(drawn: list[Figure]) -> None:
     ids=["one frame", "one lost", "all lost", "one of many"],
 )
 def test_a_film_of_any_kind_is_drawn(count: int, lost: tuple[int, ...], points: StripePoints) -> None:
-    assert min(read(film_figure(film(count, lost), count, points)).shape[:2]) > 500
+    rows, columns = read(film_figure(film(count, lost), count, points, lost)).shape[:2]
+    assert columns == 1430
+    assert rows > (500 if len(points) else 300)  # words instead of panels
 
 
 def test_the_same_film_gives_the_same_bytes() -> None:
