@@ -3,6 +3,7 @@
 import logging
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -10,11 +11,13 @@ from typing import NamedTuple
 
 from pipelines.deliver import deliver
 from pipelines.engine.digest import FileDigests, sha256
+from pipelines.engine.lease import lease
 from pipelines.engine.plan import Plan, make_plan
 from pipelines.engine.pool import OnStepEnd, Pool
 from pipelines.engine.run import run_plan
 from pipelines.engine.step import Failure, Outcome, Step, Success
 from pipelines.engine.store import Store, open_store
+from pipelines.engine.trust import warn_if_others_can_write
 from pipelines.recorded import RecordedScan, read_scan, scan_folders
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
 from schemas.calibration import calibration_from_json
@@ -183,9 +186,12 @@ def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator
     for folder, error in planned.refused.items():
         yield ScanEnd(folder, None, str(error), "refused")
     waiting = iter(planned.scans)
+    warn_if_others_can_write(planned.store)
+    held = lease(planned.store) if planned.to_run else nullcontext()  # what runs nothing uses what it has looked up
     try:
-        while window := list(islice(waiting, WINDOW * pool.count)):
-            yield from _run_window(window, planned, pool, on_step_end)
+        with held:
+            while window := list(islice(waiting, WINDOW * pool.count)):
+                yield from _run_window(window, planned, pool, on_step_end)
     finally:
         planned.digests.save()
         if planned.store.memory is not None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from pipelines.archive import CACHE, Job, cores, plan_job, run_job
 from pipelines.deliver import deliver
 from pipelines.engine.digest import FileDigests
+from pipelines.engine.lease import lease
 from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import OnStepEnd, Threads
 from pipelines.engine.run import run_plan
@@ -59,7 +60,7 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
 
     filming = _filming(folder, foot)
     plan = make_plan(filming, store)
-    with timed("filming and calibration", len(plan.to_run), len(plan.steps)) as on_step_end:
+    with timed("filming and calibration", len(plan.to_run), len(plan.steps)) as on_step_end, lease(store):
         outcomes = run_plan(plan, store, pool=Threads(1), on_step_end=on_step_end)
     digests: dict[str, str] = {}
     for step in filming:

@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from pipelines.cli import calibration, demo, extract, films, results, runs
+from pipelines.cli import cache, calibration, demo, extract, films, results, runs, trace, why
 from schemas.errors import Fault, FootscanError, RefusedInput, one_line
 
 INTERRUPTED = 130
@@ -14,7 +14,7 @@ INTERRUPTED = 130
 app = typer.Typer(
     name="footscan",
     help="Turn the films of a laser-stripe foot scanner into a measured 3D foot.",
-    epilog="Exit status: 0 done; 1 done, with scans that failed, or a calibration beyond its tolerance; "
+    epilog="Exit status: 0 done; 1 done, with scans that failed, a calibration beyond its tolerance, or a damaged cache; "
     "2 wrong use or refused input; 3 fault of the machine.",
     no_args_is_help=True,
     add_completion=False,
@@ -28,6 +28,9 @@ app.add_typer(calibration.calibrate, name="calibrate")
 app.command("map")(calibration.map_pixels)
 app.command("run")(runs.run)
 app.command("plan")(runs.plan)
+app.command("why")(why.why)
+app.command("trace")(trace.trace)
+app.add_typer(cache.cache, name="cache")
 app.command("measure")(results.measure)
 app.command("compare")(results.compare)
 

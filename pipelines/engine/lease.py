@@ -1,0 +1,100 @@
+"""Runs under way say so in the store, so that nobody takes away what they are about to use."""
+
+import contextlib
+import json
+import logging
+import os
+import re
+import secrets
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from pipelines.engine.store import Store
+from schemas.documents import canonical_json
+from schemas.errors import Fault
+
+log = logging.getLogger("footscan.store")
+
+FOLDER = "runs"
+HEARTBEAT_S = 60.0
+STALE_S = 600.0
+"""Without a heartbeat for so long, a run is taken for dead."""
+
+
+@dataclass(frozen=True)
+class Lease:
+    """What a run says of itself."""
+
+    name: str
+    """Its file in the store."""
+    host: str | None
+    """None, as all below, where the file is damaged."""
+    process: int | None
+    started: float | None
+    """s since 1970, by the clock of its host; so is `heartbeat`."""
+    heartbeat: float | None
+
+
+@contextmanager
+def lease(store: Store) -> Iterator[None]:
+    """Holds a lease while a run lasts. A store that cannot be written to gets none, and that is said."""
+    host = re.sub(r"[^A-Za-z0-9.]", "-", socket.gethostname())[:64] or "host"
+    name = f"{FOLDER}/{host}-{os.getpid()}-{secrets.token_hex(4)}.json"
+    started = time.time()
+    ended = threading.Event()
+
+    def beat() -> None:
+        while not ended.wait(HEARTBEAT_S):
+            try:
+                _write(name, host, started, store)
+            except Fault as error:
+                log.debug("%s", error)  # the next may do; the run itself says what it cannot write
+
+    try:
+        _write(name, host, started, store)
+    except Fault as error:
+        log.warning("%s; 'footscan cache gc' will not know of this run", error)
+    thread = threading.Thread(target=beat, name="lease", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+        with contextlib.suppress(OSError):
+            store.files.remove(name)
+
+
+def leases(store: Store) -> list[Lease]:
+    """All that lie in the store, whether their runs are alive or not."""
+    found = []
+    for name, _ in store.files.sizes(FOLDER):
+        if name.endswith(".json"):
+            with contextlib.suppress(FileNotFoundError):  # its run has just ended
+                found.append(_read(name, store.files.read(name)))
+    return found
+
+
+def live_leases(store: Store) -> list[Lease]:
+    """Those of runs that are to be taken for alive; one of which nothing is known is."""
+    now = time.time()
+    return [one for one in leases(store) if one.heartbeat is None or now - one.heartbeat < STALE_S]
+
+
+def _write(name: str, host: str, started: float, store: Store) -> None:
+    now = {"host": host, "process": os.getpid(), "started": started, "heartbeat": time.time()}
+    store.files.write(name, canonical_json(now).encode())
+
+
+def _read(name: str, data: bytes) -> Lease:
+    try:
+        match json.loads(data):
+            case {"host": str(host), "process": int(process), "started": float(started), "heartbeat": float(heartbeat)}:
+                return Lease(name, host, process, started, heartbeat)
+    except (ValueError, RecursionError):
+        pass
+    return Lease(name, None, None, None, None)

@@ -1,0 +1,74 @@
+"""Runs under way are known to all who use the store."""
+
+import logging
+import os
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from pipelines.engine import lease as lease_module
+from pipelines.engine.lease import STALE_S, lease, leases, live_leases
+from pipelines.engine.store import Store
+from schemas.documents import canonical_json
+
+
+def test_a_lease_lasts_as_long_as_its_run(store: Store) -> None:
+    assert leases(store) == []
+    before = time.time()
+    with lease(store), lease(store):
+        one, other = live_leases(store)
+        assert one.name != other.name
+        assert one.process == other.process == os.getpid()
+        assert one.started is not None
+        assert before <= one.started <= time.time()
+    assert leases(store) == []
+    assert not [thread for thread in threading.enumerate() if thread.name == "lease"]
+
+
+def test_it_ends_with_a_run_that_fails(store: Store) -> None:
+    with pytest.raises(KeyboardInterrupt), lease(store):
+        raise KeyboardInterrupt
+    assert leases(store) == []
+
+
+def test_its_heart_beats(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lease_module, "HEARTBEAT_S", 0.02)
+    with lease(store):
+        [first] = leases(store)
+        assert first.heartbeat is not None
+        give_up = time.monotonic() + 10
+        while (leases(store)[0].heartbeat or 0) <= first.heartbeat:
+            assert time.monotonic() < give_up, "no heartbeat"
+            time.sleep(0.01)
+        assert leases(store)[0].started == first.started
+
+
+def write(store: Store, age_s: float) -> None:
+    beat = time.time() - age_s
+    document = {"host": "h", "process": 7, "started": beat - 60.0, "heartbeat": beat}
+    store.files.write("runs/h-7-ab.json", canonical_json(document).encode())
+
+
+def test_without_a_heartbeat_a_run_is_taken_for_dead(store: Store) -> None:
+    write(store, STALE_S - 60)
+    assert len(live_leases(store)) == 1
+    write(store, STALE_S + 1)
+    assert (len(leases(store)), live_leases(store)) == (1, [])
+
+
+@pytest.mark.parametrize("damaged", [b"", b"[]", b"{}", b'{"host":1}', b"\xff", b"[" * 100_000])
+def test_a_damaged_lease_may_be_a_run(store: Store, damaged: bytes) -> None:
+    store.files.write("runs/h-7-ab.json", damaged)
+    [one] = live_leases(store)
+    assert (one.name, one.host, one.started) == ("runs/h-7-ab.json", None, None)
+
+
+def test_a_store_that_cannot_be_written_to_does_not_keep_a_run_from_trying(
+    store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    Path(store.files.path("")).write_text("in the way")
+    with caplog.at_level(logging.WARNING), lease(store):
+        pass
+    assert "cannot be written" in caplog.text
