@@ -14,8 +14,8 @@ INTERRUPTED = 130
 app = typer.Typer(
     name="footscan",
     help="Turn the films of a laser-stripe foot scanner into a measured 3D foot.",
-    epilog="Exit status: 0 done; 1 done, with scans that failed, a calibration beyond its tolerance, or a damaged cache; "
-    "2 wrong use or refused input; 3 fault of the machine.",
+    epilog="Exit status: 0 done; 1 done, with scans that failed, a calibration beyond its tolerance or a damaged "
+    "cache; 2 wrong use or refused input; 3 fault of the machine.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

@@ -9,7 +9,6 @@ import contextlib
 import gc
 import importlib.metadata
 import importlib.util
-import json
 import sys
 import threading
 from collections.abc import Iterator
@@ -20,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.engine.atomic import write_atomically
-from pipelines.engine.digest import file_state, is_settled, sha256
+from pipelines.engine.digest import BROKEN, file_state, is_settled, sealed, sha256, unsealed
 from schemas.documents import canonical_json
 from schemas.errors import Fault
 
@@ -137,8 +136,8 @@ def _source(name: str) -> _Source:
 def _remembered() -> dict[str, list[Any]]:
     """What is known of modules that have not been touched since: their states, digests and imports."""
     try:
-        return dict(json.loads(MEMORY.read_bytes()))
-    except (OSError, ValueError, TypeError, RecursionError):
+        return dict(unsealed(MEMORY.read_bytes())["modules"])
+    except (OSError, *BROKEN):
         return {}
 
 
@@ -149,7 +148,7 @@ def _remember() -> None:
     if _CHANGED:
         _CHANGED.clear()
         with contextlib.suppress(Fault):
-            write_atomically(MEMORY, canonical_json(_remembered()).encode())
+            write_atomically(MEMORY, sealed({"modules": _remembered()}))
 
 
 def _text(name: str) -> str:

@@ -2,15 +2,21 @@
 
 import hashlib
 import json
+import logging
 import os
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from pipelines.engine.atomic import write_atomically
 from schemas.documents import canonical_json
 from schemas.errors import RefusedInput
+
+log = logging.getLogger("footscan.store")
+
+BROKEN = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
+"""What `unsealed`, and reading what it gives, may raise."""
 
 SETTLED_NS = 2_000_000_000
 """A file younger than this may change again within its time stamp's resolution: its digest is not remembered."""
@@ -28,6 +34,20 @@ class FileState(NamedTuple):
 def sha256(data: bytes) -> str:
     """Hexadecimal SHA-256 of `data`."""
     return hashlib.sha256(data).hexdigest()
+
+
+def sealed(value: dict[str, Any]) -> bytes:
+    """An object as canonical JSON, with its digest as `seal`."""
+    return canonical_json({**value, "seal": sha256(canonical_json(value).encode())}).encode()
+
+
+def unsealed(data: bytes) -> dict[str, Any]:
+    """The object that was sealed; one of the errors in `BROKEN` where it is none."""
+    value = json.loads(data)
+    seal = value.pop("seal")
+    if seal != sha256(canonical_json(value).encode()):
+        raise ValueError("broken seal")
+    return dict(value)
 
 
 def file_state(path: Path) -> FileState:
@@ -53,16 +73,19 @@ class FileDigests:
     def load(cls, memory: Path) -> "FileDigests":
         """What was remembered; nothing where the file is missing or damaged."""
         try:
-            rows = json.loads(memory.read_bytes())
+            rows = unsealed(memory.read_bytes())["rows"]
             return cls(memory, {path: (FileState(*state), str(digest)) for path, state, digest in rows})
-        except (OSError, ValueError, TypeError, RecursionError):
+        except FileNotFoundError:
+            return cls(memory)
+        except (OSError, *BROKEN):
+            log.warning("%s: damaged, will be made again", memory)
             return cls(memory)
 
     def save(self) -> None:
         """Remember for the next run."""
         if self._changed:
             rows = [[path, list(state), digest] for path, (state, digest) in sorted(self._known.items())]
-            write_atomically(self.memory, canonical_json(rows).encode())
+            write_atomically(self.memory, sealed({"rows": rows}))
             self._changed = False
 
     def of(self, path: Path) -> tuple[str, FileState]:

@@ -10,6 +10,9 @@ from typing import Any, Protocol
 from pipelines.engine.atomic import write_atomically
 from schemas.errors import Fault, RefusedInput, one_line
 
+LOCAL = ("file", "local")
+"""fsspec's names for this machine, where it would write into files that others may be reading."""
+
 
 class Files(Protocol):
     """Files of a store, by names such as `blobs/ab/abcd`."""
@@ -105,7 +108,7 @@ class RemoteFiles:
     def state(self, name: str) -> str | None:
         try:
             found = self._system.info(self._inside(name))
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return None
         # Each kind of store tells what it has: an object store a digest, others a time.
         told = (found.get(fact) for fact in ("size", "ETag", "etag", "md5Hash", "mtime", "created", "LastModified"))
@@ -140,6 +143,5 @@ def open_files(place: Path | str) -> Files:
     """The files of a store at a path, or at a URL."""
     if isinstance(place, Path) or "://" not in place:
         return LocalFiles(str(place))
-    if place.startswith("file://"):
-        return LocalFiles(place.removeprefix("file://"))
-    return RemoteFiles(place)
+    protocol, _, path = place.partition("://")
+    return LocalFiles(path) if protocol in LOCAL else RemoteFiles(place)

@@ -7,16 +7,31 @@ import contextlib
 import logging
 import sqlite3
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+from pipelines.engine.digest import sha256
+
 log = logging.getLogger("footscan.store")
 
 _TABLE = """
-CREATE TABLE IF NOT EXISTS known (key TEXT PRIMARY KEY, row TEXT, digest TEXT, kind TEXT, problem TEXT, blob TEXT)
+CREATE TABLE IF NOT EXISTS known
+(key TEXT PRIMARY KEY, row TEXT, digest TEXT, kind TEXT, problem TEXT, blob TEXT, seal TEXT)
 """
-_SELECT = "SELECT row, digest, kind, problem, blob FROM known WHERE key = ?"
+_SELECT = "SELECT row, digest, kind, problem, blob, seal FROM known WHERE key = ?"
+_INSERT = "INSERT OR REPLACE INTO known (key, row, digest, kind, problem, blob, seal) VALUES (?, ?, ?, ?, ?, ?, ?)"
+
+_ERRORS = (sqlite3.Error, OSError, UnicodeDecodeError)
+"""The last where SQLite's own message quotes what is damaged."""
+_OUT_OF_REACH = {
+    sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED, sqlite3.SQLITE_PROTOCOL,
+    sqlite3.SQLITE_PERM, sqlite3.SQLITE_AUTH, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN,
+    sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_NOMEM, sqlite3.SQLITE_INTERRUPT,
+}  # fmt: skip
+"""Errors that say nothing of what is in the file."""
 
 
 class Known(NamedTuple):
@@ -45,16 +60,30 @@ class Memory:
         if new is not None:
             return new
         with self._lock:
-            if self._connection is None:
-                if not self.file.exists():
-                    return None
-                self._connection = self._open()
             try:
+                if self._connection is None:
+                    if not self.file.exists():
+                        return None
+                    self._connection = self._open()
                 found = self._connection.execute(_SELECT, (key,)).fetchone()
-            except sqlite3.Error:
-                self._forget()
+            except _ERRORS as error:
+                self._forget(error)
                 return None
-        return None if found is None else Known(*found)
+        if found is None:
+            return None
+        known, seal = Known(*found[:-1]), found[-1]
+        return known if seal == _seal(key, known) else None
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Many calls of `get` as one transaction: taking and giving back a lock costs more than to read."""
+        with self._lock:
+            self._try("BEGIN")
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._try("ROLLBACK")
 
     def put(self, key: str, known: Known) -> None:
         """Remember; on disk with the next `save`."""
@@ -64,19 +93,18 @@ class Memory:
         """Write down what is new. A memory that cannot be written is done without."""
         if not self._new:
             return
-        with self._lock, contextlib.suppress(OSError):
-            rows = [(key, *known) for key, known in list(self._new.items())]
+        with self._lock:
+            rows = [(key, *known, _seal(key, known)) for key, known in list(self._new.items())]
             try:
                 self.file.parent.mkdir(parents=True, exist_ok=True)
                 self._connection = self._connection or self._open()
                 with self._connection:
                     self._connection.execute(_TABLE)
-                    self._connection.executemany("INSERT OR REPLACE INTO known VALUES (?, ?, ?, ?, ?, ?)", rows)
+                    self._connection.executemany(_INSERT, rows)
                 for key, *_ in rows:
                     self._new.pop(key, None)
-            except sqlite3.Error as error:
-                log.debug("%s: %s", self.file, error)
-                self._forget()
+            except _ERRORS as error:
+                self._forget(error)
 
     def close(self) -> None:
         """Write down what is new, and let go of the file."""
@@ -86,25 +114,36 @@ class Memory:
                 self._connection.close()
                 self._connection = None
 
+    def _try(self, statement: str) -> None:
+        """What fails here fails in `get`, too, and is seen to there."""
+        with contextlib.suppress(*_ERRORS):
+            if self._connection is None and self.file.exists():
+                self._connection = self._open()
+            if self._connection is not None:
+                self._connection.execute(statement)
+
     def _open(self) -> sqlite3.Connection:
         connection = sqlite3.connect(self.file, timeout=5, check_same_thread=False)
-        with contextlib.suppress(sqlite3.Error):
+        with contextlib.suppress(*_ERRORS):
             connection.execute(_TABLE)
         return connection
 
-    def _forget(self) -> None:
-        """A damaged memory is of no use; a busy one is another run's, and stays."""
+    def _forget(self, error: Exception) -> None:
+        """A damaged memory is of no use; one that is busy, or out of reach, stays as it is."""
+        log.debug("%s: %s", self.file, error)
         if self._connection is not None:
             with contextlib.suppress(sqlite3.Error):
                 self._connection.close()
             self._connection = None
-        try:
-            probe = sqlite3.connect(self.file, timeout=5)
-            probe.execute("SELECT count(*) FROM known").fetchone()
-            probe.close()
-        except sqlite3.OperationalError:
+        if isinstance(error, OSError):
             return
-        except sqlite3.Error:
+        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT)  # none where text is no UTF-8
+        if code & 0xFF not in _OUT_OF_REACH:
             log.warning("%s: damaged, made anew", self.file)
             with contextlib.suppress(OSError):
                 self.file.unlink()
+
+
+def _seal(key: str, known: Known) -> str:
+    """SQLite does not see that a bit has changed."""
+    return sha256(repr((key, *known)).encode())

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -55,8 +56,9 @@ def make_plan(steps: Sequence[Step], store: Store) -> Plan:
         Each after the steps whose results it takes.
     """
     planned: dict[str, PlannedStep] = {}
-    for step in steps:
-        planned[step.name] = _plan_step(step, planned, store)
+    with nullcontext() if store.memory is None else store.memory.reading():
+        for step in steps:
+            planned[step.name] = _plan_step(step, planned, store)
     return Plan(list(planned.values()))
 
 

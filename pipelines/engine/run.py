@@ -8,8 +8,9 @@ import time
 from collections.abc import Mapping
 from functools import partial
 
-from pipelines.engine.code import code_identity
+from pipelines.engine.code import CodeIdentity, code_identity
 from pipelines.engine.digest import file_state
+from pipelines.engine.files import Files
 from pipelines.engine.key import image_text, key_of
 from pipelines.engine.plan import Plan, cached_outcome, without_places
 from pipelines.engine.pool import OnStepEnd, Pool, StepEnd, Task
@@ -94,16 +95,26 @@ def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> Out
 
 def _record(step: Step, image: str, digest: str | None, failure: tuple[str, str] | None, store: Store) -> None:
     """Write an action's row, after all that it names: its code and the values that it took."""
-    identity = code_identity(step.module)
-    if not store.has(identity.digest):
-        for text in identity.texts:
-            store.put(text)
-        store.put(identity.document)
+    _keep_code(code_identity(step.module), store)
     for source in step.inputs.values():
-        if isinstance(source, Value) and not store.has(source.digest):
+        if isinstance(source, Value):
             store.put(source.content)
     sources = {name: str(source.path) for name, source in step.inputs.items() if isinstance(source, SourceFile)}
     store.record(step.name, Row(json.loads(image), digest, failure), sources)
+
+
+def _keep_code(identity: CodeIdentity, store: Store) -> None:
+    """Put the texts of a step's code into the store, where they are missing or damaged; looked at once in a process."""
+    if (store.files, identity.digest) in _KEPT and store.has(identity.digest):
+        return
+    if any(store.get(digest) is None for digest in (*identity.modules.values(), identity.digest)):
+        for text in identity.texts:
+            store.put(text)
+        store.put(identity.document)
+    _KEPT.add((store.files, identity.digest))
+
+
+_KEPT: set[tuple[Files, str]] = set()
 
 
 def _content(step: Step, source: Value | Output | SourceFile, digest: str, store: Store) -> bytes:

@@ -6,17 +6,15 @@ since it was checked is not read again (`memory`).
 """
 
 import contextlib
-import json
 import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pipelines.engine.digest import sha256
+from pipelines.engine.digest import BROKEN, sealed, sha256, unsealed
 from pipelines.engine.files import Files, open_files
 from pipelines.engine.key import PreImage, key_of
 from pipelines.engine.memory import Known, Memory
-from schemas.documents import canonical_json
 
 log = logging.getLogger("footscan.store")
 
@@ -108,9 +106,9 @@ class Store:
     def record(self, step_name: str, row: Row, sources: dict[str, str] | None = None) -> None:
         """Write the row of an action, and remember it as the last one of its step."""
         key = key_of(row.image)
-        self.files.write(row_name(key), _sealed({"image": row.image, "digest": row.digest, "failure": row.failure}))
+        self.files.write(row_name(key), sealed({"image": row.image, "digest": row.digest, "failure": row.failure}))
         latest = {"step": step_name, "key": key, "sources": sources or {}}
-        self.files.write(latest_name(step_name), _sealed(latest))
+        self.files.write(latest_name(step_name), sealed(latest))
         state = self.files.state(row_name(key))
         if self.memory is not None and state is not None:
             blob = None if row.digest is None else self.files.state(blob_name(row.digest))
@@ -155,16 +153,12 @@ class Store:
     def _read_sealed(self, name: str) -> dict[str, Any] | None:
         """The content of a small file, if its seal is right."""
         try:
-            value = json.loads(self.files.read(name))
-            seal = value.pop("seal")
-            if seal != sha256(canonical_json(value).encode()):
-                raise ValueError("broken seal")
+            return unsealed(self.files.read(name))
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        except (OSError, *BROKEN):
             log.warning("%s: damaged, will be made again", self.files.path(name))
             return None
-        return dict(value)
 
 
 def open_store(place: Path | str, memory: Path | None = None) -> Store:
@@ -206,7 +200,3 @@ def plain_hex(digest: Any) -> str:
 def _known(state: str, row: Row, blob_state: str | None) -> Known:
     kind, problem = row.failure or (None, None)
     return Known(state, row.digest, kind, problem, blob_state)
-
-
-def _sealed(value: dict[str, Any]) -> bytes:
-    return canonical_json({**value, "seal": sha256(canonical_json(value).encode())}).encode()

@@ -26,7 +26,7 @@ def settled(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def remembered(memory: Path) -> dict[str, str]:
-    return {path: known for path, _, known in json.loads(memory.read_bytes())} if memory.exists() else {}
+    return {path: known for path, _, known in json.loads(memory.read_bytes())["rows"]} if memory.exists() else {}
 
 
 def test_digest_of_bytes_and_files(film: Path, tmp_path: Path) -> None:
