@@ -2,13 +2,13 @@
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from schemas.documents import inside, read_yaml
 from schemas.errors import RefusedInput
 from schemas.frames import GROUP
-from schemas.scan import CameraFilm, CameraSource, Scan
+from schemas.scan import CameraFilm, Scan
 
 SCAN_FILE = "scan.yaml"
 
@@ -21,6 +21,8 @@ class RecordedScan:
     archive: Path
     """No path in scan.yaml may leave it."""
     document: Scan
+    _found: dict[str, Path] = field(default_factory=dict, compare=False, repr=False)
+    """Where the paths in scan.yaml lead: each is followed once."""
 
     @property
     def name(self) -> str:
@@ -34,7 +36,7 @@ class RecordedScan:
 
     def film(self, camera: CameraFilm) -> Path:
         """The film of a camera, which may be missing."""
-        return film_path(self.archive, self.file, camera)
+        return self._inside(camera.file, f"file of camera {camera.id}")
 
     def array(self, camera: CameraFilm) -> Path:
         """The Zarr array of a camera's frames, which may not be there yet."""
@@ -63,7 +65,12 @@ class RecordedScan:
         return self._optional(self.document.truth, "truth")
 
     def _optional(self, named: str | None, field: str) -> Path | None:
-        return None if named is None else inside(self.archive, self.file, named, field)
+        return None if named is None else self._inside(named, field)
+
+    def _inside(self, named: str, field: str) -> Path:
+        if named not in self._found:
+            self._found[named] = inside(self.archive, self.file, named, field)
+        return self._found[named]
 
 
 def read_scan(folder: Path, archive: Path | None = None) -> RecordedScan:
@@ -90,11 +97,6 @@ def recorded_folder(folder: Path, file: str, what: str) -> Path:
     if not folder.is_dir():
         raise RefusedInput(folder, f"no such folder, expected {what}")
     return folder.resolve()
-
-
-def film_path(archive: Path, document: Path, camera: CameraSource) -> Path:
-    """The film that `document` names for a camera, which may be missing; refused where it leaves `archive`."""
-    return inside(archive, document, camera.file, f"file of camera {camera.id}")
 
 
 def scan_folders(archive: Path) -> Iterator[Path]:

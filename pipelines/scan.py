@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 from footscan.frames.film import film_files
@@ -164,13 +165,18 @@ def _document(document: Document) -> Value:
 
 
 def _about(scan: RecordedScan, parameters: ScanParameters) -> Value:
-    about = {"patient": scan.document.patient, "scan": scan.document.scan, "provenance": _provenance(parameters)}
+    about = {
+        "patient": scan.document.patient,
+        "scan": scan.document.scan,
+        "provenance": _provenance(parameters_text(parameters)),
+    }
     return Value(canonical_json(about).encode())
 
 
-def _provenance(parameters: ScanParameters) -> dict[str, str]:
+@lru_cache(maxsize=8)
+def _provenance(parameters: str) -> dict[str, str]:
     return {
         f"{step}.{name}": canonical_json(value)
-        for step, values in json.loads(parameters_text(parameters))["values"].items()
+        for step, values in json.loads(parameters)["values"].items()
         for name, value in values.items()
     }

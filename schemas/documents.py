@@ -4,6 +4,7 @@ import difflib
 import json
 import re
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -158,51 +159,12 @@ def read_text(path: Path) -> str:
         raise RefusedInput(path, f"cannot be read ({getattr(error, 'strerror', None) or error})") from None
 
 
-class _TextLoader(yaml.SafeLoader):
-    """Scalars stay the text that was written; the model gives them their type.
-
-    YAML would read `no` as false, `2026-11-20` as a date, `0123` as 83 and `1e3` as text. What makes YAML more than
-    lists and named values is refused: aliases, tags, deep nesting.
-    """
-
-    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 (the base class's own attribute)
-    depth = 0
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        event: Any = self.peek_event()  # type: ignore[no-untyped-call]  # types-PyYAML leaves it out
-        if isinstance(event, yaml.AliasEvent):
-            raise _refusal(f"alias {str(event.anchor)[:80]!r}, expected it written out", event)
-        if getattr(event, "tag", None) is not None:
-            raise _refusal(f"tag {event.tag[:80]!r}, expected none", event)
-        self.depth += 1
-        if self.depth > MAX_DEPTH:
-            raise _refusal(f"expected at most {MAX_DEPTH} levels", event)
-        node = super().compose_node(parent, index)
-        self.depth -= 1
-        return node
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        names: set[str] = set()
-        for key, _ in node.value:
-            if not isinstance(key.value, str) or key.tag != self.DEFAULT_SCALAR_TAG:
-                raise _refusal("expected a name before ':'", key)
-            if key.value in names:
-                raise _refusal(f"{key.value[:80]!r} stands twice, expected each name once", key)
-            names.add(key.value)
-        return super().construct_mapping(node, deep)
-
-
-def _refusal(problem: str, where: Any) -> yaml.MarkedYAMLError:
-    """`where` : the event or node that is refused."""
-    return yaml.MarkedYAMLError(problem=problem, problem_mark=where.start_mark)
-
-
-_TextLoader.add_implicit_resolver("tag:yaml.org,2002:null", re.compile(r"^(?:~|null|)$"), ["~", "n", ""])
-
-
 def _parse_yaml(path: Path, text: str) -> Any:
     try:
-        return _encodable(yaml.load(text, Loader=_TextLoader))  # a SafeLoader
+        try:
+            return _encodable(_yaml_document(yaml.parse(text, Loader=_PARSER)))
+        except (yaml.YAMLError, ValueError):  # PyYAML's own parser takes a little more, and says better what is wrong
+            return _encodable(_yaml_document(yaml.parse(text, Loader=yaml.SafeLoader)))
     except yaml.MarkedYAMLError as error:
         mark: Any = error.problem_mark
         where = "" if mark is None else f"line {mark.line + 1}, column {mark.column + 1}: "
@@ -210,6 +172,66 @@ def _parse_yaml(path: Path, text: str) -> Any:
         raise RefusedInput(path, f"{where}{problem}{'' if 'expected' in problem else ', expected YAML'}") from None
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise RefusedInput(path, f"expected YAML ({error})") from None
+
+
+_PARSER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""Of libyaml where PyYAML was built with it: an archive has a document for each scan."""
+_Events = Iterator[Any]
+"""PyYAML's, which have no types."""
+
+
+def _yaml_document(events: _Events) -> Any:
+    """The only document among the events of a parser; None where there is none.
+
+    Scalars stay the text that was written; the model gives them their type: YAML would read `no` as false, `2026-11-20`
+    as a date, `0123` as 83 and `1e3` as text. What makes YAML more than lists and named values is refused: aliases,
+    tags, deep nesting.
+    """
+    next(events)  # the start of the stream
+    if isinstance(next(events), yaml.StreamEndEvent):
+        return None
+    value = _yaml_value(next(events), events, 1)
+    next(events)  # the end of the document
+    if not isinstance(more := next(events), yaml.StreamEndEvent):
+        raise _refusal("expected a single document", more)
+    return value
+
+
+def _yaml_value(event: Any, events: _Events, depth: int) -> Any:
+    if isinstance(event, yaml.AliasEvent):
+        raise _refusal(f"alias {str(event.anchor)[:80]!r}, expected it written out", event)
+    if event.tag is not None:
+        raise _refusal(f"tag {event.tag[:80]!r}, expected none", event)
+    if depth > MAX_DEPTH:
+        raise _refusal(f"expected at most {MAX_DEPTH} levels", event)
+    if isinstance(event, yaml.ScalarEvent):
+        is_plain: bool = event.implicit[0]
+        return None if is_plain and event.value in NOTHING else event.value
+    if isinstance(event, yaml.SequenceStartEvent):
+        return [_yaml_value(part, events, depth + 1) for part in _until(yaml.SequenceEndEvent, events)]
+    values: dict[str, Any] = {}
+    for key in _until(yaml.MappingEndEvent, events):
+        name = _yaml_value(key, events, depth + 1)
+        if not isinstance(name, str):
+            raise _refusal("expected a name before ':'", key)
+        if name in values:
+            raise _refusal(f"{name[:80]!r} stands twice, expected each name once", key)
+        values[name] = _yaml_value(next(events), events, depth + 1)
+    return values
+
+
+def _until(end: type, events: _Events) -> _Events:
+    while not isinstance(event := next(events), end):
+        yield event
+
+
+NOTHING = {"", "~", "null"}
+"""What stands for no value where it is not in quotes."""
+
+
+def _refusal(problem: str, where: Any) -> yaml.MarkedYAMLError:
+    """`where` : the event that is refused."""
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=where.start_mark)
 
 
 def _refuse_constant(name: str) -> None:

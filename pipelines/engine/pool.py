@@ -7,7 +7,7 @@ import logging
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 from uuid import uuid4
 
@@ -99,44 +99,54 @@ class Cluster:
 
     def run(self, tasks: Mapping[str, Task], run_task: RunTask, on_step_end: OnStepEnd) -> dict[str, Outcome]:
         """See `Pool`."""
-        from distributed import as_completed
+        outcomes: dict[str, Outcome] = {}
+
+        def end(ended: StepEnd) -> None:
+            outcomes[ended.step.name] = ended.outcome
+            on_step_end(ended)
+
+        with self._watching():
+            while left := {name: _with(task, outcomes) for name, task in tasks.items() if name not in outcomes}:
+                suspects = self._run_together(left, run_task, end)
+                for step, failure in suspects:
+                    # With a worker all die that it has been given. Who killed it is seen when each runs alone.
+                    alone = {step.name: _with(tasks[step.name], outcomes)}
+                    if len(suspects) == 1 or self._run_together(alone, run_task, end):
+                        end(StepEnd(step, failure, True, 0.0))
+        return outcomes
+
+    def _run_together(self, tasks: Mapping[str, Task], run_task: RunTask, end: OnStepEnd) -> list[tuple[Step, Failure]]:
+        """Run tasks; those that were given up since workers died of them, or beside them, are returned."""
+        from distributed import KilledWorker, as_completed
 
         # What a scheduler knows by a name, it does not run again; and its pages group tasks by the first part.
         run = uuid4().hex[:8]
         drawn = _draw(tasks, run_task, lambda step: (f"{step.kind}-{run}", step.scan, step.camera or 0))
-        names = list(drawn)
-        futures = dict(zip(self.client.compute(list(drawn.values())), names, strict=True))
-        outcomes: dict[str, Outcome] = {}
+        steps = [tasks[name].step for name in drawn]
+        futures = dict(zip(self.client.compute(list(drawn.values())), steps, strict=True))
+        suspects = []
         try:
-            with self._watching():
-                for future in as_completed(futures):
-                    name = futures[future]
-                    outcomes[name] = self._end(tasks[name].step, future, on_step_end)
+            for future in as_completed(futures):
+                step = futures[future]
+                if future.status == "finished":
+                    end(future.result())
+                    continue
+                error = future.exception()
+                if not isinstance(error, KilledWorker):
+                    problem = one_line(f"{step.name}: {type(error).__name__}: {error}")
+                    end(StepEnd(step, Failure(problem, "fault", step.name), True, 0.0))
+                elif str(error.task) == str(future.key):  # not what only waits for such a task
+                    suspects.append((step, self._give_up(step, error)))
         except BaseException:
             self.client.cancel(list(futures))
             raise
-        return outcomes
+        return suspects
 
-    def _end(self, step: Step, future: Any, on_step_end: OnStepEnd) -> Outcome:
-        if future.status == "finished":
-            end: StepEnd = future.result()
-        else:
-            end = StepEnd(step, self._explain(step, future.exception()), True, 0.0)
-        on_step_end(end)
-        return end.outcome
-
-    def _explain(self, step: Step, error: BaseException | None) -> Failure:
-        """Why a task has no result at all: its worker died, or that of one before it."""
-        from distributed import KilledWorker
-
-        if not isinstance(error, KilledWorker):
-            return Failure(one_line(f"{step.name}: {type(error).__name__}: {error}"), "fault", step.name)
-        (kind, *_), scan, camera = _parts(error.task)
-        cause = f"{scan}/{kind}" + (f"-{camera}" if camera else "")
+    def _give_up(self, step: Step, error: Any) -> Failure:
         most = self._memory.get(getattr(error.last_worker, "address", ""), 0)
         held = f", the last one when it held {most / 1e6:.0f} MB" if most else ""
-        problem = f"{cause}: killed {FAILURES_ALLOWED + 1} workers{held}; given up"
-        return Failure(problem, "fault", cause)
+        problem = f"{step.name}: killed {FAILURES_ALLOWED + 1} workers{held}; given up"
+        return Failure(problem, "fault", step.name)
 
     @contextmanager
     def _watching(self) -> Iterator[None]:
@@ -214,9 +224,8 @@ def _draw(tasks: Mapping[str, Task], run_task: RunTask, key: Callable[[Step], An
     return drawn
 
 
-def _parts(key: Any) -> tuple[list[str], str, int]:
-    """Kind (and run), scan and camera of a task's key, as Dask gives it back."""
-    import ast
-
-    name, scan, camera = ast.literal_eval(key) if isinstance(key, str) else key
-    return str(name).rsplit("-", 1), str(scan), int(camera)
+def _with(task: Task, outcomes: Mapping[str, Outcome]) -> Task:
+    """The task, with what has become known of those that it waits for."""
+    known = {name: outcomes[name] for name in task.waits_for if name in outcomes}
+    waits_for = tuple(name for name in task.waits_for if name not in known)
+    return replace(task, before={**task.before, **known}, waits_for=waits_for)

@@ -1,5 +1,6 @@
 """Carrying out a plan: only what is no hit becomes a task of Dask."""
 
+import contextlib
 import importlib
 import json
 import logging
@@ -66,6 +67,7 @@ def execute(step: Step, inputs: Mapping[str, str], store: Store) -> tuple[Outcom
     image = image_text(step, inputs)
     known = cached_outcome(step, store.lookup(key_of(image)))
     if known is not None:
+        _note_latest(step, key_of(image), store)
         return known, False
     try:
         return _run(step, image, inputs, store), True
@@ -99,8 +101,20 @@ def _record(step: Step, image: str, digest: str | None, failure: tuple[str, str]
     for source in step.inputs.values():
         if isinstance(source, Value):
             store.put(source.content)
-    sources = {name: str(source.path) for name, source in step.inputs.items() if isinstance(source, SourceFile)}
-    store.record(step.name, Row(json.loads(image), digest, failure), sources)
+    store.record(step.name, Row(json.loads(image), digest, failure), _sources(step))
+
+
+def _note_latest(step: Step, key: str, store: Store) -> None:
+    """What another step, or an earlier run, has made is this step's last result, too."""
+    latest = store.latest(step.name)
+    if latest is None or latest.key != key:
+        with contextlib.suppress(Fault):  # the result is there all the same
+            store.note_latest(step.name, key, _sources(step))
+
+
+def _sources(step: Step) -> dict[str, str]:
+    """Where the files of the archive lie that a step takes, by the name of the input."""
+    return {name: str(source.path) for name, source in step.inputs.items() if isinstance(source, SourceFile)}
 
 
 def _keep_code(identity: CodeIdentity, store: Store) -> None:

@@ -107,12 +107,15 @@ class Store:
         """Write the row of an action, and remember it as the last one of its step."""
         key = key_of(row.image)
         self.files.write(row_name(key), sealed({"image": row.image, "digest": row.digest, "failure": row.failure}))
-        latest = {"step": step_name, "key": key, "sources": sources or {}}
-        self.files.write(latest_name(step_name), sealed(latest))
+        self.note_latest(step_name, key, sources or {})
         state = self.files.state(row_name(key))
         if self.memory is not None and state is not None:
             blob = None if row.digest is None else self.files.state(blob_name(row.digest))
             self.memory.put(key, _known(state, row, blob))
+
+    def note_latest(self, step_name: str, key: str, sources: dict[str, str]) -> None:
+        """Remember an action as the last one of a step."""
+        self.files.write(latest_name(step_name), sealed({"step": step_name, "key": key, "sources": sources}))
 
     def latest(self, step_name: str) -> Latest | None:
         """The last action of a step, whatever its key."""

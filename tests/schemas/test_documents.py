@@ -100,7 +100,7 @@ def said(error: RefusedInput, path: Path) -> str:
         ("side: right\n", "? [a]\n: b\n", "line 4, column 3: expected a name before ':'"),
         ("side: right\n", "~: b\n", "line 4, column 1: expected a name before ':'"),
         ("side: right\n", "side: \0\n", "expected YAML (unacceptable character #x0000"),
-        ("side: right\n", "---\nside: right\n", "line 4, column 1: but found another document"),
+        ("side: right\n", "---\nside: right\n", "line 4, column 1: expected a single document"),
         ("side: right\n", "side: " + "[" * 5000 + "\n", f"line 4, column 30: expected at most {MAX_DEPTH} levels"),
     ],
 )  # fmt: skip

@@ -22,7 +22,7 @@ from footscan.frames import ingest
 from footscan.frames.ingest import chunk_name, discard, ingest_film, is_complete
 from footscan.frames.reader import read_frames
 from schemas.errors import Fault, RefusedInput
-from schemas.frames import FrameManifest
+from schemas.frames import GROUP, FrameManifest
 
 SIZE = (48, 64)
 
@@ -41,7 +41,7 @@ def film(scan: Path, jpeg: Callable[..., bytes], write_mjpeg: Callable[..., Path
 
 @pytest.fixture
 def array(scan: Path) -> Path:
-    return scan / ingest.GROUP / "cam1"
+    return scan / GROUP / "cam1"
 
 
 def assert_holds(array: Path, manifest: FrameManifest, jpeg: Callable[..., bytes]) -> None:
