@@ -339,7 +339,7 @@ def test_two_threads_at_once(line, light, frame):
 
 @pytest.fixture
 def photographs() -> Path:
-    if "FOOTSCAN_DATA" not in os.environ:
+    if not os.environ.get("FOOTSCAN_DATA"):
         pytest.skip("set FOOTSCAN_DATA to the folder that holds ciclop/")
     return Path(os.environ["FOOTSCAN_DATA"]) / "ciclop"
 
