@@ -7,6 +7,7 @@ since it was checked is not read again (`memory`).
 
 import contextlib
 import logging
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -190,12 +191,12 @@ def latest_name(step_name: str) -> str:
     return f"latest/{digest[:2]}/{digest}.json"
 
 
-_HEX = frozenset("0123456789abcdef")
+_IS_HEX = re.compile("[0-9a-f]{64}").fullmatch
 
 
 def plain_hex(digest: Any) -> str:
     """`digest` where it is one: a name out of a file of the store must not become a path."""
-    if not isinstance(digest, str) or len(digest) != 64 or not _HEX.issuperset(digest):
+    if not isinstance(digest, str) or not _IS_HEX(digest):
         raise ValueError(f"{str(digest)[:80]!r} is no SHA-256 digest")
     return digest
 
