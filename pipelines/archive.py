@@ -169,7 +169,7 @@ def plan_job(job: Job, *, reasons: bool = False) -> PlannedJob:
             if scan.name in names:
                 raise RefusedInput(scan.file, f"{scan.name} is also in {names[scan.name]}, expected each scan once")
             names[scan.name] = folder
-            plan = make_plan(_draw(scan, planned), planned.store)
+            plan = make_plan(draw_steps(scan, planned), planned.store)
         except RefusedInput as error:
             planned.refused[str(folder)] = error
             continue
@@ -179,6 +179,12 @@ def plan_job(job: Job, *, reasons: bool = False) -> PlannedJob:
                 Waiting(scan.name, p.step.kind, p.step.camera, p.step.name, p.reason) for p in plan.to_run
             ]
     return planned
+
+
+def draw_steps(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
+    """The steps of one scan of a job; RefusedInput as in `scan_steps`, or where it has no calibration."""
+    calibration = _calibration(scan, planned.job, planned.calibrations)
+    return scan_steps(scan, calibration, planned.job.parameters, planned.digests)
 
 
 def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
@@ -207,11 +213,6 @@ def _cache(base: Path, named: str | None) -> Path | str | None:
     return named if named is None or "://" in named else base / named
 
 
-def _draw(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
-    calibration = _calibration(scan, planned.job, planned.calibrations)
-    return scan_steps(scan, calibration, planned.job.parameters, planned.digests)
-
-
 def _sum_up(scan: RecordedScan, plan: Plan) -> PlannedScan:
     outcomes = {p.step.kind: p.outcome for p in plan.steps if p.step.camera is None}
     failures = [p.outcome for p in plan.steps if isinstance(p.outcome, Failure)]
@@ -228,13 +229,13 @@ def _run_window(
     steps: list[Step] = []
     for scan in window:
         if scan.to_run:
-            steps += _draw(scan.scan, planned)
+            steps += draw_steps(scan.scan, planned)
     outcomes = _run_and_mend(steps, planned, pool, on_step_end)
     for scan in window:
         end = _end_scan(scan, outcomes, planned)
         if end.kind == "damaged":
             log.warning("%s", end.problem)
-            again = _run_and_mend(_draw(scan.scan, planned), planned, pool, on_step_end)
+            again = _run_and_mend(draw_steps(scan.scan, planned), planned, pool, on_step_end)
             end = _end_scan(scan, again, planned)
         yield end
 

@@ -73,15 +73,10 @@ def why(
 
 def plan_of_scan(found: "PlannedScan", planned: "PlannedJob") -> "Plan":
     """The plan of one scan of a job, with all its steps."""
+    from pipelines.archive import draw_steps
     from pipelines.engine.plan import make_plan
-    from pipelines.scan import scan_steps
 
-    job = planned.job
-    wins = job.calibration if job.calibration_wins else None
-    path = wins or found.scan.calibration or job.calibration
-    assert path is not None, "a scan without a calibration was refused"
-    steps = scan_steps(found.scan, planned.calibrations[path], job.parameters, planned.digests)
-    return make_plan(steps, planned.store)
+    return make_plan(draw_steps(found.scan, planned), planned.store)
 
 
 def local_time(seconds: float | None) -> str:

@@ -64,7 +64,7 @@ class LocalFiles:
 
     def state(self, name: str) -> str | None:
         try:
-            found = os.stat(f"{self.root}/{name}")  # noqa: PTH116
+            found = os.stat(f"{self.root}/{name}")  # noqa: PTH116 (as above)
         except OSError:
             return None
         # Of these, ctime cannot be set back.

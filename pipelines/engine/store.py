@@ -8,7 +8,7 @@ since it was checked is not read again (`memory`).
 import contextlib
 import logging
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -168,11 +168,6 @@ class Store:
 def open_store(place: Path | str, memory: Path | None = None) -> Store:
     """The store at a path or URL, with what the file `memory` remembers of it."""
     return Store(open_files(place), None if memory is None else Memory(memory))
-
-
-def without_memory(store: Store) -> Store:
-    """The same store, read anew at every turn."""
-    return replace(store, memory=None)
 
 
 def blob_name(digest: str) -> str:
