@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from footscan.stripe.points import StripePoints
     from schemas.parameters.extraction import ExtractionParameters
 
-STREAMS = {Path("/dev"), Path("/dev/fd")}
-"""Folders of names that stand for what is open already, as /dev/stdout does."""
-
 
 def _path(name: str) -> Callable[[str], Path]:
     """How an argument of such a name becomes a path: '', of a shell variable that is not set, would be this folder."""
@@ -60,6 +57,7 @@ def extract(
     """Find the laser stripe: one sub-pixel point a row of frame,i,j,width,peak,score."""
     from footscan.frames.film import film_files, open_film, pixel_frames
     from footscan.stripe.film import extract_film, points_csv
+    from pipelines.engine.atomic import write_atomically
 
     parameters = _parameters(settings or [])
     film = open_film(file)
@@ -74,11 +72,11 @@ def extract(
     points = extract_film(seen.watch(pixel_frames(film)), parameters, backgrounds)
     picture = None if overlay is None else _drawn(film, points, seen.lost, _about(film, background, parameters))
     if out is not None:
-        _write(out, points_csv(points).encode())
+        write_atomically(out, points_csv(points).encode())
     elif not as_json:
         sys.stdout.write(points_csv(points))
     if overlay is not None and picture is not None:
-        _write(overlay, picture)
+        write_atomically(overlay, picture)
     if as_json:
         print_json(
             {
@@ -122,7 +120,9 @@ def _backgrounds(path: Path, film: "Film") -> "Iterable[Rgb | None]":
 
 def _check_outputs(out: Path | None, overlay: Path | None, sources: Sequence[Path]) -> None:
     """Refuses what cannot be written, or would replace the other output, or be a frame to the next run."""
-    if out is not None and not _is_stream(out):
+    from pipelines.engine.atomic import is_stream
+
+    if out is not None and not is_stream(out):
         if out.suffix.lower() not in {".csv", ""}:
             raise RefusedInput(out, f"expected a file that ends in .csv, found {out.suffix!r}")
         _check_folder(out)
@@ -148,11 +148,6 @@ def _check_folder(output: Path) -> None:
     except (OSError, RuntimeError) as error:  # before Python 3.13 a circle of links is a RuntimeError
         problem = getattr(error, "strerror", None) or "leads nowhere"
         raise RefusedInput(output, f"cannot be written ({folder}: {problem})") from None
-
-
-def _is_stream(path: Path) -> bool:
-    """Whether a path is a device or a pipe, which may have any name."""
-    return path.parent in STREAMS or (path.exists() and not path.is_file() and not path.is_dir())
 
 
 @dataclass
@@ -193,17 +188,6 @@ def _about(film: "Film", background: Path | None, parameters: "ExtractionParamet
 
 def _name(path: Path) -> str:
     return path.name or path.resolve().name
-
-
-def _write(file: Path, data: bytes) -> None:
-    """Writes a file as a whole, or into a device or a pipe."""
-    from pipelines.engine.atomic import write_atomically
-
-    if not _is_stream(file):
-        write_atomically(file, data)
-        return
-    with file.open("ab") as stream:
-        stream.write(data)
 
 
 def _figures(film: "Film", points: "StripePoints") -> dict[str, Any]:

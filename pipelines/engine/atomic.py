@@ -14,12 +14,22 @@ def write_atomically(path: Path, data: bytes) -> None:
     A symbolic link stays one: what it points to is written. A device or a pipe is written into.
     """
     try:
-        if path.exists() and not (path.is_file() or path.is_dir()):
-            path.write_bytes(data)
+        if is_stream(path):
+            with path.open("ab") as stream:
+                stream.write(data)
         else:
             _replace(path.resolve(), data)
     except OSError as error:
         raise Fault(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+STREAMS = {Path("/dev"), Path("/dev/fd")}
+"""Folders of names that stand for what is open already, as /dev/stdout does."""
+
+
+def is_stream(path: Path) -> bool:
+    """Whether a path is a device or a pipe, which may have any name."""
+    return path.parent in STREAMS or (path.exists() and not path.is_file() and not path.is_dir())
 
 
 def _replace(path: Path, data: bytes) -> None:
