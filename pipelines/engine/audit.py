@@ -6,7 +6,7 @@ import logging
 import random
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
@@ -204,7 +204,7 @@ def _elsewhere(step: Step, folder: Path) -> Step:
     if writes is None:
         return step
     places = {name: folder / name if writes.is_relative_to(place) else place for name, place in step.places.items()}
-    return replace(step, places=places)
+    return step._replace(places=places)
 
 
 def _content(name: str, action: Repeatable, store: Store) -> bytes:

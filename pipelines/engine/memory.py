@@ -7,19 +7,18 @@ import contextlib
 import logging
 import sqlite3
 import threading
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from pipelines.engine.digest import sha256
-
 log = logging.getLogger("footscan.store")
 
 _TABLE = """
 CREATE TABLE IF NOT EXISTS known
-(key TEXT PRIMARY KEY, row TEXT, digest TEXT, kind TEXT, problem TEXT, blob TEXT, seal TEXT)
+(key TEXT PRIMARY KEY, row TEXT, digest TEXT, kind TEXT, problem TEXT, blob TEXT, seal INTEGER) WITHOUT ROWID
 """
 _SELECT = "SELECT row, digest, kind, problem, blob, seal FROM known WHERE key = ?"
 _INSERT = "INSERT OR REPLACE INTO known (key, row, digest, kind, problem, blob, seal) VALUES (?, ?, ?, ?, ?, ?, ?)"
@@ -144,6 +143,6 @@ class Memory:
                 self.file.unlink()
 
 
-def _seal(key: str, known: Known) -> str:
+def _seal(key: str, known: Known) -> int:
     """SQLite does not see that a bit has changed."""
-    return sha256(repr((key, *known)).encode())
+    return zlib.crc32(repr((key, *known)).encode())

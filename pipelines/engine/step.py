@@ -1,10 +1,10 @@
 """What the engine runs: steps, and the actions that they become once their inputs are known."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from pydantic import BaseModel
 
@@ -47,9 +47,8 @@ class SourceFile:
 Input = Output | Value | SourceFile
 
 
-@dataclass(frozen=True)
-class Step:
-    """A pure function with parameters and named inputs."""
+class Step(NamedTuple):
+    """A pure function with parameters and named inputs. A tuple, for an archive's plan makes tens of thousands."""
 
     scan: str
     """The scan it belongs to, as `patient/scan`."""
@@ -58,14 +57,14 @@ class Step:
     module: str
     """Name of the one that holds `run(inputs, parameters, places) -> bytes`; imported when the step runs."""
     parameters: BaseModel | None = None
-    inputs: Mapping[str, Input] = field(default_factory=dict)
+    inputs: Mapping[str, Input] = {}
     camera: int | None = None
-    places: Mapping[str, Path] = field(default_factory=dict)
+    places: Mapping[str, Path] = {}
     """Folders and files that the step reads or writes beside the store; no part of the key."""
     writes: Path | None = None
     """A file outside the store that the step leaves behind and without which it must run again."""
 
-    @cached_property
+    @property
     def name(self) -> str:
         """Unique within a graph, and the same in every run: `patient/scan/extract-3`."""
         return f"{self.scan}/{self.kind}" + (f"-{self.camera}" if self.camera is not None else "")
