@@ -52,11 +52,13 @@ class Memory:
     _new: dict[str, Known] = field(default_factory=dict)
     _connection: sqlite3.Connection | None = None
     _lock: threading.Lock = field(default_factory=threading.Lock)
+    _is_out_of_reach: bool = False
+    """Locked by another process, or on a disk that fails: each further look would wait as long as the first."""
 
     def get(self, key: str) -> Known | None:
         """What is remembered of an action."""
         new = self._new.get(key)
-        if new is not None:
+        if new is not None or self._is_out_of_reach:
             return new
         with self._lock:
             try:
@@ -77,12 +79,14 @@ class Memory:
     def reading(self) -> Iterator[None]:
         """Many calls of `get` as one transaction: taking and giving back a lock costs more than to read."""
         with self._lock:
-            self._try("BEGIN")
+            if not self._is_out_of_reach:
+                self._begin()
         try:
             yield
         finally:
             with self._lock:
-                self._try("ROLLBACK")
+                if self._connection is not None:
+                    self._connection.rollback()
 
     def put(self, key: str, known: Known) -> None:
         """Remember; on disk with the next `save`."""
@@ -113,18 +117,25 @@ class Memory:
                 self._connection.close()
                 self._connection = None
 
-    def _try(self, statement: str) -> None:
-        """What fails here fails in `get`, too, and is seen to there."""
-        with contextlib.suppress(*_ERRORS):
+    def _begin(self) -> None:
+        try:
             if self._connection is None and self.file.exists():
                 self._connection = self._open()
-            if self._connection is not None:
-                self._connection.execute(statement)
+            if self._connection is not None and not self._connection.in_transaction:
+                self._connection.execute("BEGIN")
+        except _ERRORS as error:
+            self._forget(error)
 
     def _open(self) -> sqlite3.Connection:
         connection = sqlite3.connect(self.file, timeout=5, check_same_thread=False)
-        with contextlib.suppress(*_ERRORS):
+        try:
             connection.execute(_TABLE)
+            ((pages,),), ((page_size,),) = (connection.execute(f"PRAGMA page_{what}") for what in ("count", "size"))
+            if self.file.stat().st_size < pages * page_size:
+                raise sqlite3.DatabaseError("cut short, which SQLite takes for zeros")
+        except _ERRORS:
+            connection.close()
+            raise
         return connection
 
     def _forget(self, error: Exception) -> None:
@@ -134,10 +145,10 @@ class Memory:
             with contextlib.suppress(sqlite3.Error):
                 self._connection.close()
             self._connection = None
-        if isinstance(error, OSError):
-            return
         code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT)  # none where text is no UTF-8
-        if code & 0xFF not in _OUT_OF_REACH:
+        if isinstance(error, OSError) or code & 0xFF in _OUT_OF_REACH:
+            self._is_out_of_reach = True
+        else:
             log.warning("%s: damaged, made anew", self.file)
             with contextlib.suppress(OSError):
                 self.file.unlink()

@@ -128,15 +128,16 @@ class Cluster:
         try:
             for future in as_completed(futures):
                 step = futures[future]
-                if future.status == "finished":
-                    end(future.result())
+                try:
+                    ended = future.result()  # which is made again where it died with its worker before it was fetched
+                except KilledWorker as error:
+                    if str(error.task) == str(future.key):  # not what only waits for such a task
+                        suspects.append((step, self._give_up(step, error)))
                     continue
-                error = future.exception()
-                if not isinstance(error, KilledWorker):
+                except Exception as error:  # of Dask's: ours are in what a task returns
                     problem = one_line(f"{step.name}: {type(error).__name__}: {error}")
-                    end(StepEnd(step, Failure(problem, "fault", step.name), True, 0.0))
-                elif str(error.task) == str(future.key):  # not what only waits for such a task
-                    suspects.append((step, self._give_up(step, error)))
+                    ended = StepEnd(step, Failure(problem, "fault", step.name), True, 0.0)
+                end(ended)
         except BaseException:
             self.client.cancel(list(futures))
             raise

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ DIGESTS = {"cloud": "a" * 64, "other": "b" * 64}
 
 
 def image(step: Step, digests: dict[str, str] = DIGESTS) -> str:
-    return image_text(replace(step, inputs={name: Output("P/S/before") for name in digests}), digests)
+    return image_text(step._replace(inputs={name: Output("P/S/before") for name in digests}), digests)
 
 
 def key(step: Step, digests: dict[str, str] = DIGESTS) -> str:

@@ -215,11 +215,18 @@ def test_read_only(file: Path, truth: Truth, monkeypatch: pytest.MonkeyPatch) ->
 
 def test_busy_with_another_run(file: Path, truth: Truth, monkeypatch: pytest.MonkeyPatch) -> None:
     original = sqlite3.connect
-    monkeypatch.setattr(memory_module.sqlite3, "connect", lambda path, **more: original(path, **more | {"timeout": 0}))
+    waits: list[Path] = []
+
+    def connect(path: Path, **options: Any) -> sqlite3.Connection:
+        waits.append(path)
+        return original(path, **options | {"timeout": 0})
+
+    monkeypatch.setattr(memory_module.sqlite3, "connect", connect)
     with closing(original(file)) as other:
         other.execute("BEGIN EXCLUSIVE")
         store = open_store(file.parent / "store", file)
         assert told(store) == truth
+        assert len(waits) == 1
         close(store)
         other.execute("UPDATE known SET blob = 'of the other run'")
         other.commit()

@@ -1,7 +1,6 @@
 """What would run, and why."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +113,7 @@ def test_cached_failure_is_a_hit_for_all_that_stand_behind_it(
 ) -> None:
     source = "from schemas.errors import Finding\ndef run(*_):\n    raise Finding('no stripe')\n"
     steps = chain()
-    steps[0] = replace(steps[0], module=package.step_module("bad", source))
+    steps[0] = steps[0]._replace(module=package.step_module("bad", source))
     run_steps(*steps)
     plan = make_plan(steps, store)
     assert [planned.state for planned in plan.steps] == [State.HIT] * 3
