@@ -275,11 +275,11 @@ def _run_footscan(folder: Path, scans: int) -> int:
     results: dict[str, str] = {}
     runs = 0
     for step in draw(scans):
-        outcome, ran = execute(step, _digests(step, results), store)
-        if isinstance(outcome, Failure):
-            raise RuntimeError(outcome.problem)
-        results[step.name] = outcome.digest
-        runs += ran
+        end = execute(step, _digests(step, results), store)
+        if isinstance(end.outcome, Failure):
+            raise RuntimeError(end.outcome.problem)
+        results[step.name] = end.outcome.digest
+        runs += end.ran
     assert store.memory is not None
     store.memory.close()
     return runs

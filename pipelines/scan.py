@@ -57,7 +57,7 @@ class CalibrationFile:
 
     def _once(self, what: object, draw: Callable[[], Document]) -> Value:
         if what not in self._drawn:
-            self._drawn[what] = _document(draw())
+            self._drawn[what] = _document(draw(), self.path)
         return self._drawn[what]
 
 
@@ -154,14 +154,14 @@ def _travel(scan: RecordedScan, camera: CameraFilm) -> dict[str, Value]:
     positions = scan.positions(camera)
     if positions is not None:
         x_mm = [None if math.isnan(x) else x for x in read_positions(positions).tolist()]
-        return {"positions": Value(canonical_json({"file": positions.name, "x_mm": x_mm}).encode())}
+        return {"positions": Value(canonical_json({"file": positions.name, "x_mm": x_mm}).encode(), positions)}
     travel = camera.travel or scan.document.travel
     assert travel is not None, "scan.yaml was checked for it"
-    return {"travel": _document(travel)}
+    return {"travel": _document(travel, scan.file)}
 
 
-def _document(document: Document) -> Value:
-    return Value(canonical_json(document.model_dump(mode="json")).encode())
+def _document(document: Document, path: Path) -> Value:
+    return Value(canonical_json(document.model_dump(mode="json")).encode(), path)
 
 
 def _about(scan: RecordedScan, parameters: ScanParameters) -> Value:

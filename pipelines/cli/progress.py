@@ -77,7 +77,7 @@ class StepProgress:
             self._bar.update(self._task, advance=1, description=self._line(end.step.name.rpartition("/")[2]))
             self._write(
                 "step", scan=end.step.scan, step=end.step.kind, camera=end.step.camera, ran=end.ran,
-                seconds=round(end.seconds, 6), problem=failure,
+                seconds=round(end.seconds, 6), problem=failure, otherwise=end.otherwise,
             )  # fmt: skip
 
     def on_scan_end(self, end: "ScanEnd") -> None:

@@ -31,6 +31,8 @@ class StepEnd:
     ran: bool
     """False where the step's inputs turned out to be those of an earlier run."""
     seconds: float
+    otherwise: str | None = None
+    """What the same action came to before, where that was another result."""
 
 
 OnStepEnd = Callable[[StepEnd], None]

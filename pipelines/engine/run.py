@@ -31,6 +31,16 @@ def run_plan(plan: Plan, store: Store, *, pool: Pool, on_step_end: OnStepEnd) ->
         Result or failure of every step by its name, the hits included.
     """
     outcomes = {p.step.name: p.outcome for p in plan.steps if p.outcome is not None}
+
+    def on_end(end: StepEnd) -> None:
+        if end.otherwise is not None:
+            log.warning(
+                "%s: came out otherwise than before (%s) from the same inputs, parameters and code: "
+                "it is not deterministic, see 'footscan cache verify --recompute'",
+                end.step.name, end.otherwise,
+            )  # fmt: skip
+        on_step_end(end)
+
     tasks: dict[str, Task] = {}
     for planned in plan.to_run:
         before = [source.step for source in planned.step.inputs.values() if isinstance(source, Output)]
@@ -38,7 +48,7 @@ def run_plan(plan: Plan, store: Store, *, pool: Pool, on_step_end: OnStepEnd) ->
         code = code_identity(planned.step.module).digest
         waits_for = tuple(name for name in before if name in tasks)
         tasks[planned.step.name] = Task(planned.step, code, known, waits_for)
-    return outcomes | pool.run(tasks, partial(run_step, store), on_step_end) if tasks else outcomes
+    return outcomes | pool.run(tasks, partial(run_step, store), on_end) if tasks else outcomes
 
 
 def run_step(store: Store, task: Task, ended: Mapping[str, StepEnd]) -> StepEnd:
@@ -58,50 +68,62 @@ def run_step(store: Store, task: Task, ended: Mapping[str, StepEnd]) -> StepEnd:
         if isinstance(result, Failure):
             return StepEnd(step, result, False, time.perf_counter() - start)
         digests[name] = result.digest
-    outcome, ran = execute(step, digests, store)
-    return StepEnd(step, outcome, ran, time.perf_counter() - start)
+    return execute(step, digests, store)
 
 
-def execute(step: Step, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, bool]:
-    """The outcome of a step with inputs of these digests, from the cache or by running it; whether it ran."""
+def execute(step: Step, inputs: Mapping[str, str], store: Store) -> StepEnd:
+    """A step with inputs of these digests, from the cache or by running it."""
+    start = time.perf_counter()
     image = image_text(step, inputs)
-    known = cached_outcome(step, store.lookup(key_of(image)))
-    if known is not None:
+    outcome = cached_outcome(step, store.lookup(key_of(image)))
+    ran, otherwise = outcome is None, None
+    if outcome is None:
+        outcome, otherwise = _run_safely(step, image, inputs, store)
+    else:
         _note_latest(step, key_of(image), store)
-        return known, False
+    return StepEnd(step, outcome, ran, time.perf_counter() - start, otherwise)
+
+
+def _run_safely(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, str | None]:
+    """As `_run`; what goes wrong is an outcome, too."""
     try:
-        return _run(step, image, inputs, store), True
+        return _run(step, image, inputs, store)
     except Fault as error:
-        return Failure(str(error), "damaged" if isinstance(error, DamagedError) else "fault", step.name), True
+        return Failure(str(error), "damaged" if isinstance(error, DamagedError) else "fault", step.name), None
     except Exception as error:  # a defect of ours, or of a library, in one scan must not cost the others
         log.debug("%s", step.name, exc_info=True)
         problem = one_line(f"{step.name}: {type(error).__name__}: {error}")
-        return Failure(problem, "fault", step.name), True
+        return Failure(problem, "fault", step.name), None
 
 
-def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> Outcome:
-    """Run a step and record what came out, unless its files were changed meanwhile."""
+def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, str | None]:
+    """Run a step and record what came out, unless its files were changed meanwhile; and what came out once before."""
     content = {name: _content(step, source, inputs[name], store) for name, source in step.inputs.items()}
     try:
         result = importlib.import_module(step.module).run(content, step.parameters, step.places)
     except (RefusedInput, Finding) as error:
         _check_sources(step)
         kind, problem = "finding" if isinstance(error, Finding) else "refused", str(error)
-        _record(step, image, None, (kind, without_places(problem, step.places)), store)
-        return Failure(problem, kind, step.name)
+        failure = kind, without_places(problem, step.places)
+        return Failure(problem, kind, step.name), _record(step, image, None, failure, store)
     _check_sources(step)
     digest = store.put(result)
-    _record(step, image, digest, None, store)
-    return Success(digest)
+    return Success(digest), _record(step, image, digest, None, store)
 
 
-def _record(step: Step, image: str, digest: str | None, failure: tuple[str, str] | None, store: Store) -> None:
-    """Write an action's row, after all that it names: its code and the values that it took."""
+def _record(step: Step, image: str, digest: str | None, failure: tuple[str, str] | None, store: Store) -> str | None:
+    """Write an action's row, after all that it names: its code and the values that it took.
+
+    Returns what another row of the same action said: of a run beside this one, or of one whose result was lost.
+    """
     _keep_code(code_identity(step.module), store)
     for source in step.inputs.values():
         if isinstance(source, Value):
             store.put(source.content)
-    store.record(step.name, Row(json.loads(image), digest, failure), _sources(step))
+    row, before = Row(json.loads(image), digest, failure), store.row(key_of(image))
+    store.record(step.name, row, _sources(step))
+    is_same = before is None or (before.digest, before.failure) == (digest, failure)
+    return None if before is None or is_same else before.digest or str(before.failure)
 
 
 def _note_latest(step: Step, key: str, store: Store) -> None:
@@ -113,8 +135,9 @@ def _note_latest(step: Step, key: str, store: Store) -> None:
 
 
 def _sources(step: Step) -> dict[str, str]:
-    """Where the files of the archive lie that a step takes, by the name of the input."""
-    return {name: str(source.path) for name, source in step.inputs.items() if isinstance(source, SourceFile)}
+    """Where the files lie that a step's inputs are, or were read from, by the name of the input."""
+    paths = {name: source.path for name, source in step.inputs.items() if not isinstance(source, Output)}
+    return {name: str(path) for name, path in paths.items() if path is not None}
 
 
 def _keep_code(identity: CodeIdentity, store: Store) -> None:

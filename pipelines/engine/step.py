@@ -25,6 +25,8 @@ class Value:
     """An input that is known when the graph is drawn, small enough to be handed over as it is."""
 
     content: bytes
+    path: Path | None = None
+    """The file that it was read from, where there is one; no part of the key."""
     source: ClassVar[str] = "value"
 
     @cached_property

@@ -283,3 +283,20 @@ def test_code_that_was_changed_and_back_hits_again(package: Any, run_steps: RunS
     assert run_steps(step(""))[1] == ["a"]
     assert run_steps(step("X = 1\n"))[1] == ["a"]
     assert run_steps(step("# only a remark\n"))[1] == []
+
+
+OTHERWISE = "import time\ndef run(*_):\n    return str(time.perf_counter_ns()).encode()\n"
+
+
+def test_a_result_that_comes_out_otherwise_is_said_aloud(
+    package: Any, store: Store, run_steps: RunSteps, caplog: pytest.LogCaptureFixture
+) -> None:
+    step = Step("P/S", "odd", package.step_module("odd", OTHERWISE))
+    (first, _) = run_steps(step)
+    assert not caplog.records
+    store.files.remove(blob_name(first["odd"].digest))
+    (second, ran) = run_steps(step)
+    assert ran == ["odd"]
+    assert second != first
+    (told,) = [record.getMessage() for record in caplog.records]
+    assert told.startswith(f"P/S/odd: came out otherwise than before ({first['odd'].digest})")
