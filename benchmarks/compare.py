@@ -1,7 +1,9 @@
 """Timing of a candidate beside a baseline, turn by turn, so that a busy machine slows both."""
 
+import subprocess
+import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,3 +36,13 @@ def print_ratios(title: str, seconds: Mapping[str, list[float]], calls: int, uni
 def ratio_text(ratios: NDArray[np.float64]) -> str:
     """Median and range of the ratios of one round each."""
     return f"{np.median(ratios):6.2f} times the baseline ({ratios.min():.2f} to {ratios.max():.2f})"
+
+
+def spread(values: Sequence[float], digits: int = 1) -> str:
+    """Median and range."""
+    return f"{np.median(values):9.{digits}f} ({min(values):.{digits}f} to {max(values):.{digits}f})"
+
+
+def python(*arguments: str) -> str:
+    """What a new process of this Python prints."""
+    return subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.PIPE, text=True).stdout

@@ -1,16 +1,13 @@
-"""What a warm step costs: the engine beside joblib.Memory and Hamilton's cache, and a warm archive of small scans.
+"""What a warm step costs: the engine beside joblib.Memory and Hamilton's cache.
 
-    .venv/bin/python -m benchmarks.engine [SCAN]
+    .venv/bin/python -m benchmarks.engine
 
-SCAN is the scan of a folder that `footscan demo` made; of its films every fifth frame makes the small scans. The two
-others come with `pip install -e '.[benchmarks]'`.
+The two others come with `pip install -e '.[benchmarks]'`.
 """
 
 import importlib
 import json
-import os
 import shutil
-import subprocess
 import sys
 import tempfile
 import time
@@ -21,9 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.compare import interleave, ratio_text
-from footscan.frames.film import encoded_frames, open_film
-from footscan.virtual.film import write_film
+from benchmarks.compare import python, ratio_text, spread
 from pipelines.engine import code
 from pipelines.engine.digest import sha256
 from pipelines.engine.key import image_text, key_of
@@ -31,13 +26,11 @@ from pipelines.engine.plan import make_plan
 from pipelines.engine.run import execute
 from pipelines.engine.step import Failure, Input, Output, SourceFile, Step, Success, Value
 from pipelines.engine.store import open_store
-from pipelines.recorded import read_scan
 from schemas.workflow import ScanParameters
 
-DEFAULT = Path("demo/archive/P0001/demo-R")
 ROUNDS = 5
-SCANS, FEWER_SCANS, SMALL_SCANS = 500, 50, 1000
-"""Of a graph for the engine alone, of one for all engines, and in the archive."""
+SCANS, FEWER_SCANS = 500, 50
+"""Of a graph for the engine alone, and of one for all engines."""
 
 PACKAGE = "made_up"
 MODULES = {"background": "ingest_background", "map": "map_points", "cloud": "cloud_ply", "stl": "foot_stl"}
@@ -77,12 +70,8 @@ MODELS = {f"{step}_parameters": getattr(ScanParameters(), step) for step in Scan
 
 
 def main() -> None:
-    scan = Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT
     with tempfile.TemporaryDirectory() as place:
         compare_engines(Path(place), SCANS, FEWER_SCANS)
-    for cameras in (2, 8):
-        with tempfile.TemporaryDirectory() as place:
-            time_archive(scan.resolve(), Path(place), cameras, SMALL_SCANS)
 
 
 def compare_engines(place: Path, scans: int, fewer_scans: int) -> None:
@@ -113,21 +102,21 @@ def compare_engines(place: Path, scans: int, fewer_scans: int) -> None:
     large = rounds.pop("footscan, large")
     print(f"\nWarm planning of {scans * len(SHAPE)} steps, microseconds a step: median (range) of {ROUNDS} processes")
     for what in large[0]:
-        print(f"  {what:<44}{_spread([found[what] for found in large])}")
+        print(f"  {what:<44}{spread([found[what] for found in large])}")
     for what in ("first in its process", "again"):
         print(f"\nA warm graph of {fewer_scans * len(SHAPE)} steps, {what}, microseconds a step")
         baseline = np.array([found[what] for found in rounds["footscan"]])
         for name, each in rounds.items():
             times = [found[what] for found in each]
             ratio = "baseline" if name == "footscan" else ratio_text(np.array(times) / baseline)
-            print(f"  {name:<32}{_spread(times)}   {ratio}")
+            print(f"  {name:<32}{spread(times)}   {ratio}")
 
 
 def in_process(task: str, *arguments: object) -> Any:
     """What `prepare` or `walk` returns in a new process."""
     call = f"import json; from benchmarks import engine; print(json.dumps(engine.{task}(*{[*map(str, arguments)]})))"
     # -B: no other trace of the made-up package than its own folder
-    return json.loads(_python("-B", "-c", call).splitlines()[-1])
+    return json.loads(python("-B", "-c", call).splitlines()[-1])
 
 
 def prepare(engine: str, package: str, folder: str, scans: str) -> dict[str, float]:
@@ -315,83 +304,6 @@ def _digests(step: Step, results: Mapping[str, str]) -> dict[str, str]:
         name: results[source.step] if isinstance(source, Output) else source.digest
         for name, source in step.inputs.items()
     }
-
-
-WORKFLOW = "format: footscan.workflow/1\narchive: archive\ncalibration: calibration.json\nresults: results\n"
-COMMAND = "from pipelines.cli.main import main; main()"
-BLANK_REPORTS = "from pipelines.steps import report; report.run = lambda *_: b'<!doctype html>'; "
-PLANNING = """
-import sys, time
-start = time.perf_counter()
-from pathlib import Path
-from pipelines.archive import job_of_workflow, plan_job
-imported = time.perf_counter()
-planned = plan_job(job_of_workflow(Path(sys.argv[1])))
-print(imported - start, time.perf_counter() - imported, planned.steps, planned.to_run)
-"""
-
-
-def time_archive(scan: Path, place: Path, cameras: int, count: int) -> None:
-    """The real command on an archive of copies of one small scan, all of which is done."""
-    workflow, first = place / "workflow.yaml", place / "archive/P0001/S0001"
-    workflow.write_text(WORKFLOW)
-    shutil.copy(scan.parents[2] / "calibration.json", place)
-    _thin_out(scan, first, cameras)
-    _python("-c", COMMAND, "run", str(workflow))
-    for number in range(2, count + 1):
-        _link_scan(first, number)
-    # A thousand reports take minutes to draw, and what is in them makes no difference to a warm run.
-    _python("-c", BLANK_REPORTS + COMMAND, "run", str(workflow))
-    time.sleep(2)  # what is younger than that is read again
-    runs = {"python -c pass": lambda: _python("-c", "pass")}
-    for task in ("plan", "run"):
-        runs[f"footscan {task}"] = partial(_python, "-c", COMMAND, task, str(workflow))
-    seconds = interleave(runs, ROUNDS)
-    rows = np.array([_python("-c", PLANNING, str(workflow)).split() for _ in range(ROUNDS)], float)
-    steps, to_run = int(rows[0, 2]), int(rows[0, 3])
-    if to_run:
-        raise RuntimeError(f"{to_run} of {steps} steps to run, expected none")
-    print(f"\nA warm archive of {count} scans of {cameras} cameras, {steps} steps: seconds, median (range)")
-    nothing = seconds.pop("python -c pass")
-    times = {"python -c pass": nothing}
-    times |= {f"{name}, beyond that": list(np.subtract(each, nothing)) for name, each in seconds.items()}
-    times |= {"of this, imports": list(rows[:, 0]), "planning": list(rows[:, 1])}
-    for name, each in times.items():
-        print(f"  {name:<44}{_spread(each, 2)}", flush=True)
-
-
-def _thin_out(scan: Path, folder: Path, cameras: int) -> None:
-    """A scan of every fifth frame of some of the cameras of another."""
-    recorded = read_scan(scan)
-    folder.mkdir(parents=True)
-    travel = recorded.document.travel
-    assert travel is not None, "the demo has it"
-    lines = [
-        "format: footscan.scan/1", "patient: P0001", f"scan: {folder.name}", f"side: {recorded.document.side}",
-        f"travel: {{start_mm: {travel.start_mm}, step_mm: {5 * travel.step_mm}}}", "cameras:",
-    ]  # fmt: skip
-    for camera in recorded.document.cameras[:: 8 // cameras]:
-        film = open_film(recorded.film(camera))
-        frames = [frame for frame in list(encoded_frames(film))[::5] if frame is not None]
-        write_film(folder / f"cam{camera.id}.avi", frames, film.width, film.height, 18)
-        lines.append(f"- {{id: {camera.id}, file: cam{camera.id}.avi}}")
-    (folder / "scan.yaml").write_text("\n".join(lines) + "\n")
-
-
-def _link_scan(first: Path, number: int) -> None:
-    """The same scan under another name; its frames are links, for a thousand copies would fill the disk."""
-    folder = first.with_name(f"S{number:04d}")
-    shutil.copytree(first, folder, copy_function=os.link)
-    (folder / "scan.yaml").unlink()
-    (folder / "scan.yaml").write_text((first / "scan.yaml").read_text().replace(first.name, folder.name))
-
-
-def _python(*arguments: str) -> str:
-    return subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.PIPE, text=True).stdout
-
-
-def _spread(values: list[float], digits: int = 1) -> str:
-    return f"{np.median(values):9.{digits}f} ({min(values):.{digits}f} to {max(values):.{digits}f})"
 
 
 if __name__ == "__main__":

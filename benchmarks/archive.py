@@ -1,0 +1,175 @@
+"""Archives of small scans as the command runs them: when all is done, how much memory they take, on how many workers.
+
+    .venv/bin/python -m benchmarks.archive [SCAN] [warm | memory | workers]
+
+SCAN is the scan of a folder that `footscan demo` made; of its films every fifth frame makes the small scans.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.compare import interleave, print_ratios, python, ratio_text, spread
+from footscan.frames.film import encoded_frames, open_film
+from footscan.virtual.film import write_film
+from pipelines.recorded import read_scan
+
+DEFAULT = Path("demo/archive/P0001/demo-R")
+EVERY = 5
+"""Of the frames."""
+ROUNDS = 5
+
+WORKFLOW = "format: footscan.workflow/1\narchive: archive\ncalibration: calibration.json\nresults: results\n"
+COMMAND = "from pipelines.cli.main import main; main()"
+BLANK_REPORTS = "from pipelines.steps import report; report.run = lambda *_: b'<!doctype html>'; "
+PLANNING = """
+import sys, time
+start = time.perf_counter()
+from pathlib import Path
+from pipelines.archive import job_of_workflow, plan_job
+imported = time.perf_counter()
+planned = plan_job(job_of_workflow(Path(sys.argv[1])))
+print(imported - start, time.perf_counter() - imported, planned.steps, planned.to_run)
+"""
+
+
+def main() -> None:
+    given = [argument for argument in sys.argv[1:] if argument not in PARTS]
+    scan = Path(given[0] if given else DEFAULT).resolve()
+    for part in [argument for argument in sys.argv[1:] if argument in PARTS] or list(PARTS):
+        PARTS[part](scan)
+
+
+def time_warm(scan: Path) -> None:
+    """Archives that are done: the whole command beside an empty process of Python."""
+    for cameras, scans in ((8, 1), (2, 1000), (8, 1000)):
+        with tempfile.TemporaryDirectory() as place:
+            _time_warm(scan, Path(place), cameras, scans)
+
+
+def measure_memory(scan: Path) -> None:
+    """Peak memory of cold archives of 10 and of 300 scans of two cameras, no two films alike, in turn."""
+    peaks: dict[int, list[float]] = {10: [], 300: []}
+    for _ in range(2):
+        for scans, found in peaks.items():
+            with tempfile.TemporaryDirectory() as place:
+                workflow = _draw_archive(scan, Path(place), 2, scans)
+                found.append(_peak_mb("-c", COMMAND, "run", str(workflow), "--threads", "2"))
+    few, many = (np.array(found) for found in peaks.values())
+    print("\nPeak memory of a cold archive on two threads, MB: median (range)")
+    print(f"  {'10 scans':<44}{spread(list(few), 0)}   baseline")
+    print(f"  {'300 scans':<44}{spread(list(many), 0)}   {ratio_text(many / few)}")
+
+
+def time_workers(scan: Path) -> None:
+    """A cold archive of eight scans of eight cameras: one worker, two, and two threads, in turn."""
+    with tempfile.TemporaryDirectory() as place:
+        workflow = _draw_archive(scan, Path(place), 8, 8)
+        runs = {
+            text: partial(_run_cold, workflow, *text.split())
+            for text in ("--workers 1", "--workers 2", "--threads 1", "--threads 2")
+        }
+        print_ratios("A cold archive of 8 scans of 8 cameras", interleave(runs, 3), 8, "scan")
+
+
+PARTS = {"warm": time_warm, "memory": measure_memory, "workers": time_workers}
+
+
+def _time_warm(scan: Path, place: Path, cameras: int, scans: int) -> None:
+    """As copies of one small scan, all of which is done."""
+    workflow, first = _workflow(scan, place), place / "archive/P0001/S0001"
+    _thin_out(scan, first, cameras)
+    python("-c", COMMAND, "run", str(workflow))
+    for number in range(2, scans + 1):
+        _link_scan(first, number)
+    # A thousand reports take minutes to draw, and what is in them makes no difference to a warm run.
+    python("-c", BLANK_REPORTS + COMMAND, "run", str(workflow))
+    time.sleep(2)  # what is younger than that is read again
+    runs = {"python -c pass": lambda: python("-c", "pass")}
+    for task in ("plan", "run"):
+        runs[f"footscan {task}"] = partial(python, "-c", COMMAND, task, str(workflow))
+    seconds = interleave(runs, ROUNDS)
+    rows = np.array([python("-c", PLANNING, str(workflow)).split() for _ in range(ROUNDS)], float)
+    steps, to_run = int(rows[0, 2]), int(rows[0, 3])
+    if to_run:
+        raise RuntimeError(f"{to_run} of {steps} steps to run, expected none")
+    print(f"\nA warm archive, {scans} x {cameras} cameras, {steps} steps: seconds, median (range)")
+    nothing = seconds.pop("python -c pass")
+    times = {"python -c pass": nothing}
+    times |= {f"{name}, beyond that": list(np.subtract(each, nothing)) for name, each in seconds.items()}
+    times |= {"of this, imports": list(rows[:, 0]), "planning": list(rows[:, 1])}
+    for name, each in times.items():
+        print(f"  {name:<44}{spread(each, 2)}", flush=True)
+
+
+def _draw_archive(scan: Path, place: Path, cameras: int, scans: int) -> Path:
+    """An archive of scans no two of which share a film; returns its workflow."""
+    for number in range(1, scans + 1):
+        _thin_out(scan, place / f"archive/P0001/S{number:04d}", cameras, f"scan {number}".encode(), number / 100)
+    return _workflow(scan, place)
+
+
+def _workflow(scan: Path, place: Path) -> Path:
+    workflow = place / "workflow.yaml"
+    workflow.write_text(WORKFLOW)
+    shutil.copy(scan.parents[2] / "calibration.json", place)
+    return workflow
+
+
+def _thin_out(scan: Path, folder: Path, cameras: int, mark: bytes = b"", shift_mm: float = 0.0) -> None:
+    """A scan of every fifth frame of some of the cameras of another, with a comment in each JPEG, and moved in X."""
+    recorded = read_scan(scan)
+    folder.mkdir(parents=True)
+    travel = recorded.document.travel
+    assert travel is not None, "the demo has it"
+    lines = [
+        "format: footscan.scan/1", "patient: P0001", f"scan: {folder.name}", f"side: {recorded.document.side}",
+        f"travel: {{start_mm: {travel.start_mm + shift_mm}, step_mm: {EVERY * travel.step_mm}}}", "cameras:",
+    ]  # fmt: skip
+    for camera in recorded.document.cameras[:: 8 // cameras]:
+        film = open_film(recorded.film(camera))
+        frames = [_commented(frame, mark) for frame in list(encoded_frames(film))[::EVERY] if frame is not None]
+        write_film(folder / f"cam{camera.id}.avi", frames, film.width, film.height, 18)
+        lines.append(f"- {{id: {camera.id}, file: cam{camera.id}.avi}}")
+    (folder / "scan.yaml").write_text("\n".join(lines) + "\n")
+
+
+def _commented(jpeg: bytes, text: bytes) -> bytes:
+    """A JPEG with a comment (marker COM, ITU T.81, B.2.4.5) after its start."""
+    return jpeg[:2] + b"\xff\xfe" + (len(text) + 2).to_bytes(2, "big") + text + jpeg[2:] if text else jpeg
+
+
+def _link_scan(first: Path, number: int) -> None:
+    """The same scan under another name; its frames are links, for a thousand copies would fill the disk."""
+    folder = first.with_name(f"S{number:04d}")
+    shutil.copytree(first, folder, copy_function=os.link)
+    (folder / "scan.yaml").unlink()
+    (folder / "scan.yaml").write_text((first / "scan.yaml").read_text().replace(first.name, folder.name))
+
+
+def _run_cold(workflow: Path, *options: str) -> None:
+    shutil.rmtree(workflow.parent / "results", ignore_errors=True)
+    for frames in (workflow.parent / "archive").rglob("*.zarr"):
+        shutil.rmtree(frames)
+    python("-c", COMMAND, "run", str(workflow), *options)
+
+
+def _peak_mb(*arguments: str) -> float:
+    """The most memory that a process of Python held."""
+    process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise RuntimeError(f"exit status {process.returncode}")
+    return usage.ru_maxrss / 1e3
+
+
+if __name__ == "__main__":
+    main()
