@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from pipelines.deliver import deliver
 from pipelines.engine.digest import FileDigests, sha256
+from pipelines.engine.files import open_files
 from pipelines.engine.lease import lease
 from pipelines.engine.plan import Plan, make_plan
 from pipelines.engine.pool import OnStepEnd, Pool
@@ -119,7 +120,13 @@ class ScanEnd:
 
 
 def job_of_workflow(path: Path, threads: int | None = None, *, may_be_empty: bool = False) -> Job:
-    """The job that a workflow.yaml describes; RefusedInput where the archive is empty and may not be so."""
+    """The job that a workflow.yaml describes.
+
+    Raises
+    ------
+    RefusedInput
+        It breaks its format, the archive is empty and may not be so, or no store can lie where it says.
+    """
     workflow = read_yaml(path, Workflow)
     base = path.resolve().parent
     archive = base / workflow.archive
@@ -133,7 +140,7 @@ def job_of_workflow(path: Path, threads: int | None = None, *, may_be_empty: boo
         calibration=base / workflow.calibration if workflow.calibration else None,
         calibration_wins=False,
         results=results,
-        cache=_cache(base, workflow.cache) or results / CACHE,
+        cache=_cache(path, workflow.cache) or results / CACHE,
         parameters=workflow.parameters,
         threads=threads or workflow.workers or cores(),
     )
@@ -209,8 +216,15 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _cache(base: Path, named: str | None) -> Path | str | None:
-    return named if named is None or "://" in named else base / named
+def _cache(workflow: Path, named: str | None) -> Path | str | None:
+    """Where the store lies that a workflow names; a URL is tried, for each scan would be refused for it otherwise."""
+    if named is None or "://" not in named:
+        return None if named is None else workflow.resolve().parent / named
+    try:
+        open_files(named)
+    except RefusedInput as error:
+        raise RefusedInput(workflow, f"{named}: {error.problem}", field="cache") from None
+    return named
 
 
 def _sum_up(scan: RecordedScan, plan: Plan) -> PlannedScan:

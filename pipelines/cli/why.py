@@ -130,7 +130,6 @@ def _named(step: str, every: Sequence[Explanation]) -> list[Explanation]:
 
 def _explain(planned: "PlannedStep", plan: "Plan", store: "Store") -> Explanation:
     from pipelines.engine.audit import input_digests
-    from pipelines.engine.collect import last_written
     from pipelines.engine.explain import changes, inputs_of
     from pipelines.engine.key import image_text, key_of
     from pipelines.engine.store import row_name
@@ -152,7 +151,7 @@ def _explain(planned: "PlannedStep", plan: "Plan", store: "Store") -> Explanatio
         was = {name: digest for name, (_, digest) in inputs_of(last.image).items()}
         present = {name: digests.get(name, was.get(name, "")) for name in step.inputs}
         found = changes(step, last.image, json.loads(image_text(step, present)), store)
-    return Explanation(step, state, reason, tuple(found), last, last_written(store, row_name(key)) if last else None)
+    return Explanation(step, state, reason, tuple(found), last, store.files.written(row_name(key)) if last else None)
 
 
 def _show(chosen: Sequence[Explanation]) -> None:

@@ -1,13 +1,10 @@
 """What lies in a store, and what of it nothing needs any more."""
 
-import contextlib
-import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
 from pipelines.engine.explain import code_of, inputs_of, kind_of
-from pipelines.engine.files import LocalFiles
 from pipelines.engine.lease import FOLDER as LEASES
 from pipelines.engine.lease import Lease, live_leases
 from pipelines.engine.pins import read_pins
@@ -118,7 +115,7 @@ def find_garbage(
     unused = [name for name in contents.sizes if _is_garbage(name, kept, live)]
     garbage = Garbage()
     for name in sorted(unused, key=lambda name: (row_key(name) is None, name)):
-        written = last_written(store, name)
+        written = store.files.written(name)
         is_old = written is not None and now - written >= older_than_s
         (garbage.names if is_old else garbage.young).append(name)
     return garbage
@@ -133,22 +130,6 @@ def delete(garbage: Garbage, store: Store) -> tuple[list[str], list[Lease]]:
         store.files.remove(name)
         deleted.append(name)
     return deleted, []
-
-
-def last_written(store: Store, name: str) -> float | None:
-    """When a file got its content or its name, s since 1970; None where it is not there, or its store does not tell."""
-    if isinstance(store.files, LocalFiles):
-        with contextlib.suppress(OSError):
-            status = os.stat(store.files.path(name))  # noqa: PTH116 (see LocalFiles)
-            return max(status.st_mtime, status.st_ctime)
-        return None
-    from fsspec.core import url_to_fs
-
-    system, path = url_to_fs(store.files.path(name))
-    try:
-        return float(system.modified(path).timestamp())
-    except (FileNotFoundError, NotImplementedError):
-        return None
 
 
 def _is_partial(name: str) -> bool:

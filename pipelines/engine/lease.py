@@ -65,7 +65,7 @@ def lease(store: Store) -> Iterator[None]:
     finally:
         ended.set()
         thread.join()
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, Fault):  # it will be taken for dead
             store.files.remove(name)
 
 

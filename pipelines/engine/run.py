@@ -75,7 +75,10 @@ def execute(step: Step, inputs: Mapping[str, str], store: Store) -> StepEnd:
     """A step with inputs of these digests, from the cache or by running it."""
     start = time.perf_counter()
     image = image_text(step, inputs)
-    outcome = cached_outcome(step, store.lookup(key_of(image)))
+    try:
+        outcome = cached_outcome(step, store.lookup(key_of(image)))
+    except Fault as error:  # a store that cannot be asked costs this scan; where it stays away, the next plan says so
+        return StepEnd(step, Failure(str(error), "fault", step.name), False, time.perf_counter() - start)
     ran, otherwise = outcome is None, None
     if outcome is None:
         outcome, otherwise = _run_safely(step, image, inputs, store)
@@ -128,9 +131,9 @@ def _record(step: Step, image: str, digest: str | None, failure: tuple[str, str]
 
 def _note_latest(step: Step, key: str, store: Store) -> None:
     """What another step, or an earlier run, has made is this step's last result, too."""
-    latest = store.latest(step.name)
-    if latest is None or latest.key != key:
-        with contextlib.suppress(Fault):  # the result is there all the same
+    with contextlib.suppress(Fault):  # the result is there all the same
+        latest = store.latest(step.name)
+        if latest is None or latest.key != key:
             store.note_latest(step.name, key, _sources(step))
 
 

@@ -16,6 +16,7 @@ from pipelines.engine.digest import BROKEN, sealed, sha256, unsealed
 from pipelines.engine.files import Files, open_files
 from pipelines.engine.key import PreImage, key_of
 from pipelines.engine.memory import Known, Memory
+from schemas.errors import Fault
 
 log = logging.getLogger("footscan.store")
 
@@ -71,7 +72,7 @@ class Store:
             return None
         if sha256(data) != digest:
             log.warning("%s: damaged, will be made again", self.files.path(name))
-            with contextlib.suppress(OSError):
+            with contextlib.suppress(OSError, Fault):  # a store that one may only read stays as it is
                 self.files.remove(name)
             return None
         return data

@@ -1,19 +1,24 @@
 """An archive: each scan's failure is its own, in one line, and is told again without any work."""
 
+import itertools
+import json
+import re
 import shutil
-from collections.abc import Callable
+import uuid
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from fsspec.implementations.memory import MemoryFileSystem
 
-from pipelines.archive import job_of_scan, plan_job, run_job
+from pipelines.archive import job_of_scan, job_of_workflow, plan_job, run_job
 from pipelines.engine import run as engine_run
 from pipelines.engine.pool import Threads
 from pipelines.steps import measure
 from schemas.calibration import Calibration
 from schemas.documents import read_yaml
-from schemas.errors import Finding, RefusedInput
+from schemas.errors import Fault, Finding, RefusedInput
 from schemas.scan import Scan
 
 
@@ -141,3 +146,123 @@ def test_one_scan_without_a_workflow(done: Any, tmp_path: Path) -> None:
     assert (tmp_path / "out/P0001/S1/foot.stl").read_bytes() == (done.results / "foot.stl").read_bytes()
     with pytest.raises(RefusedInput, match="no such file"):
         read_yaml(tmp_path / "scan.yaml", Scan)
+
+
+LAST = ("surface", "foot.stl", "quality", "measure", "report")
+"""The steps of a scan that nothing but each other takes results of."""
+
+
+class UnreachableError(Exception):
+    """Of a kind that only a store's own library knows."""
+
+
+@pytest.fixture
+def remote(done: Any) -> Iterator[Any]:
+    """A finished archive whose store lies at a URL; what it delivered is gone, and what the last steps came to."""
+    place = f"memory://{uuid.uuid4().hex}"
+    memory, here = MemoryFileSystem(), done.root / "results/.footscan"
+    for file in [*here.glob("blobs/*/*"), *here.glob("latest/*/*"), *here.glob("actions/*/*")]:
+        content = file.read_bytes()
+        if file.match("actions/*/*") and json.loads(content)["image"]["step"] in LAST:
+            continue
+        memory.pipe_file(f"{place}/{file.relative_to(here)}", content)
+    shutil.rmtree(done.root / "results")
+    done.workflow.write_text(f"{done.workflow.read_text()}cache: {place}\n")
+    yield done
+    memory.rm(place, recursive=True)
+
+
+def fail(patch: pytest.MonkeyPatch, calls: range) -> list[str]:
+    """Have the stores in memory fail at these of the calls to them; returns what failed, as it does."""
+    counted = itertools.count()
+    failed = []
+
+    def failing(method: Callable[..., Any]) -> Callable[..., Any]:
+        def asked(*args: Any, **options: Any) -> Any:
+            if next(counted) in calls:
+                failed.append(method.__name__)
+                raise UnreachableError("Connect timeout on endpoint\n")
+            return method(*args, **options)
+
+        return asked
+
+    for name in ("info", "cat_file", "pipe_file", "ls", "rm_file"):
+        patch.setattr(MemoryFileSystem, name, failing(getattr(MemoryFileSystem, name)))
+    return failed
+
+
+def test_store_at_a_url_is_used_and_gives_the_same(remote: Any, finished: Path) -> None:
+    [scan], ran = remote.run()
+    assert (scan.problem, ran) == (None, set(LAST))
+    for file in scan.digests:
+        assert (remote.results / file).read_bytes() == (finished / "results/P0001/S1" / file).read_bytes()
+    (remote.root / "results/.footscan/known.sqlite").unlink()
+    assert remote.plan() == (15, {})
+    assert remote.run()[1] == set()
+
+
+@pytest.mark.parametrize("first", [0, 7, 29])
+def test_plan_of_a_store_that_is_away_is_one_fault(
+    remote: Any, monkeypatch: pytest.MonkeyPatch, first: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    failed = fail(monkeypatch, range(first, 10**9))
+    job = remote.job()
+    with pytest.raises(Fault) as fault:
+        plan_job(job, reasons=True)
+    assert str(fault.value).startswith(f"{job.cache}/")
+    assert str(fault.value).endswith("(UnreachableError: Connect timeout on endpoint)")
+    assert (len(failed), caplog.messages) == (1, [])
+
+
+@pytest.mark.parametrize("count", [1, 10**9], ids=["once", "from then on"])
+def test_store_that_fails_costs_no_result(
+    remote: Any, finished: Path, count: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    """At whichever call: while planning, in a step, at the delivery, at the end of the run."""
+    told = re.compile(
+        rf"{remote.job().cache}/\S+: cannot be (looked up|read|written|removed|listed) "
+        r"\(UnreachableError: Connect timeout on endpoint\)"
+    )
+    complete: set[str] = set()
+    problems = []
+    for first in (3, 21, 30, 31, 45, 60, 90, 120, 160, 200):
+        with pytest.MonkeyPatch.context() as patch:
+            failed = fail(patch, range(first, first + count))
+            try:
+                ended = [scan.problem for scan in remote.run()[0]]
+            except Fault as fault:
+                ended = [str(fault)]
+        problems += [problem for problem in ended if problem is not None]
+        if count > 1 and failed:
+            assert ended[-1] is not None
+        # What was complete stays so, and nothing is taken for damaged.
+        to_run = remote.plan()[1].keys()
+        assert complete.isdisjoint(to_run)
+        complete = {*LAST} - to_run
+    assert len(problems) > 3
+    assert [problem for problem in problems if not told.fullmatch(problem)] == []
+    assert [line for line in caplog.messages if not line.endswith("will not know of this run")] == []
+    [scan], ran = remote.run()
+    assert scan.problem is None
+    assert complete.isdisjoint(ran)
+    for file in scan.digests:
+        assert (remote.results / file).read_bytes() == (finished / "results/P0001/S1" / file).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("cache", "problem"),
+    [
+        ("://x", "names no protocol, expected PROTOCOL://BUCKET/FOLDER or the like"),
+        ("s3://", "names no place, expected PROTOCOL://BUCKET/FOLDER or the like"),
+        ("memory://", "names no place, expected PROTOCOL://BUCKET/FOLDER or the like"),
+        ("nosuch://x", "expected a place that fsspec reaches (Protocol not known: nosuch)"),
+    ],
+)
+def test_cache_that_is_no_place_is_refused_before_anything(archive: Any, cache: str, problem: str) -> None:
+    archive.workflow.write_text(f"{archive.workflow.read_text()}cache: '{cache}'\n")
+    for may_be_empty in (False, True):  # as `run` and `cache stats` do
+        with pytest.raises(RefusedInput) as refused:
+            job_of_workflow(archive.workflow, may_be_empty=may_be_empty)
+        assert str(refused.value) == f"{archive.workflow}: cache: {cache}: {problem}"
+        assert refused.value.exit_status == 2
+    assert not (archive.root / "results").exists()

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from pipelines.engine.audit import repeatable
-from pipelines.engine.collect import CODE, VALUES, Garbage, delete, find_garbage, last_written, read_contents
+from pipelines.engine.collect import CODE, VALUES, Garbage, delete, find_garbage, read_contents
 from pipelines.engine.lease import lease
 from pipelines.engine.pins import pin, unpin
 from pipelines.engine.plan import make_plan
@@ -206,10 +206,10 @@ def test_when_a_file_was_written(store: Store) -> None:
     for one in (store, open_store("memory://collect-test")):
         before = time.time() - 1
         digest = one.put(b"x")
-        written = last_written(one, blob_name(digest))
+        written = one.files.written(blob_name(digest))
         assert written is not None
         assert before <= written <= time.time() + 1
-        assert last_written(one, blob_name("0" * 64)) is None
+        assert one.files.written(blob_name("0" * 64)) is None
 
 
 def test_a_store_elsewhere(chain: Chain, run_steps: Any, store: Store) -> None:
