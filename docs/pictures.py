@@ -10,16 +10,17 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from footscan.frames.film import open_film, pixel_frames
 from footscan.report.calibration_figure import calibration_figure
 from footscan.report.colours import distance_colours
+from footscan.report.deviation import draw_colour_bar, write
 from footscan.report.render import render_mesh
 from footscan.stripe.film import extract_film
 from footscan.stripe.points import StripePoints
 from footscan.surface.export import read_mesh
-from footscan.verify.compare import signed_distances
+from footscan.verify.distances import signed_distances
 from footscan.virtual.scanner import FAN_DEGREES, VOLUME_MM, standard_scanner
 from pipelines.recorded import read_scan
 from schemas.calibration import read_calibration
@@ -32,7 +33,6 @@ LIMIT_MM = 0.5
 SHOWN = 0.62
 """Where along the foot the frames are taken."""
 SKIN = (224, 178, 150)
-INK = (70, 70, 70)
 ABOVE = np.array([[-1.0, 0, 0], [0, -1, 0], [0, 0, 1]])
 MEDIAL = np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
 BELOW = np.array([[-1.0, 0, 0], [0, 1, 0], [0, 0, -1]])
@@ -71,9 +71,9 @@ def _draw_result(mesh: Path, scan: Path) -> Image.Image:
     film = _with_points(frame, points).resize((width, width * 3 // 4), Image.Resampling.LANCZOS)
     sheet.paste(film, (left, 34))
     pen = ImageDraw.Draw(sheet)
-    _write(pen, (20, 10), "The reconstructed foot, distance to the true one")
-    _write(pen, (left, 10), "One frame of camera 1, stripe points in green")
-    _draw_bar(pen, (140, 400), 180)
+    write(pen, (20, 10), "The reconstructed foot, distance to the true one")
+    write(pen, (left, 10), "One frame of camera 1, stripe points in green")
+    draw_colour_bar(pen, (140, 392), 180, LIMIT_MM, signed=True)
     return sheet
 
 
@@ -119,19 +119,6 @@ def _with_points(frame: Bytes, points: StripePoints) -> Image.Image:
     for i, j in zip(2 * points["i"][::6] + 0.5, 2 * points["j"][::6] + 0.5, strict=True):
         pen.ellipse((i - 3, j - 3, i + 3, j + 3), fill=(60, 255, 90))
     return picture
-
-
-def _draw_bar(pen: ImageDraw.ImageDraw, corner: tuple[int, int], width: int) -> None:
-    x, y = corner
-    colours = distance_colours(np.linspace(-1, 1, width), 1.0)
-    for step, colour in enumerate(colours.tolist()):
-        pen.line((x + step, y, x + step, y + 9), fill=tuple(colour))
-    _write(pen, (x - 62, y - 4), f"-{LIMIT_MM:g} mm")
-    _write(pen, (x + width + 8, y - 4), f"+{LIMIT_MM:g} mm")
-
-
-def _write(pen: ImageDraw.ImageDraw, corner: tuple[int, int], text: str) -> None:
-    pen.text(corner, text, fill=INK, font=ImageFont.load_default(14))
 
 
 def _few_colours(picture: Image.Image) -> Image.Image:

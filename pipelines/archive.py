@@ -63,6 +63,15 @@ class Waiting(NamedTuple):
     reason: str
 
 
+class Refused(NamedTuple):
+    """A scan whose input breaks its format."""
+
+    scan: str
+    """`patient/scan`; its folder where that cannot be read, or is another's."""
+    folder: Path
+    error: RefusedInput
+
+
 @dataclass(frozen=True)
 class PlannedScan:
     """What is known of a scan before anything runs."""
@@ -86,8 +95,7 @@ class PlannedJob:
     store: Store
     digests: FileDigests
     calibrations: dict[Path, CalibrationFile] = field(default_factory=dict)
-    refused: dict[str, RefusedInput] = field(default_factory=dict)
-    """Scans whose input breaks its format, by folder."""
+    refused: list[Refused] = field(default_factory=list)
     scans: list[PlannedScan] = field(default_factory=list)
     waiting: list[Waiting] = field(default_factory=list)
     """Filled where reasons were asked for."""
@@ -108,6 +116,8 @@ class ScanEnd:
     """What became of one scan."""
 
     scan: str
+    source: Path
+    """The scan's own folder."""
     folder: Path | None
     """Its results; None where it has none."""
     problem: str | None
@@ -162,23 +172,32 @@ def job_of_scan(folder: Path, calibration: Path | None, results: Path, threads: 
     )
 
 
-def plan_job(job: Job, *, reasons: bool = False) -> PlannedJob:
+def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None = None) -> PlannedJob:
     """Draw the graph of each scan of a job and look every step up in the cache.
 
-    With `reasons`, what would run is listed step by step; without, it is counted.
+    Parameters
+    ----------
+    reasons : bool
+        Whether what would run is listed step by step, not only counted.
+    folders : dict, optional
+        Of the scans of earlier jobs on the same archive, by name, so that none is overwritten; those of this job are
+        added.
     """
     local = job.cache if isinstance(job.cache, Path) else job.results / CACHE
     planned = PlannedJob(job, open_store(job.cache, local / "known.sqlite"), FileDigests.load(local / "files.json"))
-    names: dict[str, Path] = {}
+    folders = {} if folders is None else folders
     for folder in job.folders:
+        name = str(folder)
         try:
             scan = read_scan(folder, job.archive)
-            if scan.name in names:
-                raise RefusedInput(scan.file, f"{scan.name} is also in {names[scan.name]}, expected each scan once")
-            names[scan.name] = folder
+            other = folders.get(scan.name, folder)
+            if other != folder and _is_still(scan.name, other, job.archive):
+                raise RefusedInput(scan.file, f"{scan.name} is also in {other}, expected each scan once")
+            name = scan.name
+            folders[name] = folder
             plan = make_plan(draw_steps(scan, planned), planned.store)
         except RefusedInput as error:
-            planned.refused[str(folder)] = error
+            planned.refused.append(Refused(name, folder.resolve(), error))
             continue
         planned.scans.append(_sum_up(scan, plan))
         if reasons:
@@ -196,8 +215,8 @@ def draw_steps(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
 
 def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
     """Run what is left of a planned job and deliver each scan's results; yields what became of each scan."""
-    for folder, error in planned.refused.items():
-        yield ScanEnd(folder, None, str(error), "refused")
+    for name, folder, error in planned.refused:
+        yield ScanEnd(name, folder, None, str(error), "refused")
     waiting = iter(planned.scans)
     warn_if_others_can_write(planned.store)
     held = lease(planned.store) if planned.to_run else nullcontext()  # what runs nothing uses what it has looked up
@@ -225,6 +244,14 @@ def _cache(workflow: Path, named: str | None) -> Path | str | None:
     except RefusedInput as error:
         raise RefusedInput(workflow, f"{named}: {error.problem}", field="cache") from None
     return named
+
+
+def _is_still(name: str, folder: Path, archive: Path | None) -> bool:
+    """Whether a scan lies where it was found before."""
+    try:
+        return read_scan(folder, archive).name == name
+    except RefusedInput:
+        return False
 
 
 def _sum_up(scan: RecordedScan, plan: Plan) -> PlannedScan:
@@ -281,15 +308,15 @@ def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planne
         known = planned_scan.failure or Success(planned_scan.delivered.get(file, ""))
         outcome = outcomes.get(f"{scan.name}/{kind}", known)
         if isinstance(outcome, Failure):
-            return ScanEnd(scan.name, None, outcome.problem + _what_stays(target), outcome.kind)
+            return ScanEnd(scan.name, scan.folder, None, outcome.problem + _what_stays(target), outcome.kind)
         digests[file] = outcome.digest
     problem = deliver(digests, planned.store, planned.digests, target)
     if problem is not None:
         whole = all(planned.store.has(digest) for digest in digests.values())  # what is damaged has been set aside
-        return ScanEnd(scan.name, None, problem, "fault" if whole else "damaged")
+        return ScanEnd(scan.name, scan.folder, None, problem, "fault" if whole else "damaged")
     finding = Measures.model_validate_json((target / "measures.json").read_bytes()).finding
     ended = None if finding is None else "finding"
-    return ScanEnd(scan.name, target, finding, ended, digests, known=not planned_scan.to_run)
+    return ScanEnd(scan.name, scan.folder, target, finding, ended, digests, known=not planned_scan.to_run)
 
 
 def _what_stays(target: Path) -> str:

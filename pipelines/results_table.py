@@ -9,9 +9,21 @@ from typing import Any
 
 from pipelines.archive import ScanEnd
 from pipelines.engine.atomic import write_atomically
+from pipelines.scan import DELIVERED
 from pipelines.version import SOFTWARE
+from schemas.quality import MeshQuality
 
 CSV, PARQUET = "results.csv", "results.parquet"
+
+TEXTS = {"scan", "status", "problem", "side", "software", "calibration_sha256"} | {
+    f"{file}_sha256" for file in DELIVERED
+}
+COUNTS = {"cameras", "frames_lost", "stripe_points", "cloud_points"} | {
+    f"mesh_{name}"
+    for name, field in MeshQuality.model_json_schema()["properties"].items()
+    if {kind["type"] for kind in field.get("anyOf", [field])} <= {"integer", "null"}
+}
+"""Names of columns; all others hold measures, distances and shares."""
 
 Cell = str | int | float | None
 
@@ -82,16 +94,17 @@ def _as_parquet(columns: Sequence[str], rows: Sequence[dict[str, Cell]]) -> byte
     import pyarrow
     from pyarrow import parquet
 
-    table = pyarrow.table({column: _column([row.get(column) for row in rows]) for column in columns})
+    types = {column: _type(column) for column in columns}
+    table = pyarrow.Table.from_pylist(rows, pyarrow.schema(types.items()))
     out = io.BytesIO()
     parquet.write_table(table, out)
     return out.getvalue()
 
 
-def _column(cells: list[Cell]) -> Any:
-    """Numbers of one column are of one type, whether they happen to be whole or not."""
+def _type(column: str) -> Any:
+    """The same in every table, so that those of several archives can be joined."""
     import pyarrow
 
-    if any(isinstance(cell, float) for cell in cells):
-        return pyarrow.array(cells, pyarrow.float64())
-    return pyarrow.array(cells)
+    if column in TEXTS:
+        return pyarrow.string()
+    return pyarrow.int64() if column in COUNTS else pyarrow.float64()

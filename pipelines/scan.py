@@ -117,9 +117,11 @@ def scan_steps(
 
     maps = calibration.cameras(frozenset(camera.id for camera in scan.document.cameras))
     foot = FootParameters(side=scan.document.side)
-    fused = add(Step(scan.name, "fuse", f"{STEPS}.fuse", parameters.fusion, points))
-    cleaned = add(Step(scan.name, "clean", f"{STEPS}.clean", parameters.outliers, {"cloud": fused}))
-    oriented = add(Step(scan.name, "orient", f"{STEPS}.orient", parameters.normals, {"clean": cleaned}))
+    seen: dict[str, Input] = {**points, "calibration": maps}
+    cleaned = add(Step(scan.name, "clean", f"{STEPS}.clean", parameters.outliers, seen))
+    fused = add(Step(scan.name, "fuse", f"{STEPS}.fuse", parameters.fusion, {"clean": cleaned}))
+    merged: dict[str, Input] = {"fused": fused, "calibration": maps}
+    oriented = add(Step(scan.name, "orient", f"{STEPS}.orient", parameters.normals, merged))
     mesh = add(Step(scan.name, "surface", f"{STEPS}.surface", parameters.surface, {"oriented": oriented}))
     measures = add(Step(scan.name, "measure", f"{STEPS}.measure", foot, {"surface": mesh}))
     verified: dict[str, Output] = {}
@@ -127,7 +129,9 @@ def scan_steps(
         pair: dict[str, Input] = {"surface": mesh, "truth": source_files(truth, digests)}
         verified = {"verified": add(Step(scan.name, "verify", f"{STEPS}.verify", None, pair, places={"truth": truth}))}
     of_cameras = {**manifests, **stripes, **verified}
-    judged: dict[str, Input] = {"clean": cleaned, "surface": mesh, "calibration": calibration.source, **of_cameras}
+    judged: dict[str, Input] = {
+        "clean": cleaned, "fused": fused, "surface": mesh, "calibration": calibration.source, **of_cameras
+    }  # fmt: skip
     qualities = add(Step(scan.name, "quality", f"{STEPS}.quality", None, judged))
     add(Step(scan.name, "cloud.ply", f"{STEPS}.cloud_ply", None, {"oriented": oriented}))
     add(Step(scan.name, "foot.stl", f"{STEPS}.foot_stl", foot, {"surface": mesh}))

@@ -1,46 +1,79 @@
 """The points of all cameras to one cloud."""
 
 from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.cells import cell_means, group_by_cell
-from footscan.cloud.points import PLANE_MM, POINT_DTYPE, coordinates
+from footscan.cloud.agreement import Pairs, disagreements, find_overlaps
+from footscan.cloud.correction import correct
+from footscan.cloud.merge import merge
+from footscan.cloud.stripes import Floats, Stripes, sort_stripes
+from schemas.fusion import FusionReport, PairDisagreement
 from schemas.parameters.fusion import FusionParameters
 
-UNSUPPORTED_WEIGHT = 1e-9
-"""Unsupported points count only in cells that hold no others."""
+
+class Fusion(NamedTuple):
+    """One cloud of all cameras, and how well they agree."""
+
+    cloud: NDArray[np.void]
+    """(M,) of `POINT_DTYPE`, mm, scanner frame; ordered by laser plane, then Y, then Z."""
+    report: FusionReport
 
 
-def fuse(points_by_camera: Iterable[NDArray[np.void]], parameters: FusionParameters) -> NDArray[np.void]:
-    """One cloud of the points of several cameras, in an order that does not depend on that of the cameras.
+def fuse(points: NDArray[np.void] | Iterable[NDArray[np.void]], parameters: FusionParameters) -> Fusion:
+    """One cloud of the points of several cameras, in which skin that several saw is there once.
 
-    Where cameras overlap, their points lie on two sheets 0.05 to 0.2 mm apart. Within each stripe plane the points in a
-    square cell are averaged, so that one sheet is left; camera, frame and source are those of the point nearest to the
-    mean.
+    How far apart the cameras place the same skin is measured for each pair of them. Cameras that stand off the others
+    are moved if they agree better for it where they were not fitted. Then what cameras see in one laser plane is
+    averaged across the stripe, with weights 1 / sigma^2, and thinned out.
 
     Parameters
     ----------
-    points_by_camera : arrays of `POINT_DTYPE`, mm, scanner frame
+    points : array of `POINT_DTYPE` of all cameras, or several of them, mm, scanner frame. Along the stripe, points
+        follow each other as `source` does, or as they stand where it is the same. What is not finite is left out.
 
     Returns
     -------
-    (M,) array of `POINT_DTYPE`, ordered by X, then Y, then Z of their cells
+    The same for any order of cameras. A cloud of the points as they are, where there is nothing to compare.
     """
-    points = np.concatenate([np.empty(0, POINT_DTYPE), *points_by_camera])
-    if not points.size:
-        return points
-    points = points[np.lexsort((points["source"], points["camera"]))]
-    xyz = coordinates(points)
-    # Reversed, since `group_by_cell` sorts by the last column first.
-    cell = np.array([parameters.cell_mm, parameters.cell_mm, PLANE_MM])
-    order, starts = group_by_cell(xyz[:, ::-1] + cell / 2, cell)
-    means = cell_means(xyz, order, starts, np.where(points["supported"], 1.0, UNSUPPORTED_WEIGHT))
+    stripes = sort_stripes([points] if isinstance(points, np.ndarray) else points)
+    overlaps = find_overlaps(stripes, stripes.yz, parameters.overlap_mm)
+    before = disagreements(stripes, overlaps)
+    corrected = correct(stripes, overlaps, parameters)
+    after = before
+    if corrected.yz is not stripes.yz:
+        after = disagreements(stripes, find_overlaps(stripes, corrected.yz, parameters.overlap_mm))
+    off = np.array([corrected.too_far.get(int(camera), 0.0) for camera in stripes.cameras])
+    merged = merge(
+        replace(stripes, sigma=np.hypot(stripes.sigma, off[stripes.camera])) if np.any(off) else stripes,
+        corrected.yz,
+        np.where(off > 0, parameters.overlap_mm, parameters.contradiction_mm),
+        _deviations(stripes, after),
+        parameters,
+    )
+    report = FusionReport(
+        pairs=[
+            PairDisagreement(cameras=pair, points=count, before=disagreement, after=after.get(pair, before[pair])[1])
+            for pair, (count, disagreement) in before.items()
+        ],
+        corrections=corrected.corrections,
+        contradicted=merged.contradicted,
+        warnings=[
+            f"camera {camera} stands {away:.2f} mm off the others, expected {parameters.largest_correction_mm:g} mm at "
+            "most: it was moved since the calibration, or its travel is not what the scan says"
+            for camera, away in sorted(corrected.too_far.items())
+        ],
+    )
+    return Fusion(merged.points, report)
 
-    cell_of = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(order))))
-    distance = np.sum((xyz[order] - means[cell_of]) ** 2, axis=1)
-    nearest = np.lexsort((distance, cell_of))[starts]
-    fused = points[order[nearest]]
-    fused["x"], fused["y"], fused["z"] = means.T
-    return fused
+
+def _deviations(stripes: Stripes, pairs: Pairs) -> Floats:
+    """(C, C) standard deviations of the distances between each two cameras, mm; 0 where they were not compared."""
+    number = {int(camera): k for k, camera in enumerate(stripes.cameras)}
+    deviations = np.zeros((len(number), len(number)))
+    for (a, b), (_, disagreement) in pairs.items():
+        deviations[number[a], number[b]] = deviations[number[b], number[a]] = disagreement.deviation_mm
+    return deviations

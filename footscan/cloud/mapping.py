@@ -5,10 +5,13 @@ from numpy.typing import NDArray
 
 from footscan.calibration.maps import is_supported, to_world
 from footscan.cloud.points import make_points
+from footscan.cloud.uncertainty import predicted_deviations, standard_deviations
 from footscan.stripe.points import StripePoints
 from schemas.calibration import CameraCalibration
 from schemas.errors import RefusedInput
 from schemas.parameters.mapping import MappingParameters
+
+Mask = NDArray[np.bool_]
 
 
 def map_stripe(
@@ -23,7 +26,7 @@ def map_stripe(
 
     Parameters
     ----------
-    stripe : (N,) points of one camera; frame, i and j (px) are used
+    stripe : (N,) points of one camera, in their order along the stripe; frame, i, j, width and sigma (px) are used
     x_of_frame : (F,) X of the laser plane in each frame, mm
 
     Returns
@@ -46,5 +49,16 @@ def map_stripe(
         camera=camera.camera,
         frame=frame,
         source=np.arange(len(pixels)),
-        supported=is_supported(camera, pixels, parameters.margin_px),
+        supported=_supported(camera, pixels, parameters),
+        sigma=standard_deviations(stripe, camera),
     )
+
+
+def _supported(camera: CameraCalibration, pixels: NDArray[np.float64], parameters: MappingParameters) -> Mask:
+    """(N,) whether data support the map at a pixel, or its covariance tells that it holds there without them."""
+    supported = is_supported(camera, pixels, parameters.margin_px)
+    outside = np.flatnonzero(~supported)
+    predicted = predicted_deviations(camera, pixels[outside])
+    if predicted is not None:
+        supported[outside] = predicted <= parameters.extrapolation_mm
+    return supported

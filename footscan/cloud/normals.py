@@ -1,46 +1,201 @@
 """Normals of a cloud, all pointing outward."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cloud.planes import SUMS, add_point, plane_normal
 from footscan.cloud.points import coordinates, stripe_step
+from footscan.cloud.views import View
+from footscan.cloud.voxels import EMPTY, voxelise
+from footscan.compiled import compiled
 from schemas.errors import Finding
 from schemas.parameters.normals import NormalParameters
 
-END_WEIGHT = 0.5
-"""How much the way from the middle to the ends of the foot counts for what is outside."""
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+CELLS_A_RADIUS = 2
+"""Neighbours are looked for in cells of this part of the radius."""
+FEWEST = 6
+"""So many points, the point itself included, make a plane, ..."""
+LEAST_BREADTH = 0.15
+"""... where they scatter by this part of the radius, at least, across their longest direction: those of one
+stripe alone lie on a line. Else the radius is doubled."""
+PASSES = 50
+"""So many times what neighbours decide spreads to their neighbours."""
 
 
-def estimate_normals(cloud: NDArray[np.void], parameters: NormalParameters) -> NDArray[np.float32]:
+def estimate_normals(
+    cloud: NDArray[np.void], views: Mapping[int, View], parameters: NormalParameters
+) -> NDArray[np.float32]:
     """(N, 3) unit normals of `cloud`, from planes through the neighbours of each point.
 
-    They point to where the point's camera stands, for it would not have seen the surface from behind. At heel and toes,
-    whose normals lie along X, that says little, and the way from the middle of the cloud decides.
+    A point was seen, so its normal points to the side on which its camera stood. Where the camera looked along the
+    surface, or its place is not known, the normals around decide; where there are none, what leads away from the
+    cloud's middle.
 
     Parameters
     ----------
     cloud : (N,) array of `POINT_DTYPE`, mm, scanner frame
-    """
-    import open3d as o3d
+    views : where the cameras stand, from the laser's plane
 
+    Raises
+    ------
+    Finding
+        All points lie in one plane of the laser, or some are no numbers.
+    """
     if not len(cloud):
         return np.zeros((0, 3), np.float32)
-    if stripe_step(cloud) == 0.0:
+    xyz, step = coordinates(cloud), stripe_step(cloud)
+    if not np.isfinite(xyz).all():
+        raise Finding("the cloud has points without coordinates, expected them to be dropped")
+    if step == 0.0:
         raise Finding(f"{len(cloud)} points in one plane, expected stripes at several places of the travel")
-    xyz = coordinates(cloud)
-    legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(xyz))
-    search = o3d.geometry.KDTreeSearchParamHybrid(parameters.radius_steps * stripe_step(cloud), parameters.neighbours)
-    legacy.estimate_normals(search, fast_normal_computation=False)
-    normals = np.asarray(legacy.normals)
-    backward = np.sum(normals * _outward(cloud, xyz, parameters), axis=1) < 0
-    return np.where(backward[:, None], -normals, normals).astype(np.float32)
+    radius = max(parameters.radius_steps * step, parameters.smallest_radius_mm)
+    voxels = voxelise(xyz, (radius / CELLS_A_RADIUS,) * 3)
+    order = np.argsort(voxels.voxel, kind="stable")
+    starts = np.searchsorted(voxels.voxel[order], np.arange(len(voxels.place) + 1))
+    windows = np.ceil(radius / voxels.size).astype(np.int64)
+    cells = (starts, voxels.number, voxels.place, windows)
+
+    places = np.ascontiguousarray(xyz[order])
+    normals = _fit(places, radius, *cells)
+    cosines = _cosines(cloud[order], places, normals, views)
+    normals[cosines < 0] *= -1
+    sure = np.abs(cosines) >= parameters.grazing
+    _spread(places, radius, *cells, np.where(sure, PASSES, 0), normals)
+    oriented = np.empty((len(cloud), 3), np.float32)
+    oriented[order] = normals
+    return oriented
 
 
-def _outward(cloud: NDArray[np.void], xyz: NDArray[np.float64], parameters: NormalParameters) -> NDArray[np.float64]:
-    """(N, 3) rough directions from the surface to the outside."""
-    directions = np.zeros((256, 2))
-    for camera, direction in parameters.camera_directions.items():
-        directions[camera] = direction
-    low, high = np.percentile(xyz[:, 0], [1, 99])
-    along = 2 * (xyz[:, 0] - (low + high) / 2) / max(high - low, 1e-6)
-    return np.column_stack([END_WEIGHT * np.clip(along, -1, 1) ** 3, directions[cloud["camera"]]])
+@compiled
+def _fit(
+    xyz: Floats, radius: float, starts: NDArray[np.int64], number: Ints, place: Ints, window: NDArray[np.int64]
+) -> Floats:
+    """(N, 3) unit normals, either way, of planes through what is nearer than `radius`, the nearer the heavier.
+
+    Points (N, 3) come cell by cell; those of cell v begin at `starts[v]`.
+    """
+    normals = np.empty(xyz.shape)
+    near, wide = np.empty(xyz.shape), np.empty(xyz.shape)
+    sums = np.empty(SUMS)
+    for v in range(len(place)):
+        count = _gather(xyz, starts, number, place[v], window, near)
+        wide_count = 0
+        for n in range(starts[v], starts[v + 1]):
+            narrow = _sum_up(near[:count], xyz[n], radius, sums)
+            nx, ny, nz, _, breadth = plane_normal(sums)
+            if narrow or breadth < (LEAST_BREADTH * radius) ** 2:
+                if wide_count == 0:
+                    wide_count = _gather(xyz, starts, number, place[v], 2 * window, wide)
+                _sum_up(wide[:wide_count], xyz[n], 2.0 * radius, sums)
+                nx, ny, nz, _, _ = plane_normal(sums)
+            normals[n, 0], normals[n, 1], normals[n, 2] = nx, ny, nz
+    return normals
+
+
+@compiled
+def _gather(
+    xyz: Floats, starts: NDArray[np.int64], number: Ints, place: Ints, window: NDArray[np.int64], near: Floats
+) -> int:
+    """Brings together the points of the cells around a place; how many they are."""
+    count = 0
+    a, b, c = place
+    for i in range(a - window[0], a + window[0] + 1):
+        for j in range(b - window[1], b + window[1] + 1):
+            for k in range(c - window[2], c + window[2] + 1):
+                if number[i, j, k] != EMPTY:
+                    for m in range(starts[number[i, j, k]], starts[number[i, j, k] + 1]):
+                        near[count, 0], near[count, 1], near[count, 2] = xyz[m, 0], xyz[m, 1], xyz[m, 2]
+                        count += 1
+    return count
+
+
+@compiled
+def _sum_up(near: Floats, middle: Floats, radius: float, sums: Floats) -> bool:
+    """Adds up what is nearer than `radius`, seen from `middle`; whether that is too little for a plane."""
+    sums[:] = 0.0
+    count = 0
+    reach = 1.0 / (radius * radius)
+    for m in range(len(near)):
+        x, y, z = near[m, 0] - middle[0], near[m, 1] - middle[1], near[m, 2] - middle[2]
+        part = 1.0 - (x * x + y * y + z * z) * reach
+        if part > 0.0:
+            add_point(sums, x, y, z, part * part)
+            count += 1
+    return count < FEWEST
+
+
+def _cosines(cloud: NDArray[np.void], xyz: Floats, normals: Floats, views: Mapping[int, View]) -> Floats:
+    """(N,) cosines of the angles between the normals and the directions to the cameras; 0 where one is not known."""
+    centres = np.full((256, 3), np.nan)
+    for camera, view in views.items():
+        centres[camera] = view.centre
+    towards = centres[cloud["camera"]] - xyz * [0.0, 1.0, 1.0]  # the head stands where the point does
+    cosines: Floats = np.sum(normals * towards, axis=1) / np.linalg.norm(towards, axis=1)
+    return np.where(np.isfinite(cosines), cosines, 0.0)
+
+
+@compiled
+def _spread(
+    xyz: Floats,
+    radius: float,
+    starts: NDArray[np.int64],
+    number: Ints,
+    place: Ints,
+    window: NDArray[np.int64],
+    since: NDArray[np.int64],
+    normals: Floats,
+) -> None:
+    """Turns normals by the sum of those around that are sure; these are then sure for the next pass.
+
+    `since` (N,): the pass from which each counts, counted down; 0 for those that are not sure.
+    """
+    for step in range(PASSES - 1, 0, -1):
+        found = False
+        for v in range(len(place)):
+            for n in range(starts[v], starts[v + 1]):
+                if since[n]:
+                    continue
+                vote = _vote(n, xyz, radius, starts, number, place[v], window, since, step, normals)
+                if vote != 0.0:
+                    found = True
+                    since[n] = step
+                    if vote < 0.0:
+                        normals[n] *= -1.0
+        if not found:
+            break
+    middle = np.array([np.mean(xyz[:, 0]), np.mean(xyz[:, 1]), np.mean(xyz[:, 2])])
+    for n in range(len(xyz)):
+        if since[n] == 0 and np.sum((xyz[n] - middle) * normals[n]) < 0.0:
+            normals[n] *= -1.0
+
+
+@compiled
+def _vote(
+    n: int,
+    xyz: Floats,
+    radius: float,
+    starts: NDArray[np.int64],
+    number: Ints,
+    place: Ints,
+    window: NDArray[np.int64],
+    since: NDArray[np.int64],
+    step: int,
+    normals: Floats,
+) -> float:
+    """How well the normal of point `n` agrees with those around it that were sure before this step."""
+    total = 0.0
+    for i in range(place[0] - window[0], place[0] + window[0] + 1):
+        for j in range(place[1] - window[1], place[1] + window[1] + 1):
+            for k in range(place[2] - window[2], place[2] + window[2] + 1):
+                if number[i, j, k] == EMPTY:
+                    continue
+                for m in range(starts[number[i, j, k]], starts[number[i, j, k] + 1]):
+                    part = 1.0 - np.sum((xyz[m] - xyz[n]) ** 2) / (radius * radius)
+                    if since[m] > step and part > 0.0:
+                        total += part * part * np.sum(normals[m] * normals[n])
+    return total

@@ -6,6 +6,9 @@ from numpy.typing import NDArray
 PLANE_MM = 0.25
 """Stripe planes closer than this are one."""
 
+UNKNOWN_SIGMA_MM = 0.1
+"""Standard deviation of points that nothing is known of."""
+
 POINT_DTYPE = np.dtype(
     [
         ("x", "<f4"),
@@ -15,10 +18,13 @@ POINT_DTYPE = np.dtype(
         ("frame", "<i4"),
         ("camera", "u1"),
         ("supported", "?"),
+        ("sigma", "<f4"),
+        ("cameras", "u1"),
     ]
 )
-"""A world point: x, y, z in mm (scanner frame), the row of the stripe point it came from, its frame, its camera, and
-whether the calibration supports its pixel.
+"""A world point: x, y, z in mm (scanner frame), the row of the stripe point it came from, its frame, its camera,
+whether the calibration supports its pixel, the standard deviation to be expected of its place in mm, along the normal
+of the surface within the laser's plane, and how many cameras it was made of.
 
 Coordinates are stored as float32: half a metre away their last digit is 0.03 µm, a thousandth of what a stripe
 resolves. Arithmetic on them is done in float64, see `coordinates`.
@@ -31,11 +37,13 @@ def make_points(
     frame: int | NDArray[np.integer] = 0,
     source: int | NDArray[np.integer] = 0,
     supported: bool | NDArray[np.bool_] = True,
+    sigma: float | NDArray[np.floating] = UNKNOWN_SIGMA_MM,
 ) -> NDArray[np.void]:
     """A (N,) array of `POINT_DTYPE` from (N, 3) coordinates in mm and, each, one value or N of them."""
     points = np.zeros(len(xyz), POINT_DTYPE)
     points["x"], points["y"], points["z"] = np.asarray(xyz).T
     points["camera"], points["frame"], points["source"], points["supported"] = camera, frame, source, supported
+    points["sigma"], points["cameras"] = sigma, 1
     return points
 
 

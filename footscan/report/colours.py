@@ -31,21 +31,23 @@ def distance_colours(distance: NDArray[np.floating], limit: float) -> NDArray[np
     return np.rint(colours).astype(np.uint8)
 
 
-def colour_bar(limit: float) -> str:
-    """The colours from -`limit` to +`limit` mm as SVG, with five figures below them."""
+def colour_bar(limit: float, *, signed: bool = True) -> str:
+    """The colours from -`limit` to +`limit` mm, or from 0 where no distance has a sign, as SVG with figures below."""
     steps = 100
-    colours = distance_colours((np.arange(steps) + 0.5) / steps * 2 - 1, 1.0)
+    least = -limit if signed else 0.0
+    colours = distance_colours(least + (np.arange(steps) + 0.5) / steps * (limit - least), limit)
     # Each step reaches below the next, so that no seam shows between them.
     bars = "".join(
         f'<rect x="{20 + 3 * k}" y="0" width="{300 - 3 * k}" height="14" fill="#{r:02x}{g:02x}{b:02x}"/>'
         for k, (r, g, b) in enumerate(colours)
     )
     figures = "".join(
-        f'<text x="{20 + 75 * k}" y="30" text-anchor="middle">{sign}{number(abs(share) * limit, 2)}</text>'
-        for k, (share, sign) in enumerate([(-1, "−"), (-0.5, "−"), (0, ""), (0.5, "+"), (1, "+")])
+        f'<text x="{20 + 75 * k}" y="30" text-anchor="middle">{"+" if signed and at > 0 else ""}{number(at, 2)}</text>'
+        for k, at in enumerate(np.linspace(least, limit, 5).tolist())
     )
+    meaning = ": blue lies inside it, red outside" if signed else ", to any side"
     return (
         '<figure class="bar"><svg viewBox="0 0 340 36" role="img" aria-label="Colour bar">'
         f'{bars}<rect class="frame" x="20" y="0" width="300" height="14"/>{figures}</svg>'
-        "<figcaption>Distance to the reference model in mm: blue lies inside it, red outside</figcaption></figure>"
+        f"<figcaption>Distance to the reference model in mm{meaning}</figcaption></figure>"
     )

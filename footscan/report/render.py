@@ -1,7 +1,10 @@
 """Pictures of a triangle mesh: orthographic, hidden parts removed by depth, smoothly shaded."""
 
+import io
+
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from footscan.compiled import compiled
 
@@ -133,3 +136,10 @@ def _mean_of_samples(samples: NDArray[np.float32]) -> NDArray[np.uint8]:
     pixels = np.concatenate([sums[..., :3] / covered, sums[..., 3:] / _SAMPLES**2], axis=2)
     rounded: NDArray[np.uint8] = np.rint(pixels).astype(np.uint8)
     return rounded
+
+
+def png_bytes(pixels: NDArray[np.uint8]) -> bytes:
+    """(rows, columns, 3 or 4) pixels as PNG."""
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, "PNG", compress_level=6)
+    return buffer.getvalue()

@@ -7,15 +7,16 @@ from numpy.typing import NDArray
 
 from footscan.report.calibration_figure import calibration_figure
 from footscan.report.colours import colour_bar, colour_limit, distance_colours
+from footscan.report.comparison_figures import figures_facts, moved_note, regions_table
 from footscan.report.coverage import coverage_plot
 from footscan.report.markup import data_uri, facts, number, section, table, text, words
+from footscan.report.page import page
 from footscan.report.sample_frames import FrameSample, sample_frames
-from footscan.report.style import STYLE
 from footscan.report.surface_views import surface_views
-from footscan.report.viewer import SCRIPT, SCRIPT_DIGEST, viewer
+from footscan.report.viewer import viewer
 from schemas.calibration import Calibration, Source
 from schemas.measures import Measure, Measures
-from schemas.quality import Comparison, MeshQuality, Quality
+from schemas.quality import MeshQuality, Quality
 
 _FIRST = (
     "foot_length",
@@ -34,8 +35,6 @@ _TILES = 4
 _UNITS = {"mm": ("mm", 1), "mm2": ("mm²", 0), "mm3": ("mm³", 0), "deg": ("°", 1), "1": ("", 3)}
 """How a unit is written, and to how many decimals its values are."""
 _PLAIN = np.array([224, 198, 178], np.uint8)
-_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src '" + SCRIPT_DIGEST + "'"
-"""A browser refuses whatever is not on the page itself."""
 
 
 def scan_page(
@@ -68,13 +67,19 @@ def scan_page(
     truth_distance : (V,) float, mm, signed, positive outside the reference model; None where there is no such model
     provenance : name and value of what the result came from, in the order shown
     """
-    heading = f"{text(patient)} <span>{text(scan)}</span>"
     parts = [
         section("Measures", _tiles(measures), _measures_table(measures)),
         _surface(vertices, faces, measures, truth_distance),
     ]
     if quality.truth is not None:
-        parts.append(section("Distance to the reference model", _comparison(quality.truth)))
+        parts.append(
+            section(
+                "Distance to the reference model",
+                figures_facts(quality.truth),
+                moved_note(quality.truth.transform, _IN_ONE_FRAME),
+                regions_table(quality.truth.regions),
+            )
+        )
     parts += [
         section("Cameras", _cameras_table(quality, cloud)),
         section("Stripe coverage", _COVERAGE_NOTE, coverage_plot(cloud, quality.cameras)),
@@ -83,18 +88,17 @@ def scan_page(
         section("Mesh", _mesh(quality.mesh, quality.cloud_points)),
         section("Provenance", table(["", ""], ([text(name), text(value)] for name, value in provenance.items()))),
     ]
-    return _PAGE.format(
-        policy=_POLICY,
-        title=text(f"{patient} {scan}"),
-        style=STYLE,
-        script=SCRIPT,
-        heading=heading,
-        side=text({"right": "Right foot", "left": "Left foot"}.get(side, "Foot, side unknown")),
-        parts="\n".join(parts),
+    return page(
+        title=f"{patient} {scan}",
+        kicker={"right": "Right foot", "left": "Left foot"}.get(side, "Foot, side unknown"),
+        heading=f"{text(patient)} <span>{text(scan)}</span>",
+        parts=parts,
     )
 
 
-def upright(vertices: NDArray[np.float64], transform: Sequence[Sequence[float]]) -> NDArray[np.float64]:
+def upright(
+    vertices: NDArray[np.float64], transform: Sequence[Sequence[float]] | NDArray[np.float64]
+) -> NDArray[np.float64]:
     """(V, 3) vertices in mm, moved from the scanner's frame to the foot's by the 4 x 4 `transform` of its measures.
 
     X runs from heel to toes, Y to the foot's own left, Z up. The transform mirrors left feet into right ones; a picture
@@ -158,20 +162,6 @@ def _value(measure: Measure) -> str:
     return "–" if measure.value is None else number(measure.value, _UNITS[measure.unit][1])
 
 
-def _comparison(truth: Comparison) -> str:
-    names = ("mean", "std", "rms", "p50", "p90", "p95", "p99", "min", "max", "signed_mean")
-    titles = ("Mean", "Std. dev.", "RMS", "50 %", "90 %", "95 %", "99 %", "Least", "Greatest", "Signed mean")
-    values = [f"{number(getattr(truth, name), 3)} mm" for name in names]
-    moved = (
-        "The surface was not moved beforehand: both are in the scanner’s frame."
-        if truth.transform is None
-        else "The surface was moved beforehand, by the matrix "
-        + "; ".join(", ".join(number(value, 4) for value in line) for line in truth.transform)
-        + "."
-    )
-    return facts(zip(titles, values, strict=True)) + f'<p class="note">{moved}</p>'
-
-
 def _cameras_table(quality: Quality, cloud: NDArray[np.void]) -> str:
     reasons = sorted({reason for camera in quality.cameras for reason in camera.removed})
     headings = [
@@ -228,24 +218,4 @@ _COVERAGE_NOTE = (
     '<p class="note">Points of the cloud by the frame they come from, all cameras to one scale. '
     "On the right: the most of any frame.</p>"
 )
-
-_PAGE = """\
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="{policy}">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>
-{style}</style>
-</head>
-<body>
-<header><p>{side}</p><h1>{heading}</h1></header>
-<main>
-{parts}
-</main>
-<script>{script}</script>
-</body>
-</html>
-"""
+_IN_ONE_FRAME = "The surface was not moved beforehand: both are in the scanner’s frame."

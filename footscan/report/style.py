@@ -32,6 +32,7 @@ td { overflow-wrap: anywhere; }
 td.n, .measures td:not(:last-child) { white-space: nowrap; }
 .facts { display: grid; grid-template-columns: repeat(auto-fill, minmax(112px, 1fr)); gap: 10px 16px; margin: 0; }
 .facts + .note { margin-top: 10px; }
+.facts + .facts, .facts + .wide { margin-top: 14px; }
 dt { color: var(--soft); font-size: 13px; }
 dd { margin: 0; font-weight: 600; font-variant-numeric: tabular-nums; }
 .status { padding: 1px 8px; border-radius: 9px; font-size: 13px; white-space: nowrap; }
@@ -61,6 +62,11 @@ canvas:active { cursor: grabbing; }
 .bar { max-width: 500px; margin-bottom: 16px; }
 .frame { fill: none; stroke: #8a939c; stroke-width: .6; }
 .bar svg text { font-size: 12px; }
+.histogram { max-width: 760px; }
+.histogram + .histogram { margin-top: 16px; }
+.class { fill: #8fbccb; stroke: #fff; stroke-width: .4; }
+.histogram svg path { fill: none; }
+summary { margin: 4px 0; color: var(--accent); font-size: 14px; cursor: pointer; }
 .frames { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(250px, 100%), 1fr)); gap: 16px; }
 .frames figcaption b { color: var(--ink); }
 .frames svg { background: #000; border-radius: 4px; }

@@ -1,18 +1,16 @@
 """The surface from its six sides, over a grid in mm."""
 
-import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from footscan.report.markup import data_uri, number, text
-from footscan.report.render import render_mesh
+from footscan.report.render import png_bytes, render_mesh
 from schemas.scan import Side
 
-_PIXELS_PER_MM = 3.0
+PIXELS_PER_MM = 3.0
 _MARGIN_MM = 8.0
 _LABELS_LEFT_MM, _LABELS_BELOW_MM = 17.0, 13.0
 """Room for the figures of the grid."""
@@ -21,7 +19,7 @@ _LABELLED_MM = 50
 
 
 @dataclass(frozen=True)
-class _View:
+class View:
     """Where a picture is seen from. `right` and `up` are the axes to the right and up in it: sign, then 0 to 2."""
 
     title: str
@@ -29,48 +27,71 @@ class _View:
     up: tuple[int, int]
 
 
-def surface_views(
-    vertices: NDArray[np.float64], faces: NDArray[np.integer], colours: NDArray[np.uint8], side: Side, last: str
-) -> str:
-    """Six pictures of a surface as SVG: from above and below, from both sides, from the toes and from the heel.
+X, Y, Z = range(3)
 
-    The figure `last` follows them.
+
+def views_of(side: Side | None) -> list[View]:
+    """The six sides of a foot in its own frame, named for which foot it is; of another thing (None), for its axes.
+
+    A foot has X from heel to toes, Y to its own left, Z up.
+    """
+    medial, lateral = {"right": (" (medial)", " (lateral)"), "left": (" (lateral)", " (medial)")}.get(
+        side or "", ("", "")
+    )
+    left, right = f"Left side{medial}", f"Right side{lateral}"
+    front, back = "From the toes", "From the heel"
+    if side is None:
+        left, right, front, back = (f"From {axis}" for axis in ("+Y", "−Y", "+X", "−X"))
+    return [
+        View("From above", (1, X), (1, Y)),
+        View("From below", (1, X), (-1, Y)),
+        View(left, (-1, X), (1, Z)),
+        View(right, (1, X), (1, Z)),
+        View(front, (1, Y), (1, Z)),
+        View(back, (-1, Y), (1, Z)),
+    ]
+
+
+def surface_views(
+    vertices: NDArray[np.float64], faces: NDArray[np.integer], colours: NDArray[np.uint8], side: Side | None, last: str
+) -> str:
+    """Six pictures of a surface as SVG, as `views_of` names them, and the figure `last` behind them.
 
     Parameters
     ----------
     vertices : (V, 3) float64, mm, foot's frame
-        X from heel to toes, Y to the foot's own left, Z up.
     faces : (F, 3) int
     colours : (V, 3) uint8, RGB
-    side : tells which of its sides is the medial one
+    side : which foot it is; None for another thing
     last : markup
     """
-    medial, lateral = {"right": (" (medial)", " (lateral)"), "left": (" (lateral)", " (medial)")}.get(side, ("", ""))
-    x, y, z = 0, 1, 2
-    views = [
-        _View("From above", (1, x), (1, y)),
-        _View("From below", (1, x), (-1, y)),
-        _View(f"Left side{medial}", (-1, x), (1, z)),
-        _View(f"Right side{lateral}", (1, x), (1, z)),
-        _View("From the toes", (1, y), (1, z)),
-        _View("From the heel", (-1, y), (1, z)),
-    ]
+    views = views_of(side)
     widest = max(float(np.ptp(vertices[:, view.right[1]])) for view in views) + 2 * _MARGIN_MM + _LABELS_LEFT_MM
     figures = "\n".join(_figure(view, vertices, faces, colours, widest) for view in views)
     return f'<div class="views">\n{figures}\n{last}\n</div>'
 
 
-def _figure(
-    view: _View, vertices: NDArray[np.float64], faces: NDArray[np.integer], colours: NDArray[np.uint8], widest: float
-) -> str:
+def render_view(
+    view: View, vertices: NDArray[np.float64], faces: NDArray[np.integer], colours: NDArray[np.uint8]
+) -> tuple[NDArray[np.uint8], float, float]:
+    """The picture of a view, (rows, columns, 4) RGBA, `PIXELS_PER_MM` large, and its left and lower edge in mm.
+
+    Parameters are those of `surface_views`.
+    """
     right, up = (sign * vertices[:, axis] for sign, axis in (view.right, view.up))
     towards = np.cross(_unit(*view.right), _unit(*view.up))
     left, bottom = float(right.min()) - _MARGIN_MM, float(up.min()) - _MARGIN_MM
-    rows, columns = (int(np.ceil((np.ptp(along) + 2 * _MARGIN_MM) * _PIXELS_PER_MM)) for along in (up, right))
-    width, height = columns / _PIXELS_PER_MM, rows / _PIXELS_PER_MM
+    rows, columns = (int(np.ceil((np.ptp(along) + 2 * _MARGIN_MM) * PIXELS_PER_MM)) for along in (up, right))
+    seen = np.column_stack([right - left, up - bottom - rows / PIXELS_PER_MM, vertices @ towards])
+    return render_mesh(seen, faces, colours, (rows, columns), PIXELS_PER_MM), left, bottom
 
-    seen = np.column_stack([right - left, up - bottom - height, vertices @ towards])
-    picture = data_uri("image/png", _png(render_mesh(seen, faces, colours, (rows, columns), _PIXELS_PER_MM)))
+
+def _figure(
+    view: View, vertices: NDArray[np.float64], faces: NDArray[np.integer], colours: NDArray[np.uint8], widest: float
+) -> str:
+    pixels, left, bottom = render_view(view, vertices, faces, colours)
+    width, height = pixels.shape[1] / PIXELS_PER_MM, pixels.shape[0] / PIXELS_PER_MM
+    picture = data_uri("image/png", png_bytes(pixels))
     box = f"{-_LABELS_LEFT_MM:g} 0 {width + _LABELS_LEFT_MM:.2f} {height + _LABELS_BELOW_MM:.2f}"
     grid = "".join(_grid_lines(view, left, bottom, width, height))
     share = (width + _LABELS_LEFT_MM) / widest
@@ -87,7 +108,7 @@ def _unit(sign: int, axis: int) -> NDArray[np.float64]:
     return vector
 
 
-def _grid_lines(view: _View, left: float, bottom: float, width: float, height: float) -> Iterator[str]:
+def _grid_lines(view: View, left: float, bottom: float, width: float, height: float) -> Iterator[str]:
     """Lines every `_GRID_MM`, figures on every `_LABELLED_MM`, in the foot's own coordinates."""
     for at in range(_multiple_above(left), int(np.floor(left + width)) + 1, _GRID_MM):
         place = f"{at - left:.2f}"
@@ -105,9 +126,3 @@ def _grid_lines(view: _View, left: float, bottom: float, width: float, height: f
 
 def _multiple_above(least: float) -> int:
     return int(np.ceil(least / _GRID_MM)) * _GRID_MM
-
-
-def _png(pixels: NDArray[np.uint8]) -> bytes:
-    buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, "PNG", compress_level=6)
-    return buffer.getvalue()

@@ -6,7 +6,8 @@ import hashlib
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.report.simplify import simplify
+from footscan.surface.decimate import decimate
+from footscan.surface.mesh import Mesh, used
 
 _MOST_TRIANGLES = 12_000
 """They have no more than 36,000 corners, so 16 bits number them; some 150 kB on the page."""
@@ -21,13 +22,14 @@ def viewer(vertices: NDArray[np.float64], faces: NDArray[np.integer], colours: N
     faces : (F, 3) int, counter-clockwise as seen from outside
     colours : (V, 3) uint8, RGB
     """
-    points, triangles, shades = simplify(vertices, faces, colours.astype(np.float64), _MOST_TRIANGLES)
-    points = points - (points.min(axis=0) + points.max(axis=0)) / 2
+    small = decimate(used(Mesh(vertices, np.asarray(faces, np.int32), colours=colours)), _MOST_TRIANGLES)
+    points = small.vertices - (small.vertices.min(axis=0) + small.vertices.max(axis=0)) / 2
     radius = max(float(np.linalg.norm(points, axis=1).max()), np.finfo(np.float64).tiny)
     arrays = {
         "points": np.rint(points / radius * 32767).astype("<i2"),
-        "faces": triangles.astype("<u2"),
-        "colours": np.rint(shades).astype("u1"),
+        # Of a surface in thousands of shreds, which has no smaller form, what 16 bits cannot number is not shown.
+        "faces": small.faces[(small.faces < 2**16).all(axis=1)].astype("<u2"),
+        "colours": small.colours,
     }
     data = " ".join(f'data-{name}="{base64.b64encode(array.tobytes()).decode()}"' for name, array in arrays.items())
     return (

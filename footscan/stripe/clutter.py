@@ -27,9 +27,10 @@ def is_moving_stripe(
 ) -> NDArray[np.bool_]:
     """Which of the points of a film belong to a stripe that moves, and moves on.
 
-    A glint is a short piece whose place holds points in many frames. A long piece may stand still: so does the stripe
-    on a prism. A place through which long pieces turn, as around the bend of an ankle, is no glint's either, for it is
-    pieces that are judged. A short piece that has none beside it in the frame before nor in the one after is noise.
+    A glint is a short piece whose place holds short pieces in many frames. A long piece may stand still: so does the
+    stripe on a prism; and a toe's short stripe may run where that of the forefoot stood before. A place through which
+    long pieces turn, as around the bend of an ankle, is no glint's either, for it is pieces that are judged. A short
+    piece that has none beside it in the frame before nor in the one after is noise.
 
     Parameters
     ----------
@@ -44,8 +45,10 @@ def is_moving_stripe(
     extent = _extents(centres, piece, pieces)
     kept = np.ones(pieces, np.bool_)
     if frames >= FEWEST_FRAMES:
-        still = _frames_in_place(centres, frame, CELL_PX) >= max(FEWEST_FRAMES, parameters.glint_share * frames)
-        kept &= (np.bincount(piece, still) <= STATIC_SHARE * points) | (extent >= parameters.glint_length_px)
+        short = extent < parameters.glint_length_px
+        held = _frames_in_place(centres, frame, short[piece], CELL_PX)
+        still = held >= max(FEWEST_FRAMES, parameters.glint_share * frames)
+        kept &= (np.bincount(piece, still) <= STATIC_SHARE * points) | ~short
     if frames >= FEWEST_NEIGHBOURS:
         followed = _is_followed(centres, frame, kept[piece], frames, parameters.follow_reach_px)
         kept &= (np.bincount(piece, followed) >= FOLLOWED_SHARE * points) | (extent >= parameters.lonely_length_px)
@@ -84,12 +87,16 @@ def _extents(centres: NDArray[np.float64], piece: NDArray[np.int32], pieces: int
 
 
 @compiled
-def _frames_in_place(centres: NDArray[np.float64], frame: NDArray[np.int32], side: float) -> NDArray[np.int32]:
-    """For each point, in how many frames there is a point in its square cell or in one beside it."""
+def _frames_in_place(
+    centres: NDArray[np.float64], frame: NDArray[np.int32], counted: NDArray[np.bool_], side: float
+) -> NDArray[np.int32]:
+    """For each point, in how many frames there is a counted one in its square cell or in one beside it."""
     cells = _cells(centres, side)
     shape = cells[:, 0].max() + 2, cells[:, 1].max() + 2
     latest, frames = np.full(shape, -1, np.int32), np.zeros(shape, np.int32)
     for a in range(len(centres)):
+        if not counted[a]:
+            continue
         for v in range(cells[a, 0] - 1, cells[a, 0] + 2):
             for u in range(cells[a, 1] - 1, cells[a, 1] + 2):
                 if latest[v, u] != frame[a]:

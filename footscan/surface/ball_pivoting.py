@@ -41,7 +41,7 @@ def mesh_cloud(
     cloud, cloud_normals = np.asarray(points, np.float64), np.asarray(normals, np.float64)
     spacing = parameters.spacing_steps * step_mm
     spaced, spaced_normals = _space_evenly(cloud, cloud_normals, spacing)
-    spaced = project(spaced, spaced_normals, cloud, cloud_normals, parameters.smoothing_steps * step_mm)
+    spaced = project(spaced, spaced_normals, cloud, cloud_normals, step_mm, parameters.reach_steps).points
     legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(spaced))
     legacy.normals = o3d.utility.Vector3dVector(spaced_normals)
     radii = o3d.utility.DoubleVector([radius * step_mm for radius in sorted(parameters.ball_radii_steps)])

@@ -45,7 +45,7 @@ def close_holes(
     holes = rims(faces)
     _join(joined, faces[np.isin(faces, [vertex for hole in holes for vertex in hole]).sum(axis=1) >= 2])
     for hole in holes:
-        for rim in [hole] if _perimeter(vertices[hole]) <= max_perimeter else _slits(vertices, hole, max_width):
+        for rim in [hole] if perimeter(vertices[hole]) <= max_perimeter else _slits(vertices, hole, max_width):
             at = {vertex: k for k, vertex in enumerate(rim)}
             pairs = ((at[a], at[b]) for a in rim for b in joined[a] if b in at)
             new, patch = patch_over(vertices[rim], spacing, {(a, b) for a, b in pairs if a < b})
@@ -102,7 +102,7 @@ def _slits(vertices: Vertices, hole: list[int], max_width: float) -> list[list[i
         corners = vertices[hole]
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
         around = np.abs(along[:, None] - along)
-        around = np.minimum(around, _perimeter(corners) - around)
+        around = np.minimum(around, perimeter(corners) - around)
         width = distance_matrix(corners, corners)
         deep = (width <= max_width) & (around >= np.maximum(SLIT_RATIO * width, 2 * max_width))
         worth = np.where(deep, around - SLIT_RATIO * width, 0.0)
@@ -116,7 +116,8 @@ def _slits(vertices: Vertices, hole: list[int], max_width: float) -> list[list[i
     return slits
 
 
-def _perimeter(corners: Vertices) -> float:
+def perimeter(corners: Vertices) -> float:
+    """Length in mm of the closed line through (N, 3) `corners`."""
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).sum())
 
 

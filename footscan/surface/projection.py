@@ -1,60 +1,153 @@
 """Moving of points onto the smooth surface through the points around them (moving least squares).
 
-Alexa et al., "Computing and rendering point set surfaces", 2003, doi:10.1109/TVCG.2003.1175093, with the normal given.
+Alexa et al., "Computing and rendering point set surfaces", 2003, doi:10.1109/TVCG.2003.1175093, with quadratic height
+fields over planes whose normal follows the surface. A quadratic follows what is curved; a plane or a mean would shrink
+toes and heel.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
-NEIGHBOURS = 48
-BLOCK = 20_000
-"""Points whose neighbourhoods are held at once; it bounds the memory."""
+from footscan.compiled import compiled
+from footscan.surface.buckets import sort_into_cubes
+
+STEEPEST = 0.35
+"""Sine of the angle between surface and stripe planes below which neighbouring stripes count as no farther apart: what
+is farther away says little of a toe, which is no quadric."""
 SAME_SIDE = 0.3
 """Neighbours whose normals agree less than this (cosine) lie on another side of something thin, as the next toe."""
 RIDGE = 1e-3
 """Keeps curvature small where the neighbours do not tell it, as along a single stripe."""
+SECTORS = 8
 
-Points = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 
-def project(points: Points, normals: Points, cloud: Points, cloud_normals: Points, radius: float) -> Points:
-    """(N, 3) `points` moved along their normals onto quadratic height fields through the cloud around them.
+@dataclass(frozen=True)
+class Projection:
+    """Where points have moved to, and what held them there."""
 
-    A quadratic follows a curved surface; a plane or a mean would shrink toes and heel.
+    points: Floats
+    """(N, 3) mm"""
+    normals: Floats
+    """(N, 3) unit vectors of the surface there"""
+    gap_steps: Floats
+    """(N,) distance along the surface to the nearest point of the cloud, in distances from stripe to stripe there;
+    infinite where there was none."""
+    sectors: NDArray[np.int64]
+    """(N,) in how many of eight directions there are points."""
+    nearest: NDArray[np.int64]
+    """(N,) number of the nearest point of the cloud; -1 where there was none."""
+
+
+def project(
+    points: Floats,
+    normals: Floats,
+    cloud: Floats,
+    cloud_normals: Floats,
+    step_mm: float,
+    reach_steps: float,
+    rounds: int = 2,
+) -> Projection:
+    """Moves points along their normals onto the surface through a cloud.
+
+    Where the surface is steep, stripes lie farther apart along it, and neighbours are sought as much farther.
 
     Parameters
     ----------
     points, normals : (N, 3) mm, unit vectors
     cloud, cloud_normals : (M, 3) mm, unit vectors
-    radius : of the neighbourhoods, mm; weights fall to zero there. Points move by a third of it at most.
+    step_mm : distance from one stripe plane to the next, along X
+    reach_steps : radius of the neighbourhoods, in distances from stripe to stripe; weights fall to zero there. Points
+        move by half of it at most in a round
+    rounds : each starts from where the one before has moved to, with the normal found there
     """
-    tree = KDTree(cloud)
-    moved = points.copy()
-    for start in range(0, len(points), BLOCK):
-        block = slice(start, start + BLOCK)
-        nearest = np.arange(1, min(NEIGHBOURS, len(cloud)) + 1)
-        distance, neighbours = map(np.asarray, tree.query(points[block], k=nearest, workers=-1))
-        normal = normals[block]
-        weight = np.clip(1 - (distance / radius) ** 2, 0, None) ** 2
-        weight *= np.einsum("nki,ni->nk", cloud_normals[neighbours], normal) > SAME_SIDE
-        height = _height_at_origin(cloud[neighbours] - points[block, None], normal, weight, radius)
-        moved[block] += np.clip(height, -radius / 3, radius / 3)[:, None] * normal
-    return moved
+    buckets = sort_into_cubes(cloud, reach_steps * step_mm)
+    moved = _project(points, normals, cloud, cloud_normals, step_mm, reach_steps, rounds, *buckets)
+    return Projection(*moved)
 
 
-def _height_at_origin(offsets: Points, normal: Points, weight: Points, radius: float) -> Points:
-    """(N,) height over the tangent plane, at its origin, of the quadratics fitted to (N, K, 3) `offsets`."""
-    helper = np.where(np.abs(normal[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    first = np.cross(normal, helper)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    second = np.cross(normal, first)
-    u, v, h = (np.einsum("nki,ni->nk", offsets, axis) for axis in (first, second, normal))
-    u, v = u / radius, v / radius
-    terms = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)
-    weighted = terms * weight[:, :, None]
-    normal_matrix = np.einsum("nki,nkj->nij", weighted, terms) + RIDGE * np.diag([0.0, 1, 1, 1, 1, 1])
-    enough = weight.sum(axis=1) > RIDGE
-    normal_matrix[~enough] = np.eye(6)
-    solution = np.linalg.solve(normal_matrix, np.einsum("nki,nk->ni", weighted, h)[:, :, None])
-    return np.where(enough, solution[:, 0, 0], 0.0)
+@compiled
+def _project(  # noqa: PLR0912, PLR0915 (a call a neighbour would cost more than what it does)
+    points: Floats,
+    normals: Floats,
+    cloud: Floats,
+    cloud_normals: Floats,
+    step: float,
+    reach: float,
+    rounds: int,
+    edge: float,
+    low: Floats,
+    dims: NDArray[np.int64],
+    start: NDArray[np.int64],
+    order: NDArray[np.int64],
+) -> tuple[Floats, Floats, Floats, NDArray[np.int64], NDArray[np.int64]]:
+    count = len(points)
+    moved, turned = points.copy(), normals.copy()
+    gap, sectors, nearest = np.full(count, np.inf), np.zeros(count, np.int64), np.full(count, -1)
+    matrix, right, terms = np.empty((6, 6)), np.empty(6), np.empty(6)
+    first, last, offset = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3)
+    for n in range(count):
+        place, normal = points[n].copy(), normals[n].copy()
+        for round_ in range(rounds):
+            apart = step / max(np.sqrt(max(1.0 - normal[0] * normal[0], 0.0)), STEEPEST)
+            radius = reach * apart
+            helper = np.zeros(3)
+            helper[0 if abs(normal[0]) < 0.7 else 1] = 1.0
+            across = np.cross(normal, helper)
+            across /= np.sqrt(np.sum(across * across))
+            along = np.cross(normal, across)
+            matrix[:] = 0.0
+            right[:] = 0.0
+            closest, closest_point, seen = np.inf, -1, 0
+            for axis in range(3):
+                first[axis] = min(max(int((place[axis] - radius - low[axis]) / edge), 0), dims[axis])
+                last[axis] = min(int((place[axis] + radius - low[axis]) / edge), dims[axis] - 1)
+            for a in range(first[0], last[0] + 1):
+                for b in range(first[1], last[1] + 1):
+                    row = (a * dims[1] + b) * dims[2]
+                    for at in range(start[row + first[2]], start[row + max(last[2] + 1, first[2])]):
+                        near = order[at]
+                        squared, agreement = 0.0, 0.0
+                        for axis in range(3):
+                            offset[axis] = cloud[near, axis] - place[axis]
+                            squared += offset[axis] * offset[axis]
+                            agreement += cloud_normals[near, axis] * normal[axis]
+                        if squared >= radius * radius or agreement < SAME_SIDE:
+                            continue
+                        weight = (1.0 - squared / (radius * radius)) ** 2
+                        u, v, height = 0.0, 0.0, 0.0
+                        for axis in range(3):
+                            u += offset[axis] * across[axis] / radius
+                            v += offset[axis] * along[axis] / radius
+                            height += offset[axis] * normal[axis]
+                        terms[0], terms[1], terms[2] = 1.0, u, v
+                        terms[3], terms[4], terms[5] = u * u, u * v, v * v
+                        for r in range(6):
+                            right[r] += weight * terms[r] * height
+                            for c in range(r, 6):
+                                matrix[r, c] += weight * terms[r] * terms[c]
+                        if u * u + v * v < closest:
+                            closest, closest_point = u * u + v * v, near
+                        seen |= 1 << min(int((np.arctan2(v, u) / (2.0 * np.pi) + 0.5) * SECTORS), SECTORS - 1)
+            if matrix[0, 0] < RIDGE:
+                closest_point = -1
+                break
+            for r in range(6):
+                for c in range(r):
+                    matrix[r, c] = matrix[c, r]
+                matrix[r, r] += RIDGE if r else 0.0
+            quadric = np.linalg.solve(matrix, right)
+            height = min(max(quadric[0], -radius / 2), radius / 2)
+            for axis in range(3):
+                place[axis] += height * normal[axis]
+                normal[axis] -= (quadric[1] * across[axis] + quadric[2] * along[axis]) / radius
+            normal /= np.sqrt(np.sum(normal * normal))
+            if round_ == rounds - 1:
+                moved[n], turned[n] = place, normal
+                gap[n], nearest[n] = np.sqrt(closest) * reach, closest_point
+                for sector in range(SECTORS):
+                    sectors[n] += (seen >> sector) & 1
+    return moved, turned, gap, sectors, nearest

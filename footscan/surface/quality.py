@@ -3,19 +3,53 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.surface.holes import rims
+from footscan.surface.holes import perimeter, rims
 from footscan.surface.topology import edge_counts, face_components
 from schemas.quality import MeshQuality
 
+Floats = NDArray[np.float64]
 
-def mesh_quality(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> MeshQuality:
-    """Counts of what a mesh consists of; a closed one has no open and no non-manifold edges."""
+
+def mesh_quality(
+    vertices: NDArray[np.floating],
+    faces: NDArray[np.integer],
+    filled: NDArray[np.bool_] | None = None,
+    cut_mm: float | None = None,
+) -> MeshQuality:
+    """Counts and shares of what a mesh consists of; a closed one has no open and no non-manifold edges.
+
+    Parameters
+    ----------
+    vertices : (V, 3) mm
+    faces : (F, 3)
+    filled : (V,) what was not measured, where that is known; a triangle is filled where one of its corners is
+    cut_mm : Z of the flat cut above the ankle, where there is one
+    """
+    points = np.asarray(vertices, np.float64)
     _, counts = edge_counts(faces)
+    holes = rims(faces)
+    area, shape = _areas_and_shapes(points[faces])
+    total = float(area.sum()) or 1.0
+    on_cut = np.zeros(len(faces), np.bool_) if cut_mm is None else (points[faces, 2] == cut_mm).all(axis=1)
+    is_filled = None if filled is None else filled[faces].any(axis=1) & ~on_cut
     return MeshQuality(
         vertices=len(vertices),
         triangles=len(faces),
         open_edges=int(np.sum(counts == 1)),
         non_manifold_edges=int(np.sum(counts > 2)),
         components=int(face_components(faces).max(initial=-1)) + 1,
-        holes=len(rims(faces)),
+        holes=len(holes),
+        largest_hole_mm=max((perimeter(points[hole]) for hole in holes), default=0.0),
+        filled_share=None if is_filled is None else float(area[is_filled].sum()) / total,
+        cut_share=None if filled is None else float(area[on_cut].sum()) / total,
+        triangle_quality=float(shape.mean()) if len(faces) else None,
+        worst_triangles=float(np.quantile(shape, 0.01)) if len(faces) else None,
     )
+
+
+def _areas_and_shapes(corners: Floats) -> tuple[Floats, Floats]:
+    """(F,) areas in mm² and how even triangles are, from 0 to 1 (Bank and Smith, "Mesh smoothing", 1997)."""
+    sides = corners - np.roll(corners, 1, axis=1)
+    area = 0.5 * np.linalg.norm(np.cross(sides[:, 1], sides[:, 2]), axis=1)
+    squared = np.einsum("nki,nki->n", sides, sides)
+    return area, 4 * np.sqrt(3.0) * area / np.where(squared > 0, squared, 1.0)

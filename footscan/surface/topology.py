@@ -1,4 +1,4 @@
-"""Edges, components and vertices of triangle meshes."""
+"""Edges, components, vertices and their normals of triangle meshes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,13 @@ def face_components(faces: Faces) -> NDArray[np.int32]:
     return component.astype(np.int32)
 
 
+def largest_component(faces: Faces) -> NDArray[np.int32]:
+    """`faces` of the part that has most of them."""
+    component = face_components(faces)
+    largest: NDArray[np.bool_] = component == np.argmax(np.bincount(component))
+    return faces[largest].astype(np.int32)
+
+
 def keep_large_components(faces: Faces, share: float) -> NDArray[np.int32]:
     """`faces` without the parts that hold less than `share` of them."""
     component = face_components(faces)
@@ -51,3 +58,16 @@ def used_vertices(vertices: NDArray[np.float64], faces: Faces) -> tuple[NDArray[
     """The vertices that `faces` use, in their order, and the faces renumbered to them."""
     used, renumbered = np.unique(faces, return_inverse=True)
     return vertices[used], renumbered.reshape(faces.shape).astype(np.int32)
+
+
+def vertex_normals(vertices: NDArray[np.float64], faces: Faces) -> NDArray[np.float64]:
+    """(V, 3) unit vectors: the mean of the faces around each vertex, by their areas; 0 where there is none."""
+    corners = vertices[faces]
+    of_faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.empty_like(vertices)
+    for axis in range(3):
+        sums = [np.bincount(faces[:, k], of_faces[:, axis], minlength=len(vertices)) for k in range(3)]
+        normals[:, axis] = sums[0] + sums[1] + sums[2]
+    length = np.sqrt(np.einsum("ni,ni->n", normals, normals))
+    unit: NDArray[np.float64] = normals / np.where(length > 0, length, 1.0)[:, None]
+    return unit

@@ -1,10 +1,12 @@
 """Sharing the frames of all cameras among processes; what comes out does not depend on how they are shared."""
 
+import os
+import threading
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from itertools import islice
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import NamedTuple
 
 from footscan.virtual.render import CameraRenderer
@@ -80,7 +82,16 @@ _studios: list[Studio] = []
 
 
 def _open_studio(meshes: list[Mesh], surface: Surface, settings: SimulationSettings) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     _studios[:] = [Studio(meshes, surface, settings)]
+
+
+def _end_with_parent() -> None:
+    """A pool that is killed cannot end its processes: they would wait for work for ever."""
+    parent = parent_process()
+    assert parent is not None, "runs in a process of a pool"
+    parent.join()
+    os._exit(1)
 
 
 def _shoot(camera: int, shots: list[Shot]) -> list[bytes]:

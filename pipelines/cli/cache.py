@@ -126,7 +126,7 @@ def verify(
             "problems": problems,
         }
         if not as_json:
-            print(f"{count} actions done again, {len(differences)} came to something else")
+            print(f"{count} action{'s' * (count != 1)} done again, {len(differences)} came to something else")
         for one in differences:
             message(f"footscan: {one.step}: NOT REPRODUCED: recorded {one.recorded}, now {one.found}")
         for problem in problems:
@@ -232,13 +232,13 @@ def _scan_name(scan: str) -> str:
 
 
 def _share(text: str) -> float:
-    number = text.strip().removesuffix("%")
+    number, sign, rest = text.strip().partition("%")  # which must be there: 0.5 might be half of them, or 0.5%
     try:
-        share = float(number) / 100
+        share = float(number) / 100 if sign and not rest else 0.0
     except ValueError:
         share = 0.0
     if not 0 < share <= 1:
-        raise RefusedInput("--recompute", f"expected a share from 0% to 100%, such as 5%, found {text!r}")
+        raise RefusedInput("--recompute", f"expected a share above 0% and at most 100%, such as 5%, found {text!r}")
     return share
 
 

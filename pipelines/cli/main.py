@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from pipelines.cli import cache, calibration, demo, extract, films, results, runs, trace, why
+from pipelines.cli import cache, calibration, compare, demo, export, extract, films, results, runs, trace, verify, why
 from schemas.errors import Fault, FootscanError, RefusedInput, one_line
 
 INTERRUPTED = 130
@@ -32,7 +32,9 @@ app.command("why")(why.why)
 app.command("trace")(trace.trace)
 app.add_typer(cache.cache, name="cache")
 app.command("measure")(results.measure)
-app.command("compare")(results.compare)
+app.command("compare")(compare.compare)
+app.command("export")(export.export)
+app.add_typer(verify.verify, name="verify")
 
 
 def main() -> None:
@@ -46,7 +48,10 @@ def main() -> None:
 def run_command(arguments: list[str]) -> int:
     """The exit status of `footscan ARGUMENTS`; what went wrong stands on standard error in one line."""
     try:
-        return int(app(arguments, standalone_mode=False, prog_name="footscan") or 0)
+        status = int(app(arguments, standalone_mode=False, prog_name="footscan") or 0)
+        if status == INTERRUPTED:  # which is what Typer makes of it
+            raise KeyboardInterrupt
+        return status
     except (FootscanError, typer.TyperException, typer.Abort, KeyboardInterrupt, OSError, MemoryError) as error:
         problem, status = _explain(error)
         if problem:

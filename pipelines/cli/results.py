@@ -1,4 +1,4 @@
-"""`footscan measure` and `footscan compare`."""
+"""`footscan measure`."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -34,25 +34,6 @@ def measure(
         print_json(measures.model_dump(mode="json"))
     else:
         print_measures(measures, {})
-
-
-def compare(
-    result: Annotated[Path, typer.Argument(help="What is examined: a mesh, or a cloud (PLY).")],
-    reference: Annotated[Path, typer.Argument(help="What it should be: a mesh.")],
-    as_json: AsJson = False,
-) -> None:
-    """Distances of one surface to another, in millimetres; both in one frame."""
-    from footscan.surface.export import read_mesh, read_shape
-    from footscan.verify.compare import compare as compare_shapes
-
-    comparison = compare_shapes(read_shape(result), read_mesh(reference))
-    if as_json:
-        print_json(comparison.model_dump(mode="json"))
-        return
-    figures = comparison.model_dump(exclude={"unit", "transform"})
-    print_table(
-        f"{result.name} to {reference.name}, mm", ["figure", "mm"], [[k, f"{v:.4f}"] for k, v in figures.items()]
-    )
 
 
 def print_measures(measures: "Measures", known: dict[str, float]) -> None:

@@ -62,21 +62,33 @@ def run(
         raise RefusedInput("--threads, --workers, --cluster", "exclude each other, expected one of them")
     if watch and (scan is not None or as_json):
         raise RefusedInput("--watch", "goes with a workflow alone, not with --scan or --json")
+    if cluster == "":
+        raise RefusedInput("--cluster", "expected the address of a Dask scheduler, such as tcp://one:8786, found ''")
     with ExitStack() as stack:
         log = None if log_json is None else stack.enter_context(_log(log_json))
         pool = _LazyPool(stack, workers, cluster)
         if watch:
             return _watch(workflow or WORKFLOW, threads, pool, log)
         job = _job(workflow, scan, calibration, out, threads)
-        return _run(job, pool, log, as_json=as_json, table=scan is None)
+        ends = _run(job, pool, log, as_json=as_json)
+    if scan is not None:
+        return _status(ends, single=True)
+    return max(_status(ends, single=False), _write_table(ends, job.results))
 
 
-def _run(job: "Job", pool: "_LazyPool", log: TextIO | None, *, as_json: bool = False, table: bool = False) -> int:
-    """Run a job and tell what became of it; the exit status."""
+def _run(
+    job: "Job",
+    pool: "_LazyPool",
+    log: TextIO | None,
+    *,
+    as_json: bool = False,
+    folders: dict[str, Path] | None = None,
+) -> "list[ScanEnd]":
+    """Run a job and tell what became of it; `folders` as in `plan_job`."""
     from pipelines.archive import plan_job, run_job
     from pipelines.cli.progress import StepProgress
 
-    planned = plan_job(job)
+    planned = plan_job(job, folders=folders)
     if planned.steps:
         message(_summary(planned))
     ends = []
@@ -84,10 +96,6 @@ def _run(job: "Job", pool: "_LazyPool", log: TextIO | None, *, as_json: bool = F
         for end in run_job(planned, pool.open(job.threads, planned.to_run), progress.on_step_end):
             progress.on_scan_end(end)
             ends.append(end)
-    if table:
-        from pipelines.results_table import write_results_table
-
-        write_results_table(ends, job.results)
     if as_json:
         print_json(_ends_json(planned, ends, progress.ran))
     for end in ends:
@@ -95,7 +103,19 @@ def _run(job: "Job", pool: "_LazyPool", log: TextIO | None, *, as_json: bool = F
             _tell(end.scan, end.problem)
         elif not as_json:
             print(f"{end.scan}: {end.folder}")
-    return _status(ends, single=not table)
+    return ends
+
+
+def _write_table(ends: "list[ScanEnd]", results: Path) -> int:
+    """Write the table of all results; where that cannot be, it is said, and the exit status is that of a fault."""
+    from pipelines.results_table import write_results_table
+
+    try:
+        write_results_table(ends, results)
+    except Fault as error:
+        message(f"footscan: {error}")
+        return error.exit_status
+    return 0
 
 
 def _watch(workflow: Path, threads: int | None, pool: "_LazyPool", log: TextIO | None) -> int:
@@ -106,10 +126,13 @@ def _watch(workflow: Path, threads: int | None, pool: "_LazyPool", log: TextIO |
     job = job_of_workflow(workflow, threads, may_be_empty=True)
     assert job.archive is not None, "of a workflow"
     arrivals = Arrivals(job.archive)
+    folders: dict[str, Path] = {}
+    ends: dict[Path, ScanEnd] = {}
     message(f"watching {job.archive}")
     while True:
-        if folders := arrivals.complete():
-            _run(replace(job, folders=folders), pool, log)
+        if complete := arrivals.complete():
+            ends |= {end.source: end for end in _run(replace(job, folders=complete), pool, log, folders=folders)}
+            _write_table([end for source, end in ends.items() if source.is_dir()], job.results)
         time.sleep(POLL_S)
 
 
@@ -160,8 +183,8 @@ def plan(
             print_table("", ["scan", "step", "camera", "reason"], rows)
         if planned.steps:
             print(_summary(planned))
-    for folder, error in planned.refused.items():
-        _tell(folder, str(error))
+    for refused in planned.refused:
+        _tell(refused.scan, str(refused.error))
     for planned_scan in planned.scans:
         if planned_scan.failure is not None:
             _tell(planned_scan.scan.name, planned_scan.failure.problem)
@@ -202,7 +225,7 @@ def _plan_json(planned: "PlannedJob") -> dict[str, object]:
         "steps": planned.steps,
         "hits": planned.steps - planned.to_run,
         "misses": [{"scan": w.scan, "step": w.kind, "camera": w.camera, "reason": w.reason} for w in planned.waiting],
-        "refused": [{"scan": folder, "problem": str(error)} for folder, error in planned.refused.items()],
+        "refused": [{"scan": refused.scan, "problem": str(refused.error)} for refused in planned.refused],
         "failed": [{"scan": name, "problem": failure.problem} for name, failure in failures if failure is not None],
     }
 

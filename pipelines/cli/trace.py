@@ -2,12 +2,15 @@
 
 import hashlib
 import json
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pipelines.cli.output import AsJson, message, print_json
+from pipelines.cli.runs import WORKFLOW
 from schemas.documents import canonical_json
 from schemas.errors import RefusedInput
 
@@ -55,15 +58,27 @@ def _digest(file: Path) -> str:
 
 
 def _store(file: Path, cache: str | None) -> "Store":
-    from pipelines.archive import CACHE
     from pipelines.cli.cache import open_place
 
     if cache is not None:
         return open_place(cache)
-    for folder in file.resolve().parents:
-        if (folder / CACHE).is_dir():
-            return open_place(folder / CACHE)
-    raise RefusedInput(file, f"no store ({CACHE}) lies above it, expected --cache PLACE")
+    for place in _places(file):
+        if isinstance(place, str) or (place / "actions").is_dir():  # else there are notes on another store at most
+            return open_place(place)
+    raise RefusedInput(file, f"no {WORKFLOW} and no folder above it leads to its store, expected --cache PLACE")
+
+
+def _places(file: Path) -> Iterator[Path | str]:
+    """Where its store may lie: where the workflow.yaml above it has that, if these are its results, or above it."""
+    from pipelines.archive import CACHE, job_of_workflow
+
+    folders = file.resolve().parents
+    for folder in folders:
+        with suppress(RefusedInput):
+            job = job_of_workflow(folder / WORKFLOW, may_be_empty=True)
+            if job.results.resolve() in folders:
+                yield job.cache
+    yield from (folder / CACHE for folder in folders)
 
 
 def _json(found: "Trace | None") -> dict[str, Any]:

@@ -56,8 +56,8 @@ def why(
     from pipelines.archive import plan_job
 
     planned = plan_job(_job(scan, workflow, calibration, out))
-    for error in planned.refused.values():
-        raise error
+    for refused in planned.refused:
+        raise refused.error
     [found] = planned.scans
     plan = plan_of_scan(found, planned)
     every = [_explain(one, plan, planned.store) for one in plan.steps]
@@ -67,7 +67,7 @@ def why(
     elif chosen:
         _show(chosen)
     else:
-        newest = max(every, key=lambda one: one.made or 0.0)
+        newest = _newest(every)
         print(f"{found.scan.name}: nothing would run; last result: {_short(newest.step)}, {_came_to(newest)}")
 
 
@@ -154,6 +154,10 @@ def _explain(planned: "PlannedStep", plan: "Plan", store: "Store") -> Explanatio
     return Explanation(step, state, reason, tuple(found), last, store.files.written(row_name(key)) if last else None)
 
 
+def _newest(every: Sequence[Explanation]) -> Explanation:
+    return max(every, key=lambda one: one.made or 0.0)
+
+
 def _show(chosen: Sequence[Explanation]) -> None:
     """A table for all steps of which the same is to be said, such as those of the cameras."""
     alike: dict[tuple[str, tuple[object, ...]], list[Explanation]] = {}
@@ -232,7 +236,7 @@ def _json(scan: str, every: Sequence[Explanation], chosen: Sequence[Explanation]
             }
             for one in chosen
         ],
-        "last": None if chosen else max(map(_last_json, every), key=lambda last: (last or {}).get("made") or ""),
+        "last": None if chosen else _last_json(_newest(every)),
     }
 
 

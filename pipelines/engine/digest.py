@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from pipelines.engine.atomic import write_atomically
 from schemas.documents import canonical_json
-from schemas.errors import RefusedInput
+from schemas.errors import Fault, RefusedInput
 
 log = logging.getLogger("footscan.store")
 
@@ -82,10 +82,13 @@ class FileDigests:
             return cls(memory)
 
     def save(self) -> None:
-        """Remember for the next run."""
+        """Remember for the next run; where that cannot be, it reads the files again."""
         if self._changed:
             rows = [[path, list(state), digest] for path, (state, digest) in sorted(self._known.items())]
-            write_atomically(self.memory, sealed({"rows": rows}))
+            try:
+                write_atomically(self.memory, sealed({"rows": rows}))
+            except Fault as error:
+                log.warning("%s; the next run will read all films again", error)
             self._changed = False
 
     def of(self, path: Path) -> tuple[str, FileState]:

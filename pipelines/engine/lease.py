@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 from pipelines.engine.store import Store
 from schemas.documents import canonical_json
@@ -37,6 +38,9 @@ class Lease:
     started: float | None
     """s since 1970, by the clock of its host; so is `heartbeat`."""
     heartbeat: float | None
+    system: str | None
+    """What its process has this number in, and when it started there; None where that is not known."""
+    birth: str | None
 
 
 @contextmanager
@@ -82,19 +86,67 @@ def leases(store: Store) -> list[Lease]:
 def live_leases(store: Store) -> list[Lease]:
     """Those of runs that are to be taken for alive; one of which nothing is known is."""
     now = time.time()
-    return [one for one in leases(store) if one.heartbeat is None or now - one.heartbeat < STALE_S]
+    beating = (one for one in leases(store) if one.heartbeat is None or now - one.heartbeat < STALE_S)
+    return [one for one in beating if not _is_gone(one)]
+
+
+def _is_gone(one: Lease) -> bool:
+    """Whether the process of a lease is known to have ended: it can be looked for where it ran, and there alone."""
+    if one.process is None or one.system is None or one.system != _system():
+        return False
+    try:
+        os.kill(one.process, 0)
+    except ProcessLookupError:
+        return True
+    except OSError:  # another user's
+        return False
+    birth = _birth(one.process)
+    return birth is not None and birth != one.birth  # its number is another's by now
+
+
+def _system() -> str | None:
+    """This boot of this machine, and what its processes are counted in: a container has numbers of its own."""
+    try:
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+        return f"{boot} {Path('/proc/self/ns/pid').readlink()}"
+    except OSError:  # no Linux
+        return None
+
+
+def _birth(process: int) -> str | None:
+    """When a process started, in ticks since the boot; `ended` of one that only waits for its parent to hear of it."""
+    try:
+        status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return None
+    state, *facts = status.rpartition(")")[2].split()
+    return "ended" if state in "ZX" else facts[18]
 
 
 def _write(name: str, host: str, started: float, store: Store) -> None:
-    now = {"host": host, "process": os.getpid(), "started": started, "heartbeat": time.time()}
+    now = {
+        "host": host,
+        "process": os.getpid(),
+        "started": started,
+        "heartbeat": time.time(),
+        "system": _system(),
+        "birth": _birth(os.getpid()),
+    }
     store.files.write(name, canonical_json(now).encode())
 
 
 def _read(name: str, data: bytes) -> Lease:
     try:
         match json.loads(data):
-            case {"host": str(host), "process": int(process), "started": float(started), "heartbeat": float(heartbeat)}:
-                return Lease(name, host, process, started, heartbeat)
+            case {
+                "host": str(host),
+                "process": int(process),
+                "started": float(started),
+                "heartbeat": float(heartbeat),
+                **more,
+            }:
+                system, birth = (str(more[fact]) if more.get(fact) else None for fact in ("system", "birth"))
+                return Lease(name, host, process, started, heartbeat, system, birth)
     except (ValueError, RecursionError):
         pass
-    return Lease(name, None, None, None, None)
+    return Lease(name, None, None, None, None, None, None)

@@ -4,10 +4,12 @@ Tasks hand over digests, never arrays; a worker reads and writes the store itsel
 """
 
 import logging
+import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from multiprocessing import resource_tracker
 from typing import Any, Protocol
 from uuid import uuid4
 
@@ -183,12 +185,33 @@ def local_cluster(workers: int) -> Iterator[Cluster]:
     _quieten()
     from distributed import Client, LocalCluster
 
-    with (
-        dask.config.set({"distributed.scheduler.allowed-failures": FAILURES_ALLOWED}),
-        LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=":0") as here,
-        Client(here) as client,
-    ):
-        yield Cluster(client, workers)
+    settings = {
+        "distributed.scheduler.allowed-failures": FAILURES_ALLOWED,
+        "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "error",  # as `_quieten`, for the workers
+    }
+    with dask.config.set(settings):
+        with _deaf_to_ctrl_c():
+            here = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=":0")
+        with here, Client(here) as client:
+            yield Cluster(client, workers)
+
+
+@contextmanager
+def _deaf_to_ctrl_c() -> Iterator[None]:
+    """What is started here, be it by threads that are started here, is not interrupted from the terminal.
+
+    A terminal interrupts all processes of a command. Workers would die of it in the midst of what they say to each
+    other; they are ended by the process that started them.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # for it would take the mask off, when the first process is started
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 @contextmanager

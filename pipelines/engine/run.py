@@ -5,9 +5,12 @@ import importlib
 import json
 import logging
 import platform
+import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
+from weakref import WeakValueDictionary
 
 from pipelines.engine.code import CodeIdentity, code_identity
 from pipelines.engine.digest import file_state
@@ -75,16 +78,32 @@ def execute(step: Step, inputs: Mapping[str, str], store: Store) -> StepEnd:
     """A step with inputs of these digests, from the cache or by running it."""
     start = time.perf_counter()
     image = image_text(step, inputs)
-    try:
-        outcome = cached_outcome(step, store.lookup(key_of(image)))
-    except Fault as error:  # a store that cannot be asked costs this scan; where it stays away, the next plan says so
-        return StepEnd(step, Failure(str(error), "fault", step.name), False, time.perf_counter() - start)
-    ran, otherwise = outcome is None, None
-    if outcome is None:
-        outcome, otherwise = _run_safely(step, image, inputs, store)
-    else:
-        _note_latest(step, key_of(image), store)
+    key = key_of(image)
+    with _alone_at(key):
+        try:
+            outcome = cached_outcome(step, store.lookup(key))
+        except Fault as error:  # a store that is away costs this scan; where it stays away, the next plan says so
+            return StepEnd(step, Failure(str(error), "fault", step.name), False, time.perf_counter() - start)
+        ran, otherwise = outcome is None, None
+        if outcome is None:
+            outcome, otherwise = _run_safely(step, image, inputs, store)
+        else:
+            _note_latest(step, key, store)
     return StepEnd(step, outcome, ran, time.perf_counter() - start, otherwise)
+
+
+@contextmanager
+def _alone_at(key: str) -> Iterator[None]:
+    """Threads that come to the same action, for scans with equal films, take turns: the first result serves all."""
+    with _LOCK:
+        under_way = _UNDER_WAY.setdefault(key, threading.Lock())
+    with under_way:
+        yield
+
+
+_LOCK = threading.Lock()
+_UNDER_WAY: WeakValueDictionary[str, threading.Lock] = WeakValueDictionary()
+"""By key; a lock lasts as long as somebody holds it or waits."""
 
 
 def _run_safely(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, str | None]:

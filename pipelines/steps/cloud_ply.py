@@ -3,8 +3,11 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from footscan.cloud.points import coordinates
-from footscan.surface.export import cloud_ply_bytes
+from footscan.surface.formats.ply import ply_of
+from footscan.surface.mesh import Mesh
 from pipelines.arrays import unpack
 
 
@@ -13,4 +16,8 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     del parameters, places
     oriented = unpack(inputs["oriented"])
     cloud = oriented["cloud"]
-    return cloud_ply_bytes(coordinates(cloud), oriented["normals"], cloud["camera"], ("unit mm", "frame scanner"))
+    no_faces = np.zeros((0, 3), np.int32)
+    points = Mesh(
+        coordinates(cloud), no_faces, oriented["normals"], camera=cloud["camera"], metadata={"frame": "scanner"}
+    )
+    return ply_of(points)

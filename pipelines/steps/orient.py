@@ -1,15 +1,18 @@
-"""Normals of the cleaned cloud."""
+"""Normals of the fused cloud."""
 
 from collections.abc import Mapping
 from pathlib import Path
 
 from footscan.cloud.normals import estimate_normals
+from footscan.cloud.views import views_of
 from pipelines.arrays import pack, unpack
+from schemas.calibration import Calibration
 from schemas.parameters.normals import NormalParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: NormalParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `clean`."""
+    """`inputs`: `fused` and the `calibration` of all cameras."""
     del places
-    cloud = unpack(inputs["clean"])["cloud"]
-    return pack(cloud=cloud, normals=estimate_normals(cloud, parameters))
+    cloud = unpack(inputs["fused"])["cloud"]
+    views = views_of(Calibration.model_validate_json(inputs["calibration"]).cameras)
+    return pack(cloud=cloud, normals=estimate_normals(cloud, views, parameters))

@@ -10,22 +10,25 @@ from footscan.surface.quality import mesh_quality
 from pipelines.arrays import unpack
 from schemas.calibration import Source
 from schemas.frames import FrameManifest
+from schemas.fusion import FusionReport
 from schemas.quality import CameraQuality, Comparison, Quality
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `calibration` (its name and digest), `clean`, `surface`, `manifest-N` and `stripe-N` of each camera,
-    `verified` where there is a truth."""
+    """`inputs`: `calibration` (its name and digest), `clean`, `fused`, `surface`, `manifest-N` and `stripe-N` of each
+    camera, `verified` where there is a truth."""
     del parameters, places
-    clean = unpack(inputs["clean"])
-    removed = json.loads(clean["removed"].tobytes())
+    removed = json.loads(unpack(inputs["clean"])["removed"].tobytes())
+    fused = unpack(inputs["fused"])
     surface = unpack(inputs["surface"])
+    cut_mm = surface["cut_mm"].item() if "cut_mm" in surface else None
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
     quality = Quality(
         calibration=Source.model_validate_json(inputs["calibration"]),
         cameras=[_camera(camera, inputs, removed.get(str(camera), {})) for camera in ids],
-        cloud_points=len(clean["cloud"]),
-        mesh=mesh_quality(surface["vertices"], surface["faces"]),
+        fusion=FusionReport.model_validate_json(fused["report"].tobytes()),
+        cloud_points=len(fused["cloud"]),
+        mesh=mesh_quality(surface["vertices"], surface["faces"], surface.get("filled"), cut_mm),
         truth=_truth(inputs),
     )
     return (quality.model_dump_json(indent=2) + "\n").encode()

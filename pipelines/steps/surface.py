@@ -3,8 +3,12 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.surface.ball_pivoting import mesh_cloud
+from footscan.surface.closed_surface import close_surface
+from footscan.surface.topology import vertex_normals
 from pipelines.arrays import pack, unpack
 from schemas.parameters.surface import SurfaceParameters
 
@@ -13,6 +17,13 @@ def run(inputs: Mapping[str, bytes], parameters: SurfaceParameters, places: Mapp
     """`inputs`: `oriented`."""
     del places
     oriented = unpack(inputs["oriented"])
-    cloud = oriented["cloud"]
-    vertices, faces = mesh_cloud(coordinates(cloud), oriented["normals"], stripe_step(cloud), parameters)
-    return pack(vertices=vertices, faces=faces)
+    cloud, normals = oriented["cloud"], oriented["normals"]
+    points, step_mm = coordinates(cloud), stripe_step(cloud)
+    if parameters.method == "ball_pivoting":
+        vertices, faces = mesh_cloud(points, normals, step_mm, parameters)
+        return pack(vertices=vertices, faces=faces, normals=vertex_normals(vertices, faces))
+    mesh = close_surface(points, normals, cloud["camera"], step_mm, parameters)
+    known = {"normals": mesh.normals, "camera": mesh.camera, "filled": mesh.filled}
+    cut = {"cut_mm": np.array(float(mesh.metadata["cut_mm"]))} if "cut_mm" in mesh.metadata else {}
+    given = {name: values for name, values in known.items() if values is not None}
+    return pack(vertices=mesh.vertices, faces=mesh.faces, **given, **cut)

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from footscan.surface.export import read_mesh
-from footscan.verify.compare import compare, signed_distances
+from footscan.verify.compare import compare
+from footscan.verify.distances import signed_distances
 from pipelines.arrays import pack, unpack
 
 

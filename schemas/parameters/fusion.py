@@ -1,8 +1,8 @@
 """Parameters of the fusion of the cameras."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from schemas.documents import Document
 
@@ -10,5 +10,26 @@ from schemas.documents import Document
 class FusionParameters(Document):
     """How the points of several cameras become one cloud."""
 
-    cell_mm: Annotated[float, Field(ge=0.05, le=5)] = 0.5
-    """Edge of the cells within which the points of one stripe plane are averaged."""
+    spacing_mm: Annotated[float, Field(ge=0, le=5)] = 0.4
+    """Points of one stripe plane are no closer to each other; 0 keeps all."""
+    contradiction_mm: Annotated[float, Field(gt=0, le=10)] = 1.0
+    """Points of two cameras that lie farther apart show different surfaces."""
+    contradiction_sigmas: Annotated[float, Field(ge=1, le=20)] = 4.0
+    """Of points that are closer and yet more than so many standard deviations apart, the better supported stay."""
+    correct_cameras: bool = True
+    """Whether a camera may be moved by what it and others see of the same skin."""
+    overlap_mm: Annotated[float, Field(gt=0, le=20)] = 3.0
+    """How far apart two cameras may place the same skin for it to be compared."""
+    largest_correction_mm: Annotated[float, Field(gt=0, le=10)] = 1.0
+    """A camera that would have to be moved farther is left as it is and reported."""
+    smallest_correction_mm: Annotated[float, Field(ge=0, le=10)] = 0.02
+    """A camera that would have to be moved less is left as it is."""
+
+    @model_validator(mode="after")
+    def _can_be_seen(self) -> Self:
+        if self.overlap_mm <= self.largest_correction_mm:
+            raise ValueError(
+                f"overlap_mm: expected more than largest_correction_mm, {self.largest_correction_mm:g}, "
+                f"found {self.overlap_mm:g}"
+            )
+        return self

@@ -29,7 +29,7 @@ results: results
 
 def _command(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
     line = [str(part) for part in (FOOTSCAN, *arguments)]
-    return subprocess.run(line, capture_output=True, text=True, timeout=120, check=False, **options)
+    return subprocess.run(line, capture_output=True, text=True, timeout=300, check=False, **options)
 
 
 @pytest.fixture(scope="session")

@@ -15,78 +15,35 @@ from pathlib import Path
 from subprocess import CompletedProcess
 from typing import Any
 
-import numpy as np
 import pytest
-import simplejpeg
 from pyarrow import parquet
-
-from footscan.virtual.film import write_film
-from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
 
 Footscan = Callable[..., CompletedProcess[str]]
 Mistake = Callable[[CompletedProcess[str]], str]
 CAMERAS = (1, 5)
-"""One looks from above, one from below."""
-PX_PER_MM = 5.0
 STEPS = 15
 """Ingest, extract and map of 2 cameras; fuse, clean, orient, surface, measure, quality, 2 exports, report."""
-PATIENCE_S = 90.0
+PATIENCE_S = 300.0
 """No test waits as long, unless it fails."""
-WORKFLOW = """\
-format: footscan.workflow/1
-archive: archive
-calibration: calibration.json
-results: results
-"""
-DOCUMENT = """\
-format: footscan.scan/1
-patient: P0001
-scan: {scan}
-side: right
-travel: {{start_mm: 0.0, step_mm: 10.0}}
-cameras:
-- {{id: 1, file: cam1.avi}}
-- {{id: 5, file: cam5.avi}}
-"""
-
-
-def frame(radius_mm: float, upper: bool) -> bytes:
-    """A stripe round a bar along X, as a camera sees it that looks straight along the bar."""
-    j, i = np.mgrid[0:480, 0:640].astype(np.float64)
-    distance = np.abs(np.hypot(i - 320, j - 240) - radius_mm * PX_PER_MM)
-    light = 200 * np.exp(-0.5 * (distance / 1.8) ** 2) * ((j <= 245) if upper else (j >= 235))
-    image = np.clip(light[..., None] * [1.0, 0.12, 0.1] + 20, 0, 255).astype(np.uint8)
-    return bytes(simplejpeg.encode_jpeg(image, 90, "RGB", "420"))
-
-
-def calibration() -> Calibration:
-    """The bar's axis lies at Z = 40 mm."""
-    pixel_map = PolynomialMap(
-        order=1, centre_px=(320.0, 240.0), scale_px=PX_PER_MM, alpha_y=[0.0, 1.0, 0.0], alpha_z=[40.0, 0.0, -1.0]
-    )
-    cameras = [CameraCalibration(camera=camera, map=pixel_map, region_px=[], points=0) for camera in CAMERAS]
-    return Calibration(sources=[Source(name="made up", sha256="")], software="tests", cameras=cameras)
-
-
-@pytest.fixture(scope="module")
-def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A workflow with one small scan, of a bar that narrows towards both its ends. To be read only."""
-    bench = tmp_path_factory.mktemp("filmed")
-    (bench / "workflow.yaml").write_text(WORKFLOW)
-    (bench / "calibration.json").write_text(calibration().model_dump_json())
-    scan = bench / "archive/P0001/S1"
-    scan.mkdir(parents=True)
-    (scan / "scan.yaml").write_text(DOCUMENT.format(scan="S1"))
-    radii = 14 + 18 * np.sqrt(1 - np.linspace(-1, 1, 20) ** 2)
-    for camera, upper in zip(CAMERAS, (True, False), strict=True):
-        write_film(scan / f"cam{camera}.avi", [frame(radius, upper) for radius in radii], 640, 480, 18)
-    return bench
 
 
 @pytest.fixture
-def bench(filmed: Path, tmp_path: Path) -> Path:
+def bench(pristine: Path, tmp_path: Path) -> Path:
     """A copy of the workflow and its scan, before their first run."""
-    return Path(shutil.copytree(filmed, tmp_path / "bench"))
+    return Path(shutil.copytree(pristine, tmp_path / "bench"))
+
+
+def copy_scan(source: Path, to: Path, *missing: str) -> None:
+    """A scan with the same films, named for its folder."""
+    shutil.copytree(source, to, ignore=shutil.ignore_patterns(*missing))
+    document = to / "scan.yaml"
+    document.write_text(document.read_text().replace("scan: S1", f"scan: {to.name}"))
+
+
+def table(bench: Path) -> dict[str, dict[str, Any]]:
+    """Rows of the table of all results, by the name of their scan's folder."""
+    rows = parquet.read_table(bench / "results/results.parquet").to_pylist()
+    return {Path(row["scan"]).name: row for row in rows}
 
 
 def results(bench: Path, scan: str = "S1") -> dict[str, bytes]:
@@ -117,12 +74,14 @@ def started(bench: Path, *options: object) -> Iterator[subprocess.Popen[str]]:
 
 
 def press_ctrl_c(process: subprocess.Popen[str]) -> list[str]:
-    """A terminal sends SIGINT to all processes of the command; what it says on standard error."""
+    """A terminal sends SIGINT to all processes of the command; what it says on standard error before its last line."""
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130, said
     assert "Traceback" not in said
-    return said.splitlines()
+    *others, last = said.splitlines()
+    assert last == "footscan: interrupted; what is complete is kept"
+    return others
 
 
 @contextmanager
@@ -161,9 +120,7 @@ def test_scans_are_run_as_they_arrive(bench: Path) -> None:
     shutil.move(archive / "S1", source)  # the archive is there, and empty
     with started(bench, "--watch", "--log-json", log) as process:
         wait_for(log.exists, process)
-        (archive / "S2").mkdir()
-        (archive / "S2/scan.yaml").write_text(DOCUMENT.format(scan="S2"))
-        shutil.copy(source / "cam1.avi", archive / "S2")
+        copy_scan(source, archive / "S2", "cam5.avi")
         with being_copied(source / "cam5.avi", archive / "S2/cam5.avi"):
             shutil.copytree(source, archive / "S1")
             wait_for(lambda: events(log, "scan"), process)
@@ -171,9 +128,16 @@ def test_scans_are_run_as_they_arrive(bench: Path) -> None:
             assert not (archive / "S2/frames.zarr").exists()
             assert not (bench / "results/P0001/S2").exists()
         wait_for(lambda: len(events(log, "scan")) == 2, process)
+        before = results(bench)
+        shutil.copytree(source, archive / "S0")  # and still named S1
+        wait_for(lambda: len(events(log, "scan")) == 3 and "S0" in table(bench), process)
         said = press_ctrl_c(process)
-    assert said[0] == f"watching {bench / 'archive'}"
-    assert [(end["scan"], end["status"]) for end in events(log, "scan")] == [("P0001/S1", "done"), ("P0001/S2", "done")]
+    problem = f"{archive / 'S0/scan.yaml'}: P0001/S1 is also in {archive / 'S1'}, expected each scan once"
+    assert (said[0], said[-1]) == (f"watching {bench / 'archive'}", f"footscan: {problem}")
+    ended = [(end["scan"], end["status"]) for end in events(log, "scan")]
+    assert ended == [("P0001/S1", "done"), ("P0001/S2", "done"), (str(archive / "S0"), "refused")]
+    assert results(bench) == before
+    assert {name: row["status"] for name, row in table(bench).items()} == {"S1": "done", "S2": "done", "S0": "refused"}
     ran = [event["step"] for event in events(log, "step") if event["scan"] == "P0001/S2" and event["ran"]]
     assert sorted(ran) == ["ingest", "ingest", "report"]  # its films are those of S1, whose frames gave the rest
     assert results(bench)["foot.stl"] == results(bench, "S2")["foot.stl"]
@@ -191,6 +155,19 @@ def test_ctrl_c_ends_a_run_and_the_next_goes_on(footscan: Footscan, bench: Path)
     done = footscan("run", bench / "workflow.yaml", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["ran"] <= STEPS - complete
+
+
+def test_ctrl_c_ends_processes_and_all_that_they_say(footscan: Footscan, bench: Path) -> None:
+    log = bench / "log.jsonl"
+    with started(bench, "--workers", 2, "--log-json", log) as process:
+        wait_for(lambda: len(events(log, "step")) >= len(CAMERAS), process)
+        planned, dashboard = press_ctrl_c(process)
+    assert planned == f"{STEPS} of {STEPS} steps to run"
+    assert dashboard.startswith("dashboard: http://")
+    assert not (bench / "results/P0001").exists()
+    done = footscan("run", bench / "workflow.yaml", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["ran"] <= STEPS - len(events(log, "step"))
 
 
 def test_processes_give_the_bytes_of_threads(command: Footscan, footscan: Footscan, bench: Path) -> None:
@@ -215,8 +192,7 @@ def test_log_and_table_tell_of_each_scan(footscan: Footscan, bench: Path) -> Non
     """One scan is sound, of one a film was cut off, and one lacks a film."""
     archive, log = bench / "archive/P0001", bench / "log.jsonl"
     for scan in ("S2", "S3"):
-        shutil.copytree(archive / "S1", archive / scan)
-        (archive / scan / "scan.yaml").write_text(DOCUMENT.format(scan=scan))
+        copy_scan(archive / "S1", archive / scan)
     film = archive / "S2/cam1.avi"
     film.write_bytes(film.read_bytes()[:-5000])
     (archive / "S3/cam5.avi").unlink()
@@ -237,17 +213,36 @@ def test_log_and_table_tell_of_each_scan(footscan: Footscan, bench: Path) -> Non
     cameras = sorted(step["camera"] for step in steps if step["scan"] == "P0001/S1" and step["camera"] is not None)
     assert cameras == sorted(3 * CAMERAS)
     assert all(set(scan) == {"event", "time", "scan", "status", "known", "results", "problem"} for scan in scans)
+    assert {scan["scan"] for scan in scans} == {"P0001/S1", "P0001/S2", "P0001/S3"}
     ended = {Path(scan["scan"]).name: scan for scan in scans}
     assert {name: scan["status"] for name, scan in ended.items()} == {"S1": "done", "S2": "refused", "S3": "refused"}
     assert (ended["S1"]["results"], ended["S1"]["problem"]) == (str(bench / "results/P0001/S1"), None)
     assert problems == {f"footscan: {ended[name]['problem']}" for name in ("S2", "S3")}
 
-    rows = {Path(row["scan"]).name: row for row in parquet.read_table(bench / "results/results.parquet").to_pylist()}
+    rows = table(bench)
+    assert {row["scan"] for row in rows.values()} == {"P0001/S1", "P0001/S2", "P0001/S3"}
     assert {name: row["status"] for name, row in rows.items()} == {"S1": "done", "S2": "refused", "S3": "refused"}
     measures = json.loads(results(bench)["measures.json"])["measures"]
     assert rows["S1"]["foot_length_mm"] == measures["foot_length"]["value"]
     assert rows["S2"]["foot_length_mm"] is None
     assert str(film) in rows["S2"]["problem"]
+
+
+def test_a_table_that_cannot_be_written_hides_no_scan(footscan: Footscan, bench: Path) -> None:
+    archive = bench / "archive/P0001"
+    copy_scan(archive / "S1", archive / "S2", "cam5.avi")
+    (bench / "results/results.parquet").mkdir(parents=True)
+    done = footscan("run", bench / "workflow.yaml")
+    assert (done.returncode, done.stdout) == (3, f"P0001/S1: {bench / 'results/P0001/S1'}\n")
+    _, scan, table = done.stderr.splitlines()
+    assert scan == f"footscan: {archive / 'S2/cam5.avi'}: no such film"
+    assert table == f"footscan: {bench / 'results/results.parquet'}: cannot be written (Is a directory)"
+
+
+def test_a_cluster_without_a_name_is_refused(footscan: Footscan, bench: Path, mistake: Mistake) -> None:
+    done = footscan("run", bench / "workflow.yaml", "--cluster", "")
+    assert done.returncode == 2
+    assert mistake(done).startswith("--cluster: expected the address of a Dask scheduler")
 
 
 def test_a_cluster_that_nobody_runs_is_refused(command: Footscan, bench: Path, mistake: Mistake) -> None:

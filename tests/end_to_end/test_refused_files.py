@@ -159,11 +159,6 @@ def test_broken_stl(refuse: Refuse, measured: Path, tmp_path: Path, content: Cal
         assert told in line
 
 
-def test_a_cloud_is_no_reference(refuse: Refuse, measured: Path) -> None:
-    results = measured / "results/P0001/small"
-    assert "cloud.ply: holds no triangles" in refuse("compare", results / "foot.stl", results / "cloud.ply")
-
-
 @pytest.mark.parametrize("scale", [0.001, 1000.0])
 def test_a_foot_in_another_unit(refuse: Refuse, tmp_path: Path, scale: float) -> None:
     (tmp_path / "foot.stl").write_bytes(stl(scale))

@@ -6,6 +6,7 @@ import re
 import shutil
 import uuid
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,13 @@ from fsspec.implementations.memory import MemoryFileSystem
 
 from pipelines.archive import job_of_scan, job_of_workflow, plan_job, run_job
 from pipelines.engine import run as engine_run
-from pipelines.engine.pool import Threads
+from pipelines.engine.pool import StepEnd, Threads
 from pipelines.steps import measure
 from schemas.calibration import Calibration
 from schemas.documents import read_yaml
 from schemas.errors import Fault, Finding, RefusedInput
 from schemas.scan import Scan
+from schemas.workflow import ScanParameters
 
 
 def add_scan(archive: Any, name: str, old: str = "", new: str = "") -> Path:
@@ -63,6 +65,47 @@ def test_each_broken_scan_is_one_line_and_the_rest_is_whole(done: Any) -> None:
     assert [path.name for path in (done.root / "results/P0001").iterdir()] == ["S1"]
 
 
+def test_no_later_job_overwrites_the_scan_of_an_earlier_one(done: Any) -> None:
+    """As in a watch, where each scan that arrives is a job of its own."""
+    folders: dict[str, Path] = {}
+
+    def refused(folder: Path) -> list[str]:
+        planned = plan_job(replace(done.job(), folders=[folder]), folders=folders)
+        return [str(one.error) for one in planned.refused]
+
+    assert refused(done.scan) == refused(done.scan) == []
+    twin = add_scan(done, "S0", "scan: S0", "scan: S1")
+    assert refused(twin) == [f"{twin / 'scan.yaml'}: P0001/S1 is also in {done.scan}, expected each scan once"]
+    assert refused(done.scan) == []  # who came first keeps the name
+    document = done.scan / "scan.yaml"
+    document.write_text(document.read_text().replace("scan: S1", "scan: other"))
+    assert refused(twin) == []  # and has given it up
+    shutil.rmtree(twin)
+    assert refused(add_scan(done, "S2", "scan: other", "scan: S1")) == []
+
+
+def test_a_scan_that_lacks_a_film_is_told_by_its_name(done: Any) -> None:
+    (add_scan(done, "S2", "scan: S2", "scan: late") / "cam5.avi").unlink()
+    unreadable = add_scan(done, "S3", "side: right", "side: [right")
+    twin = add_scan(done, "S4", "scan: S4", "scan: S1")
+    (twin / "cam5.avi").unlink()
+    ends, _ = done.run()
+    assert [(end.scan, end.source.name) for end in ends] == [
+        ("P0001/late", "S2"), (str(unreadable), "S3"), (str(twin), "S4"), ("P0001/S1", "S1")
+    ]  # fmt: skip
+
+
+def test_what_cannot_be_remembered_of_films_is_no_fault(
+    archive: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("pipelines.engine.digest.SETTLED_NS", 0)
+    files = archive.root / "results/.footscan/files.json"
+    files.mkdir(parents=True)
+    [scan], _ = archive.run()
+    assert scan.problem is None
+    assert caplog.messages[-1] == f"{files}: cannot be written (Is a directory); the next run will read all films again"
+
+
 def test_finding_fails_its_scan_and_is_remembered(archive: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def none(*_: object) -> bytes:
         raise Finding("no foot in the surface")
@@ -86,6 +129,16 @@ def test_defect_costs_its_scan_and_is_tried_again(done: Any, monkeypatch: pytest
     scans, ran = done.run()
     assert [scan.problem for scan in scans] == [None, None]
     assert ran == {"P0001/S2/measure", "P0001/S2/report"}
+
+
+def test_equal_films_of_two_scans_that_start_together_are_gone_through_once(archive: Any) -> None:
+    add_scan(archive, "S2")
+    ends: list[StepEnd] = []
+    scans = list(run_job(plan_job(archive.job()), Threads(4), ends.append))
+    assert [scan.problem for scan in scans] == [None, None]
+    ran = sorted(end.step.kind for end in ends if end.ran)
+    once = ["clean", "cloud.ply", "extract", "extract", "foot.stl", "fuse", "map", "map"]
+    assert ran == sorted([*once, *4 * ["ingest"], "measure", "orient", "quality", "report", "report", "surface"])
 
 
 def test_equal_films_of_two_scans_are_computed_once(done: Any) -> None:
@@ -266,3 +319,15 @@ def test_cache_that_is_no_place_is_refused_before_anything(archive: Any, cache: 
         assert str(refused.value) == f"{archive.workflow}: cache: {cache}: {problem}"
         assert refused.value.exit_status == 2
     assert not (archive.root / "results").exists()
+
+
+def test_empty_parts_of_a_workflow(archive: Any) -> None:
+    text = archive.workflow.read_text()
+    archive.workflow.write_text(f"{text}parameters:\n  extraction:\n  outliers: {{gap_mm: 0.7}}\n")
+    parameters = archive.job().parameters
+    assert (parameters.extraction, parameters.outliers.gap_mm) == (ScanParameters().extraction, 0.7)
+    archive.workflow.write_text(f"{text}parameters:\n")
+    assert archive.job().parameters == ScanParameters()
+    archive.workflow.write_text(f"{text}cache: ''\n")
+    with pytest.raises(RefusedInput, match="cache: expected a folder or a URL, found ''"):
+        archive.job()

@@ -22,7 +22,7 @@ def rows(folder: Path) -> list[dict[str, Any]]:
 @pytest.fixture
 def ends(done: Any) -> list[ScanEnd]:
     scans, _ = done.run()
-    return [*scans, ScanEnd("P0002/S1", None, "cam3.avi: truncated, with a comma", "refused")]
+    return [*scans, ScanEnd("P0002/S1", done.scan, None, "cam3.avi: truncated, with a comma", "refused")]
 
 
 def test_rows_hold_measures_quality_versions_and_digests(ends: list[ScanEnd], tmp_path: Path) -> None:
@@ -50,6 +50,22 @@ def test_parquet_holds_the_same(ends: list[ScanEnd], tmp_path: Path) -> None:
     table = parquet.read_table(tmp_path / PARQUET).to_pylist()
     for of_parquet, of_csv in zip(table, rows(tmp_path), strict=True):
         assert {name: "" if cell is None else str(cell) for name, cell in of_parquet.items()} == of_csv
+
+
+def test_a_columns_type_does_not_depend_on_what_is_in_it(ends: list[ScanEnd], tmp_path: Path) -> None:
+    write_results_table(ends[:1], tmp_path / "good")
+    write_results_table(ends[1:], tmp_path / "bad")
+    good, bad = (parquet.read_schema(tmp_path / name / PARQUET) for name in ("good", "bad"))
+    assert [good.field(name).type for name in bad.names] == bad.types
+    types = {name: str(good.field(name).type) for name in good.names}
+    texts = {"scan", "status", "problem", "side", "software"} | {name for name in types if name.endswith("_sha256")}
+    counts = {"cameras", "frames_lost", "stripe_points", "cloud_points"}
+    counts |= {"mesh_vertices", "mesh_triangles", "mesh_open_edges", "mesh_non_manifold_edges", "mesh_components"}
+    counts |= {"mesh_holes"}
+    assert types.keys() >= {"mesh_largest_hole_mm", "mesh_filled_share", "mesh_worst_triangles"}
+    assert {name for name, kind in types.items() if kind == "string"} == texts
+    assert {name for name, kind in types.items() if kind == "int64"} == counts
+    assert {types[name] for name in types.keys() - texts - counts} == {"double"}
 
 
 def test_what_is_there_is_not_written_again(ends: list[ScanEnd], tmp_path: Path) -> None:

@@ -17,9 +17,9 @@ from schemas.calibration import Calibration
 from schemas.errors import RefusedInput
 from schemas.workflow import ScanParameters
 
-FROM_CLEAN = {"clean", "orient", "surface", "measure", "quality", "cloud.ply", "foot.stl", "report"}
+FROM_CLEAN = {"clean", "fuse", "orient", "surface", "measure", "quality", "cloud.ply", "foot.stl", "report"}
 CAMERAS = {f"{kind}-{camera}" for kind in ("ingest", "extract", "map") for camera in (1, 5)}
-ALL = CAMERAS | {"fuse"} | FROM_CLEAN
+ALL = CAMERAS | FROM_CLEAN
 
 
 def change_byte(film: Path) -> None:
@@ -49,7 +49,7 @@ def test_nothing_has_run(archive: Any) -> None:
     assert (steps, set(reasons)) == (15, ALL)
     assert reasons["ingest-1"] == "cam1 is not there"
     assert reasons["extract-5"] == "waits for ingest of camera 5"
-    assert reasons["clean"] == "waits for fuse"
+    assert reasons["clean"] == "waits for map of camera 1"
     assert not archive.results.exists()
 
 
@@ -66,10 +66,10 @@ def test_second_run_does_nothing(done: Any) -> None:
 
 
 def test_another_outlier_parameter_runs_from_the_filter_on(done: Any) -> None:
-    done.set_parameters("{outliers: {neighbours: 20}}")
+    done.set_parameters("{outliers: {shortest: 2}}")
     _, reasons = done.plan()
     assert set(reasons) == FROM_CLEAN
-    assert reasons["clean"] == "parameter neighbours changed"
+    assert reasons["clean"] == "parameter shortest changed"
     _, ran = done.run()
     assert "clean" in ran
     assert ran <= FROM_CLEAN

@@ -61,6 +61,29 @@ def test_a_scan_that_changes_comes_again(arriving: tuple[Path, Path]) -> None:
     assert arrivals.complete() == [folder]
 
 
+def test_films_of_a_clock_that_is_ahead_are_quiet_once_they_stay_as_they_are(
+    arriving: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    archive, scan = arriving
+    folder = archive / "P0001/S1"
+    shutil.copytree(scan, folder)
+    age(folder, -86400)
+    clock = 100.0
+    monkeypatch.setattr("pipelines.watch.time.monotonic", lambda: clock)
+    arrivals = Arrivals(archive)
+    assert arrivals.complete() == []
+    clock += 0.9 * QUIET_S
+    film = folder / "cam5.avi"
+    film.write_bytes(film.read_bytes() + b"more")
+    age(folder, -86400)
+    assert arrivals.complete() == []
+    clock += 0.9 * QUIET_S
+    assert arrivals.complete() == []
+    clock += 0.2 * QUIET_S
+    assert arrivals.complete() == [folder]
+    assert arrivals.complete() == []
+
+
 def test_a_broken_document_is_handed_over_to_be_refused(arriving: tuple[Path, Path]) -> None:
     archive, _ = arriving
     folder = archive / "P0001/S1"

@@ -3,6 +3,7 @@ import pytest
 
 from footscan.cloud.mapping import map_stripe
 from footscan.cloud.points import coordinates
+from footscan.stripe.points import STRIPE_DTYPE
 from schemas.calibration import CameraCalibration, PolynomialMap
 from schemas.errors import RefusedInput
 from schemas.parameters.mapping import MappingParameters
@@ -18,7 +19,11 @@ CAMERA = CameraCalibration(
 
 
 def stripe(*rows: tuple[int, float, float]) -> np.ndarray:
-    return np.array(list(rows), [("frame", "<i4"), ("i", "<f8"), ("j", "<f8")])
+    points = np.zeros(len(rows), STRIPE_DTYPE)
+    for name, column in zip(("frame", "i", "j"), zip(*rows, strict=True), strict=False):
+        points[name] = column
+    points["sigma"] = 0.1
+    return points
 
 
 def test_world_points_by_hand() -> None:
@@ -29,6 +34,8 @@ def test_world_points_by_hand() -> None:
     assert points["source"].tolist() == [0, 1]
     assert points["frame"].tolist() == [0, 2]
     assert set(points["camera"].tolist()) == {4}
+    # Each stands alone, along the columns: 0.1 px across that, at 0.2 mm/px.
+    np.testing.assert_allclose(points["sigma"], 0.1 * 0.2, rtol=1e-6)
 
 
 def test_points_far_from_all_control_points_are_marked_and_kept() -> None:

@@ -1,89 +1,257 @@
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from footscan.cloud.outliers import remove_outliers
-from footscan.cloud.points import coordinates, make_points
+from footscan.cloud.outliers import REASONS, Removed, remove_outliers
+from footscan.cloud.points import POINT_DTYPE, make_points
+from footscan.cloud.views import View
 from schemas.parameters.outliers import OutlierParameters
 
-
-def sheet(z: float = 10.0) -> np.ndarray:
-    """A plane of 30 stripes 2 mm apart, 80 points 0.5 mm apart in each."""
-    x, y = np.meshgrid(np.arange(30) * 2.0, np.arange(80) * 0.5 - 20, indexing="ij")
-    return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, z)])
+Film = Callable[..., tuple[np.ndarray, np.ndarray]]
+Views = dict[int, View]
 
 
-def filmed(points: np.ndarray, camera: int, **more: object) -> np.ndarray:
-    """A cloud of one camera whose frame k stands at X = 2 k mm."""
-    frame = np.nan_to_num(np.round(points[:, 0] / 2)).astype(int)
-    return make_points(points, camera=camera, frame=frame, **more)
+WITH_ENDS = OutlierParameters(end_points=0)
+"""What other tests look at is told more easily where the ends of stripes stay."""
 
 
-def cleaned(extra: list[list[float]], **more: object) -> tuple[np.ndarray, dict[str, int]]:
-    cloud = np.concatenate([filmed(sheet(), camera=1), filmed(np.array(extra), camera=5, **more)])
-    kept, removed = remove_outliers(cloud, OutlierParameters())
-    assert removed[1] == dict.fromkeys(removed[1], 0)
-    np.testing.assert_array_equal(coordinates(kept), sheet())
-    return kept, removed[5]
+def line(camera: int, frame: int, start: tuple[float, float], end: tuple[float, float], count: int = 40) -> np.ndarray:
+    """A piece of stripe that is straight in Y and Z, in a frame of the even travel with 2 mm a step."""
+    part = np.linspace(0, 1, count)[:, None]
+    yz = (1 - part) * np.array(start) + part * np.array(end)
+    rows = 1_000_000 + np.arange(count)
+    return make_points(np.column_stack([np.full(count, 2.0 * frame), yz]), camera=camera, frame=frame, source=rows)
 
 
-def test_a_clean_cloud_stays_as_it_is() -> None:
-    cloud = filmed(sheet(), camera=1)
-    kept, removed = remove_outliers(cloud, OutlierParameters())
-    assert kept.tobytes() == cloud.tobytes()
-    assert removed == {1: {"volume": 0, "unsupported": 0, "distant": 0, "off_surface": 0, "island": 0}}
+def dropped(clean: np.ndarray, spoilt: np.ndarray, views: Views, **parameters: object) -> dict[str, int]:
+    """Why how many of `spoilt` are dropped, of a scan of whose other points none may be."""
+    points = np.concatenate([clean, spoilt])
+    kept, removed = remove_outliers(points, views, OutlierParameters(**{"end_points": 0, **parameters}))
+    assert not removed.codes[: len(clean)].any()
+    assert kept.tobytes() == points[removed.codes == 0].tobytes()
+    codes = removed.codes[len(clean) :]
+    return {reason: int(np.sum(codes == k)) for k, reason in enumerate(REASONS, start=1) if np.any(codes == k)}
 
 
-def test_points_outside_the_control_volume() -> None:
-    _, removed = cleaned([[10.0, 90.0, 10.0], [10.0, 0.0, -4.0], [10.0, 0.0, 200.0], [np.nan, 0.0, 10.0]])
-    assert removed == {"volume": 4, "unsupported": 0, "distant": 0, "off_surface": 0, "island": 0}
+def test_counts_stand_for_each_camera_and_reason(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    spoilt = line(5, 30, (100.0, 20.0), (110.0, 20.0), 12)
+    _, removed = remove_outliers(np.concatenate([spoilt, clean]), views, WITH_ENDS)
+    assert isinstance(removed, Removed)
+    assert removed.codes.shape == (12 + len(clean),)
+    assert set(removed.counts) == set(range(1, 9))
+    assert removed.counts[5] == {**dict.fromkeys(REASONS, 0), "volume": 12}
+    assert removed.counts[1] == dict.fromkeys(REASONS, 0)
 
 
-def test_unsupported_points() -> None:
-    _, removed = cleaned([[10.0, 0.1, 10.0], [12.0, 0.1, 10.0]], supported=False)
-    assert removed["unsupported"] == 2
+@pytest.mark.parametrize(
+    "more",
+    [
+        {},
+        {"step": 0.5},
+        {"step": 5.0},
+        {"offsets": {1: 0.5, 4: 1.0, 6: 1.3}},
+    ],
+)
+def test_a_clean_scan_loses_nothing(ellipsoid: Film, views: Views, more: dict[str, object]) -> None:
+    clean, _ = ellipsoid(**more)
+    kept, _ = remove_outliers(clean, views, WITH_ENDS)
+    assert kept.tobytes() == clean.tobytes()
 
 
-def test_unsupported_points_may_stay() -> None:
-    cloud = filmed(sheet(), camera=1, supported=False)
-    kept, _ = remove_outliers(cloud, OutlierParameters(drop_unsupported=False))
-    assert len(kept) == len(cloud)
+def test_lost_frames_and_uneven_steps_cost_nothing(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    there = ~np.isin(clean["frame"], [20, 31, 32]) & ~((clean["camera"] == 3) & (clean["frame"] > 35))
+    clean = clean[there]
+    clean["x"] += 0.8 * np.sin(clean["frame"])
+    kept, _ = remove_outliers(clean, views, WITH_ENDS)
+    assert len(kept) == len(clean)
 
 
-def test_a_lonely_point_is_distant() -> None:
-    _, removed = cleaned([[30.0, 0.0, 40.0]])
-    assert removed["distant"] == 1
+@pytest.mark.parametrize("missing", [(2,), (1, 2), (5, 6, 7, 8), (1, 2, 3, 4, 5, 6, 7)])
+def test_missing_cameras_cost_nothing(ellipsoid: Film, views: Views, missing: tuple[int, ...]) -> None:
+    clean, _ = ellipsoid()
+    clean = clean[~np.isin(clean["camera"], missing)]
+    kept, _ = remove_outliers(clean, views, WITH_ENDS)
+    assert len(kept) == len(clean)
 
 
-def test_a_point_close_above_the_sheet_is_off_the_surface() -> None:
-    _, removed = cleaned([[30.0, 0.0, 11.2]])
-    assert removed["off_surface"] == 1
+def test_gaps_in_the_stripes_of_one_camera_cost_the_others_nothing(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    clean = clean[~((clean["camera"] == 1) & (clean["z"] > 35) & (clean["z"] < 38))]
+    kept, _ = remove_outliers(clean, views, WITH_ENDS)
+    assert len(kept) == len(clean)
 
 
-def test_a_glint_that_is_dense_within_its_plane_is_dropped() -> None:
-    glint = [[30.0, 0.5 * k, 60.0] for k in range(20)]
-    _, removed = cleaned(glint)
-    assert sum(removed.values()) == 20
+def test_the_order_of_points_does_not_matter(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    points = np.concatenate([clean, line(1, 30, (10.0, 70.0), (14.0, 70.0))])
+    order = np.random.default_rng(1).permutation(len(points))
+    _, removed = remove_outliers(points, views, WITH_ENDS)
+    _, shuffled = remove_outliers(points[order], views, WITH_ENDS)
+    np.testing.assert_array_equal(shuffled.codes, removed.codes[order])
 
 
-def test_a_small_island_is_dropped() -> None:
-    patch = [[x, y, 60.0] for x in (20.0, 22.0, 24.0, 26.0) for y in np.arange(9) * 0.5]
-    _, removed = cleaned(patch)
-    assert sum(removed.values()) == 36
-    assert removed["island"] >= 1
+def test_outside_the_control_volume(ellipsoid: Film, views: Views) -> None:
+    spoilt = make_points(
+        np.array([[60.0, 90.0, 10.0], [60.0, 0.0, -160.0], [60.0, 0.0, 200.0], [np.nan, 0.0, 10.0]]), camera=3
+    )
+    assert dropped(ellipsoid()[0], spoilt, views) == {"volume": 4}
 
 
-def test_two_large_parts_stay() -> None:
-    cloud = filmed(np.concatenate([sheet(10.0), sheet(60.0)]), camera=1)
-    assert len(remove_outliers(cloud, OutlierParameters())[0]) == len(cloud)
+def test_extrapolated(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    spoilt = clean[:100].copy()
+    spoilt["supported"] = False
+    assert dropped(clean, spoilt, views) == {"extrapolated": 100}
+    assert dropped(clean, spoilt, views, drop_unsupported=False) == {}
+
+
+def test_a_glint_in_one_frame_is_isolated(ellipsoid: Film, views: Views) -> None:
+    assert dropped(ellipsoid()[0], line(1, 30, (-5.0, 58.0), (5.0, 62.0)), views) == {"isolated": 40}
+
+
+def test_speckles_are_isolated(ellipsoid: Film, views: Views) -> None:
+    spoilt = np.concatenate([line(2, frame, (0.0, 60.0 + frame), (0.1, 60.0 + frame), 2) for frame in (10, 25, 40)])
+    assert dropped(ellipsoid()[0], spoilt, views) == {"isolated": 6}
+
+
+def above(clean: np.ndarray, camera: int, by_mm: float) -> np.ndarray:
+    """What one camera sees of the top, in 16 frames, so much higher."""
+    ghost = clean[(clean["camera"] == camera) & (clean["z"] > 42) & (abs(clean["frame"] - 30) < 8)].copy()
+    ghost["z"] += by_mm
+    ghost["source"] += 1_000_000
+    return ghost
+
+
+@pytest.mark.parametrize("by_mm", [8.0, 20.0])
+def test_a_ghost_that_no_other_camera_sees_is_unconfirmed(ellipsoid: Film, views: Views, by_mm: float) -> None:
+    clean, _ = ellipsoid()
+    ghost = above(clean, 1, by_mm)
+    found = dropped(clean, ghost, views)
+    assert found["unconfirmed"] > 0.8 * len(ghost)
+    assert sum(found.values()) == len(ghost)  # what is left of it is a small part of its own
+
+
+def test_what_lies_inside_the_foot_was_not_seen(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    ghost = above(clean, 1, -10.0)
+    assert dropped(clean, ghost, views) == {"unconfirmed": len(ghost)}
+
+
+def test_few_cameras_do_not_judge_each_other(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    clean = clean[clean["camera"] <= 3]
+    assert dropped(clean, above(clean, 1, 8.0), views) == {}
+
+
+def test_cameras_of_unknown_place_are_not_asked(ellipsoid: Film) -> None:
+    clean, _ = ellipsoid()
+    assert dropped(clean, above(clean, 1, 8.0), {}) == {}
+
+
+def test_the_mirror_image_in_the_glass(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    mirrored = clean[(clean["camera"] <= 4) & (clean["z"] > 1) & (clean["z"] < 15)].copy()
+    mirrored["z"] *= -1
+    mirrored["source"] += 1_000_000
+    assert dropped(clean, mirrored, views) == {"glass": len(mirrored)}
+
+
+def test_the_glass_beside_the_foot(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    shown = [line(camera, frame, (40.0, 0.1), (60.0, -0.1)) for camera in (5, 6) for frame in range(60)]
+    before = [line(camera, frame, (-30.0, 0.2), (30.0, 0.2)) for camera in (5, 6) for frame in (-8, -7, -6, 66, 67)]
+    assert dropped(clean, np.concatenate(shown + before), views) == {"glass": 60 * 2 * 40 + 5 * 2 * 40}
+
+
+def test_what_travels_with_the_heads_is_clutter(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    spoilt = np.concatenate([line(3, frame, (-60.0, 40.0), (-55.0, 50.0)) for frame in range(-30, 90)])
+    assert dropped(clean, spoilt, views) == {"clutter": len(spoilt)}
+
+
+def test_what_the_foot_hides_for_a_while_is_clutter_too(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    spoilt = [line(3, frame, (-60.0, 40.0), (-55.0, 50.0)) for frame in range(-30, 90) if not 10 < frame < 50]
+    assert dropped(clean, np.concatenate(spoilt), views) == {"clutter": 40 * len(spoilt)}
+
+
+def test_a_small_part_apart_from_the_rest_is_clutter(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    island = [line(camera, frame, (-4.0, 100.0), (4.0, 100.0), 20) for camera in (1, 2, 3) for frame in (29, 30, 31)]
+    assert dropped(clean, np.concatenate(island), views) == {"clutter": 9 * 20}
+
+
+def block(views: Views) -> np.ndarray:
+    """A cuboid 80 x 60 x 50 mm on the glass as the cameras see it: each sees its own side, and top or bottom."""
+    parts = []
+    for camera, view in views.items():
+        side = 30.0 * np.sign(view.centre[1])
+        level = 50.0 if view.centre[2] > 0 else 0.0
+        across = np.column_stack([np.arange(-30.0, 30.1, 0.4), np.full(151, level)])
+        upright = np.column_stack([np.full(124, side), np.arange(0.4, 49.9, 0.4)])
+        for frame in range(41):
+            for number, yz in enumerate((across, upright) if view.centre[2] > 0 else (across,)):
+                xyz = np.column_stack([np.full(len(yz), 2.0 * frame), yz])
+                rows = np.arange(len(yz)) + 1000 * number
+                parts.append(make_points(xyz, camera=camera, frame=frame, source=rows))
+    return np.concatenate(parts)
+
+
+def test_a_block_keeps_its_edges(views: Views) -> None:
+    points = block(views)
+    kept, _ = remove_outliers(points, views, WITH_ENDS)
+    assert len(kept) == len(points)
+
+
+def test_a_block_is_no_clutter_where_clutter_is(views: Views) -> None:
+    spoilt = np.concatenate([line(3, frame, (-60.0, 40.0), (-55.0, 50.0)) for frame in range(-30, 70)])
+    assert dropped(block(views), spoilt, views) == {"clutter": len(spoilt)}
 
 
 @pytest.mark.parametrize("count", [0, 1, 5])
-def test_few_points(count: int) -> None:
-    cloud = make_points(np.zeros((count, 3)), camera=1)
-    assert len(remove_outliers(cloud, OutlierParameters())[0]) == count
+def test_few_points(views: Views, count: int) -> None:
+    kept, removed = remove_outliers(make_points(np.zeros((count, 3)), camera=1), views, WITH_ENDS)
+    assert len(kept) + sum(removed.counts.get(1, {}).values()) == count
+
+
+def test_points_without_coordinates(views: Views) -> None:
+    points = make_points(np.full((3, 3), np.nan), camera=2)
+    kept, removed = remove_outliers(points, views, WITH_ENDS)
+    assert kept.dtype == POINT_DTYPE
+    assert len(kept) == 0
+    assert removed.counts[2]["volume"] == 3
+
+
+def test_one_plane_and_doubled_points(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    plane = clean[clean["frame"] == 30]
+    assert len(remove_outliers(plane, views, WITH_ENDS)[0]) == len(plane)
+    doubled = np.concatenate([clean, clean])
+    assert len(remove_outliers(doubled, views, WITH_ENDS)[0]) == len(doubled)
 
 
 def test_ranges_are_ordered() -> None:
     with pytest.raises(ValidationError, match="lower limit first"):
         OutlierParameters(y_mm=(5.0, -5.0))
+
+
+def test_ends_that_another_camera_sees_within_its_stripe_are_dropped(views: Views) -> None:
+    """On a level sheet: camera 1 sees Y from -20 to 20, camera 3 from -10 to 40."""
+    first = np.concatenate([line(1, frame, (-20.0, 40.0), (20.0, 40.0), 81) for frame in range(20)])
+    third = np.concatenate([line(3, frame, (-10.0, 40.0), (40.0, 40.0), 101) for frame in range(20)])
+    kept, removed = remove_outliers(np.concatenate([first, third]), views, OutlierParameters())
+    code = 1 + REASONS.index("end")
+    of_first, of_third = np.split(removed.codes, [len(first)])
+    np.testing.assert_array_equal(of_first == code, first["y"] > 18.2)
+    np.testing.assert_array_equal(of_third == code, third["y"] < -8.2)
+    assert len(kept) == len(first) + len(third) - 2 * 4 * 20
+    assert removed.counts[1]["end"] == removed.counts[3]["end"] == 4 * 20
+
+
+def test_ends_that_nobody_else_sees_stay(views: Views) -> None:
+    alone = np.concatenate([line(1, frame, (-20.0, 40.0), (20.0, 40.0), 81) for frame in range(20)])
+    assert len(remove_outliers(alone, views, OutlierParameters())[0]) == len(alone)

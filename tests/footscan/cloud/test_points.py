@@ -1,6 +1,6 @@
 import numpy as np
 
-from footscan.cloud.points import POINT_DTYPE, coordinates, make_points, stripe_step
+from footscan.cloud.points import POINT_DTYPE, UNKNOWN_SIGMA_MM, coordinates, make_points, stripe_step
 
 
 def test_fields_and_coordinates() -> None:
@@ -8,11 +8,13 @@ def test_fields_and_coordinates() -> None:
     assert points.dtype == POINT_DTYPE
     assert points["camera"].tolist() == [3, 3]
     assert points["frame"].tolist() == [7, 8]
+    assert points["cameras"].tolist() == [1, 1]
+    np.testing.assert_array_equal(points["sigma"], np.float32(UNKNOWN_SIGMA_MM))
     np.testing.assert_array_equal(coordinates(points), [[1.0, 2.0, 3.0], [400.0, -5.5, 0.25]])
 
 
 def test_layout_is_the_same_on_every_machine() -> None:
-    assert POINT_DTYPE.itemsize == 22
+    assert POINT_DTYPE.itemsize == 27
     assert POINT_DTYPE["x"].str == "<f4"
     assert POINT_DTYPE["source"].str == "<i4"
 

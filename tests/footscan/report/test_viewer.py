@@ -22,3 +22,35 @@ def test_the_digest_is_the_scripts():
     digest = base64.b64encode(hashlib.sha256(SCRIPT.encode()).digest()).decode()
     assert f"sha256-{digest}" == SCRIPT_DIGEST
     assert "</" not in SCRIPT
+
+
+def test_a_surface_in_shreds_stays_within_16_bits():
+    """30,000 triangles that are not joined cannot become fewer: those that have numbers are shown, whole."""
+    corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    places = np.arange(30_000)
+    vertices = (corner + np.column_stack([places % 200 * 2, places // 200 * 2, places * 0])[:, None]).reshape(-1, 3)
+    page = viewer(vertices, np.arange(90_000).reshape(-1, 3), np.full((90_000, 3), 9, np.uint8))
+    data = {name: base64.b64decode(text) for name, text in re.findall(r'data-(\w+)="([^"]*)"', page)}
+    points = np.frombuffer(data["points"], "<i2").reshape(-1, 3).astype(int)
+    shown = np.frombuffer(data["faces"], "<u2").reshape(-1, 3)
+    assert len(shown) == 2**16 // 3
+    legs = points[shown][:, 1:] - points[shown][:, :1]
+    # The plane is 399 by 299 mm, and half its diagonal 32767: 1 mm is 131 or 132.
+    assert set(np.abs(legs).max(axis=(1, 2))) <= {131, 132}
+
+
+def test_a_large_surface_is_shown_with_fewer_triangles():
+    row, column = np.divmod(np.arange(101**2), 101)
+    vertices = np.column_stack([column, row, 0 * row]).astype(float)
+    corner = (np.arange(100)[:, None] * 101 + np.arange(100)).ravel()
+    faces = np.concatenate(
+        [np.column_stack([corner, corner + 1, corner + 101]), np.column_stack([corner + 1, corner + 102, corner + 101])]
+    )
+    colours = np.column_stack([2 * column, row, 0 * row + 50]).astype(np.uint8)
+    page = viewer(vertices, faces, colours)
+    data = {name: base64.b64decode(text) for name, text in re.findall(r'data-(\w+)="([^"]*)"', page)}
+    assert len(data["faces"]) // 6 in (11_999, 12_000)
+    points = np.frombuffer(data["points"], "<i2").reshape(-1, 3) / 32767 * np.hypot(50, 50) + [50, 50, 0]
+    shades = np.frombuffer(data["colours"], "u1").reshape(-1, 3)
+    np.testing.assert_allclose(shades[:, 0], 2 * points[:, 0], atol=3)
+    assert set(shades[:, 2]) == {50}

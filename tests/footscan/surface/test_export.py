@@ -1,15 +1,22 @@
+import os
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
-from footscan.surface.export import cloud_ply_bytes, read_mesh, read_points, read_shape, stl_bytes
+from footscan.surface.export import mesh_bytes, read_file, read_mesh, read_points, read_shape
+from footscan.surface.formats.ply import ply_of
+from footscan.surface.formats.stl import stl_bytes
+from footscan.surface.mesh import Mesh
 from schemas.errors import RefusedInput
 
 VERTICES = np.array([[0.0, 0, 0], [10, 0, 0], [0, 20, 0], [0, 0, 30]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], np.int32)
+UPWARDS = np.tile([0.0, 0.0, 1.0], (4, 1))
+CLOUD = Mesh(VERTICES, FACES[:0], UPWARDS, camera=np.array([1, 2, 3, 8], np.uint8))
 
 
 def refused(path: Path, problem: str) -> None:
@@ -42,8 +49,7 @@ def test_a_second_reader_reads_our_stl(tmp_path: Path) -> None:
 
 def test_a_second_reader_reads_our_cloud(tmp_path: Path) -> None:
     path = tmp_path / "cloud.ply"
-    normals = np.tile([0.0, 0.0, 1.0], (4, 1))
-    path.write_bytes(cloud_ply_bytes(VERTICES, normals, np.array([1, 2, 3, 8])))
+    path.write_bytes(ply_of(CLOUD))
     header = path.read_bytes().partition(b"end_header")[0].decode().splitlines()
     assert header[:3] == ["ply", "format binary_little_endian 1.0", "comment unit mm"]
     assert header[-1] == "property uchar camera"
@@ -54,7 +60,7 @@ def test_a_second_reader_reads_our_cloud(tmp_path: Path) -> None:
 
 
 def test_a_comment_cannot_break_the_header() -> None:
-    header = cloud_ply_bytes(VERTICES, VERTICES, np.zeros(4, int), ("a\nelement vertex 9",)).partition(b"end_header")[0]
+    header = ply_of(replace(CLOUD, metadata={"scan": "a\nelement vertex 9"})).partition(b"end_header")[0]
     assert header.count(b"\nelement vertex") == 1
 
 
@@ -93,9 +99,61 @@ def test_big_endian_ply_with_other_elements_and_quads(tmp_path: Path) -> None:
     assert faces.tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
+def test_what_is_known_of_a_mesh_comes_back(tmp_path: Path) -> None:
+    known = Mesh(
+        VERTICES,
+        FACES,
+        UPWARDS,
+        colours=np.array([[0, 1, 2], [10, 20, 30], [255, 0, 0], [1, 1, 1]], np.uint8),
+        camera=np.array([0, 3, 255, 8], np.uint8),
+        filled=np.array([True, False, False, True]),
+        metadata={"unit": "mm", "patient": "P0001", "side": "left", "software": "footscan 0.1.0"},
+    )
+    (tmp_path / "foot.ply").write_bytes(mesh_bytes(known, ".ply"))
+    found = read_file(tmp_path / "foot.ply")
+    for name in ("vertices", "faces", "normals", "colours", "camera", "filled"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
+        assert getattr(found, name).dtype == getattr(known, name).dtype
+    assert found.metadata == known.metadata
+    (tmp_path / "foot.obj").write_bytes(mesh_bytes(known, ".obj"))
+    np.testing.assert_array_equal(read_file(tmp_path / "foot.obj").colours, known.colours)
+    (tmp_path / "foot.stl").write_bytes(mesh_bytes(known, ".stl"))
+    assert read_file(tmp_path / "foot.stl").metadata == {
+        "unit": "mm",
+        "side": "left",
+        "patient": "P0001",
+        "software": "footscan_0.1.0",
+    }
+
+
+def test_colours_of_text_and_of_shares(tmp_path: Path) -> None:
+    path = tmp_path / "text.ply"
+    properties = "".join(
+        f"property {kind} {name}\n"
+        for kind, name in [*(("float", c) for c in "xyz"), *(("float", c) for c in ("red", "green", "blue"))]
+    )
+    path.write_text(
+        f"ply\nformat ascii 1.0\nelement vertex 2\n{properties}end_header\n0 0 0 255 0 128\n1 1 1 7 300 nan\n"
+    )
+    assert read_file(path).colours.tolist() == [[255, 0, 128], [7, 255, 0]]
+    path.write_text(f"ply\nformat ascii 1.0\nelement vertex 1\n{properties}end_header\n0 0 0 1 0 0.5\n")
+    assert read_file(path).colours.tolist() == [[255, 0, 128]]
+
+
+def test_another_unit(tmp_path: Path) -> None:
+    path = tmp_path / "foot.ply"
+    path.write_bytes(mesh_bytes(Mesh(VERTICES, FACES, metadata={"unit": "m"}), ".ply"))
+    refused(path, "unit: is in 'm', expected mm")
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "foot.stl")
+    refused(tmp_path / "foot.stl", "cannot be read")
+
+
 def test_a_cloud_is_no_mesh(tmp_path: Path) -> None:
     path = tmp_path / "cloud.ply"
-    path.write_bytes(cloud_ply_bytes(VERTICES, VERTICES, np.zeros(4, int)))
+    path.write_bytes(ply_of(CLOUD))
     with pytest.raises(RefusedInput, match="no triangles"):
         read_mesh(path)
 

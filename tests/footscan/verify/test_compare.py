@@ -1,8 +1,16 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 import trimesh
 
-from footscan.verify.compare import compare, distances, signed_distances
+from footscan.surface.export import Shape
+from footscan.surface.mesh import Mesh
+from footscan.verify import compare as compare_module
+from footscan.verify import distances
+from footscan.verify.compare import apart_mm, cloud_normals, compare, moved, vertex_distances
+from footscan.verify.regions import foot_regions
+from footscan.virtual.foot import make_foot
 from schemas.errors import RefusedInput
 
 NOTHING = np.zeros((0, 3), np.int32)
@@ -11,18 +19,6 @@ NOTHING = np.zeros((0, 3), np.int32)
 def box(size: float, centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
     mesh = trimesh.creation.box(extents=(size, size, size))
     return np.asarray(mesh.vertices) + np.array(centre), np.asarray(mesh.faces, np.int32)
-
-
-def test_distances_by_hand() -> None:
-    points = np.array([[0.0, 0, 0], [0, 0, 7], [5, 5, 5], [8, 9, 5], [4, 0, 0]])
-    np.testing.assert_allclose(signed_distances(points, box(10.0)), [-5, 2, 0, 5, -1], atol=1e-5)
-    np.testing.assert_allclose(distances(points, box(10.0)), [5, 2, 0, 5, 1], atol=1e-5)
-
-
-def test_far_from_the_origin_nothing_is_lost() -> None:
-    centre = (1e5, -2e5, 3e5)
-    points = np.array(centre) + np.array([[0.0, 0, 5.001], [0, 0, 4.999]])
-    np.testing.assert_allclose(signed_distances(points, box(10.0, centre)), [0.001, -0.001], atol=2e-6)
 
 
 def test_a_cloud_by_hand() -> None:
@@ -53,18 +49,150 @@ def test_a_mesh_is_sampled_by_its_area_not_by_its_vertices() -> None:
     assert result.signed_mean == pytest.approx((outside - inside) / 600, rel=0.03)
 
 
-def test_the_orientation_of_faces_does_not_decide_what_is_inside() -> None:
+def test_a_cloud_to_a_cloud() -> None:
+    x, y = (grid.ravel() for grid in np.meshgrid(np.arange(10.0), np.arange(10.0)))
+    plane = np.column_stack([x, y, np.zeros(100)])
+    upward = np.tile([0.0, 0, 1], (100, 1))
+    above = plane + np.array([0.4, 0, 0.3])
+    unsigned = compare((above, NOTHING), (plane, NOTHING), classes=8)
+    assert unsigned.mean == pytest.approx(0.5)
+    assert unsigned.signed_mean is None
+    assert [classes.signed for classes in unsigned.histograms] == [False]
+    signed = compare((above, NOTHING), (plane, NOTHING), normals_b=-upward, classes=8)
+    assert (signed.mean, signed.signed_mean) == pytest.approx((0.5, -0.3))
+    assert (signed.signed_std, signed.signed_min, signed.signed_max) == pytest.approx((0, -0.3, -0.3), abs=1e-6)
+    assert [classes.signed for classes in signed.histograms] == [False, True]
+
+
+def test_a_mesh_to_a_cloud_and_the_other_way() -> None:
+    # The cloud is the lower half of the box's bottom: what is there of it lies on the box, but little of the box is.
     vertices, faces = box(10.0)
-    assert signed_distances(np.zeros((1, 3)), (vertices, faces[:, ::-1]))[0] == pytest.approx(-5.0)
+    x, y = (grid.ravel() for grid in np.meshgrid(np.arange(-5, 5.1, 0.1), np.arange(-5, 0.01, 0.1)))
+    cloud = np.column_stack([x, y, np.full(len(x), -5.0)]), NOTHING
+    found = compare(cloud, (vertices, faces), both=True)
+    assert found.max == pytest.approx(0, abs=1e-5)
+    assert found.completeness is not None
+    assert found.completeness.points == 200_000
+    # Within 1 mm: half of the bottom and 1 mm of it beyond, 1 mm of one side, and that of two sides along half their
+    # length, with a quarter of a circle at the end.
+    area = 50 + 10 + 10 + 2 * (5 + np.pi / 4)
+    assert found.completeness.within_share == pytest.approx(area / 600, rel=0.01)
+    assert found.completeness.max == pytest.approx(np.hypot(10, 5), rel=0.01)
+    back = compare((vertices, faces), cloud)
+    assert back.model_dump(exclude={"unit", "transform", "histograms", "completeness"}) == {
+        **found.completeness.model_dump(exclude={"within_mm", "within_share"})
+    }
 
 
-def test_the_same_at_every_call_and_across_blocks() -> None:
+def test_regions_are_parts_of_the_whole() -> None:
+    foot = make_foot(resolution_mm=2.0)
+    shifted = foot.vertices + np.array([0.0, 0, 0.2]), foot.faces
+    found = compare(shifted, (foot.vertices, foot.faces), both=True)
+    assert [region.region for region in found.regions] == ["sole", "heel", "midfoot", "ball", "toes", "ankle"]
+    counts = [region.points or 0 for region in found.regions]
+    assert sum(counts) == found.points == 200_000
+    means = [region.mean for region in found.regions]
+    assert np.average(means, weights=counts) == pytest.approx(found.mean)
+    assert max(region.max for region in found.regions) == found.max
+    # Lifted by 0.2 mm, a surface moves out by 0.2 mm times the rise of its normal.
+    mesh = trimesh.Trimesh(foot.vertices, foot.faces, process=False)
+    regions = foot_regions((foot.vertices, foot.faces))
+    assert regions is not None
+    region_of = regions.of(mesh.triangles_center)
+    for row, region in enumerate(found.regions):
+        rise = np.average(mesh.face_normals[region_of == row, 2], weights=mesh.area_faces[region_of == row])
+        assert region.signed_mean == pytest.approx(0.2 * rise, abs=0.01), region.region
+    assert found.completeness is not None
+    assert len(found.completeness.regions) == 6
+    assert compare(box(10.0), box(9.0)).regions == []
+
+
+def test_the_same_at_every_call() -> None:
     a, b = box(10.0), box(9.0, (0.3, 0.2, 0.1))
-    assert compare(a, b) == compare(a, b)
+    assert compare(a, b, classes=70, both=True) == compare(a, b, classes=70, both=True)
 
 
-def test_an_empty_shape_is_refused() -> None:
-    with pytest.raises(RefusedInput, match="expected"):
-        compare((np.zeros((1, 3)), NOTHING), (np.zeros((0, 3)), NOTHING))
-    with pytest.raises(RefusedInput, match="expected"):
-        compare((np.zeros((0, 3)), NOTHING), box(1.0))
+def test_a_mesh_of_one_part_in_another_place() -> None:
+    assert apart_mm(box(2.0), box(2.0, (10.0, 0, 0))) == 8
+    assert apart_mm(box(2.0), box(2.0, (5.0, 6.0, 1.0))) == 5
+    assert apart_mm(box(2.0), box(2.0, (1.9, 0, 0))) == 0
+
+
+def test_what_is_moved_beforehand() -> None:
+    vertices, faces = box(10.0)
+    normals = vertices / np.sqrt(75)
+    turned = moved(Mesh(vertices, faces, normals), [[0, -1, 0, 3], [1, 0, 0, 4], [0, 0, 1, 5], [0, 0, 0, 1]])
+    assert compare((turned.vertices, turned.faces), box(10.0, (3.0, 4.0, 5.0))).max == pytest.approx(0, abs=1e-5)
+    assert turned.normals is not None
+    np.testing.assert_allclose(turned.normals, (turned.vertices - [3, 4, 5]) / np.sqrt(75), atol=1e-12)
+    assert moved(Mesh(vertices, faces), np.eye(4).tolist()).normals is None
+
+
+def test_normals_of_a_cloud_count_where_all_are_unit_vectors() -> None:
+    points, upward = np.zeros((3, 3)), np.tile([0.0, 0, 1], (3, 1))
+    faces = np.array([[0, 1, 2]], np.int32)
+    assert cloud_normals(Mesh(points, NOTHING, upward)) is upward
+    assert cloud_normals(Mesh(points, NOTHING)) is None
+    assert cloud_normals(Mesh(points, faces, upward)) is None
+    for length in (0.0, 0.5, np.nan, np.inf):
+        spoiled = upward.copy()
+        spoiled[1] *= length if np.isfinite(length) else 1
+        spoiled[1, 2] = length
+        assert cloud_normals(Mesh(points, NOTHING, spoiled)) is None
+
+
+def test_distances_of_vertices() -> None:
+    assert vertex_distances(box(10.0), box(8.0)).signed == pytest.approx(np.full(8, np.sqrt(3)))
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "told"),
+    [
+        ((np.zeros((0, 3)), NOTHING), box(1.0), "shape: is empty"),
+        (box(1.0), (np.zeros((0, 3)), NOTHING), "reference: is empty"),
+        ((np.zeros((4, 3)), np.array([[0, 1, 2]])), box(1.0), "shape: has no triangle with"),
+        (box(1.0), (np.zeros((4, 3)), np.array([[0, 1, 2]])), "reference: has no triangle with"),
+        (box(1.0), (np.zeros((1, 3)), NOTHING), "reference: is a single point"),
+        ((np.ones((9, 3)), NOTHING), box(1.0), "shape: is a single point"),
+        ((np.full((9, 3), np.nan), NOTHING), box(1.0), "shape: holds coordinates that are no numbers"),
+        ((box(1.0)[0] * np.nan, box(1.0)[1]), box(1.0), "shape: holds coordinates that are no numbers"),
+        (box(1.0), (box(1.0)[0] * np.inf, box(1.0)[1]), "reference: holds a coordinate of inf"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused_in_one_line(a: Shape, b: Shape, told: str) -> None:
+    with pytest.raises(RefusedInput, match=told):
+        compare(a, b, both=True)
+
+
+@pytest.mark.parametrize(
+    "cloud",
+    [
+        np.array([[0.0, 0, 8]]),
+        np.tile([0.0, 0, 8], (50, 1)),
+        np.random.default_rng(0).random((99, 3)) * [1, 1, 0] + [0, 0, 8],
+    ],
+    ids=["one point", "doubled", "planar"],
+)
+def test_odd_clouds_have_their_distances(cloud: np.ndarray) -> None:
+    found = compare((cloud, NOTHING), box(10.0), classes=70)
+    assert (found.mean, found.std, found.p99, found.signed_mean) == pytest.approx((3, 0, 3, 3))
+    assert sum(found.histograms[0].counts) == len(cloud)
+
+
+@pytest.mark.parametrize("to_cloud", [False, True], ids=["to a mesh", "to a cloud"])
+def test_memory_grows_by_few_bytes_a_point(to_cloud: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside the two shapes: what all distances and their percentiles need, and for a cloud the order of its tree."""
+    monkeypatch.setattr(distances, "BLOCK", 2000)  # what blocks need would hide what points need
+    monkeypatch.setattr(compare_module, "CHUNK", 2000)
+    few, many = 50_000, 150_000
+    cloud = np.random.default_rng(0).uniform(-5, 5, (many, 3))
+    compare((cloud[:100], NOTHING), box(10.0), classes=70)  # what is imported late is no part of it
+    peaks = []
+    for count in (few, many):
+        reference = (cloud[::-1][:count].copy(), NOTHING) if to_cloud else box(10.0)
+        tracemalloc.start()
+        compare((cloud[:count], NOTHING), reference, classes=70)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    bytes_a_point = (peaks[1] - peaks[0]) / (many - few)
+    assert 8 < bytes_a_point < 16 + 8 * to_cloud

@@ -134,6 +134,9 @@ def test_verify_does_actions_again(done: Any, cache: Command, monkeypatch: pytes
     found = as_json(cache("verify", done.workflow, "--recompute", "100%", "--json"))
     assert (found["recomputed"], found["differences"], found["problems"]) == (15, [], [])
     assert as_json(cache("verify", done.workflow, "--recompute", "5%", "--json"))["recomputed"] == 1
+    assert cache("verify", done.workflow, "--recompute", "5%")[1].endswith(
+        "1 action done again, 0 came to something else\n"
+    )
     from pipelines.steps import cloud_ply, measure
 
     monkeypatch.setattr(measure, "run", lambda *_: b"other")
@@ -158,9 +161,22 @@ def test_verify_does_actions_again(done: Any, cache: Command, monkeypatch: pytes
         (["stats", "--cache", "nowhere"], "nowhere: no such folder, expected the store of a run"),
         (["gc", "nowhere.yaml"], "no such file"),
         (["gc", "WORKFLOW", "--older-than", "-1"], "--older-than"),
-        (["verify", "WORKFLOW", "--recompute", "some"], "--recompute: expected a share from 0% to 100%, such as 5%"),
-        (["verify", "WORKFLOW", "--recompute", "0%"], "--recompute: expected a share from 0% to 100%, such as 5%"),
-        (["verify", "WORKFLOW", "--recompute", "101%"], "--recompute: expected a share from 0% to 100%, such as 5%"),
+        (
+            ["verify", "WORKFLOW", "--recompute", "some"],
+            "--recompute: expected a share above 0% and at most 100%, such as 5%",
+        ),
+        (
+            ["verify", "WORKFLOW", "--recompute", "0.05"],
+            "--recompute: expected a share above 0% and at most 100%, such as 5%",
+        ),
+        (
+            ["verify", "WORKFLOW", "--recompute", "0%"],
+            "--recompute: expected a share above 0% and at most 100%, such as 5%",
+        ),
+        (
+            ["verify", "WORKFLOW", "--recompute", "101%"],
+            "--recompute: expected a share above 0% and at most 100%, such as 5%",
+        ),
         (["verify", "--cache", "CACHE", "--recompute", "5%"], "--recompute: needs the workflow"),
         (["pin", "P0001/S2", "--cache", "CACHE"], "P0001/S2: has no results in"),
         (["unpin", "P0001/S1", "--cache", "CACHE"], "P0001/S1: is not pinned, expected one of: none is"),

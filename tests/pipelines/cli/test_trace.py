@@ -44,7 +44,7 @@ def test_a_mesh_down_to_its_films(finished: Path, trace: Trace) -> None:
     assert steps == chain | {f"{kind}-{camera}" for kind in ("ingest", "extract", "map") for camera in (1, 5)}
     action = actions[found["made_by"]]
     assert action["result"] == found["digest"]
-    for name in ("surface", "oriented", "clean", "cloud", "points-5"):
+    for name in ("surface", "oriented", "fused", "clean", "points-5"):
         action = actions[taken(action, name)["made_by"]]
     assert action["step"] == "P0001/S1/map-5"
     assert taken(action, "calibration")["content"]["camera"] == 5
@@ -68,8 +68,22 @@ def test_each_file_of_the_results(finished: Path, trace: Trace, file: str) -> No
 def test_a_file_elsewhere_with_the_store_named(finished: Path, trace: Trace, tmp_path: Path) -> None:
     copy = Path(shutil.copy(finished / "results/P0001/S1/measures.json", tmp_path / "m.json"))
     status, _, told = trace(copy)
-    assert (status, told) == (2, [f"footscan: {copy}: no store (.footscan) lies above it, expected --cache PLACE"])
+    problem = "no workflow.yaml and no folder above it leads to its store, expected --cache PLACE"
+    assert (status, told) == (2, [f"footscan: {copy}: {problem}"])
     assert trace(copy, "--cache", finished / "results/.footscan")[0] == 0
+
+
+def test_the_store_that_the_workflow_names_is_found(done: Any, trace: Trace) -> None:
+    """And not what lies beside the results, be it notes on another store or an old one."""
+    mesh, notes = done.results / "foot.stl", done.root / "results/.footscan"
+    shutil.move(notes, done.root / "elsewhere")
+    notes.mkdir()
+    (notes / "files.json").touch()
+    status, _, told = trace(mesh)
+    assert (status, "expected --cache PLACE" in told[0]) == (2, True)
+    done.workflow.write_text(f"{done.workflow.read_text()}cache: elsewhere\n")
+    shutil.copytree(done.root / "elsewhere/latest", notes / "actions")
+    assert trace(mesh)[0] == 0
 
 
 def test_what_no_step_made(done: Any, trace: Trace) -> None:
@@ -86,16 +100,16 @@ def test_what_no_step_made(done: Any, trace: Trace) -> None:
 
 def test_results_of_earlier_parameters(done: Any, trace: Trace, tmp_path: Path) -> None:
     earlier = Path(shutil.copy(done.results / "foot.stl", tmp_path / "foot.stl"))
-    done.set_parameters("{outliers: {z_mm: [-1, 30]}}")
+    done.set_parameters("{outliers: {z_mm: [-1, 70]}}")
     done.run()
     found = json.loads(trace(earlier, "--cache", done.root / "results/.footscan", "--json")[1])
     kinds = {action["kind"]: action for action in found["actions"].values()}
-    assert kinds["clean"]["parameters"]["values"]["z_mm"] == [-0.5, 120.0]
+    assert kinds["clean"]["parameters"]["values"]["z_mm"] == [-150.0, 120.0]
     assert kinds["clean"]["step"] is None
     assert "clean (of an earlier run)" in trace(earlier, "--cache", done.root / "results/.footscan")[1]
     now = json.loads(trace(done.results / "foot.stl", "--json")[1])
     kinds = {action["kind"]: action for action in now["actions"].values()}
-    assert kinds["clean"]["parameters"]["values"]["z_mm"] == [-1.0, 30.0]
+    assert kinds["clean"]["parameters"]["values"]["z_mm"] == [-1.0, 70.0]
 
 
 def test_wrong_use_is_one_line(finished: Path, trace: Trace, tmp_path: Path) -> None:

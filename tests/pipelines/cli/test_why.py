@@ -40,6 +40,7 @@ def test_nothing_would_run(done: Any, why: Why) -> None:
     )
     found = json.loads(why("P0001/S1", "--workflow", done.workflow, "--json")[1])
     assert (found["steps"], found["to_run"], found["explained"]) == (15, 0, [])
+    assert f"last result: {found['last']['step']}, " in printed
     assert len(found["last"]["digest"]) == 64
     named = explained(why("P0001/S1", "clean", "--workflow", done.workflow, "--json"))
     assert (named["clean"]["state"], named["clean"]["changes"]) == ("hit", [])
@@ -77,9 +78,9 @@ def test_an_input_that_is_a_result_names_its_step(done: Any, why: Why, monkeypat
         with pytest.raises(KeyboardInterrupt):
             done.run()
     [change] = explained(why("P0001/S1", "orient", "--workflow", done.workflow, "--json"))["orient"]["changes"]
-    assert (change["name"], change["step"]) == ("clean", "P0001/S1/clean")
+    assert (change["name"], change["step"]) == ("fused", "P0001/S1/fuse")
     assert len(change["old"]) == len(change["new"]) == 64
-    assert "input clean (result of P0001/S1/clean)" in why("P0001/S1", "orient", "--workflow", done.workflow)[1]
+    assert "input fused (result of P0001/S1/fuse)" in why("P0001/S1", "orient", "--workflow", done.workflow)[1]
 
 
 def test_a_value_line_by_line(done: Any, why: Why) -> None:

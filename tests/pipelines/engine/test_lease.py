@@ -1,7 +1,10 @@
 """Runs under way are known to all who use the store."""
 
+import json
 import logging
 import os
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -56,6 +59,29 @@ def test_without_a_heartbeat_a_run_is_taken_for_dead(store: Store) -> None:
     assert len(live_leases(store)) == 1
     write(store, STALE_S + 1)
     assert (len(leases(store)), live_leases(store)) == (1, [])
+
+
+def test_a_run_that_was_killed_on_this_machine_is_known_to_be_dead(store: Store) -> None:
+    if not Path("/proc/sys/kernel/random/boot_id").exists():
+        pytest.skip("only Linux tells")
+    hold = "import sys, time; from pipelines.engine.lease import lease; from pipelines.engine.store import open_store\n"
+    hold += "with lease(open_store(sys.argv[1])): print('held', flush=True); time.sleep(60)"
+    process = subprocess.Popen([sys.executable, "-c", hold, store.files.path("")], stdout=subprocess.PIPE)
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"held\n"
+        [one] = live_leases(store)
+        process.kill()
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+        assert live_leases(store) == []  # though its number is not free yet
+    finally:
+        process.kill()
+        process.communicate()
+    assert (len(leases(store)), live_leases(store)) == (1, [])
+    facts = json.loads(store.files.read(one.name))
+    for others, alive in (({"system": "another"}, 1), ({"process": os.getpid()}, 0), ({"system": None}, 1)):
+        store.files.write(one.name, canonical_json({**facts, **others}).encode())
+        assert len(live_leases(store)) == alive, others
 
 
 @pytest.mark.parametrize("damaged", [b"", b"[]", b"{}", b'{"host":1}', b"\xff", b"[" * 100_000])

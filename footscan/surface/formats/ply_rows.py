@@ -1,16 +1,16 @@
-"""STL, PLY and OBJ as bytes to vertices and faces. What breaks a format raises a ValueError that says how.
+"""Rows of the elements of a PLY file. What breaks the format raises a ValueError that says how.
 
 Files come from outside: every count in one is held against the bytes that are there before anything is allocated.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-VerticesAndFaces = tuple[NDArray[np.float64], NDArray[np.int64]]
+from footscan.surface.mesh import KNOWN_OF_A_MESH
 
-STL_START = 84
-STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-PLY_TYPES = {
+TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
     **dict.fromkeys(("uchar", "uint8"), "u1"),
     **dict.fromkeys(("short", "int16"), "i2"),
@@ -20,93 +20,55 @@ PLY_TYPES = {
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
-PLY_BYTE_ORDER = {"binary_little_endian": "<", "binary_big_endian": ">"}
-PLY_MAX_HEADER = 2**16
-
-
-def parse_stl(content: bytes) -> VerticesAndFaces:
-    """Binary or text STL; equal vertices are merged."""
-    count = int.from_bytes(content[80:STL_START], "little") if len(content) >= STL_START else -1
-    if len(content) == STL_START + count * STL_TRIANGLE.itemsize:
-        corners = np.frombuffer(content, STL_TRIANGLE, offset=STL_START)["corners"].reshape(-1, 3)
-    elif content.lstrip()[:5].lower() == b"solid" and b"\0" not in content:
-        words = [line.split()[1:] for line in content.splitlines() if line.lstrip()[:6].lower() == b"vertex"]
-        if len(words) % 3 or any(len(word) != 3 for word in words):
-            raise ValueError("expected three vertices of three coordinates in each facet")
-        corners = np.array(words, np.float64).reshape(-1, 3)
-    else:
-        expected = (
-            f"expected {STL_START + count * STL_TRIANGLE.itemsize} for its {count} triangles" if count >= 0 else ""
-        )
-        raise ValueError(f"{len(content)} bytes, {expected or 'expected at least 84'}")
-    vertices, faces = np.unique(corners.astype(np.float64) + 0.0, axis=0, return_inverse=True)
-    return vertices, faces.reshape(-1, 3).astype(np.int64)
-
-
-def parse_obj(content: bytes) -> VerticesAndFaces:
-    """Vertices (`v`) and faces (`f`) of an OBJ file; all else in it is passed over."""
-    vertices: list[list[float]] = []
-    faces: list[list[int]] = []
-    for line in content.splitlines():
-        words = line.split()
-        if words[:1] == [b"v"]:
-            if len(words) < 4:
-                raise ValueError(f"a vertex of {len(words) - 1} coordinates, expected three")
-            vertices.append([float(word) for word in words[1:4]])
-        elif words[:1] == [b"f"]:
-            corners = [int(word.split(b"/")[0]) for word in words[1:]]
-            faces += _fan([corner - 1 if corner > 0 else len(vertices) + corner for corner in corners])
-    try:
-        return np.array(vertices, np.float64).reshape(-1, 3), np.array(faces, np.int64).reshape(-1, 3)
-    except OverflowError:
-        raise ValueError("a face with a number too large for a vertex") from None
-
-
-def parse_ply(content: bytes) -> VerticesAndFaces:
-    """Vertices and faces of a PLY file, text or binary."""
-    byte_order, elements, offset = _ply_header(content)
-    body = content[offset:]
-    vertices, faces = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
-    reader = _PlyText(body) if byte_order is None else _PlyBinary(body, byte_order)
-    for name, count, properties in elements:
-        rows = reader.read(count, properties)
-        if name == "vertex":
-            missing = {"x", "y", "z"} - {key for key, value in rows.items() if isinstance(value, np.ndarray)}
-            if missing:
-                raise ValueError(f"vertices without {', '.join(sorted(missing))}")
-            vertices = np.column_stack([np.asarray(rows[axis], np.float64) for axis in "xyz"])
-        elif name == "face":
-            polygons = rows.get("vertex_indices", rows.get("vertex_index"))
-            if polygons is None:
-                raise ValueError("faces without vertex_indices")
-            faces = _triangles(polygons)
-    return vertices, faces
-
-
+BYTE_ORDER = {"binary_little_endian": "<", "binary_big_endian": ">"}
+MAX_HEADER = 2**16
 Property = tuple[str, str | None, str]
 """Name, type of the length if it is a list, type of the value; types as numpy's, without byte order."""
 Rows = dict[str, "NDArray[np.generic] | list[list[int]]"]
 """Property -> one value a row, or one list of integers a row."""
 
 
-def _ply_header(content: bytes) -> tuple[str | None, list[tuple[str, int, list[Property]]], int]:
-    end = content.find(b"end_header", 0, PLY_MAX_HEADER)
+class Header(NamedTuple):
+    """What a PLY file tells of itself."""
+
+    byte_order: str | None
+    """As numpy writes it; None of text."""
+    elements: list[tuple[str, int, list[Property]]]
+    """Name and number of rows of each, in the order of the file."""
+    metadata: dict[str, str]
+    """Of comments that begin with a key of ours."""
+    body: int
+    """Where the rows begin."""
+
+
+def ply_rows(content: bytes) -> tuple[Header, dict[str, Rows]]:
+    """The header, and the rows of every element."""
+    header = _header(content)
+    body = content[header.body :]
+    reader = _Text(body) if header.byte_order is None else _Binary(body, header.byte_order)
+    return header, {name: reader.read(count, properties) for name, count, properties in header.elements}
+
+
+def _header(content: bytes) -> Header:
+    """What stands before `end_header`; ValueError where it breaks the format."""
+    end = content.find(b"end_header", 0, MAX_HEADER)
     if content[:3] != b"ply" or end < 0:
         raise ValueError("expected a header from 'ply' to 'end_header'")
     offset = content.find(b"\n", end) + 1
     if not offset:
         raise ValueError("expected a line break after 'end_header'")
     form, elements = "", list[tuple[str, int, list[Property]]]()
-    for line in content[:end].decode("ascii", "replace").splitlines()[1:]:
+    lines = content[:end].decode("ascii", "replace").splitlines()[1:]
+    for line in lines:
         match line.split():
             case ["format", name, "1.0"]:
                 form = name
             case ["element", name, count] if count.isdecimal() and len(count) < 12:
                 elements.append((name, int(count), []))
-            case ["property", "list", length, value, name] if elements and {length, value} <= PLY_TYPES.keys():
-                elements[-1][2].append((name, PLY_TYPES[length], PLY_TYPES[value]))
-            case ["property", value, name] if elements and value in PLY_TYPES:
-                elements[-1][2].append((name, None, PLY_TYPES[value]))
+            case ["property", "list", length, value, name] if elements and {length, value} <= TYPES.keys():
+                elements[-1][2].append((name, TYPES[length], TYPES[value]))
+            case ["property", value, name] if elements and value in TYPES:
+                elements[-1][2].append((name, None, TYPES[value]))
             case [] | ["comment" | "obj_info", *_]:
                 pass
             case _:
@@ -114,12 +76,17 @@ def _ply_header(content: bytes) -> tuple[str | None, list[tuple[str, int, list[P
     for name, _, properties in elements:
         if len({key for key, _, _ in properties}) < len(properties):
             raise ValueError(f"a property of {name[:60]!r} stands twice")
-    if form != "ascii" and form not in PLY_BYTE_ORDER:
+    if form != "ascii" and form not in BYTE_ORDER:
         raise ValueError(f"format {form!r}, expected ascii or binary")
-    return PLY_BYTE_ORDER.get(form), elements, offset
+    return Header(BYTE_ORDER.get(form), elements, _metadata(lines), offset)
 
 
-class _PlyBinary:
+def _metadata(lines: list[str]) -> dict[str, str]:
+    comments = [line.split(maxsplit=2)[1:] for line in lines if line.split(maxsplit=1)[:1] == ["comment"]]
+    return {words[0]: words[1].strip() for words in comments if len(words) == 2 and words[0] in KNOWN_OF_A_MESH}
+
+
+class _Binary:
     """Reads element after element from the body of a binary file."""
 
     def __init__(self, body: bytes, byte_order: str) -> None:
@@ -169,7 +136,7 @@ class _PlyBinary:
         return self._body[self._at - size : self._at]
 
 
-class _PlyText:
+class _Text:
     """Reads element after element from the body of a text file, one row a line."""
 
     def __init__(self, body: bytes) -> None:
@@ -197,13 +164,3 @@ class _PlyText:
                 rows[name].append([int(float(word)) for word in row[at : at + items]])
                 at += items
         return dict(rows)
-
-
-def _triangles(polygons: "NDArray[np.generic] | list[list[int]]") -> NDArray[np.int64]:
-    if isinstance(polygons, np.ndarray):
-        return polygons.astype(np.int64).reshape(-1, 3)
-    return np.array([triangle for polygon in polygons for triangle in _fan(polygon)], np.int64).reshape(-1, 3)
-
-
-def _fan(polygon: list[int]) -> list[list[int]]:
-    return [[polygon[0], polygon[k], polygon[k + 1]] for k in range(1, len(polygon) - 1)]

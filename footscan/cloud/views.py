@@ -1,0 +1,47 @@
+"""From where, and over which part of the laser's plane, each camera looks."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from footscan.calibration.maps import IMAGE_PX, to_world
+from footscan.calibration.pose import camera_centres
+from schemas.calibration import CameraCalibration
+
+Floats = NDArray[np.float64]
+
+STEPS_A_SIDE = 16
+"""How many places of each side of its region a camera's outline in the plane is drawn through."""
+
+
+@dataclass(frozen=True)
+class View:
+    """One camera, in the frame of the heads: X counts from the laser's plane, Y and Z are the scanner's."""
+
+    centre: Floats
+    """(3,) where it stands, mm."""
+    outline: Floats
+    """(M, 2) corners in Y and Z, mm, of the convex part of the plane that its calibration supports, counterclockwise;
+    (0, 2) where that is not known."""
+
+
+def views_of(cameras: Iterable[CameraCalibration]) -> dict[int, View]:
+    """Camera -> view, of those cameras whose place the calibration, or their number, tells."""
+    calibrations = {camera.camera: camera for camera in cameras}
+    centres = camera_centres(calibrations.values())
+    return {camera: View(centre, _outline(calibrations[camera])) for camera, centre in centres.items()}
+
+
+def _outline(camera: CameraCalibration) -> Floats:
+    right, bottom = np.array(camera.image_px or IMAGE_PX) - 1.0
+    corners = np.array(camera.region_px or [(0.0, 0.0), (right, 0.0), (right, bottom), (0.0, bottom)])
+    parts = np.arange(STEPS_A_SIDE)[:, None, None] / STEPS_A_SIDE
+    border = (1 - parts) * corners + parts * np.roll(corners, -1, axis=0)
+    plane = to_world(camera, border.reshape(-1, 2))
+    try:
+        return np.asarray(plane[ConvexHull(plane).vertices])
+    except (QhullError, ValueError):  # all on one line, or not finite
+        return np.empty((0, 2))

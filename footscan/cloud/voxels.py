@@ -1,0 +1,81 @@
+"""Points by the cells of a grid."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.compiled import compiled
+
+Floats = NDArray[np.float64]
+
+EMPTY = -1
+BORDER = 4
+"""So many cells less one around those of the points are empty: neighbours so far away need no look at the border."""
+MOST_CELLS = 20_000_000
+"""Cells become larger where there would be more of them."""
+
+
+class Voxels(NamedTuple):
+    """The cells that hold points, and which of these each holds."""
+
+    origin: Floats
+    """(3,) mm: the lower corner of the first cell. The lowest points stand in the middle of theirs, so that planes a
+    cell apart have cells of their own however they are rounded."""
+    size: Floats
+    """(3,) mm: the edges of a cell."""
+    number: NDArray[np.int32]
+    """(A, B, C): the cell's number among those that hold points, or `EMPTY`."""
+    voxel: NDArray[np.int32]
+    """(N,): the number of the cell that holds each point."""
+    place: NDArray[np.int32]
+    """(V, 3): where each numbered cell stands in the grid."""
+
+
+def voxelise(xyz: Floats, size: tuple[float, float, float]) -> Voxels:
+    """`xyz` (N, 3), finite, N >= 1, by cells with edges `size`, mm; numbered by X, then Y, then Z of their places."""
+    edges = np.array(size)
+    low = xyz.min(axis=0)
+    extent = xyz.max(axis=0) - low
+    while np.prod(np.floor(extent / edges + 0.5) + 1 + 2 * BORDER) > MOST_CELLS:
+        edges = edges * 1.5
+    origin = low - (BORDER + 0.5) * edges
+    shape = tuple((np.floor(extent / edges + 0.5) + 1 + 2 * BORDER).astype(np.int64).tolist())
+    number = np.full(shape, EMPTY, np.int32)
+    cells = _mark(xyz, origin, edges, number)
+    places = _count_off(number)
+    return Voxels(origin, edges, number, number.ravel()[cells], places)
+
+
+@compiled
+def _mark(xyz: Floats, origin: Floats, edges: Floats, number: NDArray[np.int32]) -> NDArray[np.int64]:
+    """(N,) the flat index of each point's cell; cells with points are set to 0."""
+    cells = np.empty(len(xyz), np.int64)
+    flat = number.reshape(-1)
+    _, columns, rows = number.shape
+    for n in range(len(xyz)):
+        a = int((xyz[n, 0] - origin[0]) / edges[0])
+        b = int((xyz[n, 1] - origin[1]) / edges[1])
+        c = int((xyz[n, 2] - origin[2]) / edges[2])
+        cells[n] = (a * columns + b) * rows + c
+        flat[cells[n]] = 0
+    return cells
+
+
+@compiled
+def _count_off(number: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(V, 3) places of the cells that are not empty; they are given their numbers."""
+    count = 0
+    for cell in number.reshape(-1):
+        if cell != EMPTY:
+            count += 1
+    places = np.empty((count, 3), np.int32)
+    count = 0
+    for a in range(number.shape[0]):
+        for b in range(number.shape[1]):
+            for c in range(number.shape[2]):
+                if number[a, b, c] != EMPTY:
+                    number[a, b, c] = count
+                    places[count, 0], places[count, 1], places[count, 2] = a, b, c
+                    count += 1
+    return places

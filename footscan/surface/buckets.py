@@ -1,0 +1,35 @@
+"""Points sorted into cubes, so that compiled loops find those around a place."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+MAX_CUBES = 20_000_000
+"""Cubes grow where there would be more."""
+
+
+class Buckets(NamedTuple):
+    """The points in cube (a, b, c) are `order[start[k] : start[k + 1]]` with k = (a * dims[1] + b) * dims[2] + c."""
+
+    edge: float
+    """Of a cube, mm."""
+    low: NDArray[np.float64]
+    """(3,) corner of cube (0, 0, 0), mm"""
+    dims: NDArray[np.int64]
+    """(3,) how many cubes there are along each axis"""
+    start: NDArray[np.int64]
+    order: NDArray[np.int64]
+    """(N,) numbers of the points, rising within a cube"""
+
+
+def sort_into_cubes(points: NDArray[np.float64], edge: float) -> Buckets:
+    """Sorts (N, 3) `points` into cubes with an `edge` in mm, or larger ones where these would be too many."""
+    low = points.min(axis=0)
+    extent = points.max(axis=0) - low
+    while np.prod(np.floor(extent / edge) + 1) > MAX_CUBES:
+        edge *= 1.5
+    dims = np.floor(extent / edge).astype(np.int64) + 1
+    cube = np.floor((points - low) / edge).astype(np.int64) @ np.array([dims[1] * dims[2], dims[2], 1])
+    start = np.concatenate([[0], np.cumsum(np.bincount(cube, minlength=int(dims.prod())))])
+    return Buckets(edge, low, dims, start.astype(np.int64), np.argsort(cube, kind="stable").astype(np.int64))

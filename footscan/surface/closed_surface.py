@@ -1,0 +1,112 @@
+"""The closed surface through a cloud: measured where there are points, filled smoothly where there are none."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.surface.ankle import cut_flat, opening_height
+from footscan.surface.indicator import indicator, level_surface
+from footscan.surface.mesh import Mesh, with_normals
+from footscan.surface.patch import fair
+from footscan.surface.projection import Projection, project
+from footscan.surface.topology import directed_edges, vertex_normals
+from schemas.errors import Finding
+from schemas.parameters.surface import SurfaceParameters
+
+LEAST_GRID_MM = 1.0
+EVENING_ROUNDS = 2
+"""Of moving vertices along the surface to the middle of those around them; marching cubes leaves slivers."""
+LEAST_SECTORS = 7
+"""Of eight directions, in how many there must be points around a vertex that counts as measured."""
+LEAST_POINTS = 50
+LEAST_MEASURED = 0.5
+"""Share of the vertices below which a surface would be more guessed than seen."""
+
+Floats = NDArray[np.float64]
+Faces = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class _Cloud:
+    points: Floats
+    normals: Floats
+    camera: NDArray[np.uint8]
+    step_mm: float
+
+
+def close_surface(
+    points: NDArray[np.floating],
+    normals: NDArray[np.floating],
+    camera: NDArray[np.uint8],
+    step_mm: float,
+    parameters: SurfaceParameters,
+) -> Mesh:
+    """A closed mesh through `points`, its vertices told apart into measured and filled ones.
+
+    Where the leg was cut flat, the metadata say at which Z: `cut_mm`.
+
+    Parameters
+    ----------
+    points : (N, 3) mm
+    normals : (N, 3) unit vectors, outward
+    camera : (N,) camera of origin
+    step_mm : distance from one stripe plane to the next
+
+    Raises
+    ------
+    Finding
+        There are no points, or no surface runs through them.
+    """
+    usable = np.isfinite(points).all(axis=1) & np.isfinite(normals).all(axis=1)
+    if usable.sum() < LEAST_POINTS or step_mm <= 0:
+        raise Finding(f"{usable.sum()} points in planes {step_mm:g} mm apart, expected a cloud to mesh")
+    xyz, directions = np.asarray(points[usable], np.float64), np.asarray(normals[usable], np.float64)
+    cloud = _Cloud(xyz, directions, camera[usable], step_mm)
+    spacing = max(parameters.grid_steps * step_mm, LEAST_GRID_MM)
+    # One step beyond the last stripe another one would have been seen.
+    ends = float(xyz[:, 0].min() - step_mm), float(xyz[:, 0].max() + step_mm)
+    rough, faces = level_surface(indicator(xyz, directions, spacing, parameters.blur_steps * step_mm), ends)
+    on_cloud = _project(rough, faces, cloud, parameters, 2)
+    for _ in range(EVENING_ROUNDS):
+        on_cloud = _project(_evened(on_cloud, faces), faces, cloud, parameters, 1)
+    vertices = on_cloud.points
+    is_measured = (on_cloud.gap_steps <= parameters.gap_steps) & (on_cloud.sectors >= LEAST_SECTORS)
+    if is_measured.mean() < LEAST_MEASURED:
+        raise Finding(
+            f"{len(xyz)} points do not go around something: {100 * is_measured.mean():.0f} % of a closed surface would "
+            f"be measured, expected {100 * LEAST_MEASURED:.0f} % at least"
+        )
+    origin = np.where(is_measured & (on_cloud.nearest >= 0), cloud.camera[on_cloud.nearest], 0).astype(np.uint8)
+    height = opening_height(vertices, faces, ~is_measured)
+    on_lid = np.zeros(len(vertices), np.bool_)
+    if height is not None:
+        vertices, faces, kept = cut_flat(vertices, faces, height, spacing)
+        is_measured = (kept >= 0) & is_measured[kept]
+        origin = np.where(kept >= 0, origin[kept], 0).astype(np.uint8)
+        on_lid = vertices[:, 2] == height
+    free = ~is_measured & ~on_lid
+    edges = directed_edges(faces)
+    rim = np.setdiff1d(edges[free[edges[:, 0]], 1], np.flatnonzero(free | on_lid))
+    vertices = fair(vertices, faces, rim, np.flatnonzero(free))
+    vertices[free, 0] = np.clip(vertices[free, 0], *ends)
+    metadata = {} if height is None else {"cut_mm": repr(height)}
+    return with_normals(Mesh(vertices, faces, camera=origin, filled=~is_measured, metadata=metadata))
+
+
+def _project(points: Floats, faces: Faces, cloud: _Cloud, parameters: SurfaceParameters, rounds: int) -> Projection:
+    normals = vertex_normals(points, faces)
+    return project(points, normals, cloud.points, cloud.normals, cloud.step_mm, parameters.reach_steps, rounds)
+
+
+def _evened(placed: Projection, faces: Faces) -> Floats:
+    """The points, each moved within its tangent plane to the middle of its neighbours."""
+    edges = directed_edges(faces)
+    total = np.zeros_like(placed.points)
+    for axis in range(3):
+        total[:, axis] = np.bincount(edges[:, 0], placed.points[edges[:, 1], axis], minlength=len(total))
+    count = np.bincount(edges[:, 0], minlength=len(total))
+    way = total / count[:, None] - placed.points
+    way -= np.einsum("ni,ni->n", way, placed.normals)[:, None] * placed.normals
+    moved: Floats = placed.points + way
+    return moved

@@ -1,0 +1,82 @@
+"""How far a decimated mesh is from the one it was made of."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.measure.sections import cut, tape_girth
+from footscan.surface.decimate import footprint_axes
+from footscan.surface.mesh import Mesh
+from footscan.surface.sampling import sample_surface
+
+STATIONS = (0.25, 0.50, 0.62, 0.75)
+"""Shares of the length, from the heel, where girths are compared: behind the ankle's front, instep, waist, ball."""
+SAMPLES = 100_000
+EXTREMES_MM, GIRTHS_MM = 0.05, 0.1
+"""What decimation may change a measure by."""
+
+
+class Fidelity(NamedTuple):
+    """Differences in mm, all of them at least 0."""
+
+    surface_max: float
+    """Largest distance between the surfaces, of either to the other."""
+    surface_mean: float
+    extremes: float
+    """Largest change of a place where the mesh ends, or a section at one of `STATIONS` does, aside, above or below."""
+    girths: float
+    """Largest change of a tape's length around the sections at `STATIONS`."""
+
+    @property
+    def kept(self) -> bool:
+        """Whether extremes and girths are within what decimation may change."""
+        return self.extremes <= EXTREMES_MM and self.girths <= GIRTHS_MM
+
+
+def fidelity(full: Mesh, decimated: Mesh) -> Fidelity:
+    """Compares the two, which lie in one frame."""
+    to_full = _distances(_points(decimated), full)
+    to_decimated = _distances(_points(full), decimated)
+    along, across = footprint_axes(full.vertices[np.unique(full.faces)])
+    extremes, girths = zip(*(_profile(mesh, full, along, across) for mesh in (full, decimated)), strict=True)
+    return Fidelity(
+        float(max(to_full.max(), to_decimated.max())),
+        float(max(to_full.mean(), to_decimated.mean())),
+        float(np.abs(extremes[0] - extremes[1]).max()),
+        float(np.abs(girths[0] - girths[1]).max()),
+    )
+
+
+def _profile(
+    mesh: Mesh, full: Mesh, along: NDArray[np.float64], across: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Ends of `mesh` and of its sections in mm, and the girths of these, at stations of `full`."""
+    frame = np.column_stack([along, across, [0.0, 0.0, 1.0]])
+    places = mesh.vertices[np.unique(mesh.faces)] @ frame
+    ends, girths = [places.min(axis=0), places.max(axis=0)], []
+    x = full.vertices @ along
+    for share in STATIONS:
+        section = cut(mesh.vertices, mesh.faces, along * (x.min() + share * np.ptp(x)), along)
+        level = section.points @ frame[:, 1:]
+        ends += [level.min(axis=0), level.max(axis=0)] if len(level) else [np.zeros(2), np.zeros(2)]
+        girths.append(tape_girth(section, along) or 0.0)
+    return np.concatenate(ends), np.array(girths)
+
+
+def _points(mesh: Mesh) -> NDArray[np.float64]:
+    """Points all over a surface, its corners among them."""
+    even = sample_surface(mesh.vertices, mesh.faces, SAMPLES)
+    return np.concatenate([mesh.vertices[np.unique(mesh.faces)], even])
+
+
+def _distances(points: NDArray[np.float64], mesh: Mesh) -> NDArray[np.float64]:
+    """(N,) distances in mm of (N, 3) points to the surface."""
+    import open3d as o3d
+
+    middle = mesh.vertices.mean(axis=0)  # single precision: 0.00001 mm that far from the middle
+    tensor = o3d.core.Tensor.from_numpy
+    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+    scene.add_triangles(tensor((mesh.vertices - middle).astype(np.float32)), tensor(mesh.faces.astype(np.uint32)))
+    distances = scene.compute_distance(tensor((points - middle).astype(np.float32)), nthreads=1)
+    return np.asarray(distances.numpy(), np.float64)

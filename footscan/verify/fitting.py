@@ -1,0 +1,37 @@
+"""What the fits of known bodies to points have in common."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.errors import Finding
+from schemas.fits import Vector
+
+Floats = NDArray[np.float64]
+
+
+def distinct_points(points: Floats) -> Floats:
+    """(M, 3) the points, mm, without doubles, in an order that does not depend on the one they came in.
+
+    Raises
+    ------
+    Finding
+        Some coordinates are no numbers.
+    """
+    points = np.asarray(points, np.float64).reshape(-1, 3)
+    if not np.isfinite(points).all():
+        raise Finding("some coordinates are no numbers, expected mm")
+    ordered: Floats = points[np.lexsort(points.T[::-1])]
+    new = np.ones(len(ordered), np.bool_)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    return ordered[new]
+
+
+def robust_deviation(values: Floats) -> float:
+    """Standard deviation of a normal distribution with the median absolute deviation of (N,) `values`; 0 for none."""
+    return 1.4826 * float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
+
+
+def as_vector(values: Floats) -> Vector:
+    """(3,) `values` as a tuple."""
+    x, y, z = values.tolist()
+    return x, y, z

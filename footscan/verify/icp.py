@@ -1,0 +1,182 @@
+"""Robust point-to-plane ICP of many poses at once.
+
+Chen & Medioni, "Object modelling by registration of multiple range images", 1992, with Tukey's weights, whose scale
+follows the residuals (Bergstroem & Edlund, "Robust registration of point sets using iteratively reweighted least
+squares", 2014).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from footscan.verify.nearest import Floats, Surface
+
+TUKEY = 4.685
+"""Standard deviations beyond which a residual has no weight: 95 % efficient for Gaussian noise."""
+SIGMA_PER_MEDIAN = 1.4826
+"""Standard deviation of a normal distribution over the median of its absolute values."""
+DAMPING = 1e-6
+"""Share of the mean diagonal that is added to the normal matrix: directions that nothing holds stay where they are."""
+LONGEST_TURN = 0.3
+"""Radians a step."""
+SETTLED_MM = 1e-4
+"""A step that moves no point by more is the last."""
+CALMED_AFTER = 50
+CALMING = 0.05
+"""After so many steps they are shortened: a pose may be tossed to and fro between triangles."""
+SHRINKING = 0.7
+"""Tukey's scale falls by no more at a step: what lies well already must not outvote what does not yet. Graduated
+non-convexity: Blake & Zisserman, "Visual Reconstruction", 1987."""
+STEADY = 0.999
+"""Part of Tukey's scale that it must keep from step to step before the last."""
+SMALLEST_SCALE_MM = 0.02
+"""Tukey's scale between shapes without noise."""
+
+
+@dataclass(frozen=True)
+class Poses:
+    """S rigid motions: a point p goes to `rotations` p + `translations`."""
+
+    rotations: Floats
+    """(S, 3, 3), determinant +1."""
+    translations: Floats
+    """(S, 3) mm."""
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+    def __getitem__(self, chosen: NDArray[np.integer] | slice) -> "Poses":
+        return Poses(self.rotations[chosen], self.translations[chosen])
+
+    def place(self, points: Floats) -> Floats:
+        """(S, N, 3) `points` (N, 3) in each of the poses."""
+        # Not by matmul: BLAS may sum in another order with another number of threads.
+        placed: Floats = np.einsum("sij,nj->sni", self.rotations, points) + self.translations[:, None]
+        return placed
+
+    def after(self, first: "Poses") -> "Poses":
+        """`first`, and then these."""
+        rotations = np.einsum("sij,sjk->sik", self.rotations, first.rotations)
+        return Poses(rotations, np.einsum("sij,sj->si", self.rotations, first.translations) + self.translations)
+
+    def inverse(self) -> "Poses":
+        turned = np.swapaxes(self.rotations, 1, 2)
+        return Poses(turned, -np.einsum("sij,sj->si", turned, self.translations))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How points in S poses lie on a surface."""
+
+    distances: Floats
+    """(S, N) mm."""
+    within: NDArray[np.bool_]
+    """(S, N) see `Nearest`."""
+
+
+def fit_of(poses: Poses, points: Floats, surface: Surface) -> Fit:
+    """How `points` (N, 3) lie on `surface` in each pose."""
+    placed = poses.place(points)
+    found = surface.nearest(placed.reshape(-1, 3))
+    distances = np.linalg.norm(placed.reshape(-1, 3) - found.places, axis=1)
+    return Fit(distances.reshape(placed.shape[:2]), found.within.reshape(placed.shape[:2]))
+
+
+def capped_squares(poses: Poses, points: Floats, surface: Surface, cap: float) -> Floats:
+    """(S, N) squared distances in mm²; where the surface ends, or is farther away than `cap`, as if it were so far."""
+    fit = fit_of(poses, points, surface)
+    return np.square(np.where(fit.within, np.minimum(fit.distances, cap), cap))
+
+
+def settle(pose: Poses, points: Floats, surface: Surface, scale: float, most_steps: int) -> tuple[Poses, float, float]:
+    """One pose brought to where steps no longer move it, while the robust scale follows the residuals down.
+
+    Returns
+    -------
+    the pose, Tukey's scale in mm there, and by how much the last step moved it in mm
+    """
+    moved = np.inf
+    for count in range(most_steps):
+        # On a mesh no offset has a part along the surface, so that its weight does nothing but shorten the steps.
+        along = 0.0 if count < CALMED_AFTER else CALMING
+        pose, moves, fit = step(pose, points, surface, np.array([scale]), along)
+        moved = float(moves[0])
+        near = fit.distances[fit.within & (fit.distances < scale)]
+        if not len(near):
+            return pose, scale, np.inf
+        follows = max(TUKEY * SIGMA_PER_MEDIAN * float(np.median(near)), SMALLEST_SCALE_MM)
+        if moved < SETTLED_MM and follows > STEADY * scale:
+            break
+        scale = min(scale, max(follows, SHRINKING * scale))
+    return pose, scale, moved
+
+
+def step(poses: Poses, points: Floats, surface: Surface, scale: Floats, along: float) -> tuple[Poses, Floats, Fit]:
+    """One Gauss-Newton step of each pose towards the least robust distance.
+
+    Parameters
+    ----------
+    points : (N, 3) mm, about their own middle, which a step turns them around
+    scale : (S,) mm, distance at which a point loses its weight
+    along : weight of the offset along the surface, 0 for point-to-plane
+
+    Returns
+    -------
+    the poses after the step, (S,) the largest distance in mm that it moved any of the points by, at most, and how the
+    points lay before it
+    """
+    placed = poses.place(points)
+    count, size = placed.shape[:2]
+    found = surface.nearest(placed.reshape(-1, 3))
+    offsets = (placed.reshape(-1, 3) - found.places).reshape(count, size, 3)
+    distances = np.linalg.norm(offsets, axis=2)
+    within = found.within.reshape(count, size)
+    weights = np.where(within, tukey_weights(distances, scale[:, None]), 0.0)
+    radius = float(np.linalg.norm(points, axis=1).max())
+    arms = (placed - poses.translations[:, None]) / radius
+    normals = found.normals.reshape(count, size, 3)
+    matrix, vector = normal_equations(arms, normals, offsets, weights, along)
+    damping = DAMPING * np.trace(matrix, axis1=1, axis2=2) / 6 + 1e-12
+    change = -np.linalg.solve(matrix + damping[:, None, None] * np.eye(6), vector[:, :, None])[:, :, 0]
+    turns, shifts = change[:, :3] / radius, change[:, 3:]
+    shorten = np.minimum(1.0, LONGEST_TURN / np.maximum(np.linalg.norm(turns, axis=1, keepdims=True), 1e-12))
+    turns, shifts = shorten * turns, shorten * shifts
+    rotations = Rotation.from_rotvec(turns).as_matrix()
+    moved = Poses(np.einsum("sij,sjk->sik", rotations, poses.rotations), poses.translations + shifts)
+    movement = np.linalg.norm(turns, axis=1) * radius + np.linalg.norm(shifts, axis=1)
+    return moved, movement, Fit(distances, within)
+
+
+def normal_equations(
+    arms: Floats, normals: Floats, offsets: Floats, weights: Floats, along: float
+) -> tuple[Floats, Floats]:
+    """(S, 6, 6) and (S, 6): the weighted means of J'J and of J'r for three turns and three shifts.
+
+    Parameters
+    ----------
+    arms : (S, N, 3) from the centre of rotation to the points
+    normals, offsets : (S, N, 3) across the surface, and from the surface to the points
+    weights : (S, N)
+    along : weight of the offset along the surface
+    """
+    across = np.concatenate([np.cross(arms, normals), normals], axis=2)
+    gap = np.einsum("sni,sni->sn", normals, offsets)
+    total = np.maximum(weights.sum(axis=1), 1e-12)[:, None]
+    share = weights / total
+    matrix = np.einsum("sn,sni,snj->sij", share, across, across)
+    vector = np.einsum("sn,sn,sni->si", share, gap, across)
+    if along:
+        whole = np.concatenate(
+            [np.cross(arms[..., None, :], np.eye(3)), np.broadcast_to(np.eye(3), (*arms.shape, 3))], 3
+        )
+        matrix += along * np.einsum("sn,snki,snkj->sij", share, whole, whole)
+        vector += along * np.einsum("sn,snk,snki->si", share, offsets, whole)
+    return matrix, vector
+
+
+def tukey_weights(distances: Floats, scale: Floats) -> Floats:
+    """Tukey's biweight: 1 at no distance, 0 from `scale` on."""
+    weights: Floats = np.square(np.maximum(1 - np.square(distances / scale), 0.0))
+    return weights

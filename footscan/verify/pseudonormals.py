@@ -1,0 +1,139 @@
+"""Normals of a mesh's faces, edges and vertices, by which a point is told to lie outside or inside."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.surface.export import Shape
+from footscan.surface.topology import face_components
+
+SOLID_SHARE = 0.02
+"""Volume over area^1.5 from which a mesh is a body with an inside; a ball has 0.094, a foot 0.05, a sheet 0."""
+
+Floats = NDArray[np.float64]
+
+
+class Sides(NamedTuple):
+    """A mesh that tells its sides. A point p whose closest place on it is q lies outside where (p - q) · n > 0, with n
+    the normal of what q lies on: Baerentzen and Aanaes, "Signed distance computation using the angle weighted
+    pseudonormal", IEEE TVCG 11(3), 2005, doi:10.1109/TVCG.2005.49.
+
+    Unlike counting how often a ray crosses the mesh, this holds on a mesh with holes: there it says on which side of
+    the surface's rim the point lies.
+    """
+
+    vertices: Floats
+    """(V, 3) mm, no two at one place."""
+    faces: NDArray[np.int32]
+    """(F, 3), each with an area and no two alike, counter-clockwise as seen from outside."""
+    of_faces: Floats
+    """(F, 3) unit normals."""
+    of_edges: Floats
+    """(F, 3, 3) sums of the unit normals that meet at the edge opposite to each corner."""
+    of_vertices: Floats
+    """(V, 3) sums of the unit normals that meet at each vertex, weighted by the angles there."""
+
+
+def sides(mesh: Shape) -> Sides:
+    """The normals of `mesh`, whose faces may be turned any way, repeated or without area; F = 0 if none has an area.
+
+    Faces that share an edge are turned alike. A body is turned so that outside is outside; a sheet stays as it is, as
+    what is its outer side cannot be known.
+    """
+    vertices, faces = _merged(*mesh)
+    edge_of, along, meeting = _edges(faces)
+    if _contradicts(edge_of, along, meeting):
+        faces = _turned_alike(vertices, faces)
+        for part in _parts(faces):
+            faces[part] = _outward(vertices, faces[part])
+    else:
+        faces = _outward(vertices, faces)
+    edge_of, _, _ = _edges(faces)  # turning a face has exchanged two of its corners
+    corners = vertices[faces]
+    normals = _unit(_area_vectors(corners))
+    of_edges = _sums(edge_of.ravel(), np.repeat(normals, 3, axis=0), len(meeting))
+    weighted = (normals[:, None] * _angles(corners)[..., None]).reshape(-1, 3)
+    of_vertices = _sums(faces.ravel(), weighted, len(vertices))
+    return Sides(vertices, faces, normals, of_edges[edge_of], of_vertices)
+
+
+def _merged(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> tuple[Floats, NDArray[np.int32]]:
+    """Vertices that stand at one place become one; faces without area or that repeat another are left out."""
+    places, of_vertex = np.unique(np.asarray(vertices, np.float64) + 0.0, axis=0, return_inverse=True)
+    merged = of_vertex.reshape(-1)[faces]
+    area = np.linalg.norm(_area_vectors(places[merged]), axis=1)
+    merged = merged[area > 0]
+    _, first = np.unique(np.sort(merged, axis=1), axis=0, return_index=True)
+    return places, merged[np.sort(first)].astype(np.int32)
+
+
+def _edges(faces: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int8], NDArray[np.int64]]:
+    """(F, 3) number of the edge opposite to each corner, (F, 3) 1 or -1 as the face runs along it, (E,) faces there."""
+    start, end = faces[:, [1, 2, 0]].astype(np.int64), faces[:, [2, 0, 1]].astype(np.int64)
+    size = int(faces.max(initial=0)) + 1
+    key = np.minimum(start, end) * size + np.maximum(start, end)
+    _, edge_of, meeting = np.unique(key.ravel(), return_inverse=True, return_counts=True)
+    return edge_of.reshape(-1, 3), np.where(start < end, 1, -1).astype(np.int8), meeting
+
+
+def _contradicts(edge_of: NDArray[np.int64], along: NDArray[np.int8], meeting: NDArray[np.int64]) -> bool:
+    """Whether two faces that alone meet at an edge run along it the same way."""
+    direction = np.bincount(edge_of.ravel(), weights=along.ravel(), minlength=len(meeting))
+    return bool(np.any((meeting == 2) & (direction != 0)))
+
+
+def _turned_alike(vertices: Floats, faces: NDArray[np.int32]) -> NDArray[np.int32]:
+    import open3d as o3d
+
+    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(faces))
+    mesh.orient_triangles()  # as far as that can be: a Moebius strip has one side
+    return np.asarray(mesh.triangles).astype(np.int32)
+
+
+def _parts(faces: NDArray[np.int32]) -> list[NDArray[np.int64]]:
+    """Rows of the faces of each part of a mesh."""
+    part = face_components(faces)
+    order = np.argsort(part, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(part[order])) + 1)
+
+
+def _outward(vertices: Floats, faces: NDArray[np.int32]) -> NDArray[np.int32]:
+    """`faces`, turned over where they enclose a negative volume.
+
+    Seen from the middle of its rim a hole encloses next to nothing: the divergence theorem then holds for open meshes.
+    """
+    if not len(faces):
+        return faces
+    edge_of, _, meeting = _edges(faces)
+    rim = faces[:, [1, 2, 0]][meeting[edge_of] == 1]
+    corners = vertices[faces] - (vertices[rim] if len(rim) else vertices[faces[:, 0]]).mean(axis=0)
+    area_vectors = _area_vectors(corners)
+    volume = float(np.sum(corners[:, 0] * area_vectors)) / 3
+    area = float(np.linalg.norm(area_vectors, axis=1).sum())
+    return faces[:, ::-1] if volume < -SOLID_SHARE * area**1.5 else faces
+
+
+def _area_vectors(corners: Floats) -> Floats:
+    """(F, 3) normals as long as the area of each triangle."""
+    vectors: Floats = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    return vectors
+
+
+def _angles(corners: Floats) -> Floats:
+    """(F, 3) angle of each triangle at each corner, radians."""
+    angles = np.empty(corners.shape[:2])
+    for k in range(3):
+        a, b = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
+        angles[:, k] = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.sum(a * b, axis=1))
+    return angles
+
+
+def _unit(vectors: Floats) -> Floats:
+    unit: Floats = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return unit
+
+
+def _sums(group: NDArray[np.integer], vectors: Floats, count: int) -> Floats:
+    """(count, 3) sums of (N, 3) `vectors` by their `group`."""
+    return np.column_stack([np.bincount(group, weights=vectors[:, axis], minlength=count) for axis in range(3)])

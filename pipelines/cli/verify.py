@@ -1,0 +1,231 @@
+"""`footscan verify`: what a scanner makes of bodies whose form is known."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pipelines.cli.output import AsJson, figure, print_json, print_table
+from schemas.errors import Finding, RefusedInput, one_line
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from footscan.verify.stripe_ends import Sights
+    from schemas.fits import CuboidDimension, CuboidFit, SphereFit
+
+THESIS_NOMINAL = (150.0, 100.0, 50.0)
+THESIS_FOUND = (151.2, 102.0, 51.4)
+"""Table 6-1 of the thesis: the block, and what its scanner made of it."""
+SAMPLES = 100_000
+"""Points spread over a mesh."""
+BASES = {"faces": "face", "stripes": "stripes", "floor": "floor", None: "not seen"}
+
+verify = typer.Typer(help="Hold a scan of a body of known form against that form.", no_args_is_help=True)
+
+
+@verify.command("block")
+def block(
+    scan: Annotated[Path, typer.Argument(help="A scan's results, or a cloud or mesh of the block: PLY, STL, OBJ.")],
+    nominal: Annotated[str, typer.Option(help="The block's true dimensions in mm.")] = "150x100x50",
+    edge_mm: Annotated[float, typer.Option(min=0, max=20, help="Leave out what is nearer to an edge.")] = 3.0,
+    floor_mm: Annotated[
+        float, typer.Option(min=-1e4, max=1e4, help="Z from which the height counts where no bottom is seen.")
+    ] = 0.0,
+    sheet_mm: Annotated[
+        tuple[float, float],
+        typer.Option(help="Least and largest standard deviation of the laser's sheet; 0 0 seeks no cut stripes."),
+    ] = (0.2, 0.6),
+    as_json: AsJson = False,
+) -> None:
+    """Fit the faces of a cuboid: dimensions, angles and flatness, beside the thesis's Table 6-1."""
+    from footscan.verify.cuboid import fit_cuboid
+    from schemas.fits import CuboidParameters
+
+    true = _dimensions(nominal)
+    if not 0 <= sheet_mm[0] <= sheet_mm[1] <= 5:
+        raise RefusedInput("--sheet-mm", f"{sheet_mm[0]:g} {sheet_mm[1]:g}, expected two mm from 0 to 5, ascending")
+    source = _cloud_of(scan)
+    parameters = CuboidParameters(edge_mm=edge_mm, floor_mm=floor_mm, sheet_mm=sheet_mm)
+    try:
+        fit = fit_cuboid(_points(source), parameters, _sights_of(source))
+    except Finding as error:
+        raise Finding(f"{source}: {error}") from None
+    compared = _beside_nominal(fit, true)
+    if as_json:
+        rows = [
+            {"nominal_mm": true_mm, "thesis_mm": thesis_mm, "error_mm": _error(found, true_mm)}
+            | found.model_dump(mode="json")
+            for true_mm, thesis_mm, found in compared
+        ]
+        print_json({"file": str(source), "table_6_1": rows, "fit": fit.model_dump(mode="json")})
+    else:
+        _print_block(fit, compared, source)
+
+
+@verify.command("sphere")
+def sphere(
+    files: Annotated[list[Path], typer.Argument(help="Clouds or meshes: PLY, STL, OBJ; or scans' results.")],
+    diameter: Annotated[float, typer.Option(min=1, max=1000, help="Calibrated diameter in mm.")] = 120.0,
+    as_json: AsJson = False,
+) -> None:
+    """Fit spheres of one known diameter, in several places of the volume, as ISO 20685-2 tests scanners."""
+    from footscan.verify.sphere import find_spheres
+
+    found: list[tuple[Path, SphereFit]] = []
+    for file in files:
+        source = _cloud_of(file)
+        try:
+            found += [(source, fit) for fit in find_spheres(_points(source), diameter)]
+        except Finding as error:
+            raise Finding(f"{source}: {error}") from None
+    if as_json:
+        print_json([{"file": str(source)} | fit.model_dump(mode="json") for source, fit in found])
+    else:
+        _print_spheres(found, diameter)
+
+
+def _dimensions(text: str) -> tuple[float, float, float]:
+    try:
+        a, b, c = (float(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise RefusedInput("--nominal", f"{one_line(text)[:60]!r}, expected three numbers such as 150x100x50") from None
+    if not all(1 <= value <= 1000 for value in (a, b, c)):
+        raise RefusedInput("--nominal", f"{one_line(text)[:60]!r}, expected mm from 1 to 1000")
+    return a, b, c
+
+
+def _cloud_of(scan: Path) -> Path:
+    """The file to read: of a folder of results the cloud, which was measured, rather than the mesh made of it."""
+    if not scan.is_dir():
+        return scan
+    for name in ("cloud.ply", "foot.stl"):
+        if (scan / name).exists():
+            return scan / name
+    raise RefusedInput(scan, "holds neither cloud.ply nor foot.stl, expected the results of a scan")
+
+
+def _points(file: Path) -> "NDArray[np.float64]":
+    """The points of a cloud, or points spread over a mesh."""
+    from footscan.surface.export import read_shape
+    from footscan.surface.sampling import sample_surface
+
+    vertices, faces = read_shape(file)
+    return sample_surface(vertices, faces, SAMPLES) if len(faces) else vertices
+
+
+def _sights_of(cloud: Path) -> "Sights | None":
+    """What each camera saw before the fusion, as the store above a cloud has it; None where that is not there."""
+    from footscan.calibration.pose import camera_centres
+    from footscan.cloud.points import coordinates
+    from footscan.verify.stripe_ends import Sights
+    from pipelines.archive import CACHE
+    from pipelines.arrays import unpack
+    from pipelines.cli.cache import open_place
+    from pipelines.engine.digest import sha256
+    from pipelines.engine.explain import inputs_of
+    from schemas.calibration import Calibration
+
+    folder = cloud.resolve().parent
+    place = next((above / CACHE for above in folder.parents if (above / CACHE / "actions").is_dir()), None)
+    if place is None or not cloud.exists():
+        return None
+    store = open_place(place)
+    steps = {step: store.latest(f"{folder.parent.name}/{folder.name}/{step}") for step in ("clean", "cloud.ply")}
+    rows = {step: store.row(latest.key) for step, latest in steps.items() if latest}
+    clean, made = rows.get("clean"), rows.get("cloud.ply")
+    if not (clean and clean.digest and made and made.digest == sha256(cloud.read_bytes())):
+        return None
+    cleaned, calibration = store.get(clean.digest), store.get(inputs_of(clean.image)["calibration"][1])
+    if cleaned is None or calibration is None:
+        return None
+    points = unpack(cleaned)["points"]
+    centres = camera_centres(Calibration.model_validate_json(calibration).cameras)
+    return Sights(coordinates(points), points["camera"], centres)
+
+
+def _beside_nominal(
+    fit: "CuboidFit", nominal: tuple[float, float, float]
+) -> list[tuple[float, float | None, "CuboidDimension"]]:
+    """Each nominal dimension with the thesis's and the one of the fit that is meant: the block may lie on any face."""
+    from itertools import permutations
+
+    def misfit(dimensions: "tuple[CuboidDimension, ...]") -> float:
+        return sum(abs(_error(found, true) or 0.0) for found, true in zip(dimensions, nominal, strict=True))
+
+    best = min(permutations(fit.dimensions), key=misfit)
+    thesis = THESIS_FOUND if nominal == THESIS_NOMINAL else (None, None, None)
+    return list(zip(nominal, thesis, best, strict=True))
+
+
+def _error(found: "CuboidDimension", nominal: float) -> float | None:
+    return None if found.value_mm is None else found.value_mm - nominal
+
+
+def _print_block(fit: "CuboidFit", compared: list[tuple[float, float | None, "CuboidDimension"]], source: Path) -> None:
+    rows = []
+    for nominal, thesis, found in compared:
+        lower, upper = (BASES[end] for end in found.ends)
+        rows.append(
+            [
+                f"{nominal:g}",
+                figure(thesis, ".1f"),
+                figure(found.value_mm),
+                figure(found.uncertainty_mm),
+                figure(_error(found, nominal), "+.3f"),
+                figure(found.free_mm),
+                lower if lower == upper else f"{lower}, {upper}",
+            ]
+        )
+    columns = ["nominal", "thesis", "this scan", "uncertainty", "error", "without right angles", "ends"]
+    print_table(f"Table 6-1: {one_line(str(source))}, mm", columns, rows)
+    print_table(
+        f"Faces, mm; {fit.edge_mm:g} mm along the edges left out",
+        ["face", "points", "near edges", "outliers", "rms", "largest"],
+        [
+            [
+                face.name,
+                *map(str, (face.points, face.edge_points, face.outliers)),
+                figure(face.rms_mm),
+                figure(face.max_mm),
+            ]
+            for face in fit.faces
+        ],
+    )
+    print_table("Angles", ["faces", "degrees"], [[" and ".join(a.faces), f"{a.degrees:.3f}"] for a in fit.angles])
+    for found in fit.dimensions:
+        if found.note:
+            print(f"{figure(found.value_mm)}: {found.note}")
+    bases = {end for found in fit.dimensions for end in found.ends}
+    if "floor" in bases:
+        print(f"Floor: nothing saw the bottom, so the height counts from Z = {fit.floor_mm:g} mm.")
+    if "stripes" in bases:
+        step = figure(fit.stripe_step_mm, "g")
+        print(f"Stripes: no point lies on that end; it stands by the last stripe on the block, one every {step} mm.")
+        print("Turned by 5 degrees, the block would show its ends.")
+
+
+def _print_spheres(found: "list[tuple[Path, SphereFit]]", diameter: float) -> None:
+    columns = ["file", "centre", "diameter", "error", "uncertainty", "sd", "95 %", "fixed: rms", "95 %", "points"]
+    rows = [
+        [
+            one_line(str(source)),
+            ", ".join(f"{value:.1f}" for value in fit.centre_mm),
+            figure(fit.diameter_mm),
+            figure(fit.diameter_error_mm, "+.3f"),
+            figure(fit.diameter_uncertainty_mm),
+            figure(fit.radial_sd_mm),
+            figure(fit.radial_range95_mm),
+            figure(fit.fixed_rms_mm),
+            figure(fit.fixed_range95_mm),
+            str(fit.points),
+        ]
+        for source, fit in found
+    ]
+    print_table(f"Spheres of {diameter:g} mm, mm", columns, rows)
+    fits = [fit for _, fit in found]
+    error = max((fit.diameter_error_mm for fit in fits), key=abs)
+    deviation = max(fit.radial_sd_mm for fit in fits)
+    shell = max(fit.radial_range95_mm for fit in fits)
+    print(f"Worst of {len(fits)}: error of diameter {error:+.3f}, standard deviation {deviation:.3f}, 95 % {shell:.3f}")

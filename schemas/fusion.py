@@ -1,0 +1,72 @@
+"""What the fusion of the cameras tells: how far apart they place the same skin, and how they were moved."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from schemas.documents import Document
+
+Camera = Annotated[int, Field(ge=1)]
+Count = Annotated[int, Field(ge=0)]
+Length = Annotated[float, Field(ge=0)]
+Kind = Literal["none", "rigid", "affine", "quadratic"]
+
+
+class Disagreement(Document):
+    """Distances in mm between what two cameras see of the same skin, along its normal in the laser's plane."""
+
+    median_mm: float
+    """Positive where the first camera sees the skin farther out."""
+    deviation_mm: Length
+    """Standard deviation by the median of absolute deviations from the median."""
+    rms_mm: Length
+
+
+class PairDisagreement(Document):
+    """Of two cameras, before and after the corrections."""
+
+    cameras: tuple[Camera, Camera]
+    points: Count
+    """Places at which they were compared."""
+    before: Disagreement
+    after: Disagreement
+
+
+class CameraCorrection(Document):
+    """What moves the points of a camera in the laser's plane.
+
+    With u = (Y - centre) / scale and v = (Z - centre) / scale, the terms are, in this order: (1, 0), (0, 1), (-v, u);
+    for `affine` also (u, v), (u, -v), (v, u); for `quadratic` also (u^2, 0), (uv, 0), (v^2, 0), (0, u^2), (0, uv),
+    (0, v^2). Those that are not rigid keep to the range of (Y, Z) over which the camera was compared.
+    """
+
+    camera: Camera
+    kind: Kind
+    coefficients_mm: list[float] = Field(default_factory=list)
+    centre_mm: tuple[float, float] = (0.0, 0.0)
+    scale_mm: Length = 1.0
+    range_mm: tuple[float, float, float, float] | None = None
+    """Least Y and Z, greatest Y and Z of where the camera was compared with others; None where it was not."""
+    shift_mm: tuple[float, float] = (0.0, 0.0)
+    """Of Y and Z at the centre."""
+    rotation_deg: float = 0.0
+    """From Y towards Z."""
+    largest_mm: Length = 0.0
+    """How far the point that moves most is moved, within the range."""
+    points: Count
+    """Places at which the camera was compared with others."""
+    held_out_before_mm: Length | None = None
+    """Root mean square of its distances from others over stretches of the travel that took no part in the fit; None
+    where it was not compared, or too little."""
+    held_out_after_mm: Length | None = None
+
+
+class FusionReport(Document):
+    """How well the cameras agree."""
+
+    pairs: list[PairDisagreement] = Field(default_factory=list)
+    corrections: list[CameraCorrection] = Field(default_factory=list)
+    """One a camera."""
+    contradicted: dict[Camera, Count] = Field(default_factory=dict)
+    """Points by camera that gave way to those of others."""
+    warnings: list[str] = Field(default_factory=list)

@@ -1,0 +1,22 @@
+"""What a registration can be told."""
+
+from pydantic import Field
+
+from schemas.documents import Document
+
+
+class RegistrationParameters(Document):
+    """How closely two shapes are looked at when one is brought onto the other."""
+
+    points: int = Field(
+        default=10_000,
+        ge=500,
+        le=200_000,
+        description="points of the moving shape, spread evenly over it, that the fine registration takes",
+    )
+    inlier_mm: float = Field(
+        default=1.0,
+        gt=0,
+        le=100,
+        description="distance in mm from the other surface up to which a point counts as an inlier",
+    )
