@@ -11,6 +11,7 @@ from footscan.surface.mesh import Mesh, with_normals
 from footscan.surface.patch import fair
 from footscan.surface.projection import Projection, project
 from footscan.surface.topology import directed_edges, vertex_normals
+from footscan.surface.travel_ends import travel_ends
 from schemas.errors import Finding
 from schemas.parameters.surface import SurfaceParameters
 
@@ -61,11 +62,11 @@ def close_surface(
     usable = np.isfinite(points).all(axis=1) & np.isfinite(normals).all(axis=1)
     if usable.sum() < LEAST_POINTS or step_mm <= 0:
         raise Finding(f"{usable.sum()} points in planes {step_mm:g} mm apart, expected a cloud to mesh")
+    grazing, ends = travel_ends(np.asarray(points[usable], np.float64), step_mm)
+    usable[usable] = ~grazing
     xyz, directions = np.asarray(points[usable], np.float64), np.asarray(normals[usable], np.float64)
     cloud = _Cloud(xyz, directions, camera[usable], step_mm)
     spacing = max(parameters.grid_steps * step_mm, LEAST_GRID_MM)
-    # One step beyond the last stripe another one would have been seen.
-    ends = float(xyz[:, 0].min() - step_mm), float(xyz[:, 0].max() + step_mm)
     rough, faces = level_surface(indicator(xyz, directions, spacing, parameters.blur_steps * step_mm), ends)
     on_cloud = _project(rough, faces, cloud, parameters, 2)
     for _ in range(EVENING_ROUNDS):
@@ -89,7 +90,7 @@ def close_surface(
     edges = directed_edges(faces)
     rim = np.setdiff1d(edges[free[edges[:, 0]], 1], np.flatnonzero(free | on_lid))
     vertices = fair(vertices, faces, rim, np.flatnonzero(free))
-    vertices[free, 0] = np.clip(vertices[free, 0], *ends)
+    vertices[:, 0] = np.clip(vertices[:, 0], *ends)
     metadata = {} if height is None else {"cut_mm": repr(height)}
     return with_normals(Mesh(vertices, faces, camera=origin, filled=~is_measured, metadata=metadata))
 
