@@ -24,6 +24,7 @@ STEPS = "pipelines.steps"
 DELIVERED = {
     "cloud.ply": "cloud.ply",
     "foot.stl": "foot.stl",
+    "foot.ply": "foot.ply",
     "measures.json": "measure",
     "quality.json": "quality",
     "report.html": "report",
@@ -77,44 +78,11 @@ def scan_steps(
         steps.append(step)
         return Output(step.name)
 
-    manifests: dict[str, Output] = {}
-    stripes: dict[str, Output] = {}
-    points: dict[str, Output] = {}
-    arrays: dict[str, Path] = {}
-    for camera in scan.document.cameras:
-        film = scan.film(camera)
-        array = scan.array(camera)
-        manifest = add(
-            Step(
-                scan.name, "ingest", f"{STEPS}.ingest", None, {"film": source_files(film, digests)}, camera.id,
-                places={"film": film, "array": array}, writes=array / "zarr.json",
-            )
-        )  # fmt: skip
-        filmed: dict[str, Input] = {"manifest": manifest}
-        places = {"array": array}
-        if (background := scan.background(camera)) is not None:
-            places["background"] = laser_off = scan.background_array(camera)
-            filmed["background"] = add(
-                Step(
-                    scan.name, "background", f"{STEPS}.ingest_background", None,
-                    {"manifest": manifest, "background": source_files(background, digests)}, camera.id,
-                    places={"background": background, "array": laser_off}, writes=laser_off / "zarr.json",
-                )
-            )  # fmt: skip
-        stripe = add(
-            Step(scan.name, "extract", f"{STEPS}.extract", parameters.extraction, filmed, camera.id, places=places)
-        )
-        model = calibration.camera(camera.id)
-        inputs: dict[str, Input] = {
-            "stripe": stripe, "manifest": manifest, "calibration": model, **_travel(scan, camera)
-        }  # fmt: skip
-        points[f"points-{camera.id}"] = add(
-            Step(scan.name, "map", f"{STEPS}.map_points", parameters.mapping, inputs, camera.id)
-        )
-        manifests[f"manifest-{camera.id}"] = manifest
-        stripes[f"stripe-{camera.id}"] = stripe
-        arrays[f"array-{camera.id}"] = array
-
+    cameras = [_camera_steps(scan, camera, calibration, parameters, digests, add) for camera in scan.document.cameras]
+    manifests = {f"manifest-{camera.id}": camera.manifest for camera in cameras}
+    stripes = {f"stripe-{camera.id}": camera.stripe for camera in cameras}
+    points: dict[str, Input] = {f"points-{camera.id}": camera.points for camera in cameras}
+    colours = {f"colours-{camera.id}": camera.colours for camera in cameras if camera.colours is not None}
     maps = calibration.cameras(frozenset(camera.id for camera in scan.document.cameras))
     foot = FootParameters(side=scan.document.side)
     seen: dict[str, Input] = {**points, "calibration": maps}
@@ -135,12 +103,81 @@ def scan_steps(
     qualities = add(Step(scan.name, "quality", f"{STEPS}.quality", None, judged))
     add(Step(scan.name, "cloud.ply", f"{STEPS}.cloud_ply", None, {"oriented": oriented}))
     add(Step(scan.name, "foot.stl", f"{STEPS}.foot_stl", foot, {"surface": mesh}))
+    known: dict[str, Input] = {"surface": mesh, "name": _name(scan)}
+    if colours:
+        seen_light: dict[str, Input] = {"surface": mesh, "calibration": maps, **points, **colours}
+        known["texture"] = add(Step(scan.name, "texture", f"{STEPS}.texture", None, seen_light))
+    add(Step(scan.name, "foot.ply", f"{STEPS}.foot_ply", foot, known))
     shown: dict[str, Input] = {
         "oriented": oriented, "surface": mesh, "measures": measures, "quality": qualities,
         "calibration": maps, "about": _about(scan, parameters), **of_cameras,
     }  # fmt: skip
-    add(Step(scan.name, "report", f"{STEPS}.report", foot, shown, places=arrays))
+    add(
+        Step(
+            scan.name,
+            "report",
+            f"{STEPS}.report",
+            foot,
+            shown,
+            places={f"array-{camera.id}": camera.array for camera in cameras},
+        )
+    )
     return steps
+
+
+@dataclass(frozen=True)
+class _Camera:
+    """What the steps of one camera lead to."""
+
+    id: int
+    array: Path
+    manifest: Output
+    stripe: Output
+    points: Output
+    colours: Output | None
+
+
+def _camera_steps(
+    scan: RecordedScan,
+    camera: CameraFilm,
+    calibration: CalibrationFile,
+    parameters: ScanParameters,
+    digests: FileDigests,
+    add: Callable[[Step], Output],
+) -> _Camera:
+    """The steps from one camera's film to its world points, and to their colours where it has laser-off frames."""
+    film = scan.film(camera)
+    array = scan.array(camera)
+    manifest = add(
+        Step(
+            scan.name, "ingest", f"{STEPS}.ingest", None, {"film": source_files(film, digests)}, camera.id,
+            places={"film": film, "array": array}, writes=array / "zarr.json",
+        )
+    )  # fmt: skip
+    filmed: dict[str, Input] = {"manifest": manifest}
+    places = {"array": array}
+    if (background := scan.background(camera)) is not None:
+        places["background"] = laser_off = scan.background_array(camera)
+        filmed["background"] = add(
+            Step(
+                scan.name, "background", f"{STEPS}.ingest_background", None,
+                {"manifest": manifest, "background": source_files(background, digests)}, camera.id,
+                places={"background": background, "array": laser_off}, writes=laser_off / "zarr.json",
+            )
+        )  # fmt: skip
+    stripe = add(
+        Step(scan.name, "extract", f"{STEPS}.extract", parameters.extraction, filmed, camera.id, places=places)
+    )
+    inputs: dict[str, Input] = {
+        "stripe": stripe, "manifest": manifest, "calibration": calibration.camera(camera.id), **_travel(scan, camera)
+    }  # fmt: skip
+    points = add(Step(scan.name, "map", f"{STEPS}.map_points", parameters.mapping, inputs, camera.id))
+    colours = None
+    if background is not None:
+        lit: dict[str, Input] = {"stripe": stripe, "background": filmed["background"]}
+        skin = {"background": places["background"]}
+        colours = add(Step(scan.name, "colour", f"{STEPS}.colour", None, lit, camera.id, places=skin))
+    return _Camera(camera.id, array, manifest, stripe, points, colours)
 
 
 def source_files(path: Path, digests: FileDigests) -> SourceFile:
@@ -166,6 +203,10 @@ def _travel(scan: RecordedScan, camera: CameraFilm) -> dict[str, Value]:
 
 def _document(document: Document, path: Path) -> Value:
     return Value(canonical_json(document.model_dump(mode="json")).encode(), path)
+
+
+def _name(scan: RecordedScan) -> Value:
+    return Value(canonical_json({"patient": scan.document.patient, "scan": scan.document.scan}).encode())
 
 
 def _about(scan: RecordedScan, parameters: ScanParameters) -> Value:

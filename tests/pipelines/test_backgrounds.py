@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from footscan.frames.film import open_film, pixel_frames
 from footscan.frames.image import encode_png
 from footscan.frames.ingest import chunk_name, ingest_film
+from footscan.surface.export import read_file
 from footscan.virtual.film import write_film
 from pipelines.arrays import unpack
 from pipelines.engine.digest import FileDigests
@@ -30,7 +31,7 @@ from schemas.workflow import ScanParameters
 
 Image = NDArray[np.uint8]
 FRAMES = 20
-LEFT_OF_THE_BAR = 140
+LEFT_OF_THE_BAR = 130
 """Column; the bar's stripe lies to the right of it in every frame."""
 
 
@@ -264,7 +265,7 @@ def test_plan_says_why_a_camera_is_extracted_again(done: Any, unfinished: pytest
     background = name_background(done, "off.png")
     write_background(background, [surroundings(40)])
     steps, reasons = done.plan()
-    assert steps == 16
+    assert steps == 19  # with its colours, and those of the surface
     assert reasons["background-5"] == "cam5-background is not there"
     assert reasons["extract-5"] == "waits for background of camera 5"
     assert not reasons.keys() & {"ingest-1", "extract-1", "map-1", "ingest-5"}
@@ -273,7 +274,7 @@ def test_plan_says_why_a_camera_is_extracted_again(done: Any, unfinished: pytest
     assert reasons["extract-5"] == "input background changed"
     unfinished.undo()
     [end], ran = done.run()
-    assert (end.problem, "extract-5" in ran, done.plan()) == (None, True, (16, {}))
+    assert (end.problem, "extract-5" in ran, done.plan()) == (None, True, (19, {}))
 
     write_background(background, [surroundings(60)])
     _, reasons = done.plan()
@@ -284,7 +285,7 @@ def test_plan_says_why_a_camera_is_extracted_again(done: Any, unfinished: pytest
     assert not ran & {"ingest-5", "ingest-1", "extract-1", "map-1"}
 
     document.write_text(text)
-    assert done.plan() == (15, {})  # the scan without a background is what it was
+    assert done.plan() == (16, {})  # the scan without a background is what it was
 
 
 def test_a_background_of_the_same_content_is_not_read_again(done: Any) -> None:
@@ -294,7 +295,7 @@ def test_a_background_of_the_same_content_is_not_read_again(done: Any) -> None:
     shutil.copy(background, done.scan / "else.avi")
     document = done.scan / "scan.yaml"
     document.write_text(document.read_text().replace("off.avi", "else.avi"))
-    assert done.plan() == (16, {})
+    assert done.plan() == (19, {})
 
 
 def test_damaged_background_is_ingested_anew_within_the_run(done: Any) -> None:
@@ -309,3 +310,22 @@ def test_damaged_background_is_ingested_anew_within_the_run(done: Any) -> None:
     assert "background-5" in ran
     assert not ran & {"ingest-1", "ingest-5"}
     assert chunk.read_bytes() == whole
+
+
+def test_skin_is_coloured_where_laser_off_frames_show_it(done: Any) -> None:
+    background = name_background(done, "off.avi")
+    rose = np.full((480, 640, 3), (60, 36, 30), np.uint8)
+    write_background(background, [rose] * FRAMES)
+    done.run()
+    foot = read_file(done.results / "foot.ply")
+    assert foot.colours is not None
+    assert foot.filled is not None
+    red, green, blue = foot.colours[~foot.filled].mean(axis=0)
+    assert red > green > blue
+    assert (foot.metadata["patient"], foot.metadata["scan"], foot.metadata["side"]) == ("P0001", "S1", "right")
+
+
+def test_without_laser_off_frames_there_is_no_colour(done: Any) -> None:
+    foot = read_file(done.results / "foot.ply")
+    assert foot.colours is None
+    assert set(np.unique(foot.camera)) == {0, 1, 5}

@@ -1,0 +1,39 @@
+"""Colours of the surface's vertices, from those of the cameras that have laser-off frames."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from footscan.cloud.views import views_of
+from footscan.surface.texture import vertex_colours
+from pipelines.arrays import pack, unpack
+from schemas.calibration import Calibration
+
+
+def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
+    """`inputs`: `surface`, the `calibration` of all cameras, `points-N` and `colours-N` of each that has colours.
+
+    There are no `colours` where no point has one.
+    """
+    del parameters, places
+    surface = unpack(inputs["surface"])
+    views = views_of(Calibration.model_validate_json(inputs["calibration"]).cameras)
+    points, colours = [], []
+    for name in sorted((name for name in inputs if name.startswith("colours-")), key=lambda name: int(name[8:])):
+        found = unpack(inputs[name])
+        points.append(unpack(inputs[f"points-{name[8:]}"])["points"][found["seen"]])
+        colours.append(found["colours"][found["seen"]])
+    if not any(map(len, points)):
+        return pack()
+    colours_of_vertices = vertex_colours(
+        surface["vertices"],
+        surface["normals"],
+        surface["faces"],
+        surface.get("filled", np.zeros(len(surface["vertices"]), np.bool_)),
+        np.concatenate(points),
+        np.concatenate(colours),
+        {camera: view.centre for camera, view in views.items()},
+        surface["cut_mm"].item() if "cut_mm" in surface else None,
+    )
+    return pack(colours=colours_of_vertices)
