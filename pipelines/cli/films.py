@@ -30,6 +30,9 @@ def simulate_scan(
     scan: Annotated[str, typer.Option(help="Name of the scan; the folder's name where absent.")] = "",
     side: Annotated[Literal["right", "left", "unknown"], typer.Option(help="Which foot a mesh is.")] = "unknown",
     calibration: Annotated[str | None, typer.Option(help="Path that scan.yaml shall name, relative to it.")] = None,
+    turn_deg: Annotated[
+        float | None, typer.Option(help="Turn it about Z, counter-clockwise from above; 5 for --block, otherwise 0.")
+    ] = None,
     frames: Annotated[int, typer.Option(min=1, max=10_000)] = 200,
     step_mm: Annotated[float, typer.Option(min=0.01, max=1000)] = 2.0,
     light: Light = "ambient",
@@ -41,7 +44,7 @@ def simulate_scan(
     """Film a mesh that stands on the glass, in the middle of the travel."""
     from footscan.virtual.record import record_scan
     from pipelines.cli.progress import frame_progress
-    from pipelines.virtual_objects import stand_in_the_middle, virtual_object
+    from pipelines.virtual_objects import BLOCK_TURN_DEG, stand_in_the_middle, virtual_object
     from schemas.documents import pseudonym
 
     if [mesh is not None, foot is not None, block].count(True) != 1:
@@ -49,7 +52,8 @@ def simulate_scan(
     _check_empty(out)
     vertices, faces, known_side = virtual_object(mesh, foot, side)
     settings = _settings(light, seed, scanner_seed, frames, step_mm)
-    vertices = stand_in_the_middle(vertices, settings)
+    turn = turn_deg if turn_deg is not None else BLOCK_TURN_DEG if block else 0.0
+    vertices = stand_in_the_middle(vertices, settings, turn)
     with frame_progress("filming") as progress:
         record_scan(
             vertices,
