@@ -31,6 +31,9 @@ SLENDERNESS = (1.7, 4.5)
 """Length over breadth of what can be a foot."""
 GLASS_MM = 3.0
 """A mesh whose lowest point is closer than this to Z = 0 stands on the glass."""
+TOE_FROM_BALL_DEG = 6.0
+"""Seen from the heel, the second toe lies so near to the middle of the ball; what is farther off is another toe, taken
+for the second where two have grown together in the scan."""
 TURN_DEG = 0.05
 """The axis is found when it turns by less than this."""
 
@@ -124,15 +127,21 @@ def _along_axis(transform: NDArray[np.float64], samples: NDArray[np.float64]) ->
         transform = _heel_to_origin(apply(transform, samples)) @ transform
         moved = apply(transform, samples)
         length = length_from(moved, 0.0)
-        target = second_toe_tip(moved, length)
-        axis: Axis = "ball_center" if target is None else "toe2"
-        if target is None:
-            target = (metatarsale_tibiale(moved, length) + metatarsale_fibulare(moved, length)) / 2
-        turn = float(np.arctan2(target[1], target[0]))
+        ball = (metatarsale_tibiale(moved, length) + metatarsale_fibulare(moved, length)) / 2
+        toe = second_toe_tip(moved, length)
+        is_second = toe is not None and abs(np.rad2deg(_direction(toe) - _direction(ball))) <= TOE_FROM_BALL_DEG
+        axis: Axis = "toe2" if is_second else "ball_center"
+        target = toe if toe is not None and is_second else ball
+        turn = _direction(target)
         transform = _turn(-turn) @ transform
         if abs(turn) < np.deg2rad(TURN_DEG):
             break
     return _heel_to_origin(apply(transform, samples)) @ transform, axis
+
+
+def _direction(point: NDArray[np.float64]) -> float:
+    """Angle in radians from +X to a point on the floor, seen from the origin."""
+    return float(np.arctan2(point[1], point[0]))
 
 
 def _heel_to_origin(samples: NDArray[np.float64]) -> NDArray[np.float64]:

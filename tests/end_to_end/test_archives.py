@@ -62,7 +62,13 @@ def wait_for(moment: Callable[[], object], process: subprocess.Popen[str]) -> No
 @contextmanager
 def started(bench: Path, *options: object) -> Iterator[subprocess.Popen[str]]:
     """`footscan run OPTIONS` on a bench as a person at a terminal starts it; killed at the end, if it still runs."""
-    line = [str(Path(sys.executable).with_name("footscan")), "run", str(bench / "workflow.yaml"), *map(str, options)]
+    footscan = Path(sys.executable).with_name("footscan")
+    # Tests that run in the background of a shell ignore Ctrl-C, and so would what they start; at a terminal nothing does.
+    heeding = (
+        "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); os.execv(sys.argv[1], sys.argv[1:])"
+    )
+    command = [str(footscan), "run", str(bench / "workflow.yaml"), *map(str, options)]
+    line = [sys.executable, "-c", heeding, *command]
     with (bench / "stdout").open("w") as out:
         process = subprocess.Popen(line, stdout=out, stderr=subprocess.PIPE, text=True, start_new_session=True)
         try:

@@ -17,7 +17,7 @@ Footscan = Callable[..., CompletedProcess[str]]
 Mistake = Callable[[CompletedProcess[str]], str]
 
 CAMERA = 1
-STEPS_OF_THE_SCAN = 34
+STEPS_OF_THE_SCAN = 35
 
 
 @pytest.fixture

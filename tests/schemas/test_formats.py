@@ -108,10 +108,10 @@ def test_capture_is_accepted(tmp_path: Path) -> None:
 
 
 def test_workflow_refuses_misspelt_parameters_by_name(tmp_path: Path) -> None:
-    text = "format: footscan.workflow/1\narchive: a\nresults: r\nparameters: {outliers: {neighbors: 3}}\n"
+    text = "format: footscan.workflow/1\narchive: a\nresults: r\nparameters: {outliers: {island_shares: 0.1}}\n"
     with pytest.raises(RefusedInput) as caught:
         read_yaml(write(tmp_path, text), Workflow)
-    assert caught.value.field == "parameters.outliers.neighbors"
-    assert caught.value.problem == "unknown field, did you mean 'neighbours'?"
-    right = read_yaml(write(tmp_path, text.replace("neighbors", "neighbours")), Workflow)
-    assert right.parameters.outliers.neighbours == 3
+    assert caught.value.field == "parameters.outliers.island_shares"
+    assert caught.value.problem == "unknown field, did you mean 'island_share'?"
+    right = read_yaml(write(tmp_path, text.replace("island_shares", "island_share")), Workflow)
+    assert right.parameters.outliers.island_share == 0.1
