@@ -21,7 +21,7 @@ from pyarrow import parquet
 Footscan = Callable[..., CompletedProcess[str]]
 Mistake = Callable[[CompletedProcess[str]], str]
 CAMERAS = (1, 5)
-STEPS = 15
+STEPS = 16
 """Ingest, extract and map of 2 cameras; fuse, clean, orient, surface, measure, quality, 2 exports, report."""
 PATIENCE_S = 300.0
 """No test waits as long, unless it fails."""
@@ -63,7 +63,7 @@ def wait_for(moment: Callable[[], object], process: subprocess.Popen[str]) -> No
 def started(bench: Path, *options: object) -> Iterator[subprocess.Popen[str]]:
     """`footscan run OPTIONS` on a bench as a person at a terminal starts it; killed at the end, if it still runs."""
     footscan = Path(sys.executable).with_name("footscan")
-    # Tests that run in the background of a shell ignore Ctrl-C, and so would what they start; at a terminal nothing does.
+    # In the background of a shell Ctrl-C is ignored, and by all that is started there; at a terminal it is not.
     heeding = (
         "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); os.execv(sys.argv[1], sys.argv[1:])"
     )
@@ -145,7 +145,12 @@ def test_scans_are_run_as_they_arrive(bench: Path) -> None:
     assert results(bench) == before
     assert {name: row["status"] for name, row in table(bench).items()} == {"S1": "done", "S2": "done", "S0": "refused"}
     ran = [event["step"] for event in events(log, "step") if event["scan"] == "P0001/S2" and event["ran"]]
-    assert sorted(ran) == ["ingest", "ingest", "report"]  # its films are those of S1, whose frames gave the rest
+    assert sorted(ran) == [
+        "foot.ply",
+        "ingest",
+        "ingest",
+        "report",
+    ]  # its films are those of S1, whose frames gave the rest
     assert results(bench)["foot.stl"] == results(bench, "S2")["foot.stl"]
 
 

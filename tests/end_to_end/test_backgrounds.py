@@ -49,7 +49,7 @@ def test_scan_with_a_background(footscan: Footscan, mistake: Mistake, bench: Pat
 
     write_film(scan / "off/cam1.avi", laser_off, 640, 480, 18)
     plan = json.loads(footscan("plan", bench / "workflow.yaml", "--json").stdout)
-    assert plan["steps"] == STEPS_OF_THE_SCAN + 1
+    assert plan["steps"] == STEPS_OF_THE_SCAN + 3  # and its colours, and those of the surface
     reasons = {(miss["step"], miss["camera"]): miss["reason"] for miss in plan["misses"]}
     assert reasons["background", CAMERA] == "cam1-background is not there"
     assert reasons["extract", CAMERA] == "waits for background of camera 1"

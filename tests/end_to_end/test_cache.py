@@ -120,7 +120,7 @@ def test_an_outlier_parameter_concerns_what_follows_the_filter(footscan: Footsca
     after = rows(bench)
     assert all(after[step] == before[step] for step in OF_CAMERAS)
     mesh = trimesh.load_mesh(bench / "results/P0001/small/foot.stl")
-    assert mesh.bounds[1][2] == pytest.approx(90.0, abs=2.0)
+    assert 80.0 < mesh.bounds[1][2] <= 90.0  # the leg, open there, is cut where its outline is still seen
     set_parameters_back = (bench / "workflow.yaml").read_text().replace("90", "120")
     (bench / "workflow.yaml").write_text(set_parameters_back)  # the default, written out
     assert plan(footscan, bench)["misses"] == []
@@ -188,7 +188,9 @@ def test_a_store_that_is_damaged_all_over_is_made_anew(footscan: Footscan, bench
         replace(blob, bytes(content))
     set_parameters(bench, "{outliers: {shortest: 2}}")
     assert run(footscan, bench)["planned"] == STEPS  # what has been touched is looked at by the plan
-    (bench / "workflow.yaml").write_text((bench / "workflow.yaml").read_text().replace("23", "24"))  # the default
+    (bench / "workflow.yaml").write_text(
+        (bench / "workflow.yaml").read_text().replace("shortest: 2", "shortest: 3")
+    )  # the default
     run(footscan, bench)
     assert results(bench) == before
 
