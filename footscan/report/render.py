@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from footscan.compiled import compiled
+from footscan.surface.topology import vertex_normals
 
 _SAMPLES = 2  # a pixel is the mean of 2 x 2 samples: smooth outlines
 _LIGHT = np.array([-0.35, 0.5, 0.79]) / np.linalg.norm([-0.35, 0.5, 0.79])
@@ -42,7 +43,7 @@ def render_mesh(
     -------
     (rows, columns, 4) uint8, RGBA
     """
-    outward = vertex_normals(vertices, faces)
+    outward = vertex_normals(np.asarray(vertices, np.float64), faces)
     samples_per_mm = pixels_per_mm * _SAMPLES
     # Sample (0, 0) has its centre half a sample inside the corner.
     projected = np.asarray(vertices, np.float64) * [samples_per_mm, -samples_per_mm, 1.0] - [0.5, 0.5, 0.0]
@@ -62,21 +63,6 @@ def _shade(normals: NDArray[np.float64]) -> NDArray[np.float64]:
         _AMBIENT + _FILL * np.clip(normals[:, 2], 0, 1) + _KEY * np.clip(normals @ _LIGHT, 0, 1)
     )
     return shade
-
-
-def vertex_normals(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> NDArray[np.float64]:
-    """(V, 3) outward unit normals: the sum of the normals of a vertex's triangles, each weighted by its area."""
-    corners = np.asarray(vertices, np.float64)[faces]
-    of_faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sums = np.column_stack(
-        [
-            np.bincount(faces.ravel(), weights=np.repeat(of_faces[:, axis], 3), minlength=len(vertices))
-            for axis in range(3)
-        ]
-    )
-    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
-    normals: NDArray[np.float64] = np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > 0)
-    return normals
 
 
 @compiled

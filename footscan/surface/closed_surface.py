@@ -62,10 +62,10 @@ def close_surface(
     usable = np.isfinite(points).all(axis=1) & np.isfinite(normals).all(axis=1)
     if usable.sum() < LEAST_POINTS or step_mm <= 0:
         raise Finding(f"{usable.sum()} points in planes {step_mm:g} mm apart, expected a cloud to mesh")
-    grazing, ends = travel_ends(np.asarray(points[usable], np.float64), step_mm)
-    usable[usable] = ~grazing
     xyz, directions = np.asarray(points[usable], np.float64), np.asarray(normals[usable], np.float64)
-    cloud = _Cloud(xyz, directions, camera[usable], step_mm)
+    grazing, ends = travel_ends(xyz, step_mm)
+    xyz, directions = xyz[~grazing], directions[~grazing]
+    cloud = _Cloud(xyz, directions, camera[usable][~grazing], step_mm)
     spacing = max(parameters.grid_steps * step_mm, LEAST_GRID_MM)
     rough, faces = level_surface(indicator(xyz, directions, spacing, parameters.blur_steps * step_mm), ends)
     on_cloud = _project(rough, faces, cloud, parameters, 2)

@@ -1,7 +1,6 @@
 """Whether a store is what it says: everything in it read, and actions done again."""
 
 import importlib
-import json
 import logging
 import random
 import tempfile
@@ -10,17 +9,17 @@ from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
-from pipelines.engine.digest import sha256
+from pipelines.engine.digest import BROKEN, sha256, unsealed
 from pipelines.engine.key import image_text, key_of
 from pipelines.engine.lease import FOLDER as LEASES
 from pipelines.engine.lease import leases
 from pipelines.engine.pins import FOLDER as PINS
 from pipelines.engine.pins import read_pin
 from pipelines.engine.plan import Plan, without_places
-from pipelines.engine.step import Failure, Outcome, Output, SourceFile, Step, Success, Value
+from pipelines.engine.run import content_of
+from pipelines.engine.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.store import Store, latest_name
 from pipelines.engine.trace import blob_digest, row_key
-from schemas.documents import canonical_json
 from schemas.errors import DamagedError, Finding, RefusedInput
 
 log = logging.getLogger("footscan.store")
@@ -108,7 +107,7 @@ def repeat(action: Repeatable, store: Store) -> Difference | None:
     """
     with tempfile.TemporaryDirectory(prefix="footscan-") as folder:
         step = _elsewhere(action.step, Path(folder))
-        inputs = {name: _content(name, action, store) for name in step.inputs}
+        inputs = {name: content_of(step, source, action.inputs[name], store) for name, source in step.inputs.items()}
         try:
             found = sha256(importlib.import_module(step.module).run(inputs, step.parameters, step.places))
         except (RefusedInput, Finding) as error:
@@ -187,10 +186,10 @@ def _read(name: str, store: Store) -> bytes | None:
 
 def _is_sealed(data: bytes) -> bool:
     try:
-        value = json.loads(data)
-        return bool(value.pop("seal") == sha256(canonical_json(value).encode()))
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        unsealed(data)
+    except BROKEN:
         return False
+    return True
 
 
 def _said(name: str, store: Store) -> bool:
@@ -205,15 +204,3 @@ def _elsewhere(step: Step, folder: Path) -> Step:
         return step
     places = {name: folder / name if writes.is_relative_to(place) else place for name, place in step.places.items()}
     return step._replace(places=places)
-
-
-def _content(name: str, action: Repeatable, store: Store) -> bytes:
-    source = action.step.inputs[name]
-    if isinstance(source, Value):
-        return source.content
-    if isinstance(source, SourceFile):
-        return b""  # the step reads it where it lies
-    data = store.get(action.inputs[name])
-    if data is None:
-        raise DamagedError(f"{action.step.name}: the result of {source.step} is damaged, expected what was stored")
-    return data

@@ -18,7 +18,7 @@ from pipelines.engine.files import Files
 from pipelines.engine.key import image_text, key_of
 from pipelines.engine.plan import Plan, cached_outcome, without_places
 from pipelines.engine.pool import OnStepEnd, Pool, StepEnd, Task
-from pipelines.engine.step import Failure, Outcome, Output, SourceFile, Step, Success, Value
+from pipelines.engine.step import Failure, Input, Outcome, Output, SourceFile, Step, Success, Value
 from pipelines.engine.store import Row, Store
 from schemas.errors import DamagedError, Fault, Finding, RefusedInput, one_line
 
@@ -120,7 +120,7 @@ def _run_safely(step: Step, image: str, inputs: Mapping[str, str], store: Store)
 
 def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, str | None]:
     """Run a step and record what came out, unless its files were changed meanwhile; and what came out once before."""
-    content = {name: _content(step, source, inputs[name], store) for name, source in step.inputs.items()}
+    content = {name: content_of(step, source, inputs[name], store) for name, source in step.inputs.items()}
     try:
         result = importlib.import_module(step.module).run(content, step.parameters, step.places)
     except (RefusedInput, Finding) as error:
@@ -176,7 +176,8 @@ def _keep_code(identity: CodeIdentity, store: Store) -> None:
 _KEPT: set[tuple[Files, str]] = set()
 
 
-def _content(step: Step, source: Value | Output | SourceFile, digest: str, store: Store) -> bytes:
+def content_of(step: Step, source: Input, digest: str, store: Store) -> bytes:
+    """An input of a step as it is handed over; DamagedError where the result that it is cannot be had."""
     if isinstance(source, Value):
         return source.content
     if isinstance(source, SourceFile):
