@@ -3,7 +3,9 @@
 A message is one line and names the file, the field or value, and what was expected.
 """
 
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 
 class FootscanError(Exception):
@@ -22,6 +24,10 @@ class RefusedInput(FootscanError):
         self.field = field
         self.problem = problem
         super().__init__(": ".join(one_line(part) for part in (self.source, field, problem) if part))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """What another process makes it anew from."""
+        return partial(RefusedInput, field=self.field), (self.source, self.problem)
 
 
 class Finding(FootscanError):

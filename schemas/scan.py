@@ -1,5 +1,7 @@
 """A recorded scan: `scan.yaml` and the films of its cameras."""
 
+import datetime
+import re
 from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
@@ -45,6 +47,10 @@ class Scan(Document):
     side: Side
     travel: Travel | None = None
     calibration: RelativePath | None = None
+    scanner: Pseudonym | None = None
+    """Which scanner filmed it: a workflow may have a calibration for each."""
+    date: datetime.date | None = None
+    """When; where absent, the day that the scan's name begins with, if it does."""
     truth: RelativePath | None = None
     """Reference model in the scanner's own frame, for verification only."""
     cameras: Annotated[list[CameraFilm], Field(min_length=1)]
@@ -56,6 +62,16 @@ class Scan(Document):
             if self.travel is None and camera.travel is None and camera.positions is None:
                 raise ValueError(f"camera {camera.id} has no travel, expected travel or positions")
         return self
+
+    @property
+    def day(self) -> datetime.date | None:
+        """`date`, or that of a name such as 2026-11-20-R."""
+        if self.date is not None or not (named := re.match(r"\d{4}-\d{2}-\d{2}", self.scan)):
+            return self.date
+        try:
+            return datetime.date.fromisoformat(named[0])
+        except ValueError:
+            return None
 
 
 def unique_ids(cameras: Sequence[CameraSource]) -> None:

@@ -1,16 +1,18 @@
 """workflow.yaml: the one file a user edits."""
 
-from typing import Annotated, Any, Literal
+import datetime
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
-from schemas.documents import Document
+from schemas.documents import Document, Pseudonym
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.parameters.fusion import FusionParameters
 from schemas.parameters.mapping import MappingParameters
 from schemas.parameters.normals import NormalParameters
 from schemas.parameters.outliers import OutlierParameters
 from schemas.parameters.surface import SurfaceParameters
+from schemas.tuning import Tuning
 
 
 def _place(named: str) -> str:
@@ -39,14 +41,39 @@ class ScanParameters(Document):
     surface: SurfaceParameters = SurfaceParameters()
 
 
+def _as_list(folders: Any) -> Any:
+    return [folders] if isinstance(folders, str) else folders
+
+
+Folder = Annotated[str, Field(min_length=1)]
+Folders = Annotated[
+    list[Folder],
+    BeforeValidator(_as_list),
+    Field(min_length=1),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+]
+
+
+class ChosenCalibration(Document):
+    """A calibration, and for which scans it is meant."""
+
+    file: Annotated[str, Field(min_length=1)]
+    scanner: Pseudonym | None = None
+    """For scans of this scanner; of any where absent."""
+    since: datetime.date | None = None
+    """For scans of this day and later, until the next one takes over; from the start where absent."""
+
+
 class Workflow(Document):
     """The content of workflow.yaml; its paths are relative to it."""
 
     format: Literal["footscan.workflow/1"]
-    archive: Annotated[str, Field(min_length=1)]
-    """Folder that holds the scans, each a folder with a scan.yaml."""
+    archive: Folders
+    """Folder that holds the scans, each a folder with a scan.yaml; or several such folders."""
     calibration: str | None = None
     """Used for scans that name none themselves."""
+    calibrations: list[ChosenCalibration] = Field(default_factory=list)
+    """Likewise, where they differ by scanner and date; excludes `calibration`."""
     results: Annotated[str, Field(min_length=1)]
     """Folder for `<patient>/<scan>/`."""
     cache: Annotated[str, AfterValidator(_place)] | None = None
@@ -54,3 +81,16 @@ class Workflow(Document):
     workers: Annotated[int, Field(ge=1, le=256)] | None = None
     """How many steps run at once; as many as there are cores where absent."""
     parameters: Annotated[ScanParameters, BeforeValidator(_without_empty)] = ScanParameters()
+    tune: Tuning | None = None
+    """What `footscan tune` seeks."""
+
+    @model_validator(mode="after")
+    def _one_calibration_a_scan(self) -> Self:
+        if self.calibration is not None and self.calibrations:
+            raise ValueError("calibration and calibrations exclude each other, expected one of them")
+        meant = [(chosen.scanner, chosen.since) for chosen in self.calibrations]
+        for scanner, since in meant:
+            if meant.count((scanner, since)) > 1:
+                of, start = scanner or "any scanner", since or "the start"
+                raise ValueError(f"calibrations: two of {of} since {start}, expected one")
+        return self

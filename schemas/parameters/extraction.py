@@ -113,6 +113,13 @@ class ExtractionParameters(Document):
         le=1000.0,
         description="extent in px below which a piece is dropped that nothing lies near in the frame before and after",
     )
+    largest_blur: float = Field(
+        default=1.5,
+        ge=1.0,
+        le=100.0,
+        description="times the film's median width, and its median sigma, beyond both of which a piece that is hardly "
+        "red is the lit rim of the skin; of no use in films of fewer than eight frames",
+    )
     ghost_reach_px: float = Field(
         default=60.0,
         ge=0.0,

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from schemas.documents import (
     MAX_BYTES,
-    MAX_DEPTH,
     Document,
     canonical_json,
     inside,
@@ -22,6 +21,7 @@ from schemas.documents import (
 )
 from schemas.errors import RefusedInput
 from schemas.scan import Scan
+from schemas.yaml_text import MAX_DEPTH
 
 SCAN = """\
 format: footscan.scan/1

@@ -1,5 +1,7 @@
 """Messages are one line, whatever comes from outside."""
 
+import pickle
+
 from schemas.errors import DamagedError, Fault, Finding, FootscanError, RefusedInput, one_line
 
 
@@ -18,3 +20,8 @@ def test_messages_are_one_line() -> None:
 
 def test_refusal_without_field() -> None:
     assert str(RefusedInput("scan.yaml", "no such file")) == "scan.yaml: no such file"
+
+
+def test_a_refusal_reaches_another_process_whole() -> None:
+    error = pickle.loads(pickle.dumps(RefusedInput("scan.yaml", "no such side", field="side")))  # as pools hand it on
+    assert (error.source, error.field, str(error)) == ("scan.yaml", "side", "scan.yaml: side: no such side")

@@ -63,7 +63,9 @@ def test_a_camera_of_a_scan_may_have_a_background(tmp_path: Path) -> None:
     assert read_yaml(write(tmp_path, text), Scan).cameras[0].background == "off/cam1.png"
     with pytest.raises(RefusedInput) as caught:
         read_yaml(write(tmp_path, text.replace("off/cam1.png", "''")), Scan)
-    assert str(caught.value).endswith("cameras.0.background: expected a path relative to this file, found ''")
+    assert str(caught.value).endswith(
+        "cameras.0.background: expected a path relative to this file, found '' (line 9, column 41)"
+    )
     with pytest.raises(RefusedInput, match=r"cameras.0.background: unknown field"):
         read_yaml(write(tmp_path, CAPTURE.replace("cam1.avi", "cam1.avi, background: off.avi")), Capture)
 
@@ -112,6 +114,6 @@ def test_workflow_refuses_misspelt_parameters_by_name(tmp_path: Path) -> None:
     with pytest.raises(RefusedInput) as caught:
         read_yaml(write(tmp_path, text), Workflow)
     assert caught.value.field == "parameters.outliers.island_shares"
-    assert caught.value.problem == "unknown field, did you mean 'island_share'?"
+    assert caught.value.problem == "unknown field, did you mean 'island_share'? (line 4, column 25)"
     right = read_yaml(write(tmp_path, text.replace("island_shares", "island_share")), Workflow)
     assert right.parameters.outliers.island_share == 0.1

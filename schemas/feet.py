@@ -1,0 +1,79 @@
+"""A foot as shoes are chosen for it: what measures.json tells, whoever wrote it, and whose foot it is."""
+
+import re
+from datetime import date
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, model_validator
+
+from schemas.documents import Document
+from schemas.measures import Status
+from schemas.scan import Side
+
+AS_TOLD = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+"""Measures that a person or another version wrote down are as good as ours: what is not needed is passed over."""
+LARGEST = 1e12
+"""A thousand cubic metres in mm3: what is beyond is no measure of a foot."""
+
+
+class Reading(Document):
+    """One measure."""
+
+    model_config = AS_TOLD
+
+    value: Annotated[float, Field(ge=-LARGEST, le=LARGEST)] | None
+    unit: str = "mm"
+    status: Status = "ok"
+    definition: str = ""
+    note: str | None = None
+    uncertainty: Annotated[float, Field(ge=0, le=LARGEST)] | None = None
+    """One standard deviation, in the measure's own unit."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _has_fields(cls, value: Any) -> Any:
+        if not isinstance(value, dict | Reading):
+            raise ValueError('expected fields, such as {"value": 262.7}')
+        return value
+
+
+class Foot(Document):
+    """The measures of one foot."""
+
+    model_config = AS_TOLD
+
+    unit: Literal["mm"] = "mm"
+    side: Side = "unknown"
+    side_note: str | None = None
+    """Where the form of the foot speaks against its side."""
+    axis: str | None = None
+    measures: dict[str, Reading]
+    finding: str | None = None
+    """Why nothing was measured."""
+    patient: str | None = None
+    scan: str | None = None
+    source: str = "measures"
+    """What messages call it."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_measures(cls, value: Any) -> Any:
+        told = value.get("format", "") if isinstance(value, dict) else ""
+        if not re.fullmatch(r"footscan\.measures/\d+", str(told)):
+            raise ValueError(f"expected the format footscan.measures/1, found {str(told)[:80]!r}")
+        return value
+
+    @property
+    def name(self) -> str:
+        """`patient/scan` where they are known, the file otherwise."""
+        return f"{self.patient}/{self.scan}" if self.patient and self.scan else self.source
+
+    @property
+    def date(self) -> date | None:
+        """The day that the name of the scan tells: 2026-11-20-R."""
+        for year, month, day in re.findall(r"(?<!\d)(\d{4})-?(\d\d)-?(\d\d)(?!\d)", self.scan or ""):
+            try:
+                return date(int(year), int(month), int(day))
+            except ValueError:  # a number that is no day
+                continue
+        return None

@@ -1,0 +1,132 @@
+"""A scanner that films: its heads, its cameras, and how it is run. `rig.yaml`, one for each scanner."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from schemas.documents import Document, Pseudonym, RelativePath
+
+HeadNumber = Annotated[int, Field(ge=1, le=3)]
+Millimetres = Annotated[float, Field(ge=-1e4, le=1e4)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Milliseconds = Annotated[float, Field(gt=0, le=1000)]
+Port = Annotated[str, Field(min_length=1, max_length=1000)]
+
+USUAL_HEADS: dict[int, int] = {1: 1, 2: 1, 3: 2, 4: 2, 5: 3, 6: 3, 7: 3, 8: 3}
+"""Two cameras on each of the upper heads, four on the one below."""
+
+
+def _one_of(*allowed: int) -> AfterValidator:
+    """Whole numbers that YAML gives as text are no literals yet."""
+
+    def check(value: int) -> int:
+        if value not in allowed:
+            raise ValueError(f"expected {' or '.join(map(str, allowed))}, found {value}")
+        return value
+
+    return AfterValidator(check)
+
+
+class RigHead(Document):
+    """How the rail of a head lies: X of its laser plane is `offset_mm` + `direction` * machine position."""
+
+    offset_mm: Millimetres = -20.0
+    """X at which its home switch trips; it aligns the heads."""
+    direction: Annotated[int, _one_of(-1, 1)] = -1
+    """-1 where X grows away from the home switch."""
+
+
+class RigLatency(Document):
+    """How much later a camera's times are than the controller's; measured with an object in both directions."""
+
+    seconds: Annotated[float, Field(ge=-1, le=5)]
+    sd_s: Annotated[float, Field(ge=0, le=1)]
+    exposure_share: Share = 0.0
+    """Of a frame's delay against the camera's even clock, the part that belongs to its exposure and not to delivery."""
+    frame_sd_s: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Standard deviation of a frame's time besides."""
+    exposure_ms: Milliseconds | None = None
+    """Exposure with which it was measured."""
+
+
+class RigCamera(Document):
+    """One camera."""
+
+    id: Annotated[int, Field(ge=1, le=8)]
+    device: Annotated[str, Field(min_length=1, max_length=1000)]
+    """A stable name (/dev/v4l/by-id/..., /dev/v4l/by-path/...) or a URL."""
+    head: HeadNumber | None = None
+    """The head it stands on; where absent, the usual one of its number."""
+    control_url: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+    """Where a network camera takes exposure and gain."""
+    latency: RigLatency | None = None
+    """None until it was measured: a scan then says that its X is not to be relied on."""
+
+    @property
+    def on_head(self) -> int:
+        """The head it stands on."""
+        return self.head if self.head is not None else USUAL_HEADS[self.id]
+
+
+class RigTravel(Document):
+    """The travel of a scan; 40 cm in 11 s where nothing is said."""
+
+    start_mm: Millimetres = 0.0
+    length_mm: Annotated[float, Field(gt=0, le=2000)] = 400.0
+    mm_per_s: Annotated[float, Field(gt=0, le=200)] = 400.0 / 11.0
+
+    @property
+    def end_mm(self) -> float:
+        """X at which it ends."""
+        return self.start_mm + self.length_mm
+
+
+class RigLight(Document):
+    """Within what the light may be set."""
+
+    shortest_ms: Milliseconds = 0.3
+    longest_ms: Milliseconds = 20.0
+    """Motion during an exposure smears the stripe."""
+    weakest: Share = 0.1
+    """Share of their power below which the lasers do not shine evenly."""
+    gain: Share = 0.0
+    """Of each camera's range; gain makes noise grow with the picture."""
+    white_balance_k: Annotated[float, Field(ge=1000, le=20000)] = 4600.0
+    mains_hz: Annotated[int, _one_of(0, 50, 60)] = 50
+    """Of the lamps."""
+
+    @model_validator(mode="after")
+    def _shortest_is_shorter(self) -> Self:
+        if self.shortest_ms > self.longest_ms:
+            raise ValueError(
+                f"shortest_ms: expected at most longest_ms, {self.longest_ms:g}, found {self.shortest_ms:g}"
+            )
+        return self
+
+
+def _each_once(cameras: list[RigCamera]) -> list[RigCamera]:
+    for field in ("id", "device"):
+        values = [getattr(camera, field) for camera in cameras]
+        for value in values:
+            if values.count(value) > 1:
+                raise ValueError(f"{field} {value} stands twice, expected each once")
+    return cameras
+
+
+class Rig(Document):
+    """The content of rig.yaml."""
+
+    format: Literal["footscan.rig/1"]
+    scanner: Pseudonym
+    """Its name: scans and calibrations bear it."""
+    port: Port
+    """Serial port of the board, best a stable name: /dev/serial/by-id/..."""
+    heads: Annotated[tuple[RigHead, RigHead, RigHead], Field()] = (RigHead(), RigHead(), RigHead())
+    """Of axes X, Y and Z: head 1 above on the +Y side, head 2 above on the -Y side, head 3 below."""
+    cameras: Annotated[list[RigCamera], Field(min_length=1, max_length=8), AfterValidator(_each_once)]
+    travel: RigTravel = RigTravel()
+    frames_per_second: Annotated[float, Field(gt=0, le=240)] = 200.0 / 11.0
+    """Of each camera: 200 frames in 11 s."""
+    light: RigLight = RigLight()
+    calibration: RelativePath | None = None
+    """The scanner's calibration, for scans that are reconstructed at once."""
