@@ -1,4 +1,4 @@
-"""Films as they come: AVI (Motion-JPEG or raw), a folder of images, a single image.
+"""Films as they come: AVI (Motion-JPEG or raw), a folder of images, a single image, an array recorded frame by frame.
 
 The packets are taken out of the AVI untouched. A frame that is lost or torn keeps its number, for its number is its X.
 """
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
+from footscan.frames.array import damage, is_complete, read_manifest, stored_bytes
 from footscan.frames.image import SUFFIXES, Rgb, decode_image, image_size, pixel_buffer
 from schemas.errors import Fault, RefusedInput
 
@@ -29,7 +30,8 @@ class Film:
 
     path: Path
     kind: str
-    """`mjpeg`: an AVI of JPEG packets; `raw`: an AVI of plain pixels; `images`: a folder of them, or one."""
+    """`mjpeg`: an AVI of JPEG packets; `raw`: an AVI of plain pixels; `images`: a folder of them, or one; `array`: a
+    Zarr array of ours, of encoded images."""
     frames: int
     height: int
     width: int
@@ -41,7 +43,7 @@ def open_film(path: Path, size: tuple[int, int] | None = None) -> Film:
     Parameters
     ----------
     path : Path
-        An AVI, a folder of PNG or JPEG images in name order, or one image.
+        An AVI, a folder of PNG or JPEG images in name order, one image, or an array of encoded images.
     size : (rows, columns), optional
         Expected size of the frames.
 
@@ -50,8 +52,7 @@ def open_film(path: Path, size: tuple[int, int] | None = None) -> Film:
     RefusedInput
         Missing, empty, truncated, of another kind or another size.
     """
-    files = film_files(path)
-    film = _open_avi(path) if files == [path] and path.suffix.lower() not in SUFFIXES else _open_images(path, files)
+    film = _open_film(path)
     if size is not None and (film.height, film.width) != size:
         expected = f"expected frames of {size[1]} x {size[0]} pixels, found {film.width} x {film.height}"
         raise RefusedInput(path, expected, field="frame size")
@@ -76,7 +77,13 @@ def open_background(path: Path, size: tuple[int, int], frames: int, whose: str =
 
 
 def encoded_frames(film: Film) -> Iterator[bytes | None]:
-    """The frames of a film of kind `mjpeg` or `images` as they were encoded, None for each that is lost."""
+    """The frames of a film of kind `mjpeg`, `images` or `array` as they were encoded, None for each that is lost.
+
+    Fault where one of an array is damaged: it is checked against the digest under which it was recorded.
+    """
+    if film.kind == "array":
+        yield from _array_frames(film.path)
+        return
     if film.kind == "images":
         yield from (file.read_bytes() or None for file in image_files(film.path))
         return
@@ -110,7 +117,12 @@ def image_files(path: Path) -> list[Path]:
 
 
 def film_files(path: Path) -> list[Path]:
-    """The files that make up a film; RefusedInput where there are none."""
+    """The files that make up a film; RefusedInput where there are none.
+
+    Of an array that is the one which holds its manifest, and so the digest of every frame.
+    """
+    if is_complete(path):
+        return [path / "zarr.json"]
     try:
         files = image_files(path)
         for file in files:
@@ -126,6 +138,22 @@ def film_files(path: Path) -> list[Path]:
 def frame_digest(frame: bytes | Rgb) -> str:
     """SHA-256 of a frame's bytes."""
     return hashlib.sha256(frame if isinstance(frame, bytes) else np.ascontiguousarray(frame).data).hexdigest()
+
+
+def _open_film(path: Path) -> Film:
+    if is_complete(path):
+        return _open_array(path)
+    files = film_files(path)
+    return _open_avi(path) if files == [path] and path.suffix.lower() not in SUFFIXES else _open_images(path, files)
+
+
+def _open_array(path: Path) -> Film:
+    manifest = read_manifest(path)
+    if manifest.encoding != "image":
+        raise RefusedInput(path, "expected an array of encoded images, found one of pixels", field="encoding")
+    if not manifest.frames:
+        raise RefusedInput(path, "expected at least one frame, found none", field="frames")
+    return Film(path, "array", len(manifest.frames), manifest.height, manifest.width)
 
 
 def _open_images(path: Path, files: list[Path]) -> Film:
@@ -236,6 +264,14 @@ def _packets(film: Film) -> Iterator[tuple[int, bytes]]:
         for packet in container.demux(stream):
             if packet.size:
                 yield _number(packet.pts, stream), bytes(packet)
+
+
+def _array_frames(array: Path) -> Iterator[bytes | None]:
+    for number, digest in enumerate(read_manifest(array).frames):
+        data = None if digest is None else stored_bytes(array, number)
+        if digest is not None and (data is None or frame_digest(data) != digest):
+            raise damage(array, number)
+        yield data
 
 
 def _raw_frames(film: Film) -> Iterator[tuple[int, Rgb]]:

@@ -4,20 +4,21 @@ An array is written beside its place and renamed when it is whole: what has its 
 """
 
 import contextlib
-import errno
-import os
 import shutil
-import socket
-import threading
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, Literal
 
 import zarr
 from zarr.codecs import BloscCodec
 from zarr.errors import ContainsGroupError
 
+from footscan.frames.array import chunk_name, is_recorded
 from footscan.frames.codec import ImageCodec
-from footscan.frames.film import encoded_frames, frame_digest, open_film, pixel_frames
-from schemas.errors import Fault
+from footscan.frames.film import Film, encoded_frames, frame_digest, open_film, pixel_frames
+from footscan.frames.partial import move_into_place, partial_folder, sweep
+from schemas.errors import Fault, RefusedInput
 from schemas.frames import FrameManifest
 
 FRAME_SIZE = (480, 640)
@@ -27,12 +28,13 @@ FRAME_SIZE = (480, 640)
 def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SIZE) -> FrameManifest:
     """Write the frames of `film` as the Zarr array `array`, in place of what is there.
 
-    JPEG and PNG frames keep their bytes; raw ones are compressed without loss.
+    JPEG and PNG frames keep their bytes; raw ones are compressed without loss. Frames that were recorded straight into
+    `array`, which then is the film, are only checked.
 
     Parameters
     ----------
     film : Path
-        An AVI or a folder of images.
+        An AVI, a folder of images, or a recorded array.
     array : Path
         Folder of the array, e.g. `SCAN/frames.zarr/cam1`; its parent becomes a Zarr group.
     size : (rows, columns), optional
@@ -41,51 +43,23 @@ def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SI
     Raises
     ------
     RefusedInput
-        The film is missing, truncated, or not of this size.
+        The film is missing, truncated, or not of this size; or `array` holds another camera's recorded frames.
     Fault
-        The array cannot be written; nothing that looks whole is left.
+        The array cannot be written, and nothing that looks whole is left; or a recorded frame is damaged.
     """
     opened = open_film(film, size)
-    partial = _partial_folder(array)
+    if film.resolve() == array.resolve():
+        return _checked(opened)
+    if is_recorded(array):
+        raise RefusedInput(array, "holds frames that were recorded into it, expected scan.yaml to name it as the film")
+    partial = partial_folder(array.parent.parent, array.name)  # outside of the group: no reader of it meets a part
     try:
         array.parent.mkdir(parents=True, exist_ok=True)
-        _sweep(array.parent.parent)
+        sweep(array.parent.parent)
         shutil.rmtree(partial, ignore_errors=True)
-        target = zarr.create_array(
-            store=str(partial),
-            shape=(opened.frames, opened.height, opened.width, 3),
-            chunks=(1, opened.height, opened.width, 3),
-            dtype="uint8",
-            fill_value=0,
-            dimension_names=("frame", "row", "column", "rgb"),
-            chunk_key_encoding={"name": "v2", "separator": "."},  # one flat folder of images
-            **(
-                {"compressors": BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")}
-                if opened.kind == "raw"
-                else {"serializer": ImageCodec(), "compressors": None}
-            ),
-        )
-        digests: list[str | None] = []
-        if opened.kind == "raw":
-            for number, pixels in enumerate(pixel_frames(opened)):
-                digests.append(None if pixels is None else frame_digest(pixels))
-                if pixels is not None:
-                    target[number] = pixels
-        else:
-            for number, data in enumerate(encoded_frames(opened)):
-                digests.append(None if data is None else frame_digest(data))
-                if data is not None:
-                    (partial / chunk_name(number)).write_bytes(data)
-        manifest = FrameManifest(
-            encoding="pixels" if opened.kind == "raw" else "image",
-            height=opened.height,
-            width=opened.width,
-            frames=digests,
-        )
-        target.update_attributes({"footscan": manifest.model_dump(mode="json"), "film": film.name})
-        _move_into_place(partial, array)
-        with contextlib.suppress(ContainsGroupError):  # another camera's thread was first
-            zarr.open_group(str(array.parent), mode="a")
+        manifest = _write_frames(opened, partial)
+        move_into_place(partial, array)
+        make_group(array.parent)
     except OSError as error:
         raise Fault(f"{array}: cannot be written ({error.strerror or error})") from None
     finally:
@@ -93,14 +67,54 @@ def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SI
     return manifest
 
 
-def chunk_name(frame: int) -> str:
-    """File of one frame within its array."""
-    return f"{frame}.0.0.0"
+class FrameWriter:
+    """Writes encoded frames into a folder, one a file, which `finish` makes a Zarr array.
+
+    OSError where the disk refuses.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir(parents=True)
+        self._folder = folder
+        self._digests: dict[int, str] = {}
+
+    def add(self, number: int, data: bytes) -> None:
+        """Frame `number`, a JPEG or PNG image, bit for bit."""
+        (self._folder / chunk_name(number)).write_bytes(data)
+        self._digests[number] = frame_digest(data)
+
+    def renumber(self, numbers: Mapping[int, int]) -> None:
+        """Frame k becomes what was frame `numbers[k]`, which may become several; all others are removed."""
+        waiting = {old: self._folder / f"{old}.renumbered" for old in self._digests}
+        for old, path in waiting.items():  # a new number may still be another frame's old one
+            (self._folder / chunk_name(old)).rename(path)
+        uses = Counter(numbers.values())
+        for new, old in numbers.items():
+            uses[old] -= 1
+            place = self._folder / chunk_name(new)
+            shutil.copyfile(waiting[old], place) if uses[old] else waiting[old].rename(place)
+        for old in waiting.keys() - set(numbers.values()):
+            waiting[old].unlink()
+        self._digests = {new: self._digests[old] for new, old in numbers.items()}
+
+    def finish(self, frames: int, size: tuple[int, int], film: str | None) -> FrameManifest:
+        """Makes the folder an array of so many frames; those that were never added are lost.
+
+        Parameters
+        ----------
+        size : (rows, columns)
+        film : name of what they were ingested from; None for frames that come straight from a camera.
+        """
+        digests = [self._digests.get(number) for number in range(frames)]
+        manifest = FrameManifest(encoding="image", height=size[0], width=size[1], frames=digests)
+        _describe(_create_array(self._folder, "image", (frames, *size)), manifest, film)
+        return manifest
 
 
-def is_complete(array: Path) -> bool:
-    """Whether a whole array is there; what it holds is checked frame by frame on reading."""
-    return (array / "zarr.json").is_file()
+def make_group(folder: Path) -> None:
+    """Makes the folder of several arrays a Zarr group."""
+    with contextlib.suppress(ContainsGroupError):  # another camera's thread was first
+        zarr.open_group(str(folder), mode="a")
 
 
 def discard(array: Path) -> None:
@@ -108,39 +122,51 @@ def discard(array: Path) -> None:
     (array / "zarr.json").unlink(missing_ok=True)
 
 
-def _partial_folder(array: Path) -> Path:
-    """Outside of the group, so that no reader of it meets a part; one for each thread that ingests."""
-    return array.parent.parent / f".{array.name}.partial-{socket.gethostname()}-{threading.get_ident()}-{os.getpid()}"
+def _checked(recorded: Film) -> FrameManifest:
+    """The manifest of a recorded array, each of whose frames is as it was recorded."""
+    digests = [None if data is None else frame_digest(data) for data in encoded_frames(recorded)]
+    return FrameManifest(encoding="image", height=recorded.height, width=recorded.width, frames=digests)
 
 
-def _move_into_place(partial: Path, array: Path) -> None:
-    """Give `partial` the name `array`. A folder cannot be renamed onto another: the old one steps aside first.
-
-    Others may ingest the same array meanwhile; whoever comes last stays.
-    """
-    aside = partial.with_name(partial.name + ".old")
-    while True:
-        try:
-            partial.rename(array)
-            return
-        except OSError as error:
-            if error.errno not in {errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR}:
-                raise
-        with contextlib.suppress(FileNotFoundError):  # another was faster
-            array.rename(aside)
-            _remove(aside)
+def _write_frames(film: Film, folder: Path) -> FrameManifest:
+    if film.kind == "raw":
+        return _write_pixels(film, folder)
+    writer = FrameWriter(folder)
+    for number, data in enumerate(encoded_frames(film)):
+        if data is not None:
+            writer.add(number, data)
+    return writer.finish(film.frames, (film.height, film.width), film.path.name)
 
 
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)
+def _write_pixels(film: Film, folder: Path) -> FrameManifest:
+    target = _create_array(folder, "pixels", (film.frames, film.height, film.width))
+    digests: list[str | None] = []
+    for number, pixels in enumerate(pixel_frames(film)):
+        digests.append(None if pixels is None else frame_digest(pixels))
+        if pixels is not None:
+            target[number] = pixels
+    manifest = FrameManifest(encoding="pixels", height=film.height, width=film.width, frames=digests)
+    _describe(target, manifest, film.path.name)
+    return manifest
 
 
-def _sweep(folder: Path) -> None:
-    """Remove the parts that interrupted processes of this machine have left."""
-    for part in folder.glob(f".*.partial-{socket.gethostname()}-*"):
-        pid = part.name.removesuffix(".old").rpartition("-")[2]
-        if pid.isdigit() and not Path(f"/proc/{pid}").exists() and Path("/proc/self").exists():
-            shutil.rmtree(part, ignore_errors=True)
+def _create_array(folder: Path, encoding: Literal["image", "pixels"], shape: tuple[int, int, int]) -> "zarr.Array[Any]":
+    """`shape` : frames, rows, columns."""
+    return zarr.create_array(
+        store=str(folder),
+        shape=(*shape, 3),
+        chunks=(1, *shape[1:], 3),
+        dtype="uint8",
+        fill_value=0,
+        dimension_names=("frame", "row", "column", "rgb"),
+        chunk_key_encoding={"name": "v2", "separator": "."},  # one flat folder of images
+        **(
+            {"compressors": BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")}
+            if encoding == "pixels"
+            else {"serializer": ImageCodec(), "compressors": None}
+        ),
+    )
+
+
+def _describe(array: "zarr.Array[Any]", manifest: FrameManifest, film: str | None) -> None:
+    array.update_attributes({"footscan": manifest.model_dump(mode="json"), "film": film})

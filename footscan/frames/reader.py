@@ -1,14 +1,15 @@
 """Frames out of their Zarr array, each checked against the digest under which it was stored."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import zarr
 
+from footscan.frames.array import damage, stored_bytes
 from footscan.frames.film import decode_or_none, frame_digest
 from footscan.frames.image import Rgb, pixel_buffer
-from footscan.frames.ingest import chunk_name
 from schemas.errors import DamagedError
 from schemas.frames import FrameManifest
 
@@ -23,7 +24,9 @@ def read_frames(array: Path, manifest: FrameManifest) -> Iterator[Rgb | None]:
     Raises
     ------
     DamagedError
-        A frame is not the one that was stored.
+        A frame is not the one that was ingested.
+    Fault
+        It is not the one that was recorded, and there is no film to ingest it from.
     """
     read = _chunk_reader(array, manifest)
     buffer = pixel_buffer(manifest.height, manifest.width)
@@ -43,24 +46,12 @@ def _frame(array: Path, manifest: FrameManifest, number: int, read: _Reader, buf
         return None
     stored = read(number)
     if stored is None or frame_digest(stored) != digest:
-        raise DamagedError(f"{array}: frame {number} is damaged, expected the frame that was ingested")
+        raise damage(array, number)
     return decode_or_none(stored, buffer) if isinstance(stored, bytes) else stored
 
 
 def _chunk_reader(array: Path, manifest: FrameManifest) -> _Reader:
-    return _image_reader(array) if manifest.encoding == "image" else _pixel_reader(array)
-
-
-def _image_reader(array: Path) -> _Reader:
-    """Reads a chunk's file itself: what is in it is the image, and Zarr's own way takes as long as the decoding."""
-
-    def read(number: int) -> bytes | None:
-        try:
-            return (array / chunk_name(number)).read_bytes()
-        except OSError:
-            return None
-
-    return read
+    return partial(stored_bytes, array) if manifest.encoding == "image" else _pixel_reader(array)
 
 
 def _pixel_reader(array: Path) -> _Reader:

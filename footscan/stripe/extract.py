@@ -11,7 +11,7 @@ from footscan.stripe.chain import in_order, is_sharpest, neighbours, pieces_of, 
 from footscan.stripe.limits import Limits, limits_of
 from footscan.stripe.pieces import keep_stripe
 from footscan.stripe.points import STRIPE_DTYPE, StripePoints
-from footscan.stripe.profile import COLUMNS, CONTRAST, SATURATION, SYMMETRY, WIDTH, measure_profiles
+from footscan.stripe.profile import COLUMNS, CONTRAST, REDNESS, SATURATION, SYMMETRY, WIDTH, measure_profiles
 from footscan.stripe.redness import SIGNAL_SCALE, as_words, halve, mark_saturated, red_of, take_away
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, I, J, find_ridges, gaussian
 from footscan.stripe.smoothing import smooth_along
@@ -46,20 +46,22 @@ def extract_stripe(
 
 
 FOUND = ("i", "j", "width", "peak", "score", "saturation", "sigma")
-"""Columns of what `find_stripe` gives, before the numbers of the piece and of the chain."""
-PIECE, CHAIN = len(FOUND), len(FOUND) + 1
+"""The first columns of what `find_stripe` gives."""
+PIECE, CHAIN, RED = range(len(FOUND), len(FOUND) + 3)
+"""Its others: the numbers of the piece and of the chain, and how many grey levels redder than its feet a stripe is."""
+MEASURED = RED + 1
 
 
 def find_stripe(
     image: NDArray[np.uint8], parameters: ExtractionParameters, background: NDArray[np.uint8] | None = None
 ) -> NDArray[np.float64]:
-    """(N, 9): where the stripe of a frame was measured, in the columns of `FOUND`, `PIECE` and `CHAIN`.
+    """(N, 10): where the stripe of a frame was measured, in the columns of `FOUND`, `PIECE`, `CHAIN` and `RED`.
 
     Crossings of one chain follow each other along the stripe; chains of one piece lie close to each other.
     """
     rows, columns, _ = image.shape
     if rows == 0 or columns == 0:
-        return np.empty((0, CHAIN + 1))
+        return np.empty((0, MEASURED))
     buffers = _buffers(rows, columns)
     words = as_words(image)
     light = words
@@ -91,7 +93,7 @@ def find_stripe(
 
 
 def as_points(found: NDArray[np.float64], frame: NDArray[np.int32]) -> StripePoints:
-    """Points from the crossings (N, 9) that `find_stripe` gave for each frame (N,).
+    """Points from the crossings (N, 10) that `find_stripe` gave for each frame (N,).
 
     Crossings lie two pixels apart between two columns, or rows, or four where one was missed; points are put onto the
     straight line from each to the next where that passes a column, or row.
@@ -172,8 +174,8 @@ def _rows(
     chain: NDArray[np.int32],
     faintest: float,
 ) -> NDArray[np.float64]:
-    """(N, 9): the columns of `FOUND`, `PIECE` and `CHAIN`."""
-    found = np.empty((len(profiles), CHAIN + 1))
+    """(N, 10): the columns of `FOUND`, `PIECE`, `CHAIN` and `RED`."""
+    found = np.empty((len(profiles), MEASURED))
     rows, columns = words.shape
     for a in range(len(profiles)):
         i, j = profiles[a, I], profiles[a, J]
@@ -187,6 +189,7 @@ def _rows(
         found[a, 6] = sigmas[a]
         found[a, PIECE] = piece[a]
         found[a, CHAIN] = chain[a]
+        found[a, RED] = profiles[a, REDNESS]
     return found
 
 

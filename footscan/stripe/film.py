@@ -8,8 +8,9 @@ from itertools import repeat
 import numpy as np
 
 from footscan.frames.image import Rgb
+from footscan.stripe.blur import is_laser_light
 from footscan.stripe.clutter import is_moving_stripe, number_pieces
-from footscan.stripe.extract import CHAIN, PIECE, as_points, find_stripe
+from footscan.stripe.extract import MEASURED, PIECE, as_points, find_stripe
 from footscan.stripe.points import StripePoints
 from schemas.parameters.extraction import ExtractionParameters
 
@@ -30,10 +31,10 @@ def extract_film(
 
     Returns
     -------
-    (N,) of `STRIPE_DTYPE`, frame by frame, without what stands still while the heads travel and without what appears
-    in one frame alone (`clutter`).
+    (N,) of `STRIPE_DTYPE`, frame by frame, without what is blurred and hardly red beside the film's stripe (`blur`),
+    what stands still while the heads travel, and what appears in one frame alone (`clutter`).
     """
-    found = [np.empty((0, CHAIN + 1))]
+    found = [np.empty((0, MEASURED))]
     read: list[int] = []
     for number, (frame, background) in enumerate(zip(frames, backgrounds or repeat(None), strict=False)):
         if frame is not None:
@@ -41,7 +42,10 @@ def extract_film(
             read.append(number)
     crossings = np.concatenate(found)
     order = np.repeat(np.arange(-1, len(read), dtype=np.int32), [len(part) for part in found])
-    kept = is_moving_stripe(crossings[:, :2], order, number_pieces(order, crossings[:, PIECE]), len(read), parameters)
+    piece = number_pieces(order, crossings[:, PIECE])
+    lit = is_laser_light(crossings, piece, len(read), parameters)
+    crossings, order, piece = crossings[lit], order[lit], piece[lit]
+    kept = is_moving_stripe(crossings[:, :2], order, piece, len(read), parameters)
     points = as_points(crossings[kept], order[kept])
     if read != list(range(len(read))):
         points["frame"] = np.array(read, np.int32)[points["frame"]]

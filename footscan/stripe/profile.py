@@ -16,9 +16,9 @@ from footscan.stripe.limits import Limits
 from footscan.stripe.redness import SIGNAL_SCALE, WHITE_SCALE, light_of, lights_of, red_of, redness_of
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SHARPNESS, I, J
 
-WIDTH, CONTRAST, SYMMETRY, SATURATION, LIGHT = range(SHARPNESS + 1, SHARPNESS + 6)
+WIDTH, CONTRAST, SYMMETRY, SATURATION, LIGHT, REDNESS = range(SHARPNESS + 1, SHARPNESS + 7)
 """Columns of what `measure_profiles` writes, after those of the ridge."""
-COLUMNS = LIGHT + 1
+COLUMNS = REDNESS + 1
 VALLEY = 0.3
 """Rise, relative to the fall before it, at which the foot of the stripe is passed."""
 FLAT = 0.1
@@ -51,11 +51,11 @@ def measure_profiles(
     limits: Limits,
     profiles: NDArray[np.float64],
 ) -> int:
-    """Writes what stands out from both its sides, of `ridges` (N, 5), into `profiles` (N, 10); how many these are.
+    """Writes what stands out from both its sides, of `ridges` (N, 5), into `profiles` (N, 11); how many these are.
 
     `words` are the frame's pixels, (rows, columns), and `light` the same without what the room lights, if known.
     Contrasts are in levels of the signal; i, j and widths in px; the laser's light, summed over the width, in px of the
-    light that a white pixel has.
+    light that a white pixel has; redness in grey levels, the reddest of the stripe over the redder of its feet.
     """
     rows, columns = words.shape
     reach = math.ceil(limits.largest_width)
@@ -194,7 +194,7 @@ def _measure(
     profiles: NDArray[np.float64],
     n: int,
 ) -> float:
-    """The centre in samples, and width, contrast, symmetry and saturation of profile `n`; NaN where it is no stripe."""
+    """The centre in samples; NaN where it is no stripe. What the profile is like goes into row `n` of `profiles`."""
     middle = samples.size // 2
     if is_even:
         base = _level(samples, first, middle, last, base)
@@ -206,8 +206,9 @@ def _measure(
     width = (right - left) * step
     if left < 0 or width > limits.largest_width:
         return math.nan
-    saturation = _saturation(words, light, cells, clipped, first, last, left, right, limits)
-    if saturation < 0:
+    saturation = _saturation(words, cells, clipped, first, last, left, right, limits)
+    redness, is_laser = _redness(words, light, cells, saturation, first, last, left, right, limits)
+    if not is_laser:
         return math.nan
     centre = math.nan
     if saturation > 0:
@@ -216,7 +217,8 @@ def _measure(
         centre = centre_of(samples, clipped, first, last, left, right, base, contrast, limits)
     if not abs(centre - middle) * step <= 1 + 0.5 * width:
         return math.nan
-    profiles[n, WIDTH], profiles[n, CONTRAST], profiles[n, SATURATION] = width, contrast, saturation
+    profiles[n, WIDTH], profiles[n, CONTRAST] = width, contrast
+    profiles[n, SATURATION], profiles[n, REDNESS] = saturation, redness
     foot = max(light_of(words[cells[first]]), light_of(words[cells[last]]))
     profiles[n, LIGHT] = max(light_of(words[cells[middle]]) - foot, 0.0) * width
     profiles[n, SYMMETRY] = max(0.0, 1 - abs((right - centre) - (centre - left)) / (right - left))
@@ -305,7 +307,6 @@ def _half_height(
 @compiled
 def _saturation(
     words: NDArray[np.uint32],
-    light: NDArray[np.uint32],
     cells: NDArray[np.int64],
     clipped: NDArray[np.bool_],
     first: int,
@@ -314,22 +315,40 @@ def _saturation(
     right: float,
     limits: Limits,
 ) -> float:
-    """The part of the stripe's width in which red is saturated; -1 where the light is not the laser's.
-
-    The laser's light is redder than what lies beside it, in the flanks at least. On a side where red has no room left
-    above it, any light may be the laser's. Fills `clipped` with whether it is saturated.
-    """
-    reddest = saturated = inside = 0
-    for k in range(max(first, math.ceil(left - BESIDE)), min(last, math.floor(right + BESIDE)) + 1):
+    """The part of the stripe's width in which red is saturated; fills `clipped` with where it is."""
+    saturated = inside = 0
+    for k in range(*_stripe_samples(first, last, left, right)):
         clipped[k] = red_of(words[cells[k]]) >= limits.saturation
-        reddest = max(reddest, redness_of(light[cells[k]]))
         if left <= k <= right:
             inside += 1
             saturated += clipped[k]
-    share = saturated / max(inside, 1)
-    if share > 0.5:  # the flanks are whitish, and reddest is the halo around them
+    return saturated / max(inside, 1)
+
+
+@compiled
+def _redness(
+    words: NDArray[np.uint32],
+    light: NDArray[np.uint32],
+    cells: NDArray[np.int64],
+    saturation: float,
+    first: int,
+    last: int,
+    left: float,
+    right: float,
+    limits: Limits,
+) -> tuple[int, bool]:
+    """By how much the reddest of the stripe is redder than the redder one of its feet; whether its light is a laser's.
+
+    The laser's light is redder than what lies beside it, in the flanks at least. On a side where red has no room left
+    above it, any light may be the laser's.
+    """
+    reddest = 0
+    for k in range(*_stripe_samples(first, last, left, right)):
+        reddest = max(reddest, redness_of(light[cells[k]]))
+    if saturation > 0.5:  # the flanks are whitish, and reddest is the halo around them
         for k in range(first + FOOT_SAMPLES, last - FOOT_SAMPLES + 1):
             reddest = max(reddest, redness_of(light[cells[k]]))
+    least, is_laser = reddest, True
     for end, direction in ((first, 1), (last, -1)):
         redness, level = 255, 0
         for n in range(FOOT_SAMPLES):
@@ -338,7 +357,16 @@ def _saturation(
                 break
             redness = min(redness, redness_of(light[cells[k]]))
             level = max(level, red_of(words[cells[k]]))
-        has_no_room = share > 0.5 and level >= limits.saturation - NEARLY
-        if redness < 255 and reddest - redness < limits.red_threshold and not has_no_room:
-            return -1.0
-    return share
+        if redness == 255:
+            continue
+        least = min(least, reddest - redness)
+        has_no_room = saturation > 0.5 and level >= limits.saturation - NEARLY
+        if reddest - redness < limits.red_threshold and not has_no_room:
+            is_laser = False
+    return least, is_laser
+
+
+@compiled
+def _stripe_samples(first: int, last: int, left: float, right: float) -> tuple[int, int]:
+    """From which sample on, and before which, a profile is the stripe's."""
+    return max(first, math.ceil(left - BESIDE)), min(last, math.floor(right + BESIDE)) + 1

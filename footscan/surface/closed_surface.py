@@ -11,7 +11,7 @@ from footscan.surface.mesh import Mesh, with_normals
 from footscan.surface.patch import fair
 from footscan.surface.projection import Projection, project
 from footscan.surface.topology import directed_edges, vertex_normals
-from footscan.surface.travel_ends import travel_ends
+from footscan.surface.travel_ends import drawn_to_tips, travel_ends
 from schemas.errors import Finding
 from schemas.parameters.surface import SurfaceParameters
 
@@ -66,8 +66,9 @@ def close_surface(
     grazing, ends = travel_ends(xyz, step_mm)
     xyz, directions = xyz[~grazing], directions[~grazing]
     cloud = _Cloud(xyz, directions, camera[usable][~grazing], step_mm)
+    limits = (ends[0].limit, ends[1].limit)
     spacing = max(parameters.grid_steps * step_mm, LEAST_GRID_MM)
-    rough, faces = level_surface(indicator(xyz, directions, spacing, parameters.blur_steps * step_mm), ends)
+    rough, faces = level_surface(indicator(xyz, directions, spacing, parameters.blur_steps * step_mm), limits)
     on_cloud = _project(rough, faces, cloud, parameters, 2)
     for _ in range(EVENING_ROUNDS):
         on_cloud = _project(_evened(on_cloud, faces), faces, cloud, parameters, 1)
@@ -90,7 +91,7 @@ def close_surface(
     edges = directed_edges(faces)
     rim = np.setdiff1d(edges[free[edges[:, 0]], 1], np.flatnonzero(free | on_lid))
     vertices = fair(vertices, faces, rim, np.flatnonzero(free))
-    vertices[:, 0] = np.clip(vertices[:, 0], *ends)
+    vertices = drawn_to_tips(vertices, ends)
     metadata = {} if height is None else {"cut_mm": repr(height)}
     return with_normals(Mesh(vertices, faces, camera=origin, filled=~is_measured, metadata=metadata))
 

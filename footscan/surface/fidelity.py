@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
-from footscan.measure.sections import cut, tape_girth
+from footscan.measure.sections import cut, cuttable
 from footscan.surface.decimate import footprint_axes
 from footscan.surface.mesh import Mesh
 from footscan.surface.sampling import sample_surface
@@ -56,11 +57,12 @@ def _profile(
     places = mesh.vertices[np.unique(mesh.faces)] @ frame
     ends, girths = [places.min(axis=0), places.max(axis=0)], []
     x = full.vertices @ along
+    ready = cuttable(mesh.vertices, mesh.faces)
     for share in STATIONS:
-        section = cut(mesh.vertices, mesh.faces, along * (x.min() + share * np.ptp(x)), along)
-        level = section.points @ frame[:, 1:]
+        loops = cut(ready, along * (x.min() + share * np.ptp(x)), along)
+        level = np.concatenate([np.zeros((0, 3)), *(loop.points for loop in loops)]) @ frame[:, 1:]
         ends += [level.min(axis=0), level.max(axis=0)] if len(level) else [np.zeros(2), np.zeros(2)]
-        girths.append(tape_girth(section, along) or 0.0)
+        girths.append(float(ConvexHull(level).area) if len(level) else 0.0)  # in a plane, qhull's area is the perimeter
     return np.concatenate(ends), np.array(girths)
 
 

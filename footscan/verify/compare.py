@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.frame import apply
+from footscan.measure.place import apply
 from footscan.surface.export import Shape
 from footscan.surface.mesh import Mesh
 from footscan.surface.sampling import sample_surface, surface_area

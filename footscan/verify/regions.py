@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.frame import apply, foot_frame
+from footscan.measure.frame import foot_frame
+from footscan.measure.place import apply
 from footscan.surface.export import Shape
 from footscan.surface.sampling import surface_area
 from footscan.verify.distances import by_blocks
@@ -23,6 +24,8 @@ ANKLE = 0.25
 """Above this height is the ankle: below the malleoli (0.20 to 0.38 of the length), and as high as the instep."""
 REGIONS = ("sole", "heel", "midfoot", "ball", "toes", "ankle")
 """`midfoot` has the instep on its upper side."""
+UPRIGHT = 0.9
+"""Cosine by which a foot may lean that stands with its sole down."""
 DESCENT = 0.6
 """A foot's toes are lower than this share of its hind part; a box or an egg is not."""
 
@@ -62,6 +65,8 @@ def foot_regions(shape: Shape) -> FootRegions | None:
     try:
         frame = foot_frame(vertices, faces, "unknown")
     except (Finding, IndexError):  # on an upright sheet the window of a landmark holds nothing
+        return None
+    if frame.transform[2, 2] < UPRIGHT:
         return None
     x, z = frame.samples[:, 0] / frame.length, frame.samples[:, 2]
     hind, front = z[x < HEEL], z[x > TOES]

@@ -47,10 +47,14 @@ def parse_stl(content: bytes) -> Mesh:
         corners = np.frombuffer(content, TRIANGLE, offset=START)["corners"].reshape(-1, 3)
         metadata = _metadata(content[:80])
     elif content.lstrip()[:5].lower() == b"solid" and b"\0" not in content:
+        if not content.rstrip().splitlines()[-1].lstrip().lower().startswith(b"endsolid"):
+            raise ValueError("ends without 'endsolid', expected a whole text")
         words = [line.split()[1:] for line in content.splitlines() if line.lstrip()[:6].lower() == b"vertex"]
         if len(words) % 3 or any(len(word) != 3 for word in words):
             raise ValueError("expected three vertices of three coordinates in each facet")
         corners = np.array(words, np.float64).reshape(-1, 3)
+    elif b"\0" not in content:
+        raise ValueError("is text that does not begin with 'solid', expected STL")
     else:
         expected = f"expected {START + count * TRIANGLE.itemsize} for its {count} triangles" if count >= 0 else ""
         raise ValueError(f"{len(content)} bytes, {expected or 'expected at least 84'}")

@@ -11,7 +11,13 @@ import pytest
 import simplejpeg
 
 from footscan.frames.film import Film, encoded_frames, film_files, frame_digest, open_film, pixel_frames
+from footscan.frames.ingest import ingest_film
 from schemas.errors import RefusedInput
+
+MANIFEST = (
+    b'{"attributes": {"film": null, "footscan": '
+    b'{"format": "footscan.frames/1", "height": 48, "width": 64, "encoding": %b}}}'
+)
 
 
 def pictures_of(path: Path) -> list[bytes | None]:
@@ -266,3 +272,32 @@ def test_a_folder_among_frames_is_named(tmp_path: Path, jpeg: Callable[..., byte
     (tmp_path / "2.jpg").mkdir()
     with pytest.raises(RefusedInput, match=r"2\.jpg: expected an image, found a folder"):
         film_files(tmp_path)
+
+
+def test_an_array_is_a_film(tmp_path: Path, jpeg: Callable[..., bytes], write_mjpeg: Callable[..., Path]) -> None:
+    film = write_mjpeg(tmp_path / "cam1.avi", [jpeg(number) for number in (0, 1, 3)], [0, 1, 3])
+    array = tmp_path / "frames.zarr/cam1"
+    ingest_film(film, array, (48, 64))
+    opened = open_film(array, (48, 64))
+    assert (opened.kind, opened.frames, opened.height, opened.width) == ("array", 4, 48, 64)
+    assert list(encoded_frames(opened)) == [jpeg(0), jpeg(1), None, jpeg(3)]
+    assert [frame is None for frame in pixel_frames(opened)] == [False, False, True, False]
+    assert film_files(array) == [array / "zarr.json"]
+
+
+@pytest.mark.parametrize(
+    ("metadata", "problem"),
+    [
+        (b"", "expected an array of frames with its manifest"),
+        (b"[]", "expected an array of frames with its manifest"),
+        (b'{"attributes": {"footscan": {}}}', "expected an array of frames with its manifest"),
+        (b'{"zarr_format": 3, "node_type": "array"}', "expected an array of frames with its manifest"),
+        (MANIFEST % b'"pixels", "frames": []', "expected an array of encoded images, found one of pixels"),
+        (MANIFEST % b'"image", "frames": []', "expected at least one frame, found none"),
+    ],
+)
+def test_another_array_is_refused(tmp_path: Path, metadata: bytes, problem: str) -> None:
+    (tmp_path / "cam1").mkdir()
+    (tmp_path / "cam1/zarr.json").write_bytes(metadata)
+    with pytest.raises(RefusedInput, match=f"cam1: .*{problem}"):
+        open_film(tmp_path / "cam1")

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from footscan.frames.ingest import chunk_name, ingest_film
+from footscan.frames.array import chunk_name
+from footscan.frames.ingest import ingest_film
 from footscan.frames.reader import read_frame, read_frames
 from schemas.errors import DamagedError
 from schemas.frames import FrameManifest

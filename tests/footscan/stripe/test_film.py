@@ -69,6 +69,22 @@ def test_what_comes_in_one_frame_alone_goes():
     assert extract_film(map(coloured, lit), PARAMETERS)["j"].max() < 80
 
 
+def test_the_rim_of_lit_skin_goes_by_the_stripe_of_the_whole_film():
+    # it moves and goes on as the stripe does, but is wider; its place changes along it, and it is hardly red
+    wander = np.random.default_rng(3).normal(0, 1.5, COLUMNS).cumsum()
+
+    def rim(k):
+        along = np.exp(-0.5 * ((J - 70 - 2 * k - wander + wander.mean()) / 5.0) ** 2) * ((I > 40) & (I < 120))
+        return 110 * along[..., np.newaxis] * [1.0, 0.8, 0.8]
+
+    frames = [coloured(stripe(place_of(k)) if k < 14 else 0 * J) for k in range(14)]
+    lit = [np.clip(15 + rim(k), 0, 255).astype(np.uint8) for k in range(6)]
+    assert min(len(extract_stripe(frame, PARAMETERS)) for frame in lit) > 40  # in one frame it looks like a stripe
+    assert np.unique(extract_film([*frames, *lit], PARAMETERS)["frame"]).tolist() == list(range(14))
+    kept = extract_film([*frames, *lit], PARAMETERS.model_copy(update={"largest_blur": 100.0}))
+    assert np.unique(kept["frame"]).tolist() == list(range(20))
+
+
 def test_a_lost_frame_does_not_part_the_frames_beside_it():
     part = [stripe(place_of(k), 60, 90) for k in range(5)]  # short: kept only where it is followed
     frames = [coloured(part[0]), None, coloured(part[1]), None, coloured(part[2])]

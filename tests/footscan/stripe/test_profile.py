@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from footscan.stripe.limits import METHODS, Limits
-from footscan.stripe.profile import COLUMNS, CONTRAST, SATURATION, SYMMETRY, WIDTH, measure_profiles
+from footscan.stripe.profile import COLUMNS, CONTRAST, REDNESS, SATURATION, SYMMETRY, WIDTH, measure_profiles
 from footscan.stripe.redness import as_words
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SHARPNESS, I, J
 
@@ -136,6 +136,17 @@ def test_what_is_bright_but_not_redder_is_dropped():
     assert measure(grey, *ridge) is None
     assert measure(grey + np.array([30, 0, 0]), *ridge) is None  # red all over
     assert measure(grey + red(0.25 * triangle(20)), *ridge) is not None
+
+
+def test_redness_is_that_over_the_redder_foot():
+    assert down(20 + triangle(20), 20.0)[REDNESS] == 80
+    # redder by 15 on one side, up to where the triangle begins
+    image = red(20 + triangle(20))
+    image[:, :17, 0] += 15
+    assert measure(image, 20.0, 14.5, 1.0, 0.0)[REDNESS] == 80 - 15
+    # a lamp that is red to a quarter
+    lamp = 20 + triangle(20)[np.newaxis, :, np.newaxis] * [1.0, 0.75, 0.75] + np.zeros((30, 1, 1))
+    assert measure(lamp, 20.0, 14.5, 1.0, 0.0)[REDNESS] == 20
 
 
 @pytest.mark.parametrize("greener", [[0, 1, 0], [0, 0, 40], [0, 60, 0]])
