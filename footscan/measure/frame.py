@@ -1,164 +1,212 @@
-"""The foot's own frame: where its heel is, and which way its axis runs."""
+"""The foot's own frame: where its floor and its heel are, and which way its axis runs."""
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.landmarks import (
-    LOW_MM,
-    SAMPLE_MM2,
-    highest,
-    is_right,
-    length_from,
-    lowest,
-    metatarsale_fibulare,
-    metatarsale_tibiale,
-    pternion,
-    second_toe_tip,
-)
-from footscan.surface.sampling import sample_surface, surface_area
+from footscan.measure.axis import along_axis
+from footscan.measure.dense_points import dense_points
+from footscan.measure.landmarks_toes import FOREFOOT, STRIP_MM
+from footscan.measure.place import apply, low_height
+from footscan.measure.pose import Pose, find_pose
 from footscan.surface.topology import keep_large_components, used_vertices
 from schemas.errors import Finding
 from schemas.measures import Axis
 from schemas.scan import Side
 
+Floor = Literal["glass", "sole", "resting"]
+Floats = NDArray[np.float64]
+
 STRAY_SHARE = 0.02
 """Parts of a mesh with less than this share of its triangles are not the foot."""
-DIAGONAL_MM = (150.0, 600.0)
+SPACING_MM = 4.0
+"""Neighbouring samples are at most about so far apart."""
+DIAGONAL_MM = (110.0, 900.0)
+"""A child's foot without a leg, and a large one with the leg up to the knee."""
 LENGTH_MM = (100.0, 380.0)
 SLENDERNESS = (1.7, 4.5)
 """Length over breadth of what can be a foot."""
-GLASS_MM = 3.0
-"""A mesh whose lowest point is closer than this to Z = 0 stands on the glass."""
-TOE_FROM_BALL_DEG = 6.0
-"""Seen from the heel, the second toe lies so near to the middle of the ball; what is farther off is another toe, taken
-for the second where two have grown together in the scan."""
-TURN_DEG = 0.05
-"""The axis is found when it turns by less than this."""
+TOES, DESCENT = 0.80, 0.75
+"""A foot's toes are lower than this share of its hind part; a block or an egg is not."""
+CONVEX = 0.9
+"""It fills less of its convex hull."""
+HEEL_STATION, BALL_STATION, HEEL_OVER_BALL = (0.08, 0.22), (0.55, 0.85), 1.0
+"""Its heel is no broader than its ball, in parts of the length; a pear may be."""
+GLASS_MM, GLASS_DEG = 3.0, 3.0
+"""A mesh whose lowest point is so near to Z = 0, and whose sole is so nearly level, stands on the glass."""
+ABOUT_LEVEL_DEG = 20.0
+"""Without a flat sole, which tells its own level, this is near enough."""
+CLEAR_SIDE = 0.03
+"""The form tells the side where toes and ball reach so much farther ahead on one than on the other, in lengths."""
 
 
 class FootFrame(NamedTuple):
     """A foot in its own frame: mm, +X from heel to toes along the axis, Z up, origin on the floor below the rearmost
     heel point; a left foot mirrored into a right one, so that +Y is medial."""
 
-    vertices: NDArray[np.float64]
+    vertices: Floats
     """(V, 3)"""
     faces: NDArray[np.int32]
     """(F, 3), strays left out."""
-    samples: NDArray[np.float64]
-    """(N, 3) points spread evenly over the surface, one for each `SAMPLE_MM2`."""
-    transform: NDArray[np.float64]
+    samples: Floats
+    """(N, 3) the vertices, and points on large triangles, so that neighbours are at most about `SPACING_MM` apart."""
+    transform: Floats
     """(4, 4) from the frame of the mesh to this one."""
     axis: Axis
     length: float
     """Foot length, mm."""
+    side: Side = "right"
+    """As which foot it was measured: as was stated, otherwise as its form tells."""
+    side_note: str | None = None
+    """Where the form contradicts the side that was stated."""
+    floor: Floor = "sole"
+    """What the floor was taken from: the scanner's glass at Z = 0, a plane through the flat sole, or, where no sole
+    lies flat, the plane on which the foot comes to rest."""
+    floor_residual: float = 0.0
+    """Standard deviation of the skin that touches the floor about it, mm."""
+    cut_height: float | None = None
+    """Lowest point of the cut through the leg, mm; None where the leg has no flat end."""
+
+    @property
+    def low(self) -> float:
+        """Height in mm below which there is foot and no leg."""
+        return low_height(self.length)
 
 
-def foot_frame(vertices: NDArray[np.floating], faces: NDArray[np.integer], side: Side) -> FootFrame:
-    """The frame of a foot that lies in the scanner, sole down, turned by any angle about the vertical.
+def foot_frame(
+    vertices: NDArray[np.floating],
+    faces: NDArray[np.integer],
+    side: Side,
+    axis: Axis = "toe2",
+    marked: Mapping[str, Floats] | None = None,
+) -> FootFrame:
+    """The frame of a foot in mm, in whatever pose; on the scanner's glass the floor stays Z = 0.
 
-    The axis runs from the rearmost heel point to the tip of the second toe ("toe2"); where toes cannot be told apart,
-    to the middle of the ball ("ball_center"). Where these points are depends on the axis: both are sought in turn.
+    The axis runs from the rearmost heel point to the tip of the second toe ("toe2"), to the middle of the ball
+    ("ball_center"), or along the medial tangent of heel and ball ("brannock"). Where toes cannot be told apart, "toe2"
+    becomes "ball_center".
 
     Parameters
     ----------
     vertices : (V, 3) mm
-    faces : (F, 3)
-    side : a foot of unknown side is told by its toes
+    faces : (F, 3), looking outward
+    side : a foot of unknown side is told by its form
+    axis : which one is wished for
+    marked : points that a person has set, (3,) mm in the frame of the mesh; pternion and toe_2_tip count here
 
     Raises
     ------
     Finding
         This is no foot, or not in mm.
     """
-    vertices, faces = used_vertices(np.asarray(vertices, np.float64), keep_large_components(faces, STRAY_SHARE))
-    _check_size(vertices)
-    samples = sample_surface(vertices, faces, round(surface_area(vertices, faces) / SAMPLE_MM2))
+    places, faces = used_vertices(np.asarray(vertices, np.float64), keep_large_components(faces, STRAY_SHARE))
+    _check_size(places)
+    pose = find_pose(places, faces)
+    transform, floor = _on_floor(places, pose)
+    samples = dense_points(places, faces, SPACING_MM)
+    moved = apply(transform, samples)
+    _check_form(moved, pose)
 
-    transform = _on_floor(vertices)
-    transform = _heel_to_toe(apply(transform, samples)) @ transform
-    if side == "left" or (side == "unknown" and not is_right(apply(transform, samples))):
+    lead = _medial_lead(moved, pose.length)
+    form: Side = "right" if lead >= 0 else "left"
+    measured = form if side == "unknown" else side
+    if measured == "left":
         transform = np.diag([1.0, -1.0, 1.0, 1.0]) @ transform
         faces = faces[:, ::-1]
-    transform, axis = _along_axis(transform, samples)
-    moved = apply(transform, samples)
-    length = length_from(moved, 0.0)
-    _check_proportions(moved, length)
-    return FootFrame(apply(transform, vertices), faces, moved, transform, axis, length)
+    low = samples[moved[:, 2] <= low_height(pose.length)]
+    forefoot = forefoot_points(apply(transform, places), faces, pose.length, low_height(pose.length))
+    forefoot = apply(np.linalg.inv(transform), forefoot)
+    transform, found, length = along_axis(transform, low, forefoot, pose.length, axis, marked or {})
+    _check_length(length)
+    note = f"toes and ball look like those of a {form} foot"
+    return FootFrame(
+        vertices=apply(transform, places),
+        faces=faces,
+        samples=apply(transform, samples),
+        transform=transform,
+        axis=found,
+        length=length,
+        side=measured,
+        side_note=note if measured != form and abs(lead) > CLEAR_SIDE else None,
+        floor=floor,
+        floor_residual=pose.residual,
+        cut_height=None if pose.leg_end is None else float(apply(transform, pose.leg_end)[:, 2].min()),
+    )
 
 
-def apply(transform: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 3) `points` moved by a (4, 4) `transform`."""
-    moved: NDArray[np.float64] = points @ transform[:3, :3].T + transform[:3, 3]
-    return moved
+def forefoot_points(vertices: Floats, faces: NDArray[np.integer], length: float, low: float) -> Floats:
+    """Points of the forefoot, close enough together to tell its toes apart; `vertices` in the foot's frame."""
+    x, z = vertices[:, 0], vertices[:, 2]
+    ahead = (x > FOREFOOT * length) & (z <= low)
+    return dense_points(*used_vertices(vertices, faces[ahead[faces].any(axis=1)]), STRIP_MM)
 
 
-def _check_size(vertices: NDArray[np.float64]) -> None:
+def _check_size(vertices: Floats) -> None:
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0))) if len(vertices) else 0.0
     if not DIAGONAL_MM[0] <= diagonal <= DIAGONAL_MM[1]:
-        expected = f"expected a foot of {DIAGONAL_MM[0]:.0f} to {DIAGONAL_MM[1]:.0f} mm in mm"
-        raise Finding(f"the surface is {diagonal:.3g} across, {expected}")
+        raise Finding(f"the surface is {diagonal:.3g} across, expected a foot in mm: {_range(DIAGONAL_MM)}")
 
 
-def _on_floor(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The glass at Z = 0 is the floor; a mesh that is nowhere near stands on its lowest point."""
-    transform = np.eye(4)
-    lowest_z = float(vertices[:, 2].min())
-    transform[2, 3] = 0.0 if abs(lowest_z) < GLASS_MM else -lowest_z
-    return transform
+def _on_floor(vertices: Floats, pose: Pose) -> tuple[Floats, Floor]:
+    """The glass at Z = 0 where the foot stands on it, otherwise the floor of its pose; the heel near X = 0."""
+    transform = pose.transform.copy()
+    floor: Floor = "sole" if pose.stands else "resting"
+    tilt = float(np.degrees(np.arccos(np.clip(transform[2, 2], -1.0, 1.0))))
+    if abs(vertices[:, 2].min()) < GLASS_MM and tilt < (GLASS_DEG if pose.stands else ABOUT_LEVEL_DEG):
+        floor = "glass"
+        along = transform[0, :2] / np.linalg.norm(transform[0, :2])
+        transform = np.eye(4)
+        transform[:2, :2] = along, [-along[1], along[0]]
+    low = apply(transform, vertices)
+    transform[0, 3] -= low[low[:, 2] <= low_height(pose.length), 0].min()
+    return transform, floor
 
 
-def _heel_to_toe(samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turns the long direction of the sole into X, the end with the leg above it towards -X."""
-    low = samples[samples[:, 2] <= LOW_MM]
-    _, vectors = np.linalg.eigh(np.cov(low[:, :2].T))
-    turned = _turn(-np.arctan2(vectors[1, -1], vectors[0, -1]))
-    x = apply(turned, samples)[:, 0]
-    first, last = np.quantile(x[samples[:, 2] <= LOW_MM], [0, 1])
-    fifth = (last - first) / 5
-    height_at_first, height_at_last = samples[x < first + fifth, 2].max(), samples[x > last - fifth, 2].max()
-    return _turn(np.pi) @ turned if height_at_last > height_at_first else turned
-
-
-def _along_axis(transform: NDArray[np.float64], samples: NDArray[np.float64]) -> tuple[NDArray[np.float64], Axis]:
-    """`transform`, with the rearmost heel point brought to the origin and the axis to X."""
-    for _ in range(10):
-        transform = _heel_to_origin(apply(transform, samples)) @ transform
-        moved = apply(transform, samples)
-        length = length_from(moved, 0.0)
-        ball = (metatarsale_tibiale(moved, length) + metatarsale_fibulare(moved, length)) / 2
-        toe = second_toe_tip(moved, length)
-        is_second = toe is not None and abs(np.rad2deg(_direction(toe) - _direction(ball))) <= TOE_FROM_BALL_DEG
-        axis: Axis = "toe2" if is_second else "ball_center"
-        target = toe if toe is not None and is_second else ball
-        turn = _direction(target)
-        transform = _turn(-turn) @ transform
-        if abs(turn) < np.deg2rad(TURN_DEG):
-            break
-    return _heel_to_origin(apply(transform, samples)) @ transform, axis
-
-
-def _direction(point: NDArray[np.float64]) -> float:
-    """Angle in radians from +X to a point on the floor, seen from the origin."""
-    return float(np.arctan2(point[1], point[0]))
-
-
-def _heel_to_origin(samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    shift = np.eye(4)
-    shift[:2, 3] = -pternion(samples)[:2]
-    return shift
-
-
-def _turn(angle: float) -> NDArray[np.float64]:
-    """(4, 4) rotation about Z by `angle` in radians."""
-    transform = np.eye(4)
-    transform[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    return transform
-
-
-def _check_proportions(samples: NDArray[np.float64], length: float) -> None:
-    low = samples[samples[:, 2] <= LOW_MM]
-    breadth = highest(low[:, 1]) - lowest(low[:, 1])
-    if not (LENGTH_MM[0] <= length <= LENGTH_MM[1] and SLENDERNESS[0] <= length / breadth <= SLENDERNESS[1]):
+def _check_form(samples: Floats, pose: Pose) -> None:
+    """Refuses what is no foot: `samples` stand on their floor, heel about X = 0."""
+    length = pose.length
+    _check_length(length)
+    breadth = float(np.ptp(samples[samples[:, 2] <= low_height(length), 1]))
+    if not SLENDERNESS[0] <= length / breadth <= SLENDERNESS[1]:
         raise Finding(f"the surface is {length:.0f} mm long and {breadth:.0f} mm broad, expected a foot")
+    if not pose.convexity < CONVEX:
+        raise Finding("the surface is round or a block without hollows, expected a foot")
+    x, z = samples[:, 0], samples[:, 2]
+    hind, toes = z[x < (1 - TOES) * length].max(initial=0.0), z[x > TOES * length].max(initial=0.0)
+    if not toes < DESCENT * hind:
+        found = f"the surface is {hind:.0f} mm high at one end and {toes:.0f} mm at the other"
+        raise Finding(f"{found}, expected a foot, whose toes are lower than its heel with the leg")
+    low = samples[samples[:, 2] <= low_height(length)]
+    heel, ball = (
+        float(
+            np.ptp(
+                low[(low[:, 0] > first * length) & (low[:, 0] < last * length), 1],
+            )
+        )
+        for first, last in (HEEL_STATION, BALL_STATION)
+    )
+    if not 0.0 < heel < HEEL_OVER_BALL * ball:
+        raise Finding(f"the surface is {heel:.0f} mm broad at the heel and {ball:.0f} mm at the ball, expected a foot")
+
+
+def _check_length(length: float) -> None:
+    if not LENGTH_MM[0] <= length <= LENGTH_MM[1]:
+        raise Finding(f"the surface is {length:.0f} mm long, expected a foot of {_range(LENGTH_MM)}")
+
+
+def _range(bounds: tuple[float, float]) -> str:
+    return f"{bounds[0]:.0f} to {bounds[1]:.0f} mm"
+
+
+def _medial_lead(samples: Floats, length: float) -> float:
+    """By how much toes and ball reach farther ahead on the +Y side than on the other, in lengths."""
+    low = samples[samples[:, 2] <= low_height(length)]
+    toes = low[low[:, 0] > 0.6 * length]
+    last, first = float(toes[:, 1].max()), float(toes[:, 1].min())
+    quarter = (last - first) / 4
+    of_toes = toes[toes[:, 1] > last - quarter, 0].max() - toes[toes[:, 1] < first + quarter, 0].max()
+    ball = low[(low[:, 0] > 0.5 * length) & (low[:, 0] < 0.78 * length)]
+    of_ball = ball[np.argmax(ball[:, 1]), 0] - ball[np.argmin(ball[:, 1]), 0]
+    return float(of_toes + of_ball) / (2 * length)

@@ -1,66 +1,185 @@
-"""Plane sections of a mesh, and the girth of a tape around one."""
+"""Plane sections of a triangle mesh as closed loops."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError, distance_matrix
+from scipy.spatial.distance import cdist
 
-from footscan.surface.topology import directed_edges
+from footscan.compiled import compiled
 
-
-class Section(NamedTuple):
-    """Where a plane cuts a mesh."""
-
-    points: NDArray[np.float64]
-    """(S, 3) where the plane cuts an edge of the mesh, mm."""
-    ends: NDArray[np.float64]
-    """(E, 3) those of them at which the curve ends since the mesh does; none where it is closed."""
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
-def cut(
-    vertices: NDArray[np.float64], faces: NDArray[np.integer], point: NDArray[np.float64], normal: NDArray[np.float64]
-) -> Section:
-    """The section of a mesh, (V, 3) mm and (F, 3), with the plane through (3,) `point` across (3,) `normal`."""
-    height = (vertices - point) @ normal
-    above = height >= 0
-    crossing = np.ptp(above[faces].astype(np.int8), axis=1) > 0
-    edges = np.sort(directed_edges(faces[crossing]), axis=1)
-    edges, faces_at = np.unique(edges[above[edges[:, 0]] != above[edges[:, 1]]], axis=0, return_counts=True)
-    start, end = edges.T
-    share = (height[start] / (height[start] - height[end]))[:, None]
-    points = vertices[start] + share * (vertices[end] - vertices[start])
-    return Section(points, points[faces_at == 1])
+class Cuttable(NamedTuple):
+    """A mesh that knows which faces lie side by side."""
+
+    vertices: Floats
+    """(V, 3) mm"""
+    faces: Ints
+    """(F, 3)"""
+    neighbours: Ints
+    """(F, 3) face beyond the edge from corner k to the next; -1 where the mesh ends."""
 
 
-def below(section: Section, height: float) -> Section:
-    """The part of `section` up to `height` in mm above the floor; an opening higher up is of no account for it."""
-    return Section(section.points[section.points[:, 2] <= height], section.ends[section.ends[:, 2] <= height])
+class Loop(NamedTuple):
+    """A closed curve in which a plane cuts a mesh."""
+
+    points: Floats
+    """(N, 3) where the plane cuts edges of the mesh, mm, in order."""
+    edges: Ints
+    """(N, 2) the vertices of these edges."""
+    shares: Floats
+    """(N,) where on its edge each point is: 0 at the first vertex, 1 at the second."""
+    gap: float
+    """Length of the widest opening of the mesh that the loop runs straight over, mm; 0 where it is closed."""
 
 
-def tape_girth(section: Section, normal: NDArray[np.float64]) -> float | None:
-    """Length in mm of a taut tape around the section, which bridges hollows: the perimeter of its convex hull.
+def cuttable(vertices: Floats, faces: NDArray[np.integer]) -> Cuttable:
+    """The mesh, (V, 3) mm and (F, 3), ready for `cut`."""
+    corners = np.ascontiguousarray(faces, np.int64)
+    return Cuttable(np.ascontiguousarray(vertices, np.float64), corners, face_neighbours(corners, len(vertices)))
 
-    None where the section holds no area.
+
+@compiled
+def face_neighbours(faces: Ints, count: int) -> Ints:
+    """(F, 3) the face beyond the edge from each corner of (F, 3) faces to the next, -1 where there is none; `count`
+    is that of the vertices. Of more than two faces at an edge the first two belong together."""
+    last, before = np.full(count, -1), np.full(faces.size, -1)  # of the edges known by their lower vertex
+    neighbours = np.full(faces.shape, -1)
+    for face in range(len(faces)):
+        for k in range(3):
+            a, b = faces[face, k], faces[face, (k + 1) % 3]
+            lower, upper = min(a, b), max(a, b)
+            edge = last[lower]
+            while edge >= 0:
+                other, slot = edge // 3, edge % 3
+                if upper == faces[other, slot] or upper == faces[other, (slot + 1) % 3]:
+                    break
+                edge = before[edge]
+            if edge < 0:
+                before[3 * face + k] = last[lower]
+                last[lower] = 3 * face + k
+            elif neighbours[edge // 3, edge % 3] < 0:
+                neighbours[edge // 3, edge % 3] = face
+                neighbours[face, k] = edge // 3
+    return neighbours
+
+
+def cut(mesh: Cuttable, point: Floats, normal: Floats) -> list[Loop]:
+    """The loops in which the plane through (3,) `point` across the unit vector (3,) `normal` cuts the mesh.
+
+    Where the mesh is open, ends of curves are joined straight, the nearest first.
     """
-    across = np.cross(normal, [0.0, 0.0, 1.0])
-    across /= np.linalg.norm(across)
-    plane = np.column_stack([section.points @ across, section.points @ np.cross(across, normal)])
-    if len(plane) < 3:
-        return None
-    try:
-        return float(ConvexHull(plane).area)  # of a plane figure qhull's "area" is the perimeter
-    except QhullError:
-        return None
+    height = mesh.vertices @ normal - point @ normal
+    edges, ends, closed = _traced(mesh.faces, mesh.neighbours, height)
+    curves = np.split(edges, ends)[:-1]
+    loops = [_loop(mesh.vertices, height, curve, 0.0) for curve, whole in zip(curves, closed, strict=True) if whole]
+    open_curves = [curve for curve, whole in zip(curves, closed, strict=True) if not whole]
+    return loops + _joined(mesh.vertices, height, open_curves)
 
 
-def widest_gap(section: Section) -> float:
-    """Length in mm of the widest opening of the section: ends are joined to the nearest first."""
-    gaps = distance_matrix(section.ends, section.ends)
-    np.fill_diagonal(gaps, np.inf)
-    widest = 0.0
-    while np.isfinite(gaps).any():
-        first, second = np.unravel_index(np.argmin(gaps), gaps.shape)
-        widest = float(gaps[first, second])
-        gaps[[first, second], :] = gaps[:, [first, second]] = np.inf
-    return widest
+def _loop(vertices: Floats, height: Floats, edges: Ints, gap: float) -> Loop:
+    first, second = edges[:, 0], edges[:, 1]
+    shares = height[first] / (height[first] - height[second])
+    points = vertices[first] + shares[:, None] * (vertices[second] - vertices[first])
+    return Loop(points, edges, shares, gap)
+
+
+def _joined(vertices: Floats, height: Floats, curves: list[Ints]) -> list[Loop]:
+    """Open curves, joined end to end."""
+    if not curves:
+        return []
+    ends = np.concatenate([_loop(vertices, height, curve[[0, -1]], 0.0).points for curve in curves])
+    partner, distance = _nearest_pairs(ends)
+    loops, unused = [], set(range(len(curves)))
+    while unused:
+        pieces, widest, end = [], 0.0, 2 * min(unused)  # an even number is where a curve begins, the next its end
+        while end // 2 in unused:
+            unused.remove(end // 2)
+            curve = curves[end // 2]
+            pieces.append(curve if end % 2 == 0 else curve[::-1])
+            other = end ^ 1
+            widest = max(widest, float(distance[other]))
+            end = int(partner[other])
+        loops.append(_loop(vertices, height, np.concatenate(pieces), widest))
+    return loops
+
+
+def _nearest_pairs(points: Floats) -> tuple[Ints, Floats]:
+    """Of (E, 3) `points`, E even, the partner of each and how far it is; the nearest pair first, then the rest."""
+    apart = cdist(points, points)
+    np.fill_diagonal(apart, np.inf)
+    partner, distance = np.zeros(len(points), np.int64), np.zeros(len(points))
+    for _ in range(len(points) // 2):
+        first, second = np.unravel_index(np.argmin(apart), apart.shape)
+        partner[first], partner[second] = second, first
+        distance[first] = distance[second] = apart[first, second]
+        apart[[first, second], :] = apart[:, [first, second]] = np.inf
+    return partner, distance
+
+
+@compiled
+def _traced(faces: Ints, neighbours: Ints, height: Floats) -> tuple[Ints, Ints, NDArray[np.bool_]]:
+    """Follows the curves where `height`, (V,), changes its sign, from face to face: open ones first.
+
+    Returns (N, 2) the vertices of the edges crossed, (C,) where each curve ends in them, (C,) whether it is closed.
+    """
+    crossing = np.zeros(len(faces), np.bool_)
+    count = 0
+    for face in range(len(faces)):
+        first = height[faces[face, 0]] >= 0
+        if first != (height[faces[face, 1]] >= 0) or first != (height[faces[face, 2]] >= 0):
+            crossing[face] = True
+            count += 1
+    edges = np.empty((2 * count + 1, 2), np.int64)
+    ends, closed = np.empty(count, np.int64), np.empty(count, np.bool_)
+    length = curves = 0
+    for seek_open in (True, False):
+        for start in range(len(faces)):
+            if not crossing[start]:
+                continue
+            slot = _crossed(faces, height, start, -1)
+            other = _crossed(faces, height, start, slot)
+            if seek_open:
+                if neighbours[start, slot] >= 0:
+                    slot, other = other, slot
+                if neighbours[start, slot] >= 0:
+                    continue
+            face, entry = start, slot
+            edges[length, 0], edges[length, 1] = faces[face, entry], faces[face, (entry + 1) % 3]
+            length += 1
+            while face >= 0 and crossing[face]:
+                crossing[face] = False
+                leave = _crossed(faces, height, face, entry)
+                a, b = faces[face, leave], faces[face, (leave + 1) % 3]
+                edges[length, 0], edges[length, 1] = a, b
+                length += 1
+                face = neighbours[face, leave]
+                entry = _edge(faces, face, a, b)
+            whole = face == start
+            if whole:  # the last edge is the first again
+                length -= 1
+            ends[curves], closed[curves] = length, whole
+            curves += 1
+    return edges[:length], ends[:curves], closed[:curves]
+
+
+@compiled
+def _edge(faces: Ints, face: int, a: int, b: int) -> int:
+    """Which edge of the face joins the vertices `a` and `b`; -1 where there is no face."""
+    for k in range(3):
+        c, d = faces[face, k], faces[face, (k + 1) % 3]
+        if face >= 0 and ((c == a and d == b) or (c == b and d == a)):
+            return k
+    return -1
+
+
+@compiled
+def _crossed(faces: Ints, height: Floats, face: int, other_than: int) -> int:
+    """The first edge of the face that is crossed, `other_than` one left out."""
+    for k in range(3):
+        if k != other_than and (height[faces[face, k]] >= 0) != (height[faces[face, (k + 1) % 3]] >= 0):
+            return k
+    return -1

@@ -1,0 +1,196 @@
+"""A foot's surface made ready for being measured: sections, landmarks, noise."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.measure.frame import FootFrame
+from footscan.measure.landmark_errors import saddle_gradient, summit_gradient
+from footscan.measure.landmarks import Landmark
+from footscan.measure.landmarks_dorsal import CORNER_MM
+from footscan.measure.landmarks_sides import FULL_SIZE_MM
+from footscan.measure.outline import Outline, Plane, smooth_outline
+from footscan.measure.quantity import NotThere, Quantity
+from footscan.measure.roughness import roughness
+from footscan.measure.sections import Cuttable, Loop, cut, cuttable
+from footscan.surface.topology import vertex_normals
+
+Floats = NDArray[np.float64]
+
+ACROSS = np.array([1.0, 0.0, 0.0])
+UP = np.array([0.0, 0.0, 1.0])
+CLOSED_GAP_MM = 5.0
+"""A narrower opening of a section is closed straight."""
+LEAST_LOOP_MM = 60.0
+"""Shorter loops are no section of a foot."""
+LEAST_SINE = 0.1
+"""Of the angle between a plane and the normals where it cuts; noise alone makes smaller ones."""
+FACING = {
+    "pternion": (-1.0, 0.0, 0.0),
+    "metatarsale_tibiale": (0.0, 1.0, 0.0),
+    "metatarsale_fibulare": (0.0, -1.0, 0.0),
+    "heel_medial": (0.0, 1.0, 0.0),
+    "heel_lateral": (0.0, -1.0, 0.0),
+    "medial_malleolus": (0.0, 1.0, 0.0),
+    "lateral_malleolus": (0.0, -1.0, 0.0),
+} | {f"toe_{toe}_tip": (1.0, 0.0, 0.0) for toe in range(1, 6)}
+"""Landmarks that are summits of the surface, and in which direction."""
+
+
+class Place(NamedTuple):
+    """A landmark as three quantities, mm, in the foot's frame."""
+
+    x: Quantity
+    y: Quantity
+    z: Quantity
+
+    @property
+    def point(self) -> Floats:
+        """(3,) mm"""
+        return np.array([self.x.value, self.y.value, self.z.value])
+
+
+class FootSurface:
+    """A foot in its own frame, and what is computed of its surface once for all measures."""
+
+    def __init__(self, foot: FootFrame, landmarks: Mapping[str, Landmark]) -> None:
+        self.length_mm = foot.length
+        self.mesh: Cuttable = cuttable(foot.vertices, foot.faces)
+        self.normals: Floats = vertex_normals(foot.vertices, foot.faces)
+        self.errors, self.noise = roughness(foot.vertices, self.normals, foot.faces)
+        self.landmarks = landmarks
+        self._places: dict[str, Place] = {}
+
+    @cached_property
+    def midfoot(self) -> Outline:
+        """The section at half the foot length.
+
+        Raises
+        ------
+        NotThere
+            There is none, or it has a gap.
+        """
+        x = 0.5 * self.length_mm
+        near = self.mesh.vertices[np.abs(self.mesh.vertices[:, 0] - x) < 0.02 * self.length_mm]
+        if not len(near):
+            raise NotThere("the surface has no section here")
+        inside = np.array([x, *(near[:, 1:].min(axis=0) + near[:, 1:].max(axis=0)) / 2])
+        return self.outline(Plane.across(inside, ACROSS), inside)
+
+    @property
+    def top(self) -> float:
+        """Height of the highest point, mm."""
+        return float(self.mesh.vertices[:, 2].max())
+
+    def place(self, name: str) -> Place:
+        """The landmark `name`. How it follows the surface is known of summits, of the junction of foot and leg and of
+        the landing point, which hardly does, and not of one that was set by hand: its derivatives are NaN.
+
+        Raises
+        ------
+        NotThere
+            It was not found.
+        """
+        if name not in self._places:
+            if name not in self.landmarks:
+                raise NotThere(f"{name.replace('_', ' ')} was not found")
+            landmark = self.landmarks[name]
+            doubt = f"{name.replace('_', ' ')} by a fallback" if landmark.method == "fallback" else None
+            gradient = self._landmark_gradient(name, landmark)
+            self._places[name] = Place(
+                *(Quantity(float(at), of, doubt) for at, of in zip(landmark.point, gradient, strict=True))
+            )
+        return self._places[name]
+
+    def _landmark_gradient(self, name: str, landmark: Landmark) -> Floats:
+        """(3, V) derivatives of its coordinates by the displacements of the vertices."""
+        vertices, normals, point, cap = self.mesh.vertices, self.normals, landmark.point, landmark.cap
+        if cap is not None and name in FACING:
+            return summit_gradient(vertices, normals, point, np.array(FACING[name]), cap)
+        if cap is not None and name == "junction_point":
+            scale = min(1.0, self.length_mm / FULL_SIZE_MM)
+            corner = np.array([CORNER_MM[0], 0.0, CORNER_MM[1]]) * scale
+            return saddle_gradient(vertices, normals, point, corner, cap)
+        hardly = landmark.method == "geometric" and name == "landing_point"
+        return np.full((3, len(normals)), 0.0 if hardly else np.nan)
+
+    def station(self, share: float) -> Quantity:
+        """X at this share of the foot length, which is 0 at the rearmost heel point and 1 at the longest toe."""
+        tips = [self.place(name) for name in self.landmarks if name.startswith("toe_")]
+        longest = max((tip.x for tip in tips), key=lambda x: x.value, default=None)
+        gradient = np.zeros(len(self.normals)) if longest is None else share * longest.gradient
+        if "pternion" in self.landmarks:
+            gradient = gradient + (1.0 - share) * self.place("pternion").x.gradient
+        return Quantity(share * self.length_mm, gradient)
+
+    def sections(self, plane: Plane) -> list[Loop]:
+        """All loops of the surface in `plane`."""
+        return cut(self.mesh, plane.point, plane.normal)
+
+    def outline(self, plane: Plane, seed: Floats) -> Outline:
+        """The loop in `plane` around (3,) `seed`, or the one that passes nearest to it, without noise.
+
+        Raises
+        ------
+        NotThere
+            There is none, or it is open by more than CLOSED_GAP_MM.
+        """
+        loop = nearest_loop(self.sections(plane), plane, seed)
+        if loop is None:
+            raise NotThere("the surface has no section here")
+        if loop.gap >= CLOSED_GAP_MM:
+            raise NotThere(f"the surface has a gap of {loop.gap:.0f} mm here")
+        return self.smooth(loop, plane)
+
+    def smooth(self, loop: Loop, plane: Plane) -> Outline:
+        """The loop without noise."""
+        moves = np.hypot(*self.outwards(plane, loop.edges.ravel()).T).reshape(-1, 2)
+        return smooth_outline(loop, plane, moves * self.noise[loop.edges])
+
+    def gradient(self, outline: Outline, by_points: Floats) -> Floats:
+        """(V,) derivatives by the displacements of the vertices, from (N, 2) those by the points of an outline."""
+        by_points = outline.raw_gradient(by_points)
+        shares = (1.0 - outline.loop.shares, outline.loop.shares)
+        total = np.zeros(len(self.normals))
+        for vertex, share in zip(outline.loop.edges.T, shares, strict=True):
+            along = np.einsum("ni,ni->n", by_points, self.outwards(outline.plane, vertex))
+            total += np.bincount(vertex, share * along, len(total))
+        return total
+
+    def outwards(self, plane: Plane, vertices: NDArray[np.int64]) -> Floats:
+        """(N, 2) how a section moves where (N,) vertices move outwards by 1: by 1 over the sine of the angle between
+        plane and normal, LEAST_SINE at least."""
+        normals = self.normals[vertices]
+        in_plane = normals @ np.column_stack([plane.first, plane.second])
+        squared = in_plane[:, 0] ** 2 + in_plane[:, 1] ** 2
+        moved: Floats = in_plane / np.maximum(squared, LEAST_SINE**2)[:, None]
+        return moved
+
+
+def nearest_loop(loops: list[Loop], plane: Plane, seed: Floats, least: float = LEAST_LOOP_MM) -> Loop | None:
+    """The longest loop around (3,) `seed`; where none is, the one that passes nearest to it."""
+    centre = plane.flat(seed[None])[0]
+    around, passing = [], []
+    for loop in loops:
+        flat = plane.flat(loop.points) - centre
+        x, y = flat.T
+        length = float(np.hypot(np.diff(x, append=x[0]), np.diff(y, append=y[0])).sum())
+        if length < least:
+            continue
+        if _holds_origin(flat):
+            around.append((length, loop))
+        passing.append((float(np.hypot(x, y).min()), loop))
+    if around:
+        return max(around, key=lambda found: found[0])[1]
+    return min(passing, key=lambda found: found[0])[1] if passing else None
+
+
+def _holds_origin(polygon: Floats) -> bool:
+    """Whether the origin is within the (N, 2) polygon: a ray from it crosses an odd number of its sides."""
+    ahead = np.roll(polygon, -1, axis=0)
+    spans = (polygon[:, 1] > 0) != (ahead[:, 1] > 0)
+    start, end = polygon[spans], ahead[spans]
+    return bool(np.count_nonzero(start[:, 0] - start[:, 1] * (end - start)[:, 0] / (end - start)[:, 1] > 0) % 2)

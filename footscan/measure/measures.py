@@ -1,0 +1,323 @@
+"""The measures of a foot: what each is, and all of them of a mesh."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from footscan.measure import girths, linear, plantar, solid
+from footscan.measure.foot_surface import FootSurface
+from footscan.measure.frame import FootFrame, foot_frame
+from footscan.measure.landmarks import Landmark, find_landmarks
+from footscan.measure.place import apply
+from footscan.measure.quantity import NotThere, Quantity
+from schemas.measures import Axis, Measure, MeasuredLandmark, Measures, Place, Status, Unit
+from schemas.scan import Side
+
+Floats = NDArray[np.float64]
+
+FILLED_SHARE = 0.05
+"""A measure that rests on filled surface by more than this is uncertain."""
+DIGITS: dict[Unit, int] = {"mm": 3, "mm2": 0, "mm3": 0, "deg": 2, "1": 4}
+
+
+class Definition(NamedTuple):
+    """One measure."""
+
+    unit: Unit
+    text: str
+    taken: Callable[[FootSurface], Quantity]
+
+
+def _definitions() -> dict[str, Definition]:
+    """All measures, in the order in which they are shown."""
+    along, across, height = linear.along_axis, linear.across_axis, linear.height
+    tape = "tape in the plane"
+    return {
+        "foot_length": Definition("mm", "rearmost heel point to the longest toe, along the axis", linear.foot_length),
+        "foot_breadth": Definition(
+            "mm",
+            "between the tangents, parallel to the axis, at the heads of the first and fifth metatarsals",
+            partial(across, medial="metatarsale_tibiale", lateral="metatarsale_fibulare"),
+        ),
+        "foot_breadth_diagonal": Definition(
+            "mm", "between the heads of the first and fifth metatarsals, on the level", linear.foot_breadth_diagonal
+        ),
+        "foot_breadth_max": Definition(
+            "mm", "between the tangents parallel to the axis, at 55 to 85 % of the length", linear.foot_breadth_max
+        ),
+        "ball_length": Definition(
+            "mm",
+            "rearmost heel point to the head of the first metatarsal, along the axis",
+            partial(along, name="metatarsale_tibiale"),
+        ),
+        "lateral_ball_length": Definition(
+            "mm",
+            "rearmost heel point to the head of the fifth metatarsal, along the axis",
+            partial(along, name="metatarsale_fibulare"),
+        ),
+        "instep_length": Definition(
+            "mm", "rearmost heel point to the instep point, along the axis", partial(along, name="instep_point")
+        ),
+        "toe_length": Definition(
+            "mm", "head of the first metatarsal to the longest toe, along the axis", linear.toe_length
+        ),
+        "ball_angle": Definition(
+            "deg",
+            "between the line through the heads of the first and fifth metatarsals and the axis",
+            linear.ball_angle,
+        ),
+        "heel_breadth": Definition(
+            "mm",
+            "most medial to most lateral point at 10 to 20 % of the foot length, up to 40 mm high, across the axis",
+            linear.heel_breadth,
+        ),
+        "midfoot_breadth": Definition(
+            "mm", "section at half the foot length, up to 60 mm high, across the axis", linear.midfoot_breadth
+        ),
+        "bimalleolar_breadth": Definition(
+            "mm",
+            "most prominent points of both malleoli, across the axis",
+            partial(across, medial="medial_malleolus", lateral="lateral_malleolus"),
+        ),
+        "ball_height": Definition(
+            "mm", "highest point of the upright section through both metatarsal heads", linear.ball_height
+        ),
+        "toe_height": Definition("mm", "highest point of the big toe 12.5 mm behind its tip", linear.toe_height),
+        "instep_height": Definition("mm", "floor to the highest point at half the foot length", linear.instep_height),
+        "arch_height": Definition(
+            "mm",
+            "highest point of the sole at 30 to 60 % of the foot length, a third of the midfoot's breadth from its "
+            "medial edge",
+            linear.arch_height,
+        ),
+        "arch_height_index": Definition("1", "instep height over ball length", linear.arch_height_index),
+        "navicular_height": Definition("mm", "floor to the navicular", partial(height, name="navicular")),
+        "medial_malleolus_height": Definition(
+            "mm", "floor to the most prominent point of the medial malleolus", partial(height, name="medial_malleolus")
+        ),
+        "lateral_malleolus_height": Definition(
+            "mm",
+            "floor to the most prominent point of the lateral malleolus",
+            partial(height, name="lateral_malleolus"),
+        ),
+        "toe_1_angle": Definition(
+            "deg",
+            "line from the medial side of the heel to the head of the first metatarsal, against its tangent to the big "
+            "toe; positive where that turns to the lateral side",
+            linear.toe_1_angle,
+        ),
+        "toe_5_angle": Definition(
+            "deg",
+            "line from the lateral side of the heel to the head of the fifth metatarsal, against its tangent to the "
+            "little toe; positive where that turns to the medial side",
+            linear.toe_5_angle,
+        ),
+        "heel_angle": Definition(
+            "deg",
+            "middle of the heel's rear, from 6 to 20 % of the foot length high, against the vertical; positive where "
+            "it leans to the medial side upwards",
+            linear.heel_angle,
+        ),
+        "ball_girth": Definition("mm", f"{tape} that stands upright on both metatarsal heads", girths.ball_girth),
+        "straight_ball_girth": Definition(
+            "mm", f"{tape} across the axis at the head of the first metatarsal", girths.straight_ball_girth
+        ),
+        "waist_girth": Definition(
+            "mm",
+            f"{tape} across the axis, midway between the middle of the ball and half the length",
+            girths.waist_girth,
+        ),
+        "instep_girth": Definition("mm", f"{tape} across the axis at half the foot length", girths.instep_girth),
+        "instep_girth_min": Definition(
+            "mm", "least tape through the instep point, tilted by at most 30 degrees", girths.instep_girth_min
+        ),
+        "heel_girth": Definition(
+            "mm",
+            f"{tape} across the foot through the landing point and the junction of foot and leg",
+            girths.heel_girth,
+        ),
+        "long_heel_girth": Definition(
+            "mm",
+            f"{tape} across the foot through the rear of the heel on the floor and the instep point",
+            girths.long_heel_girth,
+        ),
+        "ankle_girth": Definition("mm", "least level tape above the malleoli", girths.ankle_girth),
+        "arch_index": Definition(
+            "1",
+            "middle third of the footprint without toes over the whole (Cavanagh and Rodgers 1987)",
+            plantar.arch_index,
+        ),
+        "chippaux_smirak_index": Definition(
+            "1",
+            "least width of the footprint's middle third over the greatest of its front third",
+            plantar.chippaux_smirak,
+        ),
+        "staheli_index": Definition(
+            "1",
+            "least width of the footprint's middle third over the greatest of its rear third",
+            plantar.staheli,
+        ),
+        "clarke_angle": Definition(
+            "deg",
+            "between the footprint's medial tangent and the line from there, beside the head of the first metatarsal, "
+            "to the deepest point of the arch",
+            plantar.clarke_angle,
+        ),
+        "foot_volume": Definition("mm3", "below the height of the junction of foot and leg", solid.foot_volume),
+        "foot_surface": Definition(
+            "mm2", "skin below the height of the junction of foot and leg, sole included", solid.foot_surface
+        ),
+        "scan_height": Definition("mm", "floor to the highest point of the surface", linear.scan_height),
+    }
+
+
+def measure_foot(
+    vertices: NDArray[np.floating],
+    faces: NDArray[np.integer],
+    side: Side,
+    *,
+    axis: Axis = "toe2",
+    manual: Mapping[str, Floats] | None = None,
+    errors_mm: NDArray[np.floating] | None = None,
+    reach_mm: float = 0.0,
+    filled: NDArray[np.bool_] | None = None,
+    calibration: Mapping[str, tuple[float, float]] | None = None,
+) -> Measures:
+    """The measures of a foot, in any pose. A left foot is mirrored and measured as a right one.
+
+    Parameters
+    ----------
+    vertices : (V, 3) mm, any frame; the scanner's glass is at Z = 0
+    faces : (F, 3)
+    axis : the foot axis that is wished for
+    manual : landmarks set by a person, name to (3,) mm in the frame of the mesh
+    errors_mm : (V,) standard deviations of the vertices; where not given, they are told from the mesh's roughness
+    reach_mm : vertices of one cube of this edge share their error, as those of a smoothed surface do; 0 where each has
+        its own
+    filled : (V,) which vertices were filled, not measured
+    calibration : name of a measure to (a, b): a + b times what was measured is reported
+
+    Raises
+    ------
+    Finding
+        The surface is no foot, or not in mm.
+    """
+    foot = foot_frame(vertices, faces, side, axis, manual)
+    landmarks = find_landmarks(foot, manual or {})
+    if errors_mm is not None or filled is not None:  # the foot's vertices are those of the mesh, strays left out
+        back = apply(np.linalg.inv(foot.transform), foot.vertices)
+        source = KDTree(vertices).query(back)[1]
+        errors_mm = None if errors_mm is None else np.asarray(errors_mm, np.float64)[source]
+        filled = None if filled is None else filled[source]
+    return Measures(
+        side=foot.side,
+        side_note=foot.side_note,
+        axis=foot.axis,
+        transform=foot.transform.tolist(),
+        measures=take_measures(
+            foot, landmarks, errors_mm=errors_mm, reach_mm=reach_mm, filled=filled, calibration=calibration
+        ),
+        landmarks=_in_mesh(landmarks, foot.transform),
+    )
+
+
+def take_measures(
+    foot: FootFrame,
+    landmarks: Mapping[str, Landmark],
+    *,
+    errors_mm: Floats | None = None,
+    reach_mm: float = 0.0,
+    filled: NDArray[np.bool_] | None = None,
+    calibration: Mapping[str, tuple[float, float]] | None = None,
+) -> dict[str, Measure]:
+    """All measures of a foot in its own frame; parameters as in `measure_foot`, (V,) of the foot's own vertices."""
+    surface = FootSurface(foot, landmarks)
+    errors = _Errors(surface.errors if errors_mm is None else errors_mm, _cubes(foot.vertices, reach_mm), filled)
+    known = calibration or {}
+    to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
+    return {
+        name: _measure(definition, surface, errors, known.get(name), to_mesh)
+        for name, definition in _definitions().items()
+    }
+
+
+class _Errors(NamedTuple):
+    """What is known of the errors of a foot's vertices."""
+
+    deviations: Floats
+    """(V,) mm"""
+    patch: NDArray[np.int64] | None
+    """(V,) vertices of one patch share their error; None where each has its own."""
+    filled: NDArray[np.bool_] | None
+    """(V,)"""
+
+
+def _cubes(vertices: Floats, edge: float) -> NDArray[np.int64] | None:
+    """(V,) the number of the cube in which each vertex lies."""
+    if edge <= 0:
+        return None
+    _, cube = np.unique(np.floor(vertices / edge), axis=0, return_inverse=True)
+    return cube.ravel()
+
+
+def _measure(
+    definition: Definition,
+    surface: FootSurface,
+    errors: _Errors,
+    calibration: tuple[float, float] | None,
+    to_mesh: Floats,
+) -> Measure:
+    try:
+        taken = definition.taken(surface)
+    except NotThere as missing:
+        return Measure(
+            value=None, unit=definition.unit, status="incomplete", definition=definition.text, note=str(missing)
+        )
+    offset, factor = calibration or (0.0, 1.0)
+    digits = DIGITS[definition.unit]
+    share = None if errors.filled is None else round(taken.share(errors.filled), 3)
+    doubts = [] if taken.doubt is None else [taken.doubt]
+    if share is not None and share > FILLED_SHARE:
+        doubts.append(f"{100 * share:.0f} % of it rests on surface that was filled, not measured")
+    status: Status = "uncertain" if doubts else "ok"
+    deviation = taken.sd(errors.deviations, errors.patch)
+    notes = [*doubts, *([] if taken.note is None else [taken.note])]
+    return Measure(
+        value=round(offset + factor * taken.value, digits),
+        unit=definition.unit,
+        status=status,
+        definition=definition.text,
+        note="; ".join(notes) or None,
+        uncertainty=None if deviation is None else round(abs(factor) * deviation, digits + 1),
+        surface_length=None if taken.surface_length is None else round(taken.surface_length, 3),
+        plane=None if taken.plane is None else _plane_in_mesh(*taken.plane, to_mesh),
+        filled_share=share,
+        calibration=calibration,
+    )
+
+
+def _plane_in_mesh(point: Floats, normal: Floats, to_mesh: Floats) -> tuple[Place, Place]:
+    moved, turned = apply(to_mesh, point[None])[0], to_mesh[:3, :3] @ normal
+    return _place(moved, 3), _place(turned / np.linalg.norm(turned), 6)
+
+
+def _place(point: Floats, digits: int) -> Place:
+    x, y, z = np.round(point, digits).tolist()
+    return x, y, z
+
+
+def _in_mesh(landmarks: Mapping[str, Landmark], transform: Floats) -> dict[str, MeasuredLandmark]:
+    back = np.linalg.inv(transform)
+    return {
+        name: MeasuredLandmark(
+            point=_place(apply(back, landmark.point[None])[0], 3),
+            method=landmark.method,
+            confidence=landmark.confidence,
+            note=landmark.note,
+        )
+        for name, landmark in landmarks.items()
+    }

@@ -1,0 +1,150 @@
+"""A loop in its plane, with the noise of the mesh smoothed away."""
+
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import fft, fftfreq, ifft, next_fast_len
+
+from footscan.measure.sections import Loop
+
+Floats = NDArray[np.float64]
+
+STEP_MM = 0.5
+"""Between the places along a loop at which it is smoothed."""
+ORDER = 3
+"""Of the low-pass filter: one minus its answer grows with the 2 * ORDER-th power of the frequency, so forms much longer
+than its wavelength stay as they are."""
+SLOPE_VARIANCE = 0.0006
+"""So much noise is left in an outline; around a ball of 40 mm radius it makes a tape 0.08 mm longer."""
+
+
+class Plane(NamedTuple):
+    """A plane and two directions in it."""
+
+    point: Floats
+    """(3,) mm"""
+    normal: Floats
+    """(3,) unit vector"""
+    first: Floats
+    """(3,) unit vector; horizontal unless the plane is"""
+    second: Floats
+    """(3,) unit vector across `first`; upwards unless the plane is horizontal"""
+
+    @classmethod
+    def across(cls, point: Floats, direction: Floats) -> Self:
+        """The plane through (3,) `point` across (3,) `direction`."""
+        normal = direction / np.linalg.norm(direction)
+        level = np.hypot(normal[0], normal[1]) < 1e-9
+        first = np.array([1.0, 0.0, 0.0]) if level else np.array([-normal[1], normal[0], 0.0])
+        first /= np.linalg.norm(first)
+        (x, y, z), (u, v, w) = normal.tolist(), first.tolist()
+        return cls(point, normal, first, np.array([y * w - z * v, z * u - x * w, x * v - y * u]))
+
+    def flat(self, points: Floats) -> Floats:
+        """(N, 2) coordinates in the plane of (N, 3) `points`, mm."""
+        away: Floats = points - self.point
+        return np.column_stack([away @ self.first, away @ self.second])
+
+    def solid(self, points: Floats) -> Floats:
+        """(N, 3) points of the plane from their (N, 2) coordinates."""
+        there: Floats = self.point + points[:, :1] * self.first + points[:, 1:] * self.second
+        return there
+
+
+class Outline(NamedTuple):
+    """A smoothed loop."""
+
+    points: Floats
+    """(N, 2) mm, in the plane; one for each of the loop's."""
+    plane: Plane
+    loop: Loop
+    places: Floats
+    """(N,) where they are along the loop, in steps of its even sampling."""
+    answer: Floats | None
+    """(M,) the filter's, at the frequencies of that sampling; None where nothing is filtered."""
+    noise: float
+    """Standard deviation of the loop's own points, mm."""
+
+    def smoothed(self, displacement: Floats) -> Floats:
+        """(N, 2) what a displacement, (N, 2), of the loop's own points comes to when it is smoothed as they were."""
+        if self.answer is None:
+            return displacement
+        return _interpolated(_filtered(_sampled(displacement, self.places, len(self.answer)), self.answer), self.places)
+
+    def raw_gradient(self, gradient: Floats) -> Floats:
+        """(N, 2) derivatives by the loop's own points, from those, (N, 2), by the smoothed ones."""
+        if self.answer is None:
+            return gradient
+        return _sampled_back(_filtered(_spread_back(gradient, self.places, len(self.answer)), self.answer), self.places)
+
+
+def smooth_outline(loop: Loop, plane: Plane, noise: Floats) -> Outline:
+    """The loop without the noise of the mesh. A loop without noise stays as it is, with its corners.
+
+    Parameters
+    ----------
+    noise : (N, 2) standard deviation, in the plane, of the vertices of the loop's edges, mm
+    """
+    points = plane.flat(loop.points)
+    of_points = np.hypot((1 - loop.shares) * noise[:, 0], loop.shares * noise[:, 1])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0, append=points[:1]), axis=1))])
+    count = next_fast_len(max(int(np.ceil(along[-1] / STEP_MM)), 8))
+    places = along[:-1] * (count / along[-1])
+    frequencies = fftfreq(count, along[-1] / count)
+    wavelength = _wavelength(float(np.median(of_points)), along[-1] / len(points))
+    answer = 1.0 / (1.0 + (wavelength * frequencies) ** (2 * ORDER)) if wavelength > 2 * STEP_MM else None
+    outline = Outline(points, plane, loop, places, answer, float(np.median(of_points)))
+    return outline._replace(points=outline.smoothed(points))
+
+
+def _wavelength(noise: float, spacing: float) -> float:
+    """The wavelength, mm, below which noise has to go, of points `spacing` apart, lest a tape lies on its crests.
+
+    A tape around a circle of radius R that is wavy with slopes of variance s² is longer by pi R s². White noise of
+    variance n² at a spacing d has s² = n² d (2 pi / W)³ / (3 pi) left when all shorter than W is gone.
+    """
+    return float(2 * np.pi * np.cbrt(noise**2 * spacing / (3 * np.pi * SLOPE_VARIANCE)))
+
+
+def _sampled(points: Floats, places: Floats, count: int) -> Floats:
+    """(M, 2) the closed polygon at even places along it."""
+    at = np.arange(count)
+    ring = np.append(places, count)
+    return np.column_stack([np.interp(at, ring, np.append(points[:, k], points[0, k])) for k in range(2)])
+
+
+def _interpolated(sampled: Floats, places: Floats) -> Floats:
+    """(N, 2) even samples at `places` between them."""
+    ring = np.arange(len(sampled) + 1)
+    return np.column_stack([np.interp(places, ring, np.append(sampled[:, k], sampled[0, k])) for k in range(2)])
+
+
+def _filtered(sampled: Floats, answer: Floats) -> Floats:
+    signal = ifft(fft(sampled[:, 0] + 1j * sampled[:, 1]) * answer)
+    return np.column_stack([signal.real, signal.imag])
+
+
+def _spread_back(gradient: Floats, places: Floats, count: int) -> Floats:
+    """The transpose of `_interpolated`."""
+    before = np.minimum(places.astype(np.int64), count - 1)
+    share = places - before
+    return np.column_stack(
+        [
+            np.bincount(before, (1 - share) * gradient[:, k], count)
+            + np.bincount((before + 1) % count, share * gradient[:, k], count)
+            for k in range(2)
+        ]
+    )
+
+
+def _sampled_back(gradient: Floats, places: Floats) -> Floats:
+    """The transpose of `_sampled`."""
+    at = np.arange(len(gradient))
+    ring = np.append(places, len(gradient))
+    before = np.clip(np.searchsorted(ring, at, side="right") - 1, 0, len(places) - 1)
+    share = ((at - ring[before]) / np.maximum(ring[before + 1] - ring[before], 1e-12))[:, None]
+    back = np.zeros((len(places), 2))
+    np.add.at(back, before, (1 - share) * gradient)
+    np.add.at(back, (before + 1) % len(places), share * gradient)
+    return back

@@ -1,0 +1,234 @@
+"""The footprint and its indices, from the section of the foot just above the floor.
+
+The contact is where the foot holds the height CONTACT_MM. Sections of the print run across the axis.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from footscan.measure.foot_surface import CLOSED_GAP_MM, UP, FootSurface
+from footscan.measure.outline import Outline, Plane
+from footscan.measure.quantity import NotThere, Quantity, combined
+
+Floats = NDArray[np.float64]
+
+CONTACT_MM = 1.0
+STEP_MM = 0.5
+"""Between the sections of the print."""
+APEX_MM = 10.0
+"""To both sides of the deepest point of the arch, over which it is rounded off."""
+LEAST_POINTS, LEAST_SLOPE = 5, 1e-6
+LEAST_MM2 = 20.0
+"""Smaller spots are dust or noise."""
+TOES, MERGED = 0.13, 0.18
+"""Of the foot length: a print that begins farther ahead of the line through the metatarsal heads is of a toe; one of
+the rest that reaches farther than the second has grown together with toes, and is cut at the first."""
+
+
+class Print(NamedTuple):
+    """A footprint without its toes."""
+
+    outlines: list[Outline]
+    """Its borders, mm; in the axes of the foot."""
+    stations: Floats
+    """(S,) X of its sections, mm, STEP_MM apart, in the middle of strips that cover it."""
+    widths: Floats
+    """(S,) how much of each lies in the print, mm."""
+    rear: float
+    """X of its rear end, mm."""
+    front: float
+    """X of its foremost point, mm."""
+    doubt: str | None
+
+
+def footprint(foot: FootSurface) -> Print:
+    """The contact of the foot with the floor, its toes left out.
+
+    Raises
+    ------
+    NotThere
+        The sole was not seen.
+    """
+    plane = Plane.across(np.array([0.0, 0.0, CONTACT_MM]), UP)
+    loops = foot.sections(plane)
+    if any(loop.gap >= CLOSED_GAP_MM for loop in loops):
+        raise NotThere("the surface has a gap at the sole")
+    outlines = [foot.smooth(loop, plane) for loop in loops]
+    ball = _BallLine(foot)
+    outlines = [
+        outline
+        for outline in outlines
+        if abs(_area(outline.points)) >= LEAST_MM2 and ball.ahead(outline.points).min() < TOES * foot.length_mm
+    ]
+    if not outlines:
+        raise NotThere("the foot does not reach the floor")
+    points = np.concatenate([outline.points for outline in outlines])
+    merged = bool(np.any(ball.ahead(points) > MERGED * foot.length_mm))
+    limit = TOES * foot.length_mm if merged else np.inf
+    behind = points[ball.ahead(points) <= limit]
+    rear, front = float(behind[:, 0].min()), float(behind[:, 0].max())
+    count = int(np.ceil((front - rear) / STEP_MM))
+    stations = rear + (np.arange(count) + 0.5) * (front - rear) / count
+    widths = _widths(outlines, stations, ball, limit)
+    return Print(outlines, stations, widths, rear, front, "toes run into the print" if merged else None)
+
+
+def arch_index(foot: FootSurface) -> Quantity:
+    """Middle third over the whole: Cavanagh and Rodgers, "The arch index: a useful measure from footprints",
+    J. Biomech. 20(5), 1987, doi:10.1016/0021-9290(87)90255-7."""
+    contact = footprint(foot)
+    third = (contact.front - contact.rear) / 3
+    is_middle = (contact.stations > contact.rear + third) & (contact.stations <= contact.rear + 2 * third)
+    index = float(contact.widths[is_middle].sum() / contact.widths.sum())
+    area = float(contact.widths.mean()) * (contact.front - contact.rear)
+    ends = (_end(foot, contact, -1.0), _end(foot, contact, 1.0))
+    gradient = np.zeros(len(foot.normals))
+    for outline in contact.outlines:
+        x = outline.points[:, 0]
+        middle = (x > contact.rear + third) & (x <= contact.rear + 2 * third)
+        gradient += foot.gradient(outline, _outwards(outline.points) * ((middle - index) / area)[:, None])
+    first, second = (float(np.interp(contact.rear + k * third, contact.stations, contact.widths)) for k in (1, 2))
+    gradient += (second - 2 * first) / (3 * area) * ends[0] + (2 * second - first) / (3 * area) * ends[1]
+    return Quantity(index, gradient, contact.doubt, note=_HEIGHT)
+
+
+def chippaux_smirak(foot: FootSurface) -> Quantity:
+    """Least width of the middle third over the greatest of the front third."""
+    return _ratio(foot, footprint(foot), 2)
+
+
+def staheli(foot: FootSurface) -> Quantity:
+    """Least width of the middle third over the greatest of the rear third."""
+    return _ratio(foot, footprint(foot), 0)
+
+
+def clarke_angle(foot: FootSurface) -> Quantity:
+    """On the medial tangent of the print, beside the head of the first metatarsal: between that tangent and the line to
+    the deepest point of the arch, degrees."""
+    contact = footprint(foot)
+    largest = max(contact.outlines, key=lambda outline: abs(_area(outline.points)))
+    points, thirds = largest.points, contact.rear + (contact.front - contact.rear) * np.array([1 / 3, 2 / 3])
+    if not (points[:, 0].min() < thirds[0] and points[:, 0].max() > thirds[1]):
+        raise NotThere("the print is in two parts: its medial border does not run from heel to ball")
+    corners = ConvexHull(points).vertices
+    start, end = points[corners], points[np.roll(corners, -1)]
+    middle = np.mean(thirds)
+    over = np.flatnonzero((np.minimum(start[:, 0], end[:, 0]) < middle) & (np.maximum(start[:, 0], end[:, 0]) > middle))
+    medial = max(over, key=lambda edge: float(start[edge, 1] + end[edge, 1]))
+    heel, ball = sorted((int(corners[medial]), int(np.roll(corners, -1)[medial])), key=lambda k: float(points[k, 0]))
+    tibiale = foot.place("metatarsale_tibiale").x
+    forwards = (points[ball] - points[heel]) / np.linalg.norm(points[ball] - points[heel])
+    inwards = np.array([forwards[1], -forwards[0]])
+    corner = points[heel] + forwards * (tibiale.value - points[heel, 0]) / forwards[0]
+    along, depth = (corner - points) @ forwards, (points - corner) @ inwards
+    between = (points[:, 0] > points[heel, 0]) & (points[:, 0] < points[ball, 0])
+    between &= points[:, 1] > (points[[heel, ball], 1].min() + points[:, 1].min()) / 2  # not the lateral border
+    if not between.any():
+        raise NotThere("the print has no arch")
+    place = along - along[np.argmax(np.where(between, depth, -np.inf))]
+    near = np.flatnonzero(between & (np.abs(place) <= APEX_MM))
+    weights = np.linalg.pinv(np.column_stack([place[near] ** k for k in range(3)]))
+    level, slope, bend = weights @ depth[near]
+    if len(near) < LEAST_POINTS or bend >= 0:
+        raise NotThere("the print has no arch")
+    apex = float(np.clip(-slope / (2 * bend), -APEX_MM, APEX_MM))
+    run, rise = float((along - place)[0]) + apex, float(level + apex * (slope + apex * bend))
+    factor = np.rad2deg(1.0 / (run**2 + rise**2))
+    by_points = np.zeros_like(points)
+    by_points[near] = np.outer(factor * (run * weights[0] + rise * weights[1] / (2 * bend)), inwards)
+    arch = Quantity(0.0, foot.gradient(largest, by_points), contact.doubt)
+    degrees = float(np.rad2deg(np.arctan2(rise, run)))
+    return combined(degrees, (1.0, arch), (-factor * rise, tibiale))._replace(note=_HEIGHT)
+
+
+_HEIGHT = f"contact is up to {CONTACT_MM:g} mm above the floor"
+
+
+class _BallLine:
+    """The line through both metatarsal heads, on the floor."""
+
+    def __init__(self, foot: FootSurface) -> None:
+        self.medial = foot.place("metatarsale_tibiale").point[:2]
+        self.lateral = foot.place("metatarsale_fibulare").point[:2]
+        along, across = self.medial - self.lateral
+        self.slope = max(along, LEAST_SLOPE * across) / across  # the first head is ahead of the fifth
+
+    def ahead(self, points: Floats) -> Floats:
+        """(N,) how far (N, 2) points lie ahead of it, along X."""
+        x: Floats = points[:, 0] - self.lateral[0] - self.slope * (points[:, 1] - self.lateral[1])
+        return x
+
+
+def _widths(outlines: list[Outline], stations: Floats, ball: _BallLine, limit: float) -> Floats:
+    """(S,) of the print at (S,) even `stations`, without what lies more than `limit` ahead of the ball.
+
+    The border crosses a station at Y up and down in turn: the width is the sum of Y, with that sign.
+    """
+    widths = np.zeros(len(stations))
+    step = stations[1] - stations[0]
+    for outline in outlines:
+        start = outline.points
+        end = np.roll(start, -1, axis=0)
+        bounds = np.sort(np.column_stack([start[:, 0], end[:, 0]]), axis=1)
+        first, last = np.clip(np.ceil((bounds - stations[0]) / step), 0, len(stations)).astype(np.int64).T
+        side = np.repeat(np.arange(len(start)), last - first)
+        station = np.arange(len(side)) - np.repeat(np.cumsum(last - first) - (last - first), last - first)
+        station += first[side]
+        x = stations[station]
+        along = end[side, 0] - start[side, 0]
+        y = start[side, 1] + (x - start[side, 0]) / along * (end[side, 1] - start[side, 1])
+        if np.isfinite(limit):
+            border = ball.lateral[1] + (x - limit - ball.lateral[0]) / ball.slope  # by `limit` ahead of the ball
+            y = np.maximum(y, border)
+        widths += np.bincount(station, -np.sign(along) * np.sign(_area(start)) * y, len(stations))
+    return widths
+
+
+def _ratio(foot: FootSurface, contact: Print, third: int) -> Quantity:
+    bounds = np.linspace(contact.rear, contact.front, 4)
+    middle = (contact.stations > bounds[1]) & (contact.stations <= bounds[2])
+    other = (contact.stations > bounds[third]) & (contact.stations <= bounds[third + 1])
+    least = _side_quantity(foot, contact, int(np.argmin(np.where(middle, contact.widths, np.inf))))
+    most = _side_quantity(foot, contact, int(np.argmax(np.where(other, contact.widths, -np.inf))))
+    ratio = least.value / most.value
+    found = combined(ratio, (1 / most.value, least), (-ratio / most.value, most))
+    return found._replace(doubt=contact.doubt, note=_HEIGHT)
+
+
+def _end(foot: FootSurface, contact: Print, sign: float) -> Floats:
+    """(V,) derivatives of the X of the print's rear (-1) or front end."""
+    outline = max(contact.outlines, key=lambda outline: float((sign * outline.points[:, 0]).max()))
+    by_points = np.zeros_like(outline.points)
+    by_points[np.argmax(sign * outline.points[:, 0]), 0] = 1.0
+    return foot.gradient(outline, by_points)
+
+
+def _side_quantity(foot: FootSurface, contact: Print, station: int) -> Quantity:
+    """The print's width at one of its stations."""
+    gradient = np.zeros(len(foot.normals))
+    x = contact.stations[station]
+    for outline in contact.outlines:
+        points, ahead = outline.points, np.roll(outline.points, -1, axis=0)
+        spans = np.flatnonzero((points[:, 0] > x) != (ahead[:, 0] > x))
+        outwards = _outwards(points)
+        by_points = np.zeros_like(points)
+        by_points[spans, 1] = np.sign(outwards[spans, 1])
+        if len(spans):
+            gradient += foot.gradient(outline, by_points)
+    return Quantity(float(contact.widths[station]), gradient)
+
+
+def _outwards(polygon: Floats) -> Floats:
+    """(N, 2) derivatives of the area by the points."""
+    chord = np.roll(polygon, -1, axis=0) - np.roll(polygon, 1, axis=0)
+    outwards: Floats = 0.5 * np.sign(_area(polygon)) * np.column_stack([chord[:, 1], -chord[:, 0]])
+    return outwards
+
+
+def _area(polygon: Floats) -> float:
+    """Positive where the corners run counter-clockwise."""
+    ahead = np.roll(polygon, -1, axis=0)
+    return float(0.5 * np.sum(polygon[:, 0] * ahead[:, 1] - polygon[:, 1] * ahead[:, 0]))

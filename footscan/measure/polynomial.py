@@ -1,0 +1,135 @@
+"""Polynomials of fourth order in two variables, fitted to scattered heights; compiled, since many are."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.compiled import compiled
+
+Floats = NDArray[np.float64]
+
+ORDER = 4
+POWERS = np.array([(n - j, j) for n in range(ORDER + 1) for j in range(n + 1)])
+"""(15, 2) of the two variables in the terms, by their order."""
+QUADRIC = 6
+"""Terms of up to second order."""
+REWEIGHTED = 3
+TUKEY, LEAST_MISFIT_MM = 4.7, 0.04
+"""What is farther off by so many times the noise does not count; a polynomial misses a smooth foot by the second."""
+LEAST_NOISE_MM = 0.01
+"""What scatters less is no noise."""
+MEDIAN_TO_SD = 1.4826
+LEAST_FREE = 0.2
+ENOUGH = 2
+"""Points for each term from which on a fit may be free."""
+RIDGE = 1e-9
+NEWTON_STEPS, LONGEST_STEP = 3, 0.2
+LEAST_BEND_MM = 0.1
+"""A cap that bends by less towards its border has no summit of its own."""
+
+
+@compiled
+def robust_fit(places: Floats, height: Floats, noise: float, unevenness: float) -> tuple[Floats, float]:
+    """(15,) factors of the polynomial over the unit circle and the noise of the points, mm; -1 where too few points
+    lie within.
+
+    Points count the less the nearer they are to the border, and those off the surface not at all (Tukey's biweight).
+
+    Parameters
+    ----------
+    places, height : (N, 2) in radii, (N,) mm
+    noise : what it may be, mm
+    unevenness : terms of third and fourth order are expected to be so large, mm, and noise may not make larger ones
+    """
+    squared = places[:, 0] ** 2 + places[:, 1] ** 2
+    inside = np.flatnonzero(squared < 1.0)
+    count, size = len(inside), len(POWERS)
+    if count < QUADRIC:
+        return np.zeros(size), -1.0
+    terms = terms_at(places[inside])
+    weight = (1.0 - squared[inside]) ** 2
+    kept, away, factors = weight.copy(), np.empty(count), np.zeros(size)
+    for _ in range(REWEIGHTED):
+        both = np.zeros((size, size + 1))  # the right side, and the normal equations: they tell how many terms count
+        for k in range(count):
+            for i in range(size):
+                weighted = kept[k] * terms[k, i]
+                both[i, 0] += weighted * height[inside[k]]
+                for j in range(i + 1):
+                    both[i, j + 1] += weighted * terms[k, j]
+        for i in range(size):
+            for j in range(i):
+                both[j, i + 1] = both[i, j + 1]
+        solved = np.linalg.solve(both[:, 1:] + np.diag(held_back(noise, unevenness)), both)
+        factors[:] = solved[:, 0]
+        # What holds terms back may not count as noise, which would hold them back: noise is told by a fit that is free,
+        # where there are points enough for one.
+        free = solved if count < ENOUGH * size else np.linalg.solve(both[:, 1:] + np.diag(np.full(size, RIDGE)), both)
+        used = 0.0
+        for i in range(size):
+            used += free[i, i + 1]
+        for k in range(count):
+            away[k] = abs(height[inside[k]] - np.dot(terms[k], free[:, 0]))
+        left = max(1.0 - used / count, LEAST_FREE)
+        noise = max(MEDIAN_TO_SD * np.sort(away)[count // 2] / np.sqrt(left), LEAST_NOISE_MM)
+        for k in range(count):
+            off = abs(height[inside[k]] - np.dot(terms[k], factors)) / (TUKEY * max(noise, LEAST_MISFIT_MM))
+            kept[k] = weight[k] * max(1.0 - off * off, 0.0) ** 2
+    return factors, noise
+
+
+@compiled
+def terms_at(places: Floats) -> Floats:
+    """(N, 15) of the polynomial at (N, 2) places."""
+    terms = np.empty((len(places), len(POWERS)))
+    powers = np.ones((2, ORDER + 1))
+    for k in range(len(places)):
+        for n in range(1, ORDER + 1):
+            powers[0, n], powers[1, n] = powers[0, n - 1] * places[k, 0], powers[1, n - 1] * places[k, 1]
+        for i in range(len(POWERS)):
+            terms[k, i] = powers[0, POWERS[i, 0]] * powers[1, POWERS[i, 1]]
+    return terms
+
+
+@compiled
+def held_back(noise: float, unevenness: float) -> Floats:
+    """(15,) by which the terms' squares are held back against those of the residuals: as far as those are noise, and
+    no form that the polynomial misses."""
+    hold = np.full(len(POWERS), RIDGE)
+    hold[QUADRIC:] += max(noise**2 - LEAST_MISFIT_MM**2, LEAST_NOISE_MM**2) / unevenness**2
+    return hold
+
+
+@compiled
+def slope(factors: Floats, place: Floats) -> tuple[Floats, Floats]:
+    """(2,) gradient and (2, 2) second derivatives at (2,) a place."""
+    gradient, second = np.zeros(2), np.zeros((2, 2))
+    u, v = place[0], place[1]
+    for k in range(len(POWERS)):
+        i, j = POWERS[k]
+        if i > 0:
+            gradient[0] += factors[k] * i * u ** (i - 1) * v**j
+        if j > 0:
+            gradient[1] += factors[k] * j * u**i * v ** (j - 1)
+        if i > 1:
+            second[0, 0] += factors[k] * i * (i - 1) * u ** (i - 2) * v**j
+        if j > 1:
+            second[1, 1] += factors[k] * j * (j - 1) * u**i * v ** (j - 2)
+        if i > 0 and j > 0:
+            second[0, 1] += factors[k] * i * j * u ** (i - 1) * v ** (j - 1)
+    second[1, 0] = second[0, 1]
+    return gradient, second
+
+
+@compiled
+def climb(factors: Floats, place: Floats) -> Floats:
+    """(2,) the summit near a place, by Newton's method; the place where none is near."""
+    place = place.copy()
+    for _ in range(NEWTON_STEPS):
+        gradient, second = slope(factors, place)
+        mean = (second[0, 0] + second[1, 1]) / 2
+        apart = np.hypot((second[0, 0] - second[1, 1]) / 2, second[0, 1])
+        if mean + apart > -LEAST_BEND_MM:  # the greater curvature
+            break
+        step = -np.linalg.solve(second, gradient)
+        place += step * min(1.0, LONGEST_STEP / max(np.hypot(step[0], step[1]), 1e-12))
+    return place

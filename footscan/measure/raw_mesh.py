@@ -1,0 +1,283 @@
+"""Intake of meshes that other scanners made: their unit, their strays, which side is outside, whether ends are cut."""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, QhullError
+
+from footscan.measure.frame import CONVEX
+from footscan.measure.place import apply
+from footscan.measure.pose import find_pose, volume
+from footscan.surface.topology import directed_edges, face_components, used_vertices
+from schemas.errors import Finding
+
+Floats = NDArray[np.float64]
+Faces = NDArray[np.int32]
+MeshUnit = Literal["mm", "cm", "m", "in"]
+
+MILLIMETRES: dict[MeshUnit, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+FOOT_MM = (115.0, 335.0), (100.0, 380.0)
+"""By its length a foot tells its unit: from a child of one year to the largest in common use; then the extremes."""
+LEAST_FACES = 40
+STRAY_SHARE = 0.02
+"""Parts with less than this share of the triangles are strays, ..."""
+BODY_SHARE = 0.5
+"""... those of more than this share of the largest part's extent may be another body."""
+SOME, APART = 200, 0.2
+"""Of so many points of another body less than this share lies within the hull of the first; layers of one surface share
+it."""
+OPEN_EDGES = 0.001
+"""A surface with a greater share of open edges is told to be open."""
+COARSE_MM = 0.02
+"""Coordinates that single precision rounds by more are told."""
+END, LOW, BLUNT, ROUNDED = 0.06, 0.15, 0.97, 0.4
+"""Heel and toes are round: in the last part of the length, up to this height in lengths, skin that faces ahead, but not
+by more than this cosine as a flat cut does, covers more than this share. Whole feet have 0.65 to 0.95, cut ones up to
+0.2."""
+BALL_STATION, GAPS = 0.70, 0.05
+"""There, in parts of the length, a foot is of one piece, even with toes spread; between a hand's fingers is more than
+this of its breadth."""
+
+
+class RawMesh(NamedTuple):
+    """A mesh in mm that may be a foot, looking outward, and what was done to it."""
+
+    vertices: Floats
+    """(V, 3) mm"""
+    faces: Faces
+    """(F, 3), counter-clockwise as seen from outside"""
+    unit: MeshUnit
+    """That of the vertices that were given, ..."""
+    factor: float
+    """... and what they were multiplied by."""
+    is_closed: bool
+    notes: tuple[str, ...]
+    """What a user should know, a sentence each without a full stop."""
+
+
+def take_in(vertices: NDArray[np.floating], faces: NDArray[np.integer], unit: MeshUnit | None = None) -> RawMesh:
+    """A mesh from elsewhere made ready for `foot_frame`.
+
+    Vertices that repeat are merged, triangles without area and small stray parts are left out, triangles are made to
+    look outward, and the unit is told by the size of the foot unless it is given. The pose is not changed.
+
+    Parameters
+    ----------
+    vertices : (V, 3) in mm, cm, m or inches
+    faces : (F, 3)
+
+    Raises
+    ------
+    Finding
+        The mesh has hardly any triangles, coordinates that are no numbers, or several bodies; its size is that of a
+        foot in no unit, or in two; or it has no heel, no toes, or gaps at the ball.
+    """
+    if not np.all(np.isfinite(vertices)):
+        raise Finding("the surface has coordinates that are no numbers, expected a foot")
+    notes: list[str] = []
+    vertices, faces = _clean(np.asarray(vertices, np.float64), np.asarray(faces, np.int32))
+    vertices, faces = _one_body(vertices, faces, notes)
+    meetings = _meetings(faces)
+    is_closed = _is_closed(meetings, notes)
+    faces = _outward(vertices, faces, meetings, notes)
+    pose = find_pose(vertices, faces)
+    known = _unit(pose.length, unit)
+    if pose.convexity < CONVEX:  # what is not, foot_frame tells to be no foot at all
+        _check_whole(apply(pose.transform, vertices) / pose.length, faces)
+    factor = MILLIMETRES[known]
+    if known != "mm":
+        told = "given" if unit is not None else f"told by the length of {pose.length:.3g}"
+        notes.append(f"coordinates in {known}, {told}, were multiplied by {factor:g} to have mm")
+    _tell_rounding(vertices, factor, notes)
+    return RawMesh(vertices * factor, faces, known, factor, is_closed, tuple(notes))
+
+
+def _clean(vertices: Floats, faces: Faces) -> tuple[Floats, Faces]:
+    """Without vertices that stand twice and triangles without area."""
+    if len(faces):
+        merged, place = vertices, np.zeros(0, np.intp)
+        if np.any(_meetings(faces).counts == 1):  # a closed surface has none that stand twice
+            merged, place = np.unique(vertices, axis=0, return_inverse=True)
+        if len(merged) < len(vertices):
+            vertices, faces = merged, place.reshape(-1)[faces].astype(np.int32)
+        a, b, c = (vertices[faces[:, k]] for k in range(3))
+        doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        extent = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+        faces = faces[doubled > (1e-9 * extent) ** 2]
+    if len(faces) < LEAST_FACES:
+        raise Finding(f"the surface has {len(faces)} triangles, expected a foot of at least {LEAST_FACES}")
+    return vertices, faces
+
+
+def _one_body(vertices: Floats, faces: Faces, notes: list[str]) -> tuple[Floats, Faces]:
+    """Without stray parts; a second body is refused."""
+    component = face_components(faces)
+    counts = np.bincount(component)
+    large = np.flatnonzero(counts >= STRAY_SHARE * len(faces))
+    bodies = [vertices[np.unique(faces[component == part])] for part in large]
+    bodies.sort(key=lambda body: (_is_flat(body), -_extent(body)))
+    first, others = bodies[0], [body for body in bodies[1:] if _extent(body) > BODY_SHARE * _extent(bodies[0])]
+    apart = [body for body in others if _extent(body) > _extent(first) or _inside(body, first) < APART]
+    if apart:
+        raise Finding(f"the surface has {len(apart) + 1} separate bodies, expected a single foot")
+    strays = len(counts) - len(large)
+    if strays:
+        notes.append(f"{strays} small part{'s' if strays > 1 else ''} apart from the foot left out")
+    return used_vertices(vertices, faces[np.isin(component, large)])
+
+
+def _extent(body: Floats) -> float:
+    return float(np.linalg.norm(np.ptp(body, axis=0)))
+
+
+def _is_flat(body: Floats) -> bool:
+    """Such as a plate on which a foot stands."""
+    spread = np.linalg.eigvalsh(np.cov(body.T))
+    return bool(spread[0] < 1e-6 * spread[-1])
+
+
+def _inside(points: Floats, body: Floats) -> float:
+    """The share of `points` that lie within the convex hull of `body`; 1 where that is flat."""
+    try:
+        planes = ConvexHull(body).equations
+    except QhullError:
+        return 1.0
+    some = points[:: len(points) // SOME + 1]
+    return float(np.mean([np.all(planes[:, :3] @ point + planes[:, 3] <= 0) for point in some]))
+
+
+class _Meetings(NamedTuple):
+    """Edges at which faces meet."""
+
+    order: NDArray[np.intp]
+    """(3F,) sides of faces, numbered as `directed_edges` has them; those of one edge stand together."""
+    first: NDArray[np.intp]
+    """(E,) where in `order` each edge begins, ..."""
+    counts: NDArray[np.intp]
+    """... and how many faces it has."""
+
+
+def _meetings(faces: Faces) -> _Meetings:
+    edges = directed_edges(faces)
+    key = edges.min(axis=1) * (int(faces.max()) + 1) + edges.max(axis=1)
+    order = np.argsort(key, kind="stable")
+    first = np.flatnonzero(np.diff(key[order], prepend=-1))
+    return _Meetings(order, first, np.diff(first, append=len(key)))
+
+
+def _is_closed(meetings: _Meetings, notes: list[str]) -> bool:
+    share = float(np.mean(meetings.counts == 1))
+    if share == 0:
+        return True
+    notes.append(
+        f"the surface is open at {share:.1%} of its edges" if share > OPEN_EDGES else "the surface has small holes"
+    )
+    return False
+
+
+def _outward(vertices: Floats, faces: Faces, meetings: _Meetings, notes: list[str]) -> Faces:
+    """(F, 3) faces that all look outward."""
+    against = _against(faces, meetings)
+    if against.any():
+        faces = np.where(against[:, None], faces[:, ::-1], faces)
+        turned = np.count_nonzero(against)
+        notes.append(f"{turned} triangles looked otherwise than those beside them and were turned over")
+    if volume(vertices, faces) < 0:
+        faces = faces[:, ::-1].copy()
+        notes.append("the surface looked inward and was turned over")
+    return faces
+
+
+def _against(faces: Faces, meetings: _Meetings) -> NDArray[np.bool_]:
+    """(F,) faces that look to the other side than most of the part that they are joined to by edges.
+
+    Each face is twice in a graph, as it is and turned over. Two faces that run an edge in opposite directions look to
+    the same side.
+    """
+    count = len(faces)
+    pairs = meetings.first[meetings.counts == 2]
+    one, other = meetings.order[pairs], meetings.order[pairs + 1]
+    rises = np.diff(directed_edges(faces), axis=1)[:, 0] > 0
+    turned = rises[one] == rises[other]
+    if not turned.any():
+        return np.zeros(count, np.bool_)
+    one, other = one % count, other % count
+    rows = np.concatenate([one, one + count])
+    columns = np.concatenate([other + count * turned, other + count * ~turned])
+    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(2 * count, 2 * count))
+    _, side = connected_components(graph, directed=False)
+    as_is, over = side[:count], side[count:]
+    alike = np.bincount(as_is, minlength=int(side.max()) + 1)
+    against: NDArray[np.bool_] = (alike[as_is] < alike[over]) | ((alike[as_is] == alike[over]) & (as_is > over))
+    return against
+
+
+def _unit(length: float, given: MeshUnit | None) -> MeshUnit:
+    """The unit in which a foot is so long."""
+    if given is not None:
+        if not FOOT_MM[1][0] <= MILLIMETRES[given] * length <= FOOT_MM[1][1]:
+            told = f"the surface is {length:.3g} long, which is {MILLIMETRES[given] * length:.3g} mm if in {given}"
+            raise Finding(f"{told}, expected a foot of {FOOT_MM[1][0]:.0f} to {FOOT_MM[1][1]:.0f} mm")
+        return given
+    for least, greatest in FOOT_MM:
+        fitting = [unit for unit, factor in MILLIMETRES.items() if least <= factor * length <= greatest]
+        if len(fitting) == 1:
+            return fitting[0]
+        if fitting:
+            sizes = " or ".join(f"{MILLIMETRES[unit] * length:.0f} mm if in {unit}" for unit in fitting)
+            raise Finding(f"the surface is {length:.3g} long, which is {sizes}; expected the unit to be stated")
+    expected = f"expected a foot of {least:.0f} to {greatest:.0f} mm in one of {', '.join(MILLIMETRES)}"
+    raise Finding(f"the surface is {length:.3g} long, {expected}")
+
+
+def _check_whole(places: Floats, faces: Faces) -> None:
+    """Refuses a foot without heel or toes, and a hand; `places` on the floor, heel to toes along X, in lengths."""
+    corners = places[faces]
+    low = corners[corners[:, :, 2].mean(axis=1) < LOW]
+    if not len(low):
+        raise Finding("the surface has nothing near its floor, expected a foot")
+    rear, front = float(low[:, :, 0].min()), float(low[:, :, 0].max())
+    for part, end, ahead in (("heel", rear, -1.0), ("toes", front, 1.0)):
+        last = low[np.abs(low[:, :, 0].mean(axis=1) - end) < END]
+        if _rounded(last, ahead) < ROUNDED:
+            raise Finding(f"the surface is cut off or open at the {part}, expected a foot from heel to toes")
+    low[:, :, 0] -= rear
+    if _parted(low) > GAPS:
+        raise Finding("the surface has gaps from side to side where a foot has its ball, expected a foot")
+
+
+def _rounded(triangles: Floats, ahead: float) -> float:
+    """How much of an end, seen along X from `ahead`, is skin that is no flat cut: 0 to 1 of the hull of its outline."""
+    if len(triangles) < 3:
+        return 1.0
+    crosses = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
+    seen = ahead * crosses[:, 0]
+    round_ = seen < BLUNT * np.linalg.norm(crosses, axis=1)
+    return float(seen[round_].sum() / ConvexHull(triangles[:, :, 1:].reshape(-1, 2)).volume)
+
+
+def _parted(triangles: Floats) -> float:
+    """The share of the breadth of a section across the ball that lies between its parts."""
+    is_ahead = triangles[:, :, 0] > BALL_STATION
+    crossing = triangles[is_ahead.any(axis=1) & ~is_ahead.all(axis=1)]
+    if not len(crossing):
+        return 1.0
+    x, y = crossing[:, :, 0] - BALL_STATION, crossing[:, :, 1]
+    next_x, next_y = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
+    cut = (x > 0) != (next_x > 0)
+    at = y + (next_y - y) * x / np.where(cut, x - next_x, 1.0)
+    first, last = np.where(cut, at, np.inf).min(axis=1), np.where(cut, at, -np.inf).max(axis=1)
+    order = np.argsort(first)
+    reached = np.maximum.accumulate(last[order])
+    gaps = np.clip(first[order][1:] - reached[:-1], 0.0, None)
+    return float(gaps.sum() / (reached[-1] - first.min()))
+
+
+def _tell_rounding(vertices: Floats, factor: float, notes: list[str]) -> None:
+    """Far from the origin single precision is coarse."""
+    step = float(np.abs(vertices).max()) * 2.0**-24 * factor
+    if step > COARSE_MM and np.array_equal(vertices, vertices.astype(np.float32)):
+        notes.append(f"the surface lies so far from the origin that its coordinates are rounded by up to {step:.2g} mm")

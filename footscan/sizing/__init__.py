@@ -1,0 +1,1 @@
+"""What shoes a foot takes: sizes, widths, pairs, change over time, lasts."""

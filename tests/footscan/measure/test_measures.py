@@ -1,0 +1,225 @@
+import os
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from footscan.measure.frame import FootFrame
+from footscan.measure.landmarks import Landmark
+from footscan.measure.measures import measure_foot, take_measures
+from footscan.surface.export import read_mesh
+from footscan.surface.topology import vertex_normals
+from footscan.virtual.foot import Foot, make_foot
+from schemas.errors import Finding
+from schemas.measures import Measure, Measures
+
+KNOWN_LANDMARKS = ("metatarsale_tibiale", "metatarsale_fibulare", "landing_point", "junction_point", "pternion")
+
+
+@lru_cache
+def foot() -> Foot:
+    return make_foot(resolution_mm=2.0)
+
+
+@lru_cache
+def measured() -> Measures:
+    return measure_foot(foot().vertices, foot().faces, "right")
+
+
+def known_place(vertices: np.ndarray | None = None) -> dict[str, Measure]:
+    """Measures of the foot where its landmarks are known."""
+    vertices = foot().vertices if vertices is None else vertices
+    frame = FootFrame(vertices, foot().faces, vertices, np.eye(4), "toe2", foot().measures["foot_length"])
+    landmarks = {name: Landmark(point, "geometric", 1.0) for name, point in foot().landmarks.items()}
+    return take_measures(frame, landmarks)
+
+
+def noisy(noise: float, seed: int) -> np.ndarray:
+    vertices = foot().vertices
+    away = np.random.default_rng(seed).normal(0, noise, (len(vertices), 1))
+    return vertices + away * vertex_normals(vertices, foot().faces)
+
+
+def values(measures: dict[str, Measure]) -> dict[str, float]:
+    return {name: measure.value for name, measure in measures.items() if measure.value is not None}
+
+
+def test_measures_equal_those_of_the_construction() -> None:
+    measures = known_place()
+    for name, known in foot().measures.items():
+        tolerance = {"arch_index": 0.003}.get(name, 0.15 if "girth" in name else 0.06)
+        assert measures[name].value == pytest.approx(known, abs=tolerance), name
+        assert measures[name].status == "ok"
+
+
+def test_without_help_too() -> None:
+    for name, known in foot().measures.items():
+        tolerance = {"arch_index": 0.003}.get(name, 0.5 if "girth" in name else 0.3)
+        assert measured().measures[name].value == pytest.approx(known, abs=tolerance), name
+
+
+def test_what_follows_from_others() -> None:
+    found = values(known_place())
+    landmarks = foot().landmarks
+    across = landmarks["metatarsale_tibiale"] - landmarks["metatarsale_fibulare"]
+    assert found["foot_breadth_diagonal"] == pytest.approx(np.hypot(across[0], across[1]), abs=1e-3)
+    assert found["ball_angle"] == pytest.approx(np.rad2deg(np.arctan2(across[1], across[0])), abs=0.01)
+    assert found["toe_length"] == pytest.approx(found["foot_length"] - found["ball_length"], abs=2e-3)
+    assert found["arch_height_index"] == pytest.approx(found["instep_height"] / found["ball_length"], abs=1e-4)
+    assert found["foot_breadth_max"] == pytest.approx(found["foot_breadth"], abs=0.1)
+    assert found["ball_height"] < found["instep_height"] < found["scan_height"]
+    assert found["instep_girth_min"] <= found["instep_girth"] + 3 if "instep_girth_min" in found else True
+
+
+def test_a_girth_is_never_longer_than_its_surface() -> None:
+    girths = {name: measure for name, measure in measured().measures.items() if "girth" in name}
+    assert len(girths) == 8
+    for name, measure in girths.items():
+        if measure.value is not None:
+            assert measure.surface_length is not None
+            assert measure.value <= measure.surface_length + 0.01, name
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_motion_and_mirroring_change_nothing(mirrored: bool) -> None:
+    turn = Rotation.from_euler("xyz", [20.0, 170.0, 130.0], degrees=True).as_matrix()
+    mirror = np.array([1.0, -1.0, 1.0]) if mirrored else np.ones(3)
+    faces = foot().faces[:, ::-1] if mirrored else foot().faces
+    vertices = (foot().vertices * mirror) @ turn.T + [300.0, -40.0, 700.0]
+    posed = measure_foot(vertices, np.ascontiguousarray(faces), "left" if mirrored else "right")
+    lying = measure_foot(foot().vertices + np.array([0.0, 0.0, 50.0]), foot().faces, "right")
+    assert values(posed.measures).keys() == values(lying.measures).keys()
+    for name, value in values(lying.measures).items():
+        tolerance = {"foot_volume": 100.0, "foot_surface": 10.0}.get(name, 0.01)
+        assert values(posed.measures)[name] == pytest.approx(value, abs=tolerance), name
+
+
+@pytest.mark.parametrize("resolution", [1.5, 2.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_changes_a_ball_girth_by_less_than_half_a_millimetre(seed: int, resolution: float) -> None:
+    fine = foot() if resolution == 2.0 else make_foot(resolution_mm=resolution)
+    away = np.random.default_rng(seed).normal(0, 0.3, (len(fine.vertices), 1))
+    landmarks = {name: Landmark(point, "geometric", 1.0) for name, point in fine.landmarks.items()}
+    girths = []
+    for vertices in (fine.vertices, fine.vertices + away * vertex_normals(fine.vertices, fine.faces)):
+        frame = FootFrame(vertices, fine.faces, vertices, np.eye(4), "toe2", fine.measures["foot_length"])
+        girths.append(take_measures(frame, landmarks)["ball_girth"].value or 0.0)
+    assert girths[1] == pytest.approx(girths[0], abs=0.5)
+
+
+def test_the_uncertainty_is_the_scatter() -> None:
+    repeated = [measure_foot(noisy(0.2, seed), foot().faces, "right").measures for seed in range(10)]
+    ratios = {}
+    for name in (
+        "foot_length",
+        "foot_breadth",
+        "ball_length",
+        "instep_height",
+        "ball_girth",
+        "waist_girth",
+        "heel_girth",
+    ):
+        scatter = float(np.std([measures[name].value or 0.0 for measures in repeated], ddof=1))
+        ratios[name] = float(np.median([measures[name].uncertainty or 0.0 for measures in repeated])) / scatter
+    # Ten repetitions know a scatter to a quarter of it.
+    assert np.median(list(ratios.values())) == pytest.approx(1.0, rel=0.4)
+    assert all(0.4 < ratio < 2.5 for ratio in ratios.values()), ratios
+
+
+def test_given_errors_take_the_place_of_roughness() -> None:
+    count = len(foot().vertices)
+    small, large = (
+        measure_foot(foot().vertices, foot().faces, "right", errors_mm=np.full(count, error)).measures["ball_girth"]
+        for error in (0.1, 0.4)
+    )
+    assert small.value == large.value == measured().measures["ball_girth"].value
+    together = measure_foot(
+        foot().vertices, foot().faces, "right", errors_mm=np.full(count, 0.1), reach_mm=10.0
+    ).measures["foot_length"]
+    alone = measure_foot(foot().vertices, foot().faces, "right", errors_mm=np.full(count, 0.1)).measures["foot_length"]
+    assert (together.uncertainty or 0.0) > 1.2 * (alone.uncertainty or 0.0)
+    assert 0.05 < (together.uncertainty or 0.0) < 0.25  # at most 0.1 at each end, and the fits lean a little beyond
+    assert large.uncertainty == pytest.approx(4 * (small.uncertainty or 0.0), rel=0.01)
+
+
+def test_a_measure_that_rests_on_filled_surface_is_uncertain() -> None:
+    x = foot().vertices[:, 0] / foot().measures["foot_length"]
+    back = (np.abs(x - 0.5) < 0.05) & (foot().vertices[:, 2] > 20)
+    measures = measure_foot(foot().vertices, foot().faces, "right", filled=back).measures
+    instep = measures["instep_girth"]
+    assert instep.status == "uncertain"
+    assert instep.filled_share is not None
+    assert instep.filled_share > 0.2
+    assert "filled, not measured" in (instep.note or "")
+    height = measures["instep_height"].filled_share
+    assert height is not None
+    assert 0.5 < height < 1.0  # where half the length is rests on heel and toe
+    assert (measures["foot_length"].status, measures["foot_length"].filled_share) == ("ok", 0.0)
+    assert measured().measures["instep_girth"].filled_share is None
+
+
+def test_a_gap_makes_a_measure_incomplete() -> None:
+    middle = foot().vertices[foot().faces].mean(axis=1)
+    half = 0.5 * foot().measures["foot_length"]
+    gap = (np.abs(middle[:, 0] - half) < 5) & (np.abs(middle[:, 1]) < 8) & (middle[:, 2] > 40)
+    frame = FootFrame(foot().vertices, foot().faces[~gap], foot().vertices, np.eye(4), "toe2", 2 * half)
+    landmarks = {name: Landmark(foot().landmarks[name], "geometric", 1.0) for name in KNOWN_LANDMARKS}
+    measures = take_measures(frame, landmarks)
+    assert (measures["instep_girth"].value, measures["instep_girth"].status) == (None, "incomplete")
+    assert "a gap of 1" in (measures["instep_girth"].note or "")
+    assert measures["foot_volume"].status == "incomplete"
+    assert measures["ball_girth"].status == "ok"
+
+
+def test_a_landmark_that_is_missing_is_named() -> None:
+    frame = FootFrame(foot().vertices, foot().faces, foot().vertices, np.eye(4), "toe2", 262.0)
+    landmarks = {"pternion": Landmark(foot().landmarks["pternion"], "geometric", 1.0)}
+    measures = take_measures(frame, landmarks)
+    assert measures["ball_girth"].note == "metatarsale tibiale was not found"
+    assert measures["instep_girth"].value is not None
+
+
+def test_a_landmark_set_by_hand_counts() -> None:
+    point = foot().landmarks["metatarsale_tibiale"] - [5.0, 0.0, 0.0]
+    found = measure_foot(foot().vertices, foot().faces, "right", manual={"metatarsale_tibiale": point})
+    before = measured().measures["ball_length"].value or 0.0
+    assert found.measures["ball_length"].value == pytest.approx(foot().measures["ball_length"] - 5.0, abs=0.05)
+    assert before == pytest.approx(foot().measures["ball_length"], abs=0.3)
+    assert found.measures["ball_length"].uncertainty is None
+    assert found.landmarks["metatarsale_tibiale"].method == "manual"
+    assert found.landmarks["metatarsale_tibiale"].point == pytest.approx(point, abs=1e-3)
+
+
+def test_a_calibration_is_applied_and_told() -> None:
+    calibrated = measure_foot(foot().vertices, foot().faces, "right", calibration={"heel_breadth": (1.5, 0.98)})
+    plain, changed = measured().measures["heel_breadth"], calibrated.measures["heel_breadth"]
+    assert changed.value == pytest.approx(1.5 + 0.98 * (plain.value or 0.0), abs=2e-3)
+    assert changed.calibration == (1.5, 0.98)
+    assert plain.calibration is None
+    assert values(calibrated.measures).keys() == values(measured().measures).keys()
+
+
+def test_the_document_reads_back() -> None:
+    assert Measures.model_validate_json(measured().model_dump_json()) == measured()
+
+
+def test_an_empty_mesh_is_a_finding() -> None:
+    with pytest.raises(Finding):
+        measure_foot(np.zeros((0, 3)), np.zeros((0, 3), np.int32), "right")
+
+
+def test_a_real_foot() -> None:
+    data = os.environ.get("FOOTSCAN_DATA")
+    if not data:
+        pytest.skip("FOOTSCAN_DATA is not set")
+    vertices, faces = read_mesh(Path(data) / "find" / "template.obj")
+    vertices = vertices * 1000 - np.array([0, 0, vertices[:, 2].min() * 1000])
+    found = values(measure_foot(vertices, faces, "left").measures)
+    # Toes and heel are the model's ends along X, and its axis is turned by less than 5 degrees from there.
+    assert found["foot_length"] == pytest.approx(np.ptp(vertices[:, 0]), abs=2.0)
+    # Ratios to the length within three standard deviations of ANSUR II.
+    assert found["ball_length"] / found["foot_length"] == pytest.approx(0.740, abs=0.045)
+    assert found["ball_girth"] / found["foot_length"] == pytest.approx(0.93, abs=0.126)
+    assert found["heel_breadth"] / found["foot_length"] == pytest.approx(0.27, abs=0.06)
