@@ -1,0 +1,162 @@
+"""How well passes over one object agree: figures of the stripe as one curve of X, for some latency, play and share.
+
+The curves, cubic splines, are fitted anew for each set of the three unknowns, and these by Gauss and Newton's steps
+along what the curves cannot explain (variable projection: G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973)
+413-432, with the Jacobian of L. Kaufman, BIT 15 (1975) 49-57).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.linalg import cho_factor, cho_solve
+from scipy.ndimage import uniform_filter1d
+
+from footscan.capture.head_motion import HeadMotion
+
+Floats = NDArray[np.float64]
+
+FRAMES_A_KNOT = 3.0
+CLUSTER_S = 0.5
+"""Within such a time errors may be alike: a report of the controller that is off takes several frames with it."""
+AROUND = 9
+"""Frames, by their X, that tell how well a curve follows."""
+RIDGE = 1e-9
+LEAST_FREEDOM = 0.05
+"""A frame that a curve goes through by force tells nothing, and must not tell it too loudly."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The frames of all passes."""
+
+    figures: Floats
+    """(N, M), each of about unit size."""
+    seconds: Floats
+    """(N,) the camera's times."""
+    delay_s: Floats
+    """(N,)"""
+    of_pass: NDArray[np.intp]
+    """(N,)"""
+    motions: Sequence[HeadMotion]
+    """Of each pass."""
+
+    def places(self, unknown: Floats) -> tuple[Floats, Floats]:
+        """(N,) X of each frame, and (N, 3) how it changes with the unknowns: latency (s), play (mm) and share."""
+        taken = self.seconds + unknown[2] * self.delay_s - unknown[0]
+        x, speed = np.empty(len(taken)), np.empty(len(taken))
+        for k, motion in enumerate(self.motions):
+            own = self.of_pass == k
+            x[own], speed[own], _ = motion.at(np.clip(taken[own], motion.seconds[0], motion.seconds[-1]))
+        half_way = np.sign(speed) / 2.0
+        return x - unknown[1] * half_way, np.stack([-speed, -half_way, speed * self.delay_s], axis=1)
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of the unknowns beforehand, (3,) each."""
+
+    expected: Floats
+    information: Floats
+    """One over the variance; 0 where nothing is known."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """The fit for one set of unknowns."""
+
+    seen: Seen
+    unknown: Floats
+    x: Floats
+    """(N,) mm"""
+    weights: Floats
+    """(N,)"""
+    residuals: Floats
+    """(N, M) in units of `scale`."""
+    held_out: Floats
+    """(N, M) the same, had the curves been fitted without that frame."""
+    slopes: Floats
+    """(N, M) of the curves, a mm, in the same."""
+    jacobian: Floats
+    """(N, M, 3) of what the curves foretell, of which they themselves have taken their part."""
+
+    @property
+    def cost(self) -> float:
+        """Weighted sum of squares."""
+        return float(np.sum(self.weights[:, None] * self.residuals**2))
+
+    def step(self, prior: Prior) -> Floats:
+        """Of Gauss and Newton, (3,)."""
+        pull = np.einsum("n,nma,nm->a", self.weights, self.jacobian, self.residuals)
+        pull += prior.information * (prior.expected - self.unknown)
+        return np.asarray(np.linalg.solve(self._information(prior), pull))
+
+    def covariance(self, prior: Prior) -> Floats:
+        """(3, 3) of the unknowns; errors of frames taken at about one time may be anything.
+
+        The sandwich estimator with residuals as of frames held out (HC3: J. G. MacKinnon and H. White, Journal of
+        Econometrics 29 (1985) 305-325), summed over clusters.
+        """
+        bread = np.linalg.inv(self._information(prior))
+        scores = np.einsum("n,nma,nm->na", self.weights, self.jacobian, self.held_out)
+        at = np.floor(self.seen.seconds / CLUSTER_S).astype(np.int64) * 1000 + self.seen.of_pass
+        _, cluster = np.unique(at, return_inverse=True)
+        summed = np.stack([np.bincount(cluster, column) for column in scores.T], axis=1)
+        # Few clusters that count make the estimate too small: by (G - 1) / G, G of them being equal.
+        effective = np.sum(summed**2, axis=0) ** 2 / np.maximum(np.sum(summed**4, axis=0), 1e-300)
+        summed *= np.sqrt(effective / np.maximum(effective - 1.0, 0.5))
+        return np.asarray(bread @ (summed.T @ summed + np.diag(prior.information)) @ bread)
+
+    def local_weights(self) -> Floats:
+        """(N,) one over how far off frames around are, in X, as mean square; of mean 1.
+
+        Where a stripe appears at once, along an upright edge, no smooth curve follows: such places must not count.
+        """
+        order = np.argsort(self.x, kind="stable")
+        squares = np.mean(self.held_out**2, axis=1)[order]
+        around = uniform_filter1d(squares, min(AROUND, len(squares)), mode="nearest")
+        weights = np.empty(len(squares))
+        weights[order] = 1.0 / (around + 0.1 * np.median(around))
+        return np.asarray(weights / weights.mean())
+
+    def scale(self) -> Floats:
+        """(M,) root mean square of each figure's residuals, in units of the figures' own; those that fit to nothing
+        count as 0.01."""
+        return np.asarray(np.sqrt(np.average(self.residuals**2, axis=0, weights=self.weights)).clip(0.01))
+
+    def frame_sd_s(self) -> float:
+        """How far off the time of a frame alone would have to be, for its figures to be off as they are."""
+        times = self.jacobian[:, :, 0]
+        told = np.sum(times**2, axis=1)
+        clear = told >= np.quantile(told, 0.8)
+        errors = np.sum(times * self.residuals, axis=1)[clear] / told[clear]
+        return float(1.4826 * np.median(np.abs(errors)))
+
+    def _information(self, prior: Prior) -> Floats:
+        told = np.einsum("n,nma,nmb->ab", self.weights, self.jacobian, self.jacobian)
+        return np.asarray(told + np.diag(prior.information))
+
+
+def agree(seen: Seen, unknown: Floats, scale: Floats, weights: Floats | None = None) -> Agreement:
+    """How well passes agree for `unknown` (latency, play, share), figures being counted in units of `scale` (M,)."""
+    x, changes = seen.places(unknown)
+    weights = np.ones(len(x)) if weights is None else weights
+    low, high = float(x.min()), float(x.max())
+    knots = np.concatenate([[low] * 3, np.linspace(low, high, max(int(len(x) / FRAMES_A_KNOT), 4)), [high] * 3])
+    basis = BSpline.design_matrix(x, knots, 3).toarray()
+    factor = cho_factor(basis.T @ (weights[:, None] * basis) + RIDGE * np.eye(basis.shape[1]))
+
+    def fitted(values: Floats) -> Floats:
+        return np.asarray(cho_solve(factor, basis.T @ (weights[:, None] * values)))
+
+    figures = seen.figures / scale
+    curves = fitted(figures)
+    slopes = np.asarray(BSpline(knots, curves, 3).derivative()(x))
+    ahead = (slopes[:, :, None] * changes[:, None, :]).reshape(len(x), -1)
+    jacobian = (ahead - basis @ fitted(ahead)).reshape(*slopes.shape, 3)
+    residuals = figures - basis @ curves
+    leverage = weights * np.einsum("kn,nk->n", cho_solve(factor, basis.T), basis)
+    held_out = residuals / np.maximum(1.0 - leverage, LEAST_FREEDOM)[:, None]
+    return Agreement(seen, unknown, x, weights, residuals, held_out, slopes, jacobian)

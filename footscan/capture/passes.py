@@ -1,0 +1,162 @@
+"""One pass of the heads along the foot: in the dark, with light, and where it is wanted back in the dark."""
+
+import threading
+import time
+from collections import defaultdict
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
+
+from footscan.capture.camera_deck import CameraDeck
+from footscan.capture.camera_stream import CapturedFrame
+from footscan.capture.frame_clock import FrameTimes
+from footscan.capture.heads import Heads, Travel
+from schemas.errors import Fault
+
+DARK_SECONDS = 0.4
+"""How long heads stand in the dark before and after: several frames of a slow camera."""
+AFTER_SECONDS = 0.2
+"""A frame that was stamped so long after the end says that all before it have come."""
+LATEST_SECONDS = 5.0
+LEAD_SECONDS = 0.3
+"""Heads move evenly for so long before the first place that counts and behind the last: where speed changes between two
+reports of the board, nobody knows well where the heads were."""
+
+Take = Callable[[str, CapturedFrame], None]
+"""Takes a frame of a film by its name; `queue.Full` where it has no room."""
+
+
+@dataclass(frozen=True)
+class PassPlan:
+    """What is to be done."""
+
+    start_mm: float
+    end_mm: float
+    mm_per_s: float
+    power: float
+    """Of the lasers, 0 to 1."""
+    dark_return: bool = False
+    """Whether the way back is filmed in the dark: what the light of the room shows of the skin."""
+
+
+@dataclass
+class FilmTally:
+    """What came for one film."""
+
+    taken: set[int] = field(default_factory=set)
+    """Arrivals."""
+    problems: dict[int, str] = field(default_factory=dict)
+    """What is wrong with an arrival."""
+
+
+@dataclass(frozen=True)
+class FilmedPass:
+    """What was filmed. Films are called `cam1` and `cam1-background`."""
+
+    cameras: tuple[int, ...]
+    before: Travel
+    """When the heads stood in the dark."""
+    travel: Travel
+    """With light."""
+    back: Travel | None
+    """In the dark."""
+    films: dict[str, FilmTally]
+    times: dict[int, tuple[int, FrameTimes]]
+    """Of each camera, as `CameraStream.times` has them."""
+    failed: dict[int, str]
+    """Cameras that were lost on the way, and why."""
+
+
+def film_name(camera: int, *, background: bool = False) -> str:
+    """Name of a film within the scan's group of arrays."""
+    return f"cam{camera}-background" if background else f"cam{camera}"
+
+
+def film_pass(
+    heads: Heads, deck: CameraDeck, cameras: Collection[int], plan: PassPlan, take: Take, check: Callable[[], None]
+) -> FilmedPass:
+    """Films one pass with the cameras, which must be open.
+
+    Parameters
+    ----------
+    take : where frames go, by the name of their film.
+    check : called between the parts of the pass; what it raises ends it.
+
+    Raises
+    ------
+    Fault, RefusedInput
+        As `Heads.travel`. The lasers are off, and frames go nowhere.
+    """
+    sorter = _Sorter(take)
+    connections = {camera: health.connections for camera, health in deck.health().items()}
+    try:
+        begin_mm, end_mm = _with_lead(plan, heads)
+        heads.travel_to(begin_mm)
+        sorter.begin(background=True)
+        deck.send_to(sorter.take)
+        before = _stand(deck)
+        check()
+        sorter.begin(background=False)
+        heads.lasers(plan.power)
+        travel = heads.travel(begin_mm, end_mm, plan.mm_per_s)
+        deck.wait_beyond(travel.end_seconds + AFTER_SECONDS, LATEST_SECONDS)
+        check()
+        back = None
+        if plan.dark_return:
+            sorter.begin(background=True)
+            heads.lasers(0.0)
+            back = heads.travel(end_mm, begin_mm, plan.mm_per_s)
+            deck.wait_beyond(back.end_seconds + AFTER_SECONDS, LATEST_SECONDS)
+            check()
+    finally:
+        heads.lasers(0.0)
+        deck.send_to(None)
+    failed = {}
+    for camera, health in deck.health().items():
+        if camera in cameras and (health.state != "streaming" or health.connections != connections.get(camera)):
+            failed[camera] = health.problem or f"camera {camera}: the connection was lost for a while"
+    times = {}
+    for camera in cameras:
+        try:
+            times[camera] = deck.times(camera)
+        except Fault as fault:
+            failed[camera] = str(fault)
+    return FilmedPass(tuple(sorted(cameras)), before, travel, back, sorter.films(), times, failed)
+
+
+class _Sorter:
+    """Gives each frame to the film that is being made, and notes it."""
+
+    def __init__(self, take: Take) -> None:
+        self._take = take
+        self._background = True
+        self._films: dict[str, FilmTally] = defaultdict(FilmTally)
+        self._lock = threading.Lock()
+
+    def begin(self, *, background: bool) -> None:
+        self._background = background
+
+    def take(self, frame: CapturedFrame) -> None:
+        name = film_name(frame.camera, background=self._background)
+        self._take(name, frame)  # what it does not take is not noted, and so is lost
+        with self._lock:
+            tally = self._films[name]
+            tally.taken.add(frame.arrival)
+            if frame.problem is not None:
+                tally.problems[frame.arrival] = frame.problem
+
+    def films(self) -> dict[str, FilmTally]:
+        with self._lock:
+            return dict(self._films)
+
+
+def _with_lead(plan: PassPlan, heads: Heads) -> tuple[float, float]:
+    """Where the travel begins and ends, as far as the rails allow."""
+    low, high = heads.reach_mm
+    lead = LEAD_SECONDS * plan.mm_per_s * (1.0 if plan.end_mm >= plan.start_mm else -1.0)
+    return min(max(plan.start_mm - lead, low), high), min(max(plan.end_mm + lead, low), high)
+
+
+def _stand(deck: CameraDeck) -> Travel:
+    begin = time.monotonic()
+    deck.wait_beyond(begin + DARK_SECONDS, LATEST_SECONDS)
+    return Travel(begin, time.monotonic())
