@@ -6,7 +6,8 @@ from footscan.report.deviation import Deviation, drawn
 from footscan.report.markup import facts, number, section, table, text
 from footscan.report.page import page
 from footscan.report.surface_views import surface_views
-from footscan.report.viewer import viewer
+from footscan.report.viewer import Colouring, viewer
+from footscan.report.viewer_script import SCRIPT
 from footscan.verify.register import Registration
 from schemas.quality import Comparison, Completeness
 
@@ -30,7 +31,7 @@ def comparison_page(
     """
     vertices, faces, colours = drawn(deviation)
     is_mesh = len(deviation.faces) > 0
-    turned = viewer(vertices, faces, colours) if is_mesh else ""
+    turned = viewer(vertices, faces, [Colouring("", colours)]) if is_mesh else ""
     grid = "the rearmost heel point on the floor" if deviation.side else "its own origin"
     parts = [
         section("Distances", figures_facts(comparison), moved_note(comparison.transform, _IN_ONE_FRAME)),
@@ -54,7 +55,7 @@ def comparison_page(
         kicker="Comparison",
         heading=f"{text(first)} <span>to {text(second)}</span>",
         parts=parts,
-        with_viewer=is_mesh,
+        scripts=[SCRIPT] if is_mesh else [],
     )
 
 

@@ -8,8 +8,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from footscan.report.colours import colour_limit, distance_colours
 from footscan.report.render import png_bytes
-from footscan.report.scan_page import upright
-from footscan.report.surface_views import PIXELS_PER_MM, render_view, views_of
+from footscan.report.surface_views import PIXELS_PER_MM, render_view, upright, views_of
 from footscan.surface.export import Shape
 from footscan.verify.distances import Distances
 from footscan.verify.regions import FootRegions

@@ -24,6 +24,11 @@ def words(name: str) -> str:
     return phrase[:1].upper() + phrase[1:]
 
 
+def breakable(name: str) -> str:
+    """The identifier `name`, escaped, which may be broken behind its dots and underscores."""
+    return text(name).replace("_", "_<wbr>").replace(".", ".<wbr>")
+
+
 def table(
     headings: Sequence[str], rows: Iterable[Sequence[str]], numeric: Iterable[int] = (), kind: str = "plain"
 ) -> str:
@@ -48,6 +53,12 @@ def table(
 def facts(pairs: Iterable[tuple[str, str]]) -> str:
     """Names and values side by side, as many in a row as fit; both are markup already."""
     return '<dl class="facts">' + "".join(f"<div><dt>{n}</dt><dd>{v}</dd></div>" for n, v in pairs) + "</dl>"
+
+
+def key(meanings: Iterable[tuple[str, tuple[int, int, int]]]) -> str:
+    """What colours mean: pairs of markup and red, green, blue."""
+    marks = (f'<span><i style="background:rgb{colour}"></i>{meaning}</span>' for meaning, colour in meanings)
+    return f'<p class="key">{"".join(marks)}</p>'
 
 
 def section(title: str, *parts: str) -> str:

@@ -1,35 +1,46 @@
 """A page that stands alone: what it shows is in it, and a browser is told to load nothing else."""
 
-from collections.abc import Iterable
+import base64
+import hashlib
+from collections.abc import Iterable, Sequence
 
 from footscan.report.markup import text
 from footscan.report.style import STYLE
-from footscan.report.viewer import SCRIPT, SCRIPT_DIGEST
-
-_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src '" + SCRIPT_DIGEST + "'"
-"""A browser refuses whatever is not on the page itself."""
 
 
-def page(*, title: str, kicker: str, heading: str, parts: Iterable[str], with_viewer: bool = True) -> str:
+def page(
+    *,
+    title: str,
+    kicker: str,
+    heading: str,
+    parts: Iterable[str],
+    scripts: Sequence[str] = (),
+    style: str = "",
+    pictures: str = "data:",
+) -> str:
     """A self-contained HTML page.
 
     Parameters
     ----------
     title, kicker : any text; the kicker stands above the heading
     heading, parts : markup
-    with_viewer : whether one of the parts holds a `footscan.report.viewer.viewer`, which needs its script
+    scripts : JavaScript that runs once the page is there; a browser admits these, by their digests, and no other
+    style : CSS beside that of all pages
+    pictures : from where a browser may take pictures, as a content security policy says it; the page alone as a rule
     """
+    digests = "".join(f" 'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in scripts)
     return _PAGE.format(
-        policy=_POLICY,
+        policy=f"default-src 'none'; img-src {pictures}; style-src 'unsafe-inline'; script-src{digests or ' ' + _NONE}",
         title=text(title),
-        style=STYLE,
+        style=STYLE + style,
         kicker=text(kicker),
         heading=heading,
         parts="\n".join(parts),
-        script=f"<script>{SCRIPT}</script>\n" if with_viewer else "",
+        scripts="".join(f"<script>{script}</script>\n" for script in scripts),
     )
 
 
+_NONE = "'none'"
 _PAGE = """\
 <!DOCTYPE html>
 <html lang="en">
@@ -46,6 +57,6 @@ _PAGE = """\
 <main>
 {parts}
 </main>
-{script}</body>
+{scripts}</body>
 </html>
 """

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMNS = 4
+INK = "#222222"
 
 
 def panels(count: int, frame_inches: float) -> "tuple[Figure, list[Axes]]":

@@ -14,6 +14,8 @@ _LIGHT = np.array([-0.35, 0.5, 0.79]) / np.linalg.norm([-0.35, 0.5, 0.79])
 """Towards the light: from above the viewer's left shoulder."""
 _AMBIENT, _FILL, _KEY = 0.30, 0.24, 0.46
 """How much light comes from everywhere, from the viewer (it shapes what lies in shadow) and from the lamp."""
+_COMPRESSION = 3
+"""Of PNG, 0 to 9: half the time of the usual 6, for a file that is a tenth larger."""
 _INNER_SIDE = 0.45
 """How bright the inner side of a surface is shown beside its outer side, so that a hole is seen as one."""
 
@@ -24,6 +26,7 @@ def render_mesh(
     colours: NDArray[np.uint8],
     shape: tuple[int, int],
     pixels_per_mm: float,
+    normals: NDArray[np.floating] | None = None,
 ) -> NDArray[np.uint8]:
     """The mesh as it is seen from +Z, shaded, on a transparent ground.
 
@@ -38,12 +41,16 @@ def render_mesh(
         RGB of each vertex.
     shape : (rows, columns) of the picture
     pixels_per_mm : float
+    normals : (V, 3) float
+        Unit vectors, outward, in the viewer's frame, where they are known already.
 
     Returns
     -------
     (rows, columns, 4) uint8, RGBA
     """
-    outward = vertex_normals(np.asarray(vertices, np.float64), faces)
+    outward = np.asarray(
+        vertex_normals(np.asarray(vertices, np.float64), faces) if normals is None else normals, np.float64
+    )
     samples_per_mm = pixels_per_mm * _SAMPLES
     # Sample (0, 0) has its centre half a sample inside the corner.
     projected = np.asarray(vertices, np.float64) * [samples_per_mm, -samples_per_mm, 1.0] - [0.5, 0.5, 0.0]
@@ -114,18 +121,31 @@ def rasterise(
     return samples
 
 
+@compiled
 def _mean_of_samples(samples: NDArray[np.float32]) -> NDArray[np.uint8]:
     """RGBA pixels of `_SAMPLES` x `_SAMPLES` samples: colour is the mean of those covered, alpha the share of them."""
     rows, columns = samples.shape[0] // _SAMPLES, samples.shape[1] // _SAMPLES
-    sums = samples.reshape(rows, _SAMPLES, columns, _SAMPLES, 4).sum(axis=(1, 3))
-    covered = np.maximum(sums[..., 3:] / 255, 1)
-    pixels = np.concatenate([sums[..., :3] / covered, sums[..., 3:] / _SAMPLES**2], axis=2)
-    rounded: NDArray[np.uint8] = np.rint(pixels).astype(np.uint8)
-    return rounded
+    pixels = np.zeros((rows, columns, 4), np.uint8)
+    for row in range(rows):
+        for column in range(columns):
+            red = green = blue = 0.0
+            covered = 0
+            for down in range(_SAMPLES):
+                for right in range(_SAMPLES):
+                    sample = samples[row * _SAMPLES + down, column * _SAMPLES + right]
+                    if sample[3] > 0.0:
+                        red, green, blue = red + sample[0], green + sample[1], blue + sample[2]
+                        covered += 1
+            if covered:
+                pixels[row, column, 0] = np.uint8(np.rint(red / covered))
+                pixels[row, column, 1] = np.uint8(np.rint(green / covered))
+                pixels[row, column, 2] = np.uint8(np.rint(blue / covered))
+                pixels[row, column, 3] = np.uint8(np.rint(255.0 * covered / _SAMPLES**2))
+    return pixels
 
 
 def png_bytes(pixels: NDArray[np.uint8]) -> bytes:
     """(rows, columns, 3 or 4) pixels as PNG."""
     buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, "PNG", compress_level=6)
+    Image.fromarray(pixels).save(buffer, "PNG", compress_level=_COMPRESSION)
     return buffer.getvalue()

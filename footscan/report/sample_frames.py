@@ -1,17 +1,25 @@
-"""One frame of each camera, with the stripe points found in it."""
+"""Frames of each camera along the travel, with the stripe points found in them, to be gone through by a slider."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
+from PIL import Image
 
 from footscan.report.markup import data_uri, number
 
 _MARGIN_PX = 20
 _ASPECT = 4 / 3
 _LEAST_WIDTH_PX = 160
+_SHOWN_PX = 320
+"""A wider cut is scaled down to this: some 6 kB, and a scan shows a hundred."""
+_MOST_DOTS = 150
+"""Of the points of a frame so many are drawn, one of every few."""
+
+_DOTS_ACROSS = 160
+"""So many dots side by side are as wide as a cut, however large that is."""
 
 
 @dataclass(frozen=True)
@@ -28,25 +36,67 @@ class FrameSample:
     """(N,) rows."""
 
 
-def sample_frames(samples: Iterable[FrameSample]) -> str:
-    """Each sample cropped around its stripe, as SVG with the points drawn over the pixels."""
-    return '<div class="frames">\n' + "\n".join(_figure(sample) for sample in samples) + "\n</div>"
+def sample_frames(samples: Sequence[FrameSample]) -> str:
+    """A group of figures for each frame, one of them seen at a time once `FRAMES_SCRIPT` has run.
+
+    Each figure is a cut around all stripes of its camera, as SVG with the points drawn over the pixels.
+    """
+    cuts = {camera: _cut_of(samples, camera) for camera in {sample.camera for sample in samples}}
+    numbers = sorted({sample.frame for sample in samples})
+    groups = "".join(
+        f'<div class="frames" data-frame="{frame}">\n'
+        + "\n".join(_figure(sample, cuts[sample.camera]) for sample in samples if sample.frame == frame)
+        + "\n</div>"
+        for frame in numbers
+    )
+    middle = len(numbers) // 2
+    return (
+        f'<div class="controls" id="travel" hidden><label for="moment">Frame <output id="frame"></output></label>'
+        f'<input id="moment" type="range" min="0" max="{len(numbers) - 1}" value="{middle}"></div>\n{groups}'
+    )
 
 
-def _figure(sample: FrameSample) -> str:
-    first_row, rows, first_column, columns = crop(sample.image.shape[:2], sample.i, sample.j)
-    cut = sample.image[first_row : first_row + rows, first_column : first_column + columns]
-    # A camera's own JPEG is no sharper than this one; as PNG, eight noisy frames would be several MB.
-    jpeg = simplejpeg.encode_jpeg(np.ascontiguousarray(cut), quality=90, colorsubsampling="444")
+FRAMES_SCRIPT = """\
+(() => {
+  "use strict";
+  const moment = document.getElementById("moment"), groups = document.querySelectorAll("[data-frame]");
+  const choose = () => {
+    groups.forEach((group, number) => { group.hidden = number !== Number(moment.value); });
+    document.getElementById("frame").textContent = groups[moment.value].dataset.frame;
+  };
+  moment.addEventListener("input", choose);
+  document.getElementById("travel").hidden = groups.length < 2;
+  choose();
+})();
+"""
+
+
+def _cut_of(samples: Iterable[FrameSample], camera: int) -> tuple[int, int, int, int]:
+    """The cut that shows the stripes of all samples of a camera: the picture stays where it is from frame to frame."""
+    own = [sample for sample in samples if sample.camera == camera]
+    return crop(own[0].image.shape, *(np.concatenate([getattr(one, axis) for one in own]) for axis in "ij"))
+
+
+def _figure(sample: FrameSample, cut: tuple[int, int, int, int]) -> str:
+    first_row, rows, first_column, columns = cut
+    pixels = np.ascontiguousarray(sample.image[first_row : first_row + rows, first_column : first_column + columns])
+    if columns > _SHOWN_PX:
+        size = _SHOWN_PX, max(1, round(rows * _SHOWN_PX / columns))
+        pixels = np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX, reducing_gap=1.0))
+    # A camera's own JPEG is no sharper than this one; chroma is kept, for a red stripe is little else.
+    jpeg = simplejpeg.encode_jpeg(np.ascontiguousarray(pixels), quality=75, colorsubsampling="444")
     # A dot of no length with round ends; pixel (0, 0) covers -0.5 to 0.5.
-    dots = "".join(f"M{i:.2f} {j:.2f}h0" for i, j in zip(sample.i, sample.j, strict=True))
+    step = -(-len(sample.i) // _MOST_DOTS) or 1
+    drawn = zip(sample.i[::step].tolist(), sample.j[::step].tolist(), strict=True)
+    dots = "".join(f"M{i:.1f} {j:.1f}h0" for i, j in drawn)
     name = f"Camera {sample.camera:d}, frame {sample.frame:d}"
     count = f"{number(len(sample.i))} points" if len(sample.i) else "no stripe"
     return (
         f"<figure><figcaption><b>Camera {sample.camera:d}</b> frame {sample.frame:d}, {count}</figcaption>"
         f'<svg viewBox="{first_column - 0.5} {first_row - 0.5} {columns} {rows}" role="img" aria-label="{name}">'
         f'<image x="{first_column - 0.5}" y="{first_row - 0.5}" width="{columns}" height="{rows}" '
-        f'href="{data_uri("image/jpeg", jpeg)}"/><path class="dots" d="{dots}"/></svg></figure>'
+        f'href="{data_uri("image/jpeg", jpeg)}"/><path class="dots" style="stroke-width:{columns / _DOTS_ACROSS:.1f}" '
+        f'd="{dots}"/></svg></figure>'
     )
 
 

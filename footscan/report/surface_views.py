@@ -1,6 +1,6 @@
 """The surface from its six sides, over a grid in mm."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from footscan.report.markup import data_uri, number, text
 from footscan.report.render import png_bytes, render_mesh
+from footscan.surface.topology import vertex_normals
 from schemas.scan import Side
 
 PIXELS_PER_MM = 3.0
@@ -52,8 +53,27 @@ def views_of(side: Side | None) -> list[View]:
     ]
 
 
+def upright(
+    vertices: NDArray[np.float64], transform: Sequence[Sequence[float]] | NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(V, 3) vertices in mm, moved from the scanner's frame to the foot's by the 4 x 4 `transform` of its measures.
+
+    X runs from heel to toes, Y to the foot's own left, Z up. The transform mirrors left feet into right ones; a picture
+    shows the foot as it is, so this is undone.
+    """
+    matrix = np.array(transform, np.float64)
+    if np.linalg.det(matrix[:3, :3]) < 0:
+        matrix[1] *= -1
+    moved: NDArray[np.float64] = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    return moved
+
+
 def surface_views(
-    vertices: NDArray[np.float64], faces: NDArray[np.integer], colours: NDArray[np.uint8], side: Side | None, last: str
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.integer],
+    colours: NDArray[np.uint8],
+    side: Side | None,
+    last: str = "",
 ) -> str:
     """Six pictures of a surface as SVG, as `views_of` names them, and the figure `last` behind them.
 
@@ -63,38 +83,49 @@ def surface_views(
     faces : (F, 3) int
     colours : (V, 3) uint8, RGB
     side : which foot it is; None for another thing
-    last : markup
+    last : markup, if anything
     """
     views = views_of(side)
     widest = max(float(np.ptp(vertices[:, view.right[1]])) for view in views) + 2 * _MARGIN_MM + _LABELS_LEFT_MM
-    figures = "\n".join(_figure(view, vertices, faces, colours, widest) for view in views)
+    normals = vertex_normals(vertices, faces)
+    figures = "\n".join(_figure(view, vertices, faces, colours, normals, widest) for view in views)
     return f'<div class="views">\n{figures}\n{last}\n</div>'
 
 
 def render_view(
-    view: View, vertices: NDArray[np.float64], faces: NDArray[np.integer], colours: NDArray[np.uint8]
+    view: View,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.integer],
+    colours: NDArray[np.uint8],
+    normals: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.uint8], float, float]:
     """The picture of a view, (rows, columns, 4) RGBA, `PIXELS_PER_MM` large, and its left and lower edge in mm.
 
-    Parameters are those of `surface_views`.
+    Parameters are those of `surface_views`; `normals` : (V, 3) unit vectors, outward, where they are known already.
     """
     right, up = (sign * vertices[:, axis] for sign, axis in (view.right, view.up))
     towards = np.cross(_unit(*view.right), _unit(*view.up))
     left, bottom = float(right.min()) - _MARGIN_MM, float(up.min()) - _MARGIN_MM
     rows, columns = (int(np.ceil((np.ptp(along) + 2 * _MARGIN_MM) * PIXELS_PER_MM)) for along in (up, right))
     seen = np.column_stack([right - left, up - bottom - rows / PIXELS_PER_MM, vertices @ towards])
-    return render_mesh(seen, faces, colours, (rows, columns), PIXELS_PER_MM), left, bottom
+    turned = None if normals is None else normals @ np.column_stack([_unit(*view.right), _unit(*view.up), towards])
+    return render_mesh(seen, faces, colours, (rows, columns), PIXELS_PER_MM, turned), left, bottom
 
 
 def _figure(
-    view: View, vertices: NDArray[np.float64], faces: NDArray[np.integer], colours: NDArray[np.uint8], widest: float
+    view: View,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.integer],
+    colours: NDArray[np.uint8],
+    normals: NDArray[np.float64],
+    widest: float,
 ) -> str:
-    pixels, left, bottom = render_view(view, vertices, faces, colours)
+    pixels, left, bottom = render_view(view, vertices, faces, colours, normals)
     width, height = pixels.shape[1] / PIXELS_PER_MM, pixels.shape[0] / PIXELS_PER_MM
     picture = data_uri("image/png", png_bytes(pixels))
     box = f"{-_LABELS_LEFT_MM:g} 0 {width + _LABELS_LEFT_MM:.2f} {height + _LABELS_BELOW_MM:.2f}"
     grid = "".join(_grid_lines(view, left, bottom, width, height))
-    share = (width + _LABELS_LEFT_MM) / widest
+    share = min(1.0, (width + _LABELS_LEFT_MM) / widest)  # whole pixels make it wider, and two must fit side by side
     return (
         f'<figure class="view" style="--share:{share:.4f}"><figcaption>{text(view.title)}</figcaption>'
         f'<svg viewBox="{box}" role="img" aria-label="{text(view.title)}">{grid}'

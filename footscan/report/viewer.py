@@ -1,156 +1,137 @@
-"""The surface in 3D, to be turned by hand: a small mesh on the page and a few lines of JavaScript, no library."""
+"""The surface in 3D, to be turned by hand: a small mesh on the page, in colours and with sections to choose."""
 
 import base64
-import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.surface.decimate import decimate
+from footscan.report.markup import text
+from footscan.surface.collapse import collapse_edges
+from footscan.surface.decimate import outermost
 from footscan.surface.mesh import Mesh, used
 
 _MOST_TRIANGLES = 12_000
 """They have no more than 36,000 corners, so 16 bits number them; some 150 kB on the page."""
+_VIEWS = {"above": "Above", "below": "Below", "left": "Left", "right": "Right", "front": "Front", "back": "Back"}
+
+Floats = NDArray[np.float64]
 
 
-def viewer(vertices: NDArray[np.float64], faces: NDArray[np.integer], colours: NDArray[np.uint8]) -> str:
-    """A canvas that shows the surface once `SCRIPT` has run, and is not seen without it.
+class Colouring(NamedTuple):
+    """Colours of a surface that a person may choose."""
+
+    name: str
+    """Any text."""
+    colours: NDArray[np.uint8]
+    """(V, 3) RGB"""
+    meaning: str = ""
+    """What they mean; markup."""
+
+
+class Drawing(NamedTuple):
+    """What is drawn over a surface, in its frame, mm."""
+
+    lines: Sequence[Floats] = ()
+    """(N, 3) each"""
+    points: Sequence[Floats] = ()
+    """(3,) each"""
+
+
+def viewer(
+    vertices: Floats,
+    faces: NDArray[np.integer],
+    colourings: Sequence[Colouring],
+    drawings: Mapping[str, Drawing] | None = None,
+    landmarks: Mapping[str, Floats] | None = None,
+) -> str:
+    """A canvas that shows the surface once `footscan.report.viewer_script.SCRIPT` has run, and is not seen without it.
 
     Parameters
     ----------
     vertices : (V, 3) float64, mm, foot's frame, Z up
     faces : (F, 3) int, counter-clockwise as seen from outside
-    colours : (V, 3) uint8, RGB
+    colourings : one at least; the first is shown until another is chosen
+    drawings : by name; shown by a click in a row of a table that holds an element with the name as `data-shows` and
+        what is to be told as `data-told`
+    landmarks : (3,) places by name, any text, which a person may have shown
     """
-    small = decimate(used(Mesh(vertices, np.asarray(faces, np.int32), colours=colours)), _MOST_TRIANGLES)
-    points = small.vertices - (small.vertices.min(axis=0) + small.vertices.max(axis=0)) / 2
-    radius = max(float(np.linalg.norm(points, axis=1).max()), np.finfo(np.float64).tiny)
+    places, corners, colours = _smaller(vertices, faces, np.hstack([one.colours for one in colourings]))
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    radius = max(float(np.linalg.norm(places - middle, axis=1).max()), np.finfo(np.float64).tiny)
+
+    def scaled(points: Floats) -> NDArray[np.float64]:
+        return np.asarray(np.rint((points - middle) / radius * 32767), np.float64)
+
     arrays = {
-        "points": np.rint(points / radius * 32767).astype("<i2"),
+        "points": scaled(places).astype("<i2"),
         # Of a surface in thousands of shreds, which has no smaller form, what 16 bits cannot number is not shown.
-        "faces": small.faces[(small.faces < 2**16).all(axis=1)].astype("<u2"),
-        "colours": small.colours,
+        "faces": corners[(corners < 2**16).all(axis=1)].astype("<u2"),
+        "colours": np.concatenate(np.split(colours, len(colourings), axis=1)),
     }
+    drawn = {
+        name: {
+            "lines": [scaled(line).astype(int).ravel().tolist() for line in drawing.lines],
+            "points": [scaled(point).astype(int).tolist() for point in drawing.points],
+        }
+        for name, drawing in (drawings or {}).items()
+    }
+    named = {name: scaled(place).astype(int).tolist() for name, place in (landmarks or {}).items()}
     data = " ".join(f'data-{name}="{base64.b64encode(array.tobytes()).decode()}"' for name, array in arrays.items())
+    data += f' data-drawings="{_json(drawn)}" data-landmarks="{_json(named)}"'
     return (
-        '<figure id="viewer" hidden><figcaption>In 3D <span>drag to turn</span>'
-        '<input id="zoom" type="range" min="0.8" max="4" step="0.05" value="1" aria-label="Size"></figcaption>'
-        f'<canvas id="canvas" role="img" aria-label="The surface in 3D" {data}></canvas></figure>'
+        f'<figure id="viewer" hidden>{_choices(colourings)}<canvas id="canvas" tabindex="0" role="application" '
+        'aria-label="The surface in 3D: drag or arrow keys turn it, two fingers or plus and minus change its size" '
+        f'{data}></canvas><p id="shown" aria-live="polite"></p>{_controls(bool(named))}'
+        f"{_meanings(colourings)}</figure>"
     )
 
 
-SCRIPT = """\
-(() => {
-  "use strict";
-  const canvas = document.getElementById("canvas"), zoom = document.getElementById("zoom");
-  const buffer = name => Uint8Array.from(atob(canvas.dataset[name]), c => c.charCodeAt(0)).buffer;
-  const points = new Int16Array(buffer("points")), faces = new Uint16Array(buffer("faces"));
-  const colours = new Uint8Array(buffer("colours"));
-  const light = [-0.35, 0.5, 0.79], inside = 0.45;
-  const count = points.length / 3;
-  const normals = vertexNormals();
-  const seen = new Float32Array(count * 3), outer = new Float32Array(count), inner = new Float32Array(count);
-  const towards = new Float32Array(count);
-  let turn = -0.7, tilt = 0.5, pixels, depth, scale, waiting = false;
+def _smaller(
+    vertices: Floats, faces: NDArray[np.integer], colours: NDArray[np.uint8]
+) -> tuple[Floats, NDArray[np.integer], NDArray[np.uint8]]:
+    """The surface with fewer triangles, its (V, K) colours interpolated."""
+    kept = np.unique(faces)
+    whole = used(Mesh(vertices, np.asarray(faces, np.int32)))
+    if len(faces) <= _MOST_TRIANGLES:
+        return whole.vertices, whole.faces, colours[kept]
+    fixed = np.zeros(len(whole.vertices), np.bool_)
+    fixed[outermost(whole.vertices, np.arange(len(whole.vertices)))] = True
+    places, corners, values, _ = collapse_edges(
+        whole.vertices, whole.faces, colours[kept].astype(np.float64), fixed, _MOST_TRIANGLES
+    )
+    return places, corners, np.rint(values).astype(np.uint8)
 
-  function vertexNormals() {
-    const sums = new Float32Array(count * 3);
-    for (let f = 0; f < faces.length; f += 3) {
-      const [a, b, c] = [faces[f] * 3, faces[f + 1] * 3, faces[f + 2] * 3];
-      const u = [0, 1, 2].map(k => points[b + k] - points[a + k]);
-      const v = [0, 1, 2].map(k => points[c + k] - points[a + k]);
-      const n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-      for (const corner of [a, b, c]) for (let k = 0; k < 3; k++) sums[corner + k] += n[k];
-    }
-    for (let p = 0; p < sums.length; p += 3) {
-      const length = Math.hypot(sums[p], sums[p + 1], sums[p + 2]) || 1;
-      for (let k = 0; k < 3; k++) sums[p + k] /= length;
-    }
-    return sums;
-  }
 
-  // Turned about Z, then tilted towards the viewer: right, up and towards the viewer.
-  function rotation() {
-    const [c, s, ct, st] = [Math.cos(turn), Math.sin(turn), Math.cos(tilt), Math.sin(tilt)];
-    return [c, -s, 0, s * st, c * st, ct, -s * ct, -c * ct, st];
-  }
+def _json(value: object) -> str:
+    return text(json.dumps(value, separators=(",", ":")))
 
-  function fit() {
-    // Twice the size that is shown: the browser smooths the outlines.
-    canvas.width = Math.max(1, canvas.clientWidth * 2);
-    canvas.height = Math.max(1, canvas.clientHeight * 2);
-    pixels = new ImageData(canvas.width, canvas.height);
-    depth = new Float32Array(canvas.width * canvas.height);
-    scale = Math.min(canvas.width, canvas.height * 1.25) / 65534;
-    draw();
-  }
 
-  function draw() {
-    waiting = false;
-    const m = rotation(), w = canvas.width, h = canvas.height, s = scale * zoom.value;
-    for (let p = 0; p < count; p++) {
-      const [x, y, z] = [points[p * 3], points[p * 3 + 1], points[p * 3 + 2]];
-      seen[p * 3] = w / 2 + s * (m[0] * x + m[1] * y + m[2] * z);
-      seen[p * 3 + 1] = h / 2 - s * (m[3] * x + m[4] * y + m[5] * z);
-      seen[p * 3 + 2] = m[6] * x + m[7] * y + m[8] * z;
-      const [u, v, n] = [normals[p * 3], normals[p * 3 + 1], normals[p * 3 + 2]];
-      towards[p] = m[6] * u + m[7] * v + m[8] * n;
-      const right = m[0] * u + m[1] * v + m[2] * n, up = m[3] * u + m[4] * v + m[5] * n;
-      const lit = right * light[0] + up * light[1] + towards[p] * light[2];
-      outer[p] = 0.30 + 0.24 * Math.max(0, towards[p]) + 0.46 * Math.max(0, lit);
-      inner[p] = inside * (0.30 + 0.24 * Math.max(0, -towards[p]) + 0.46 * Math.max(0, -lit));
-    }
-    pixels.data.fill(0);
-    depth.fill(-Infinity);
-    for (let f = 0; f < faces.length; f += 3) fill(faces[f], faces[f + 1], faces[f + 2], w, h);
-    canvas.getContext("2d").putImageData(pixels, 0, 0);
-  }
+def _choices(colourings: Sequence[Colouring]) -> str:
+    if len(colourings) < 2:
+        return ""
+    choices = "".join(
+        f'<label><input type="radio" name="colouring" value="{number}"{"" if number else " checked"}>'
+        f"<span>{text(one.name)}</span></label>"
+        for number, one in enumerate(colourings)
+    )
+    return f'<div class="choices" role="radiogroup" aria-label="Colours">{choices}</div>'
 
-  // One triangle, the nearest at each pixel winning.
-  function fill(a, b, c, w, h) {
-    const xa = seen[a * 3], ya = seen[a * 3 + 1], za = seen[a * 3 + 2];
-    const xb = seen[b * 3] - xa, yb = seen[b * 3 + 1] - ya, zb = seen[b * 3 + 2] - za;
-    const xc = seen[c * 3] - xa, yc = seen[c * 3 + 1] - ya, zc = seen[c * 3 + 2] - za;
-    const area = xb * yc - xc * yb;
-    if (area === 0) return;
-    // By the normals, since simplifying may turn a sliver over: inside is what clearly looks away from the viewer.
-    const shade = towards[a] + towards[b] + towards[c] > -0.6 ? outer : inner;
-    const left = Math.max(0, Math.ceil(xa + Math.min(0, xb, xc))), right = Math.min(w - 1, xa + Math.max(0, xb, xc));
-    const top = Math.max(0, Math.ceil(ya + Math.min(0, yb, yc))), bottom = Math.min(h - 1, ya + Math.max(0, yb, yc));
-    for (let row = top; row <= bottom; row++) for (let column = left; column <= right; column++) {
-      const x = column - xa, y = row - ya;
-      const atB = (x * yc - xc * y) / area, atC = (xb * y - x * yb) / area, atA = 1 - atB - atC;
-      if (atA < 0 || atB < 0 || atC < 0) continue;
-      const z = za + atB * zb + atC * zc, pixel = row * w + column;
-      if (z <= depth[pixel]) continue;
-      depth[pixel] = z;
-      const lit = atA * shade[a] + atB * shade[b] + atC * shade[c];
-      for (let k = 0; k < 3; k++) {
-        const colour = atA * colours[a * 3 + k] + atB * colours[b * 3 + k] + atC * colours[c * 3 + k];
-        pixels.data[pixel * 4 + k] = lit * colour;
-      }
-      pixels.data[pixel * 4 + 3] = 255;
-    }
-  }
 
-  function redraw() {
-    if (!waiting) requestAnimationFrame(draw);
-    waiting = true;
-  }
+def _controls(with_landmarks: bool) -> str:
+    views = "".join(f'<button type="button" data-view="{name}">{said}</button>' for name, said in _VIEWS.items())
+    marks = '<label><input id="landmarks" type="checkbox"> Landmarks</label>' if with_landmarks else ""
+    return (
+        f'<div class="controls">{views}<input id="zoom" type="range" min="0.8" max="4" step="any" value="1" '
+        f'aria-label="Size">{marks}</div>'
+    )
 
-  canvas.addEventListener("pointerdown", event => canvas.setPointerCapture(event.pointerId));
-  canvas.addEventListener("pointermove", event => {
-    if (!event.buttons) return;
-    turn += event.movementX * 0.01;
-    tilt = Math.max(-1.6, Math.min(1.6, tilt + event.movementY * 0.01));
-    redraw();
-  });
-  zoom.addEventListener("input", redraw);
-  window.addEventListener("resize", fit);
-  document.getElementById("viewer").hidden = false;
-  fit();
-})();
-"""
 
-SCRIPT_DIGEST = "sha256-" + base64.b64encode(hashlib.sha256(SCRIPT.encode()).digest()).decode()
-"""By which a page's content security policy admits this script and no other."""
+def _meanings(colourings: Sequence[Colouring]) -> str:
+    return "".join(
+        f'<div data-meaning="{number}"{" hidden" if number else ""}>{one.meaning}</div>'
+        for number, one in enumerate(colourings)
+        if one.meaning
+    )

@@ -8,7 +8,8 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from footscan.report.calibration_figure import calibration_figure, round_up
+from footscan.report.calibration_facts import round_up
+from footscan.report.calibration_figure import calibration_figure
 from schemas.calibration import Calibration, CameraCalibration, PolynomialMap
 
 SQUARE = [(100.0, 100.0), (500.0, 100.0), (500.0, 400.0), (100.0, 400.0)]

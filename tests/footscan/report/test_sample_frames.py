@@ -34,7 +34,7 @@ def test_points_are_drawn_where_they_are_in_the_image():
     assert "frame 71" in page
     assert "2 points" in page
     assert 'viewBox="179.5 149.5 240 180"' in page
-    assert 'd="M200.25 240.00h0M399.75 240.00h0"' in page
+    assert 'd="M200.2 240.0h0M399.8 240.0h0"' in page
     encoded = re.search(r'href="data:image/jpeg;base64,([^"]+)"', page)
     assert encoded
     shown = simplejpeg.decode_jpeg(base64.b64decode(encoded[1]))
@@ -47,3 +47,28 @@ def test_a_frame_without_stripe_is_shown_whole_and_said_so():
     page = sample_frames([FrameSample(1, 0, np.zeros((48, 64, 3), np.uint8), np.empty(0), np.empty(0))])
     assert "no stripe" in page
     assert 'viewBox="-0.5 -0.5 64 48"' in page
+
+
+def test_frames_stand_in_groups_and_a_cameras_cut_stays_where_it_is():
+    image = np.zeros((480, 640, 3), np.uint8)
+    low, high = np.array([200.0, 400.0]), np.array([240.0, 240.0])
+    samples = [FrameSample(2, 5, image, low, high), FrameSample(1, 5, image, low, high)]
+    page = sample_frames([*samples, FrameSample(2, 9, image, low + 100, high)])
+    five, nine = page.split('data-frame="9"')
+    assert 'data-frame="5"' in five
+    assert [text.count("<figure>") for text in (five, nine)] == [2, 1]
+    # From column 200 to 500 and a margin of 20: 340 wide, in both frames of the camera.
+    boxes = re.findall(r'viewBox="([^"]*)"', page)
+    assert boxes[0] == boxes[2] != boxes[1]
+    assert boxes[0].split()[2] == "340"
+    assert 'max="1" value="1"' in page
+
+
+def test_a_wide_cut_is_scaled_down_and_its_points_are_not():
+    i = np.linspace(0, 639, 640)
+    page = sample_frames([FrameSample(1, 0, np.full((480, 640, 3), 90, np.uint8), i, np.full(640, 200.0))])
+    jpeg = base64.b64decode(re.findall(r'base64,([^"]+)"', page)[0])
+    assert simplejpeg.decode_jpeg(jpeg).shape == (240, 320, 3)
+    assert 'viewBox="-0.5 -0.5 640 480"' in page
+    assert "640 points" in page
+    assert page.count(" 200.0h0") == 128

@@ -1,0 +1,48 @@
+"""How far apart the cameras place the same skin, and how they were moved, as tables."""
+
+from footscan.report.markup import number, table, text, words
+from schemas.fusion import CameraCorrection, FusionReport
+
+
+def disagreement_table(report: FusionReport) -> str:
+    """A row for each two cameras that see the same skin, before and after the corrections."""
+    if not report.pairs:
+        return '<p class="note">No two cameras see the same skin.</p>'
+    headings = ["Cameras", "Places", *(f"{name} {when}, mm" for name in _FIGURES for when in ("before", "after"))]
+    rows = [
+        [
+            " and ".join(map(str, pair.cameras)),
+            number(pair.points),
+            *(number(getattr(when, name), 3) for name in _FIGURES.values() for when in (pair.before, pair.after)),
+        ]
+        for pair in report.pairs
+    ]
+    return table(headings, rows, numeric=range(1, len(headings)), kind="dense")
+
+
+def corrections_table(report: FusionReport) -> str:
+    """A row for each camera: how it was moved, what that is worth, and how often others were believed instead."""
+    if not report.corrections:
+        return ""
+    headings = ["Camera", "Correction", "Moves at most, mm", "Held out before, mm", "Held out after, mm", "Gave way"]
+    rows = [_correction(one, report.contradicted.get(one.camera, 0)) for one in report.corrections]
+    return table(headings, rows, numeric=range(2, len(headings)), kind="dense")
+
+
+def warnings_list(report: FusionReport) -> str:
+    """What the fusion warns of."""
+    return "".join(f'<p class="note">{text(warning)}</p>' for warning in report.warnings)
+
+
+def _correction(correction: CameraCorrection, contradicted: int) -> list[str]:
+    held_out = (correction.held_out_before_mm, correction.held_out_after_mm)
+    return [
+        str(correction.camera),
+        text(words(correction.kind)),
+        number(correction.largest_mm, 3),
+        *("–" if value is None else number(value, 3) for value in held_out),
+        number(contradicted),
+    ]
+
+
+_FIGURES = {"RMS": "rms_mm", "Median": "median_mm", "Deviation": "deviation_mm"}

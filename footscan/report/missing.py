@@ -1,0 +1,45 @@
+"""What a person should know of a scan before its figures are believed: what was refused, and what is missing."""
+
+from collections.abc import Iterator
+
+from footscan.report.markup import number, text, words
+from schemas.measures import Measures
+from schemas.quality import MeshQuality, Quality
+
+_MUCH_FILLED = 0.1
+"""Share of the area from which on it is worth a line that it was filled."""
+
+
+def missing_list(measures: Measures, quality: Quality) -> str:
+    """A line for each thing, the gravest first; one that says so where there is none."""
+    lines = [*_measures(measures), *_cameras(quality), *_mesh(quality.mesh), *quality.fusion.warnings]
+    if not lines:
+        return "<p>Nothing: all measures were taken, no frame was lost, and every camera saw the foot.</p>"
+    return '<ul class="missing">' + "".join(f"<li>{text(line)}</li>" for line in lines) + "</ul>"
+
+
+def _measures(measures: Measures) -> Iterator[str]:
+    if measures.finding is not None:
+        yield f"Not measured: {measures.finding}."
+    if measures.side_note is not None:
+        yield f"{measures.side_note[:1].upper()}{measures.side_note[1:]}."
+    for status, said in (("incomplete", "could not be taken"), ("uncertain", "is uncertain")):
+        for name, measure in measures.measures.items():
+            if measure.status == status:
+                yield f"{words(name)} {said}" + (f": {measure.note}." if measure.note else ".")
+
+
+def _cameras(quality: Quality) -> Iterator[str]:
+    for camera in quality.cameras:
+        if camera.frames_lost:
+            yield f"Camera {camera.camera}: {camera.frames_lost} of {camera.frames} frames are lost."
+        if not camera.points:
+            yield f"Camera {camera.camera} saw no stripe."
+
+
+def _mesh(mesh: MeshQuality) -> Iterator[str]:
+    if mesh.holes:
+        longest = number(mesh.largest_hole_mm)
+        yield f"The surface is open: holes {mesh.holes}, the largest {longest} mm around."
+    if mesh.filled_share is not None and mesh.filled_share > _MUCH_FILLED:
+        yield f"{number(100 * mesh.filled_share, 1)} % of the surface was seen by no camera and is filled."
