@@ -9,6 +9,7 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
+from pipelines.calibration_choice import CalibrationPlace, calibration_places, choose_calibration
 from pipelines.deliver import deliver
 from pipelines.engine.digest import FileDigests, sha256
 from pipelines.engine.files import open_files
@@ -25,6 +26,7 @@ from schemas.calibration import calibration_from_json
 from schemas.documents import read_text, read_yaml
 from schemas.errors import RefusedInput
 from schemas.measures import Measures
+from schemas.scan import Scan
 from schemas.workflow import ScanParameters, Workflow
 
 CACHE = ".footscan"
@@ -39,10 +41,10 @@ class Job:
     """Which scans, with what, to where."""
 
     folders: list[Path]
-    archive: Path | None
-    """Root that the scans' paths may not leave; without it, two levels above each scan."""
-    calibration: Path | None
-    """Wins over the scans' own where `calibration_wins`, stands in for it otherwise."""
+    archives: tuple[Path, ...]
+    """Roots that the scans' paths may not leave; without one, that is two levels above each scan."""
+    calibrations: tuple[CalibrationPlace, ...]
+    """Win over the scans' own where `calibration_wins`, stand in for it otherwise."""
     calibration_wins: bool
     results: Path
     cache: Path | str
@@ -50,6 +52,10 @@ class Job:
     parameters: ScanParameters
     threads: int
     """Steps that run at once where no other pool is given."""
+
+    def archive_of(self, folder: Path) -> Path | None:
+        """The archive that a scan lies in."""
+        return next((archive for archive in self.archives if folder.is_relative_to(archive)), None)
 
 
 class Waiting(NamedTuple):
@@ -127,6 +133,8 @@ class ScanEnd:
     """Of the files in its results."""
     known: bool = False
     """Whether nothing had to run for it."""
+    document: Scan | None = None
+    """Its scan.yaml; None where that was refused."""
 
 
 def job_of_workflow(path: Path, threads: int | None = None, *, may_be_empty: bool = False) -> Job:
@@ -139,15 +147,16 @@ def job_of_workflow(path: Path, threads: int | None = None, *, may_be_empty: boo
     """
     workflow = read_yaml(path, Workflow)
     base = path.resolve().parent
-    archive = base / workflow.archive
+    archives = tuple(base / archive for archive in workflow.archive)
     results = base / workflow.results
-    folders = list(scan_folders(archive))
+    folders = [folder for archive in archives for folder in scan_folders(archive)]
     if not folders and not may_be_empty:
-        raise RefusedInput(path, f"expected folders with a scan.yaml below {archive}, found none", field="archive")
+        below = ", ".join(map(str, archives))
+        raise RefusedInput(path, f"expected folders with a scan.yaml below {below}, found none", field="archive")
     return Job(
         folders=folders,
-        archive=archive,
-        calibration=base / workflow.calibration if workflow.calibration else None,
+        archives=archives,
+        calibrations=calibration_places(workflow, base),
         calibration_wins=False,
         results=results,
         cache=_cache(path, workflow.cache) or results / CACHE,
@@ -162,8 +171,8 @@ def job_of_scan(folder: Path, calibration: Path | None, results: Path, threads: 
         raise RefusedInput(results, "is a file, expected a folder for the results")
     return Job(
         folders=[folder],
-        archive=None,
-        calibration=calibration,
+        archives=(),
+        calibrations=() if calibration is None else (CalibrationPlace(calibration),),
         calibration_wins=True,
         results=results,
         cache=results / CACHE,
@@ -189,9 +198,9 @@ def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None
     for folder in job.folders:
         name = str(folder)
         try:
-            scan = read_scan(folder, job.archive)
+            scan = read_scan(folder, job.archive_of(folder))
             other = folders.get(scan.name, folder)
-            if other != folder and _is_still(scan.name, other, job.archive):
+            if other != folder and _is_still(scan.name, other, job.archive_of(other)):
                 raise RefusedInput(scan.file, f"{scan.name} is also in {other}, expected each scan once")
             name = scan.name
             folders[name] = folder
@@ -308,15 +317,18 @@ def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planne
         known = planned_scan.failure or Success(planned_scan.delivered.get(file, ""))
         outcome = outcomes.get(f"{scan.name}/{kind}", known)
         if isinstance(outcome, Failure):
-            return ScanEnd(scan.name, scan.folder, None, outcome.problem + _what_stays(target), outcome.kind)
+            told = outcome.problem + _what_stays(target)
+            return ScanEnd(scan.name, scan.folder, None, told, outcome.kind, document=scan.document)
         digests[file] = outcome.digest
     problem = deliver(digests, planned.store, planned.digests, target)
     if problem is not None:
         whole = all(planned.store.has(digest) for digest in digests.values())  # what is damaged has been set aside
-        return ScanEnd(scan.name, scan.folder, None, problem, "fault" if whole else "damaged")
+        kind = "fault" if whole else "damaged"
+        return ScanEnd(scan.name, scan.folder, None, problem, kind, document=scan.document)
     finding = Measures.model_validate_json((target / "measures.json").read_bytes()).finding
     ended = None if finding is None else "finding"
-    return ScanEnd(scan.name, scan.folder, target, finding, ended, digests, known=not planned_scan.to_run)
+    is_known = not planned_scan.to_run
+    return ScanEnd(scan.name, scan.folder, target, finding, ended, digests, is_known, scan.document)
 
 
 def _what_stays(target: Path) -> str:
@@ -325,13 +337,8 @@ def _what_stays(target: Path) -> str:
 
 
 def _calibration(scan: RecordedScan, job: Job, known: dict[Path, CalibrationFile]) -> CalibrationFile:
-    path = job.calibration if job.calibration_wins and job.calibration else scan.calibration or job.calibration
-    if path is None:
-        raise RefusedInput(
-            scan.file,
-            "names no calibration, expected one here or in the workflow",
-            field="calibration",
-        )
+    own = None if job.calibration_wins and job.calibrations else scan.calibration
+    path = own or choose_calibration(scan, job.calibrations)
     if path not in known:
         text = read_text(path)
         known[path] = CalibrationFile(path, calibration_from_json(text, path), sha256(text.encode()))

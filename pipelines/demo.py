@@ -8,18 +8,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipelines.archive import CACHE, Job, cores, plan_job, run_job
+from pipelines.calibration_choice import CalibrationPlace
 from pipelines.deliver import deliver
 from pipelines.engine.digest import FileDigests
 from pipelines.engine.lease import lease
 from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import OnStepEnd, Threads
 from pipelines.engine.run import run_plan
-from pipelines.engine.step import Failure, Output, Step
+from pipelines.engine.step import Step
 from pipelines.engine.store import open_store
+from pipelines.filming import calibration_steps, digests_of
 from pipelines.recorded import SCAN_FILE, scan_folders
 from pipelines.scan import STEPS
 from schemas.errors import Fault
-from schemas.parameters.calibration import CaptureCalibrationParameters
 from schemas.parameters.demo import FilmedFoot
 from schemas.workflow import ScanParameters
 
@@ -62,12 +63,7 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
     plan = make_plan(filming, store)
     with timed("filming and calibration", len(plan.to_run), len(plan.steps)) as on_step_end, lease(store):
         outcomes = run_plan(plan, store, pool=Threads(1), on_step_end=on_step_end)
-    digests: dict[str, str] = {}
-    for step in filming:
-        outcome = outcomes[step.name]
-        if isinstance(outcome, Failure):
-            raise Fault(f"{step.name}: {outcome.problem}")
-        digests[step.kind] = outcome.digest
+    digests = digests_of(filming, outcomes)
     files = FileDigests.load(results / CACHE / "files.json")
     if problem := deliver(
         {"calibration.json": digests["calibrate"], "known.json": digests["film"]}, store, files, folder
@@ -89,15 +85,7 @@ def _filming(folder: Path, foot: FilmedFoot) -> list[Step]:
     capture = folder / "capture"
     film = Step("demo", "film", f"{STEPS}.simulate_scan", foot, places={"folder": scan}, writes=scan / SCAN_FILE)
     ordinary_light = foot.settings.model_copy(update={"ambient": "ambient"})  # a scanner is calibrated once
-    film_capture = Step(
-        "demo", "capture", f"{STEPS}.simulate_capture", ordinary_light,
-        places={"folder": capture}, writes=capture / "capture.yaml",
-    )  # fmt: skip
-    calibrate = Step(
-        "demo", "calibrate", f"{STEPS}.calibrate_capture", CaptureCalibrationParameters(),
-        {"capture": Output(film_capture.name)}, places={"capture": capture},
-    )  # fmt: skip
-    return [film, film_capture, calibrate]
+    return [film, *calibration_steps("demo", capture, ordinary_light)]
 
 
 def _job(folder: Path, results: Path) -> Job:
@@ -105,8 +93,8 @@ def _job(folder: Path, results: Path) -> Job:
     archive = folder / "archive"
     return Job(
         folders=list(scan_folders(archive)),
-        archive=archive,
-        calibration=folder / "calibration.json",
+        archives=(archive,),
+        calibrations=(CalibrationPlace(folder / "calibration.json"),),
         calibration_wins=False,
         results=results,
         cache=results / CACHE,

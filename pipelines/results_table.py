@@ -1,4 +1,4 @@
-"""All results of an archive as one table: a row a scan."""
+"""All results of an archive as one table, a row a scan: for spreadsheets, for programs, and as a page for people."""
 
 import csv
 import io
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.archive import ScanEnd
+from pipelines.archive_page import write_archive_page
 from pipelines.engine.atomic import write_atomically
 from pipelines.scan import DELIVERED
 from pipelines.version import SOFTWARE
@@ -29,11 +30,12 @@ Cell = str | int | float | None
 
 
 def write_results_table(ends: Sequence[ScanEnd], folder: Path) -> None:
-    """Write `results.csv` and `results.parquet` into the folder of the results; not again what is there.
+    """Write `results.csv`, `results.parquet` and `index.html` into the folder of the results; not again what is there.
 
     A row holds the scan and what became of it, the foot's side, its measures (their unit in the name of the column),
     quality figures, the version of this program and the digests of the scan's files.
     """
+    write_archive_page(ends, folder)
     rows = [_row(end) for end in ends]
     columns = list(dict.fromkeys(name for row in rows for name in row))
     table = _as_csv(columns, rows).encode()

@@ -109,8 +109,8 @@ def scan_steps(
         known["texture"] = add(Step(scan.name, "texture", f"{STEPS}.texture", None, seen_light))
     add(Step(scan.name, "foot.ply", f"{STEPS}.foot_ply", foot, known))
     shown: dict[str, Input] = {
-        "oriented": oriented, "surface": mesh, "measures": measures, "quality": qualities,
-        "calibration": maps, "about": _about(scan, parameters), **of_cameras,
+        "clean": cleaned, "oriented": oriented, "surface": mesh, "measures": measures, "quality": qualities,
+        "calibration": maps, "about": _about(scan, parameters), **points, **of_cameras,
     }  # fmt: skip
     add(
         Step(

@@ -21,9 +21,9 @@ State = tuple[tuple[str, int, int], ...]
 
 @dataclass
 class Arrivals:
-    """The scans of an archive, and in which state each was handed over."""
+    """The scans of archives, and in which state each was handed over."""
 
-    archive: Path
+    archives: tuple[Path, ...]
     _handed_over: dict[Path, State] = field(default_factory=dict)
     _seen: dict[Path, tuple[State, float]] = field(default_factory=dict)
     """The last state of each, and since when it is so (s, monotonic)."""
@@ -31,13 +31,14 @@ class Arrivals:
     def complete(self) -> list[Path]:
         """Folders of scans that are complete, and new or changed since they were handed over last."""
         found = []
-        for folder in scan_folders(self.archive):
-            state = _state(folder, self.archive)
-            if state is None or state == self._handed_over.get(folder):
-                continue
-            if self._is_quiet(folder, state):
-                self._handed_over[folder] = state
-                found.append(folder)
+        for archive in self.archives:
+            for folder in scan_folders(archive):
+                state = _state(folder, archive)
+                if state is None or state == self._handed_over.get(folder):
+                    continue
+                if self._is_quiet(folder, state):
+                    self._handed_over[folder] = state
+                    found.append(folder)
         return found
 
     def _is_quiet(self, folder: Path, state: State) -> bool:

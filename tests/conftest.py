@@ -1,4 +1,4 @@
-"""A small archive: two cameras film a cone from its tip, one its upper half, one its lower, a plain red line.
+"""A small archive: two cameras film a rough foot, one from the left and above, one from the right and below.
 
 A folder with `workflow.yaml`, `calibration.json` and the scan `archive/P0001/S1`.
 """
@@ -9,15 +9,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 import simplejpeg
+from numpy.typing import NDArray
 
 from footscan.virtual.film import write_film
-from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
+from schemas.calibration import Calibration, CameraCalibration, HomographyMap, Source
 
-CAMERAS = {1: True, 5: False}
-"""Whether each looks from above."""
+CAMERAS = {1: 1.0, 5: -1.0}
+"""On which side of a plane along the foot each stands; the plane leans, so that one is above and one below."""
 FRAMES, STEP_MM = 20, 10.0
-PX_PER_MM = 5.0
-CENTRE_Z_MM = 40.0
+FOCAL_PX = 1500.0
+AWAY_MM = np.array([250.0, 280.0, 280.0])
+"""Of a camera from the middle of what it films: ahead, aside and above, or as far aside and below."""
+CENTRE_PX = (320.0, 240.0)
+MIDDLE_Z_MM = 14.0
+STATIONS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
+"""Along the foot, for half its breadth, and for its height above and below the middle."""
+HALF_BREADTHS_MM = (24.0, 26.0, 28.0, 32.0, 32.0, 22.0)
+HEIGHTS_MM = (52.0, 52.0, 34.0, 20.0, 12.0, 8.0)
+DEPTHS_MM = (9.0, 10.5, 11.0, 11.5, 11.0, 9.0)
 
 WORKFLOW = """\
 format: footscan.workflow/1
@@ -48,9 +57,10 @@ def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (root / "workflow.yaml").write_text(WORKFLOW)
     (root / "calibration.json").write_text(_calibration().model_dump_json())
     (scan / "scan.yaml").write_text(SCAN)
-    radii = np.linspace(36.0, 6.0, FRAMES)  # mm: it narrows towards the cameras, or they would not see its side
-    for camera, upper in CAMERAS.items():
-        write_film(scan / f"cam{camera}.avi", [_frame(radius, upper) for radius in radii], 640, 480, 18)
+    along = np.linspace(0.0, 1.0, FRAMES)
+    sections = np.column_stack([np.interp(along, STATIONS, of) for of in (HALF_BREADTHS_MM, HEIGHTS_MM, DEPTHS_MM)])
+    for camera in CAMERAS:
+        write_film(scan / f"cam{camera}.avi", [_frame(camera, *section) for section in sections.tolist()], 640, 480, 18)
     return root
 
 
@@ -61,18 +71,38 @@ def calibration() -> Callable[..., Calibration]:
 
 
 def _calibration(scale: float = 1.0) -> Calibration:
-    pixel_map = PolynomialMap(
-        order=1, centre_px=(320.0, 240.0), scale_px=PX_PER_MM, alpha_y=[0.0, scale, 0.0],
-        alpha_z=[CENTRE_Z_MM, 0.0, -scale],
-    )  # fmt: skip
-    cameras = [CameraCalibration(camera=camera, map=pixel_map, region_px=[], points=0) for camera in CAMERAS]
+    cameras = []
+    for camera in CAMERAS:
+        matrix = np.diag([scale, scale, 1.0]) @ _to_plane(camera)
+        pixel_map = HomographyMap(
+            centre_px=CENTRE_PX, scale_px=1.0, matrix=(matrix / matrix[2, 2]).ravel()[:8].tolist()
+        )
+        cameras.append(CameraCalibration(camera=camera, map=pixel_map, region_px=[], points=0))
     return Calibration(sources=[Source(name="made up", sha256="")], software="tests", cameras=cameras)
 
 
-def _frame(radius_mm: float, upper: bool) -> bytes:
-    """A red half circle of Gaussian profile, as a camera that looks straight along X would see it."""
+def _to_plane(camera: int) -> NDArray[np.float64]:
+    """(3, 3) homography from pixels about `CENTRE_PX` to Y and Z in mm in the laser's plane, X = 0."""
+    away = AWAY_MM * [1.0, CAMERAS[camera], CAMERAS[camera]]
+    forward = -away / np.linalg.norm(away)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(forward, right), forward])  # columns, rows and depth of the image
+    from_plane = np.diag([FOCAL_PX, FOCAL_PX, 1.0]) @ np.column_stack([axes[:, 1], axes[:, 2], -axes @ away])
+    about_middle = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, MIDDLE_Z_MM], [0.0, 0.0, 1.0]])
+    return about_middle @ np.linalg.inv(from_plane)
+
+
+def _frame(camera: int, half_breadth: float, height: float, depth: float) -> bytes:
+    """A red line of Gaussian profile around a section, as far as the camera sees it."""
     j, i = np.mgrid[0:480, 0:640].astype(np.float64)
-    distance = np.abs(np.hypot(i - 320, j - 240) - radius_mm * PX_PER_MM)
-    light = 200 * np.exp(-0.5 * (distance / 1.8) ** 2) * ((j <= 245) if upper else (j >= 235))
+    y, z, w = np.tensordot(_to_plane(camera), [i - CENTRE_PX[0], j - CENTRE_PX[1], np.ones_like(i)], axes=1)
+    y, z = y / w, z / w - MIDDLE_Z_MM
+    up = np.where(z > 0, height, depth)
+    ellipse = np.hypot(y / half_breadth, z / up)
+    away = np.array([y / half_breadth**2, z / up**2]) / np.maximum(ellipse, 1e-9)  # how it grows, per mm
+    distance = np.abs(ellipse - 1.0) / np.maximum(np.hypot(*np.gradient(ellipse)), 1e-9)  # px
+    is_seen = (away[0] + away[1]) * CAMERAS[camera] > 0
+    light = 200 * np.exp(-0.5 * (distance / 1.8) ** 2) * is_seen
     image = np.clip(light[..., None] * [1.0, 0.12, 0.1] + 20, 0, 255).astype(np.uint8)
     return bytes(simplejpeg.encode_jpeg(image, 90, "RGB", "420"))

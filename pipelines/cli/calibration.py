@@ -7,7 +7,14 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.cli import calibrate_capture, calibrate_chart, calibrate_check, calibrate_compare, calibrate_show
+from pipelines.cli import (
+    calibrate_capture,
+    calibrate_chart,
+    calibrate_check,
+    calibrate_compare,
+    calibrate_latency,
+    calibrate_show,
+)
 from pipelines.cli.output import AsJson, print_json
 
 calibrate = typer.Typer(help="Learn each camera's map from pixels to millimetres.", no_args_is_help=True)
@@ -17,6 +24,7 @@ calibrate.command("models")(calibrate_chart.models)
 calibrate.command("show")(calibrate_show.show)
 calibrate.command("check")(calibrate_check.check)
 calibrate.command("compare")(calibrate_compare.compare)
+calibrate.command("latency")(calibrate_latency.latency)
 
 
 def map_pixels(

@@ -54,7 +54,7 @@ def compare(
             message(f"{one_line(str(file))}: has normals that are no unit vectors, which are not used")
     registration = None
     if register:
-        registration = _register(a, b, result)
+        registration = _register(a, b, result, reference)
         a = verify.moved(a, registration.transform)
     try:
         comparison = verify.compare(
@@ -84,13 +84,15 @@ def compare(
         _print(comparison, registration, result.name, reference.name)
 
 
-def _register(a: "Mesh", b: "Mesh", file: Path) -> "Registration":
+def _register(a: "Mesh", b: "Mesh", result: Path, reference: Path) -> "Registration":
     from footscan.verify.register import register
 
     try:
         return register(_shape(a), _shape(b))
     except Finding as error:
-        raise RefusedInput(file, f"cannot be registered: {error}") from None
+        which, _, problem = str(error).partition(": ")
+        file = {"moving": result, "fixed": reference}.get(which)
+        raise RefusedInput(file or result, f"cannot be registered: {problem if file else error}") from None
 
 
 def _shape(mesh: "Mesh") -> "Shape":

@@ -58,8 +58,10 @@ def extract(
     from footscan.frames.film import film_files, open_film, pixel_frames
     from footscan.stripe.film import extract_film, points_csv
     from pipelines.engine.atomic import write_atomically
+    from schemas.overrides import overridden
+    from schemas.parameters.extraction import ExtractionParameters
 
-    parameters = _parameters(settings or [])
+    parameters = overridden(ExtractionParameters, {}, settings or [])
     film = open_film(file)
     if file.is_file() and film.kind == "images" and next(pixel_frames(film)) is None:
         raise RefusedInput(file, "expected a whole image, found one that is torn")
@@ -93,22 +95,6 @@ def extract(
     message(_summary(film, points, seen))
 
 
-def _parameters(settings: Sequence[str]) -> "ExtractionParameters":
-    """The parameters that `--set NAME=VALUE ...` gives, and the defaults of all others."""
-    from schemas.documents import validate
-    from schemas.parameters.extraction import ExtractionParameters
-
-    values: dict[str, str] = {}
-    for setting in settings:
-        name, equals, value = setting.partition("=")
-        if not (name and equals):
-            raise RefusedInput("--set", f"expected NAME=VALUE, found {setting[:80]!r}")
-        if name in values:
-            raise RefusedInput("--set", "stands twice, expected each parameter once", field=name)
-        values[name] = value
-    return validate("--set", ExtractionParameters, values)
-
-
 def _backgrounds(path: Path, film: "Film") -> "Iterable[Rgb | None]":
     """A laser-off frame for each frame of the film: of its own, or one and the same."""
     from footscan.frames.film import open_background, pixel_frames
@@ -131,8 +117,6 @@ def _check_outputs(out: Path | None, overlay: Path | None, sources: Sequence[Pat
     if overlay.suffix.lower() != ".png":
         raise RefusedInput(overlay, f"expected a file that ends in .png, found {overlay.suffix!r}")
     _check_folder(overlay)
-    if out is not None and overlay.resolve() == out.resolve():
-        raise RefusedInput(overlay, "is the file of --out, expected another file to write")
     if overlay.resolve().parent in {source.resolve() for source in sources}:
         raise RefusedInput(overlay, "lies among the frames, expected a file in another folder")
 

@@ -1,12 +1,35 @@
 """The command's entry: its sub-commands, and every error as one line with an exit status of its own."""
 
+import errno
 import logging
 import os
 import sys
 
 import typer
 
-from pipelines.cli import cache, calibration, compare, demo, export, extract, films, results, runs, trace, verify, why
+from pipelines.cli import (
+    cache,
+    calibration,
+    compare,
+    config,
+    console,
+    demo,
+    devices,
+    export,
+    extract,
+    films,
+    lasts,
+    pairs,
+    regress,
+    results,
+    runs,
+    scan_live,
+    sizes,
+    trace,
+    tune,
+    verify,
+    why,
+)
 from schemas.errors import Fault, FootscanError, RefusedInput, one_line
 
 INTERRUPTED = 130
@@ -28,13 +51,25 @@ app.add_typer(calibration.calibrate, name="calibrate")
 app.command("map")(calibration.map_pixels)
 app.command("run")(runs.run)
 app.command("plan")(runs.plan)
+app.add_typer(config.config, name="config")
+app.command("tune")(tune.tune)
 app.command("why")(why.why)
 app.command("trace")(trace.trace)
 app.add_typer(cache.cache, name="cache")
+app.command("regress")(regress.regress)
 app.command("measure")(results.measure)
+app.command("sizes")(sizes.sizes)
+app.command("pair")(pairs.pair)
+app.command("change")(pairs.change)
+app.command("lasts")(lasts.lasts)
 app.command("compare")(compare.compare)
 app.command("export")(export.export)
 app.add_typer(verify.verify, name="verify")
+app.command("devices")(devices.devices)
+app.command("home")(scan_live.home)
+app.command("jog")(scan_live.jog)
+app.command("scan")(scan_live.scan)
+app.command("console")(console.console)
 
 
 def main() -> None:
@@ -61,6 +96,9 @@ def run_command(arguments: list[str]) -> int:
 
 def _explain(error: BaseException) -> tuple[str, int]:
     """What to say of an error, and the exit status."""
+    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+        name = str(error.filename)
+        error = RefusedInput(f"{name[:60]}...", f"is a name of {len(name)} characters, expected a shorter one")
     match error:
         case FootscanError():
             return str(error), error.exit_status

@@ -1,6 +1,7 @@
 """What the command prints: tables for persons and JSON for programs on standard output, messages on standard error."""
 
 import json
+import os
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -19,15 +20,22 @@ def message(text: str) -> None:
 
 
 def keep_inputs(outputs: Iterable[Path | None], *inputs: Path) -> None:
-    """Refuses outputs that would overwrite an input.
+    """Refuses outputs that would overwrite an input, or each other.
 
     Raises
     ------
     RefusedInput
         There is one.
     """
+    named: set[str] = set()
     for output in outputs:
-        if output is None or not output.exists():
+        if output is None:
+            continue
+        place = os.path.realpath(output)  # unlike Path's, it bears links that lead in a circle
+        if place in named:
+            raise RefusedInput(output, "stands for two outputs, expected a file for each")
+        named.add(place)
+        if not output.exists():
             continue
         if output.is_dir():
             raise RefusedInput(output, "is a folder, expected the name of a file to write")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 import typer
 
 from pipelines.cli.output import AsJson, message, print_json, print_table
+from pipelines.cli.workers import ClusterAddress, Threads, Workers, check_workers, chosen_pool
 from schemas.errors import Fault, FootscanError, RefusedInput
 
 if TYPE_CHECKING:
@@ -26,18 +27,15 @@ CalibrationFile = Annotated[
     Path | None, typer.Option("--calibration", help="Calibration for --scan; the one that the scan names where absent.")
 ]
 ResultsFolder = Annotated[Path | None, typer.Option("--out", help="Folder of the results, for --scan.")]
-Threads = Annotated[
-    int | None, typer.Option("--threads", min=1, help="Steps that run at once; as many as cores where absent.")
-]
-Workers = Annotated[
-    int | None, typer.Option("--workers", min=1, help="Run the steps in so many processes of this machine instead.")
-]
-ClusterAddress = Annotated[
-    str | None, typer.Option("--cluster", metavar="ADDRESS", help="Run them on the workers of this Dask scheduler.")
-]
 JsonLog = Annotated[Path | None, typer.Option("--log-json", help="Write what happens here, a JSON object a line.")]
 WatchArchive = Annotated[
     bool, typer.Option("--watch", help="Stay, and run scans as they arrive in the archive; Ctrl-C ends it.")
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="NAME=VALUE", help="A parameter, extraction.red_threshold=22; may stand several times."
+    ),
 ]
 POLL_S = 2.0
 
@@ -47,6 +45,7 @@ def run(
     scan: ScanFolder = None,
     calibration: CalibrationFile = None,
     out: ResultsFolder = None,
+    settings: Settings = None,
     threads: Threads = None,
     workers: Workers = None,
     cluster: ClusterAddress = None,
@@ -58,18 +57,15 @@ def run(
 
     Nothing that has been computed before is computed again.
     """
-    if sum(given is not None for given in (threads, workers, cluster)) > 1:
-        raise RefusedInput("--threads, --workers, --cluster", "exclude each other, expected one of them")
+    check_workers(threads, workers, cluster)
     if watch and (scan is not None or as_json):
         raise RefusedInput("--watch", "goes with a workflow alone, not with --scan or --json")
-    if cluster == "":
-        raise RefusedInput("--cluster", "expected the address of a Dask scheduler, such as tcp://one:8786, found ''")
     with ExitStack() as stack:
         log = None if log_json is None else stack.enter_context(_log(log_json))
-        pool = _LazyPool(stack, workers, cluster)
+        job = job_of(workflow, scan, calibration, out, threads, settings, may_be_empty=watch)
+        pool = stack.enter_context(chosen_pool(job.threads, workers, cluster))
         if watch:
-            return _watch(workflow or WORKFLOW, threads, pool, log)
-        job = _job(workflow, scan, calibration, out, threads)
+            return _watch(job, pool, log)
         ends = _run(job, pool, log, as_json=as_json)
     if scan is not None:
         return _status(ends, single=True)
@@ -78,7 +74,7 @@ def run(
 
 def _run(
     job: "Job",
-    pool: "_LazyPool",
+    pool: "Pool",
     log: TextIO | None,
     *,
     as_json: bool = False,
@@ -93,7 +89,7 @@ def _run(
         message(_summary(planned))
     ends = []
     with StepProgress(planned.to_run, len(job.folders), log) as progress:
-        for end in run_job(planned, pool.open(job.threads, planned.to_run), progress.on_step_end):
+        for end in run_job(planned, pool, progress.on_step_end):
             progress.on_scan_end(end)
             ends.append(end)
     if as_json:
@@ -118,41 +114,19 @@ def _write_table(ends: "list[ScanEnd]", results: Path) -> int:
     return 0
 
 
-def _watch(workflow: Path, threads: int | None, pool: "_LazyPool", log: TextIO | None) -> int:
+def _watch(job: "Job", pool: "Pool", log: TextIO | None) -> int:
     """Run scans as they are complete, until interrupted."""
-    from pipelines.archive import job_of_workflow
     from pipelines.watch import Arrivals
 
-    job = job_of_workflow(workflow, threads, may_be_empty=True)
-    assert job.archive is not None, "of a workflow"
-    arrivals = Arrivals(job.archive)
+    arrivals = Arrivals(job.archives)
     folders: dict[str, Path] = {}
     ends: dict[Path, ScanEnd] = {}
-    message(f"watching {job.archive}")
+    message(f"watching {', '.join(map(str, job.archives))}")
     while True:
         if complete := arrivals.complete():
             ends |= {end.source: end for end in _run(replace(job, folders=complete), pool, log, folders=folders)}
             _write_table([end for source, end in ends.items() if source.is_dir()], job.results)
         time.sleep(POLL_S)
-
-
-class _LazyPool:
-    """Where steps run; opened when some do, for a cluster takes seconds to start."""
-
-    def __init__(self, stack: ExitStack, workers: int | None, cluster: str | None) -> None:
-        self._stack, self._workers, self._cluster = stack, workers, cluster
-        self._pool: Pool | None = None
-
-    def open(self, threads: int, to_run: int) -> "Pool":
-        """The pool of `--workers` or `--cluster`, otherwise so many threads."""
-        from pipelines.engine.pool import Cluster, Threads, joined_cluster, local_cluster
-
-        if self._pool is None and to_run and (self._workers is not None or self._cluster is not None):
-            opening = joined_cluster(self._cluster) if self._cluster else local_cluster(self._workers or 1)
-            self._pool = self._stack.enter_context(opening)
-            if isinstance(self._pool, Cluster):
-                message(f"dashboard: {self._pool.client.dashboard_link}")
-        return self._pool or Threads(threads)
 
 
 @contextmanager
@@ -169,12 +143,13 @@ def plan(
     scan: ScanFolder = None,
     calibration: CalibrationFile = None,
     out: ResultsFolder = None,
+    settings: Settings = None,
     as_json: AsJson = False,
 ) -> int:
     """Say what `run` would do, and why, without doing it."""
     from pipelines.archive import plan_job
 
-    planned = plan_job(_job(workflow, scan, calibration, out, None), reasons=True)
+    planned = plan_job(job_of(workflow, scan, calibration, out, None, settings), reasons=True)
     if as_json:
         print_json(_plan_json(planned))
     else:
@@ -193,21 +168,40 @@ def plan(
     return 0
 
 
-def _job(
-    workflow: Path | None, scan: Path | None, calibration: Path | None, out: Path | None, threads: int | None
+def with_settings(job: "Job", settings: list[str] | None) -> "Job":
+    """`job` with what `--set` says of its parameters."""
+    from schemas.overrides import overridden
+    from schemas.workflow import ScanParameters
+
+    if not settings:
+        return job
+    return replace(job, parameters=overridden(ScanParameters, job.parameters.model_dump(mode="json"), settings))
+
+
+def job_of(
+    workflow: Path | None,
+    scan: Path | None,
+    calibration: Path | None,
+    out: Path | None,
+    threads: int | None,
+    settings: list[str] | None,
+    *,
+    may_be_empty: bool = False,
 ) -> "Job":
+    """The job that the options of a command describe; `may_be_empty`: an archive that has no scan yet."""
     from pipelines.archive import job_of_scan, job_of_workflow
 
     if scan is None:
         for name, value in (("--calibration", calibration), ("--out", out)):
             if value is not None:
                 raise RefusedInput(name, "goes with --scan, expected it in the workflow")
-        return job_of_workflow(workflow or WORKFLOW, threads)
+        read = job_of_workflow(workflow or WORKFLOW, threads, may_be_empty=may_be_empty)
+        return with_settings(read, settings)
     if workflow is not None:
         raise RefusedInput(workflow, "a workflow and --scan exclude each other, expected one of them")
     if out is None:
         raise RefusedInput("--out", "is missing, expected a folder for the results of --scan")
-    return job_of_scan(scan, calibration, out, threads)
+    return with_settings(job_of_scan(scan, calibration, out, threads), settings)
 
 
 def _tell(scan: str, problem: str) -> None:

@@ -11,7 +11,6 @@ import typer
 
 from pipelines.cli.output import AsJson, message, print_json
 from pipelines.cli.runs import WORKFLOW
-from schemas.documents import canonical_json
 from schemas.errors import RefusedInput
 
 if TYPE_CHECKING:
@@ -147,6 +146,8 @@ def _grow(tree: "Tree", taken_as: str, key: str, found: "Trace", shown: set[str]
 
 def _facts(action: "TracedAction") -> list[str]:
     values = action.parameters.get("values") if isinstance(action.parameters, dict) else None
+    from schemas.documents import canonical_json
+
     given = [f"{name} {canonical_json(value)}" for name, value in values.items()] if isinstance(values, dict) else []
     libraries = ", ".join(f"{name} {version}" for name, version in action.libraries.items())
     facts = [f"parameters: {', '.join(given)}"] if given else []

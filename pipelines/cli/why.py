@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.cli.output import AsJson, print_json, print_table
-from pipelines.cli.runs import WORKFLOW
+from pipelines.cli.runs import WORKFLOW, Settings, with_settings
 from schemas.errors import RefusedInput
 
 if TYPE_CHECKING:
@@ -50,12 +50,13 @@ def why(
     out: Annotated[
         Path | None, typer.Option(help="Folder of the results, for a scan folder without a workflow.")
     ] = None,
+    settings: Settings = None,
     as_json: AsJson = False,
 ) -> None:
     """Say what changed since the last result of each step that would run, old and new side by side."""
     from pipelines.archive import plan_job
 
-    planned = plan_job(_job(scan, workflow, calibration, out))
+    planned = plan_job(with_settings(_job(scan, workflow, calibration, out), settings))
     for refused in planned.refused:
         raise refused.error
     [found] = planned.scans
@@ -100,24 +101,25 @@ def _job(scan: str, workflow: Path | None, calibration: Path | None, out: Path |
     if calibration is not None:
         raise RefusedInput("--calibration", "goes with --out, expected it in the workflow")
     job = job_of_workflow(workflow or WORKFLOW)
-    return replace(job, folders=[_folder(scan, job.folders, job.archive)])
+    return replace(job, folders=[_folder(scan, job)])
 
 
-def _folder(scan: str, folders: Sequence[Path], archive: Path | None) -> Path:
+def _folder(scan: str, job: "Job") -> Path:
     """The folder of a scan that is named by its folder, or as `patient/scan`."""
     from pipelines.recorded import read_scan
 
     named = Path(scan).resolve()
-    for folder in folders:
+    for folder in job.folders:
         if folder.resolve() == named:
             return folder
-    for folder in sorted(folders, key=lambda folder: not folder.as_posix().endswith(f"/{scan}")):
+    for folder in sorted(job.folders, key=lambda folder: not folder.as_posix().endswith(f"/{scan}")):
         try:
-            if read_scan(folder, archive).name == scan:
+            if read_scan(folder, job.archive_of(folder)).name == scan:
                 return folder
         except RefusedInput:
             continue
-    raise RefusedInput(scan, f"no such scan in the workflow's archive {archive}, expected a folder or patient/scan")
+    archives = ", ".join(map(str, job.archives))
+    raise RefusedInput(scan, f"no such scan in the workflow's archive {archives}, expected a folder or patient/scan")
 
 
 def _named(step: str, every: Sequence[Explanation]) -> list[Explanation]:

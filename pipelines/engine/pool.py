@@ -187,7 +187,8 @@ def local_cluster(workers: int) -> Iterator[Cluster]:
 
     settings = {
         "distributed.scheduler.allowed-failures": FAILURES_ALLOWED,
-        "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "error",  # as `_quieten`, for the workers
+        # A worker that misses its scheduler at the end of a run calls it an error.
+        "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical",
     }
     with dask.config.set(settings):
         with _deaf_to_ctrl_c():

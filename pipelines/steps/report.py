@@ -1,7 +1,7 @@
 """The page that a person opens."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from footscan.frames.ingest import discard
 from footscan.frames.reader import read_frame
 from footscan.report.sample_frames import FrameSample
 from footscan.report.scan_page import scan_page
+from footscan.stripe.points import StripePoints
 from pipelines.arrays import unpack
 from schemas.calibration import Calibration
 from schemas.errors import DamagedError
@@ -18,10 +19,14 @@ from schemas.measures import Measures
 from schemas.parameters.foot import FootParameters
 from schemas.quality import Quality
 
+FRAMES_SHOWN = 12
+"""Along the travel, of each camera."""
+
 
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `calibration`, `oriented`, `surface`, `measures`, `quality`, `about` and, where there is a truth,
-    `verified`; for each camera `manifest-N` and `stripe-N`; `places`: each camera's array of frames, `array-N`."""
+    """`inputs`: `calibration`, `clean`, `oriented`, `surface`, `measures`, `quality`, `about` and, where there is a
+    truth, `verified`; for each camera `manifest-N`, `stripe-N` and `points-N`; `places`: each camera's array of frames,
+    `array-N`."""
     surface = unpack(inputs["surface"])
     about = json.loads(inputs["about"])
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
@@ -31,29 +36,46 @@ def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping
         side=parameters.side,
         vertices=surface["vertices"],
         faces=surface["faces"],
+        filled=surface.get("filled"),
+        cut_mm=surface["cut_mm"].item() if "cut_mm" in surface else None,
+        points=np.concatenate([unpack(inputs[f"points-{camera}"])["points"] for camera in ids]),
+        codes=unpack(inputs["clean"])["codes"],
         cloud=unpack(inputs["oriented"])["cloud"],
         measures=Measures.model_validate_json(inputs["measures"]),
         quality=Quality.model_validate_json(inputs["quality"]),
         calibration=Calibration.model_validate_json(inputs["calibration"]),
-        samples=[sample for camera in ids for sample in _samples(camera, inputs, places)],
+        samples=_samples(ids, inputs, places),
         truth_distance=unpack(inputs["verified"])["vertex_distance"] if "verified" in inputs else None,
         provenance=about["provenance"],
     )
     return page.encode()
 
 
-def _samples(camera: int, inputs: Mapping[str, bytes], places: Mapping[str, Path]) -> list[FrameSample]:
-    """The frame of a camera with the most stripe points, where it has any."""
-    stripe = unpack(inputs[f"stripe-{camera}"])["stripe"]
-    if not len(stripe):
+def _samples(ids: Sequence[int], inputs: Mapping[str, bytes], places: Mapping[str, Path]) -> list[FrameSample]:
+    """Frames from the first to the last that hold a stripe, as all cameras saw them; lost ones are left out."""
+    stripes = {camera: unpack(inputs[f"stripe-{camera}"])["stripe"] for camera in ids}
+    held = np.concatenate([stripe["frame"] for stripe in stripes.values()])
+    if not len(held):
         return []
-    number = int(np.argmax(np.bincount(stripe["frame"])))
+    numbers = np.unique(np.rint(np.linspace(held.min(), held.max(), FRAMES_SHOWN)).astype(int)).tolist()
+    return [
+        sample for camera, stripe in stripes.items() for sample in _of_camera(camera, stripe, numbers, inputs, places)
+    ]
+
+
+def _of_camera(
+    camera: int, stripe: StripePoints, numbers: Sequence[int], inputs: Mapping[str, bytes], places: Mapping[str, Path]
+) -> Iterator[FrameSample]:
     manifest = FrameManifest.model_validate_json(inputs[f"manifest-{camera}"])
     array = places[f"array-{camera}"]
-    try:
-        image = read_frame(array, manifest, number)
-    except DamagedError:
-        discard(array)
-        raise
-    points = stripe[stripe["frame"] == number]
-    return [] if image is None else [FrameSample(camera, number, image, points["i"], points["j"])]
+    for number in numbers:
+        if number >= len(manifest.frames):
+            return
+        try:
+            image = read_frame(array, manifest, number)
+        except DamagedError:
+            discard(array)
+            raise
+        if image is not None:
+            points = stripe[stripe["frame"] == number]
+            yield FrameSample(camera, number, image, points["i"], points["j"])

@@ -18,6 +18,7 @@ import pytest
 from pipelines.cli.main import run_command
 
 Footscan = Callable[..., subprocess.CompletedProcess[str]]
+MadeOnce = Callable[[str, Callable[[Path], None]], Path]
 FOOTSCAN = Path(sys.executable).with_name("footscan")
 WORKFLOW = """\
 format: footscan.workflow/1
@@ -52,30 +53,35 @@ def footscan(capsys: pytest.CaptureFixture[str]) -> Footscan:
 
 
 @pytest.fixture(scope="session")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A bench as it is before its first run: 72 frames, 4 mm apart, of the right foot. To be read only."""
-    return _made_once(tmp_path_factory, "recorded", _record)
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
+    """A folder by its name, made by the first worker that asks for it; the other workers of the test run share it."""
+
+    def folder(name: str, make: Callable[[Path], None]) -> Path:
+        root = tmp_path_factory.getbasetemp()
+        if "PYTEST_XDIST_WORKER" in os.environ:
+            root = root.parent
+        folder, unfinished = root / name, root / f"{name}-unfinished"
+        with (root / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not folder.exists():
+                shutil.rmtree(unfinished, ignore_errors=True)
+                make(unfinished)
+                unfinished.rename(folder)
+        return folder
+
+    return folder
 
 
 @pytest.fixture(scope="session")
-def measured(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def recorded(made_once: MadeOnce) -> Path:
+    """A bench as it is before its first run: 72 frames, 4 mm apart, of the right foot. To be read only."""
+    return made_once("recorded", _record)
+
+
+@pytest.fixture(scope="session")
+def measured(recorded: Path, made_once: MadeOnce) -> Path:
     """A bench after its first run. To be read only."""
-    return _made_once(tmp_path_factory, "measured", lambda bench: _measure(recorded, bench))
-
-
-def _made_once(tmp_path_factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:
-    """A folder made by the first worker that asks for it; the other workers of the test run share it."""
-    root = tmp_path_factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        root = root.parent
-    folder, unfinished = root / name, root / f"{name}-unfinished"
-    with (root / f"{name}.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not folder.exists():
-            shutil.rmtree(unfinished, ignore_errors=True)
-            make(unfinished)
-            unfinished.rename(folder)
-    return folder
+    return made_once("measured", lambda bench: _measure(recorded, bench))
 
 
 def _record(bench: Path) -> None:

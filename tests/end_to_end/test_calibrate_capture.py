@@ -18,16 +18,18 @@ from footscan.virtual.scanner import standard_scanner
 from schemas.calibration import read_calibration
 
 Footscan = Callable[..., CompletedProcess[str]]
+MadeOnce = Callable[[str, Callable[[Path], None]], Path]
 PLACEMENTS = 3
 GRID = np.stack(np.meshgrid(np.linspace(-70, 70, 57), np.linspace(0, 114, 39)), -1).reshape(-1, 2)
 
 
 @pytest.fixture(scope="module")
-def filmed(command: Footscan, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("filmed") / "capture"
-    done = command("simulate", "capture", "--out", folder, "--placements", PLACEMENTS, "--scanner-seed", 3)
-    assert done.returncode == 0, done.stderr
-    return folder
+def filmed(command: Footscan, made_once: MadeOnce) -> Path:
+    def film(folder: Path) -> None:
+        done = command("simulate", "capture", "--out", folder, "--placements", PLACEMENTS, "--scanner-seed", 3)
+        assert done.returncode == 0, done.stderr
+
+    return made_once("filmed-capture", film)
 
 
 @pytest.fixture
@@ -38,12 +40,15 @@ def capture(filmed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
 
 
 @pytest.fixture(scope="module")
-def calibrated(command: Footscan, filmed: Path) -> Path:
+def calibrated(command: Footscan, filmed: Path, made_once: MadeOnce) -> Path:
     """The calibration from `filmed`."""
-    file = filmed.with_name("calibration.json")
-    done = command("calibrate", "capture", filmed, "--out", file)
-    assert done.returncode == 0, done.stderr
-    return file
+
+    def calibrate(folder: Path) -> None:
+        folder.mkdir()
+        done = command("calibrate", "capture", filmed, "--out", folder / "calibration.json")
+        assert done.returncode == 0, done.stderr
+
+    return made_once("calibrated-capture", calibrate) / "calibration.json"
 
 
 def test_every_map_is_near_the_truth(footscan: Footscan, capture: Path, tmp_path: Path) -> None:
@@ -66,6 +71,7 @@ def test_every_map_is_near_the_truth(footscan: Footscan, capture: Path, tmp_path
 
 
 def test_the_table_names_the_chosen_model_and_the_pairs(footscan: Footscan, capture: Path) -> None:
+    keep(capture, 1, 2)
     done = footscan("calibrate", "capture", capture)
     assert done.returncode == 0
     assert "chosen" in done.stdout
@@ -113,6 +119,7 @@ def test_a_dark_frame_of_all_cameras_is_refused(footscan: Footscan, capture: Pat
 
 
 def test_a_model_by_name(footscan: Footscan, capture: Path) -> None:
+    keep(capture, 1, 5)
     done = footscan("calibrate", "capture", capture, "--model", "homography-distortion", "--json")
     assert done.returncode == 0
     assert all(camera["map"]["distortion"] is not None for camera in json.loads(done.stdout)["cameras"])
@@ -170,13 +177,11 @@ def test_drift_is_measured_camera_by_camera(
 
 
 def test_drift_of_another_scanner_is_what_its_true_maps_say(
-    footscan: Footscan, calibrated: Path, tmp_path: Path
+    footscan: Footscan, calibrated: Path, recorded: Path
 ) -> None:
-    other = tmp_path / "other"
-    assert footscan("simulate", "capture", "--out", other, "--placements", 2, "--scanner-seed", 4).returncode == 0
-    done = footscan("calibrate", "check", calibrated, other, "--json")
+    done = footscan("calibrate", "check", calibrated, recorded / "capture", "--json")
     assert done.returncode == 1
-    scanner, calibration = standard_scanner(4), read_calibration(calibrated)
+    scanner, calibration = standard_scanner(1), read_calibration(calibrated)
     told = {camera["camera"]: camera for camera in json.loads(done.stdout)["cameras"]}
     for camera in calibration.cameras:
         pixels = scanner.camera(camera.camera).project_plane(GRID[:, 0], GRID[:, 1])
@@ -321,6 +326,7 @@ def test_a_capture_of_links_is_read(footscan: Footscan, capture: Path, tmp_path:
 
 
 def test_a_shift_that_all_cameras_share_may_be_the_objects(footscan: Footscan, calibrated: Path, capture: Path) -> None:
+    keep(capture, 1, 2, 5, 6)
     place(capture, [[y + 0.5, z] for y, z in placements_of(capture)])
     done = footscan("calibrate", "check", calibrated, capture)
     assert done.returncode == 1

@@ -1,5 +1,6 @@
 """Wrong use, and files that are not what they should be: one line, exit status 2, nothing written."""
 
+import json
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -159,13 +160,20 @@ def test_broken_stl(refuse: Refuse, measured: Path, tmp_path: Path, content: Cal
         assert told in line
 
 
-@pytest.mark.parametrize("scale", [0.001, 1000.0])
-def test_a_foot_in_another_unit(refuse: Refuse, tmp_path: Path, scale: float) -> None:
+@pytest.mark.parametrize("scale", [0.01, 1000.0])
+def test_a_foot_in_no_unit(refuse: Refuse, tmp_path: Path, scale: float) -> None:
     (tmp_path / "foot.stl").write_bytes(stl(scale))
     line = refuse("measure", tmp_path / "foot.stl", "--out", tmp_path / "measures.json")
     assert line.startswith(f"{tmp_path / 'foot.stl'}: ")
     assert "mm" in line
     assert not (tmp_path / "measures.json").exists()
+
+
+def test_the_unit_of_a_foot_is_told(footscan: Footscan, tmp_path: Path) -> None:
+    (tmp_path / "foot.stl").write_bytes(stl(0.001))
+    done = footscan("measure", tmp_path / "foot.stl", "--json")
+    assert "coordinates in m, told by the length of 0.26" in done.stderr
+    assert json.loads(done.stdout)["measures"]["foot_length"]["value"] == pytest.approx(262.0, abs=0.5)
 
 
 def test_a_sphere_is_no_foot(refuse: Refuse, tmp_path: Path) -> None:

@@ -111,10 +111,8 @@ def test_frames_of_another_size_are_refused(folder: Path) -> None:
 
 def test_a_broken_reference_is_refused_by_name(folder: Path) -> None:
     replace(folder / "reference.yaml", "[30, 0]", "[0, 0]")
-    assert (
-        refusal(folder)
-        == "reference.yaml: placements_mm: placement 1 repeats placement 0, expected each placement once"
-    )
+    told = "placement 1 repeats placement 0, expected each placement once"
+    assert refusal(folder) == f"reference.yaml: placements_mm: {told} (line 3, column 16)"
     replace(folder / "capture.yaml", "reference: reference.yaml", "reference: capture.yaml")
     assert refusal(folder).startswith("capture.yaml: ")
     replace(folder / "capture.yaml", "reference: capture.yaml", "reference: .")

@@ -27,13 +27,13 @@ def age(folder: Path, seconds: float = 2 * QUIET_S) -> None:
 
 
 def test_nothing_is_there_yet(arriving: tuple[Path, Path]) -> None:
-    assert Arrivals(arriving[0]).complete() == []
+    assert Arrivals((arriving[0],)).complete() == []
 
 
 def test_a_scan_waits_until_its_last_film_is_there_and_quiet(arriving: tuple[Path, Path]) -> None:
     archive, scan = arriving
     folder = archive / "P0001/S1"
-    arrivals = Arrivals(archive)
+    arrivals = Arrivals((archive,))
     shutil.copytree(scan, folder, ignore=shutil.ignore_patterns("cam5.avi", "frames.zarr"))
     age(folder)
     assert arrivals.complete() == []
@@ -52,7 +52,7 @@ def test_a_scan_that_changes_comes_again(arriving: tuple[Path, Path]) -> None:
     folder = archive / "P0001/S1"
     shutil.copytree(scan, folder)
     age(folder)
-    arrivals = Arrivals(archive)
+    arrivals = Arrivals((archive,))
     assert arrivals.complete() == [folder]
     document = folder / "scan.yaml"
     document.write_text(document.read_text() + "# a remark\n")
@@ -70,7 +70,7 @@ def test_films_of_a_clock_that_is_ahead_are_quiet_once_they_stay_as_they_are(
     age(folder, -86400)
     clock = 100.0
     monkeypatch.setattr("pipelines.watch.time.monotonic", lambda: clock)
-    arrivals = Arrivals(archive)
+    arrivals = Arrivals((archive,))
     assert arrivals.complete() == []
     clock += 0.9 * QUIET_S
     film = folder / "cam5.avi"
@@ -90,4 +90,4 @@ def test_a_broken_document_is_handed_over_to_be_refused(arriving: tuple[Path, Pa
     folder.mkdir(parents=True)
     (folder / "scan.yaml").write_text("side: [right")
     age(folder)
-    assert Arrivals(archive).complete() == [folder]
+    assert Arrivals((archive,)).complete() == [folder]

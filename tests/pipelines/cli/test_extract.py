@@ -188,7 +188,7 @@ def test_inputs_are_kept(extract: Extract, frame: Path, film: Path, tmp_path: Pa
     refused(extract(film, "--overlay", overlay), f"{overlay}: lies among the frames, expected a file in another folder")
     both = tmp_path / "both.png"
     (tmp_path / "points.csv").symlink_to(both)
-    told = "is the file of --out, expected another file to write"
+    told = "stands for two outputs, expected a file for each"
     refused(extract(frame, "--out", tmp_path / "points.csv", "--overlay", both), f"{both}: {told}")
     assert {file: file.read_bytes() for file in tmp_path.rglob("*.png")} == before
     assert not both.exists()

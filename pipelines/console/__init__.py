@@ -1,0 +1,1 @@
+"""The operator's page: a local web server over the live scanner."""

@@ -1,0 +1,218 @@
+"""One scanner, one operator at a time, and the person who is here: what all pages see, and what one of them orders."""
+
+import logging
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal
+
+from pipelines.console.charge import Charge
+from pipelines.console.guidance import guidance
+from pipelines.console.scanner import Scanner, Side
+from pipelines.console.sitting import ScannedFoot, Sitting, judged
+from schemas.documents import pseudonym
+from schemas.errors import FootscanError, RefusedInput
+
+log = logging.getLogger("footscan.console")
+
+Action = Literal["connect", "home", "jog", "shine", "scan"]
+
+LOOKS_SECONDS = 1.0
+"""How old the health of the devices may be on a page."""
+SHORTEST_SECONDS = 0.15
+"""Between two states that pages are told of."""
+END_SECONDS = 60.0
+
+
+class Console:
+    """What stands behind the pages; of any thread. A context manager, whose end leaves the scanner closed and dark."""
+
+    def __init__(self, scanner: Scanner, archive: Path, results: Path) -> None:
+        self.archive, self.results = archive, results
+        self.scanner = scanner
+        self._lock = threading.Lock()
+        self._charge = Charge()
+        self._sitting = Sitting()
+        self._action: Action | None = None
+        self._problem: str | None = None
+        self._worker: threading.Thread | None = None
+        self._heard: set[Callable[[], None]] = set()
+        self._wake, self.closing = threading.Event(), threading.Event()
+        self._seen = self._look()
+        self._unlisten = scanner.listen(lambda _: self._wake.set())
+        self._watch = threading.Thread(target=self._look_on, name="console", daemon=True)
+        self._watch.start()
+
+    def __enter__(self) -> "Console":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def seen_by(self, page: str) -> dict[str, Any]:
+        """The state of everything, as a page is told it."""
+        with self._lock:
+            holder = self._charge.holder
+            return {**self._seen, "in_charge": holder == page, "others": holder not in {None, page}}
+
+    def hear(self, told: Callable[[], None]) -> Callable[[], None]:
+        """Has `told` called, in some thread, whenever the state has changed; returns what ends that."""
+        with self._lock:
+            self._heard.add(told)
+        return lambda: self._heard.discard(told)
+
+    def enter(self, page: str) -> None:
+        """A page looks from now on."""
+        with self._lock:
+            self._charge.enter(page)
+        self._tell()
+
+    def leave(self, page: str) -> None:
+        """A page looks no more."""
+        with self._lock:
+            self._charge.leave(page)
+        self._tell()
+
+    def take_over(self, page: str) -> None:
+        """A page is in charge from now on."""
+        with self._lock:
+            self._charge.take(page)
+        self._tell()
+
+    def connect(self, page: str | None = None) -> None:
+        """Begins to open the devices, for a page or, as the console starts, for none.
+
+        As all orders: RefusedInput of a page that is not in charge, or where the scanner is busy.
+        """
+        self._begin(page, "connect", self.scanner.connect)
+
+    def home(self, page: str) -> None:
+        """Begins to home the heads."""
+        self._begin(page, "home", self.scanner.home)
+
+    def jog(self, page: str, by_mm: float, head: int | None) -> None:
+        """Begins to move heads in the dark."""
+        self._begin(page, "jog", lambda: self.scanner.jog(by_mm, head))
+
+    def shine(self, page: str) -> None:
+        """Lights the heads for a few seconds."""
+        self._begin(page, "shine", self.scanner.shine)
+
+    def scan(self, page: str, patient: str, side: Side, keep_partial: bool) -> None:
+        """Begins a scan."""
+        pseudonym(patient, "patient")
+
+        def film() -> ScannedFoot:
+            with self._lock:
+                self._sitting = self._sitting.begun(patient)
+            return judged(self.scanner.film(patient, side, keep_partial=keep_partial), self.results)
+
+        self._begin(page, "scan", film)
+
+    def resume(self, page: str) -> None:
+        """Goes on after the door was closed."""
+        with self._lock:
+            self._charge.need(page)
+        self.scanner.resume()
+
+    def stop(self) -> None:
+        """Lasers off and heads held, whoever asks."""
+        try:
+            self.scanner.stop()
+        finally:
+            self._wake.set()
+
+    def new_person(self, page: str) -> None:
+        """Forgets who was here; what was scanned stays where it is."""
+        with self._lock:
+            self._charge.need(page)
+            if self._action is not None:
+                raise RefusedInput("scanner", "is busy, expected to wait or to stop it")
+            self._sitting, self._problem = Sitting(), None
+        self._wake.set()
+
+    def end(self) -> None:
+        """Lasers off at once, and pages let go; may be called by a signal's handler, so it waits for nothing."""
+        self.closing.set()
+        threading.Thread(target=self._stop_working, name="console: last stop").start()
+
+    def close(self) -> None:
+        """Stops what is under way and lets the scanner go; the lasers are off."""
+        self.closing.set()
+        try:
+            self._stop_working()
+            if self._worker is not None:
+                self._worker.join(END_SECONDS)
+        finally:
+            self._unlisten()
+            self._wake.set()
+            self._watch.join(END_SECONDS)
+            self.scanner.close()
+
+    def _begin(self, page: str | None, action: Action, call: Callable[[], ScannedFoot | None]) -> None:
+        with self._lock:
+            if page is not None:
+                self._charge.need(page)
+            if self._action is not None or self.closing.is_set():
+                raise RefusedInput("scanner", "is busy, expected to wait or to stop it")
+            self._action, self._problem = action, None
+            self._worker = threading.Thread(target=self._act, args=(call,), name=f"console: {action}", daemon=True)
+            self._worker.start()
+        self._wake.set()
+
+    def _act(self, call: Callable[[], ScannedFoot | None]) -> None:
+        problem, foot = None, None
+        try:
+            foot = call()
+        except FootscanError as error:
+            problem = str(error)
+        except Exception as error:  # whatever it is, the operator must see it, and the next action must be possible
+            log.exception("an action failed")
+            problem = f"{type(error).__name__}: {error}"
+        with self._lock:
+            self._action, self._problem = None, problem
+            if foot is not None:
+                self._sitting = self._sitting.added(foot)
+        self._wake.set()
+
+    def _look_on(self) -> None:
+        while not self.closing.is_set():
+            self._wake.wait(LOOKS_SECONDS)
+            self._wake.clear()
+            seen = self._look()
+            with self._lock:
+                changed, self._seen = seen != self._seen, seen
+            if changed:
+                self._tell()
+            self.closing.wait(SHORTEST_SECONDS)
+
+    def _look(self) -> dict[str, Any]:
+        state, health = self.scanner.state, self.scanner.health()
+        with self._lock:
+            sitting, action, problem = self._sitting, self._action, self._problem
+        return {
+            "state": {"name": state.name, "words": state.words, "progress": state.progress},
+            "action": action,
+            "problem": problem,
+            "do": guidance(state, health, action == "scan"),
+            "devices": [vars(device) for device in health.devices],
+            "cameras": list(health.cameras),
+            "frames": {str(camera): count for camera, count in health.frames.items()},
+            "resumable": health.resumable,
+            "sitting": sitting.as_json(),
+        }
+
+    def _tell(self) -> None:
+        with self._lock:
+            heard = list(self._heard)
+        for told in heard:
+            told()
+
+    def _stop_working(self) -> None:
+        self._tell()
+        if self._worker is None or not self._worker.is_alive():
+            return
+        try:
+            self.scanner.stop()
+        except FootscanError as error:
+            log.warning("%s", error)

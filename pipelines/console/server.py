@@ -1,0 +1,282 @@
+"""The web server: pages, what they ask for, and the state as it changes."""
+
+import asyncio
+import json
+import os
+import signal
+import socket
+import threading
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache, partial
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Literal
+
+import uvicorn
+from pydantic import Field, ValidationError
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.middleware import Middleware
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.routing import Route
+
+from footscan.report.style import STYLE
+from footscan.report.viewer_script import SCRIPT
+from pipelines.console.console import Console
+from pipelines.console.foot_page import foot_page
+from pipelines.console.guard import LARGEST_BODY, PAGE, PAGE_HEADER, Guard
+from pipelines.console.live_picture import LivePictures
+from pipelines.console.pair_page import pair_page
+from pipelines.console.results import KINDS, read_result
+from pipelines.console.scanner import Side
+from pipelines.console.sitting_page import sitting_page
+from schemas.documents import Document, Pseudonym
+from schemas.errors import Fault, FootscanError, RefusedInput
+
+STATIC = Path(__file__).with_name("static")
+SCRIPTS = ("link.js", "sitting.js", "foot.js")
+ALIVE_SECONDS = 10.0
+"""After so long without a change a page is told that the server is there."""
+PAGES_KEPT = 4
+REPORT_POLICY = (
+    "sandbox allow-scripts; default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+)
+"""Of a page that stands alone: its own policy admits its own scripts only; here it is kept apart from the server."""
+
+
+class ScanAsked(Document):
+    """What a scan is started with."""
+
+    patient: Pseudonym
+    side: Side
+    keep_partial: bool = False
+
+
+class JogAsked(Document):
+    """How heads are moved by hand."""
+
+    mm: Annotated[float, Field(ge=-500, le=500)]
+    head: Literal[1, 2, 3] | None = None
+
+
+class ConsoleServer(uvicorn.Server):
+    """Ends on Ctrl-C and SIGTERM without raising them again: the command lets the scanner go afterwards."""
+
+    def __init__(self, config: uvicorn.Config, ends: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._ends = ends
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """As uvicorn has it."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        before = {number: signal.signal(number, self.handle_exit) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """As uvicorn has it."""
+        self._ends()
+        super().handle_exit(sig, frame)
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A socket that the server may be given.
+
+    Raises
+    ------
+    RefusedInput
+        Nothing can listen there.
+    """
+    try:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        return socket.create_server((host, port), family=family)
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror
+        problem = f"cannot be listened on ({why}), expected another --port or --host"
+        raise RefusedInput(f"{host}:{port}", problem) from None
+
+
+def server_of(console: Console, host: str, token: str | None) -> ConsoleServer:
+    """What serves the console; `run` it with the socket of `listen`, or have `serve` awaited."""
+    config = uvicorn.Config(
+        application(console, host, token),
+        log_level="critical",
+        access_log=False,
+        server_header=False,
+        proxy_headers=False,
+        ws="none",
+        http="h11",
+        timeout_graceful_shutdown=3,
+        timeout_keep_alive=15,
+        h11_max_incomplete_event_size=16 * 1024,
+    )
+    return ConsoleServer(config, console.end)
+
+
+def application(console: Console, host: str, token: str | None) -> Starlette:
+    """The application behind its guard; `host` and `token` as `Guard` has them."""
+    pages = _Pages(console)
+    actions = {
+        "connect": lambda page, _: console.connect(page),
+        "home": lambda page, _: console.home(page),
+        "shine": lambda page, _: console.shine(page),
+        "resume": lambda page, _: console.resume(page),
+        "take-over": lambda page, _: console.take_over(page),
+        "new-person": lambda page, _: console.new_person(page),
+        "stop": lambda *_: console.stop(),
+        "scan": lambda page, body: _scan(console, page, body),
+        "jog": lambda page, body: _jog(console, page, body),
+    }
+    return Starlette(
+        routes=[
+            Route("/", pages.sitting),
+            Route("/foot/{patient}/{scan}", pages.foot),
+            Route("/pair/{patient}/{left}/{right}", pages.pair),
+            Route("/results/{patient}/{scan}/{name}", pages.result),
+            Route("/static/{name}", _static),
+            Route("/events", pages.events),
+            Route("/cameras/{camera:int}.jpg", pages.picture),
+            *(Route(f"/do/{name}", partial(_do, act), methods=["POST"], name=name) for name, act in actions.items()),
+        ],
+        middleware=[Middleware(Guard, host=host, token=token)],
+        exception_handlers={RefusedInput: _not_there},
+    )
+
+
+class _Pages:
+    """What is answered to GET."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._pictures = LivePictures()
+        self._foot = lru_cache(PAGES_KEPT)(self._foot_page)
+
+    def _foot_page(self, patient: str, scan: str, _version: int) -> str:
+        return foot_page(self._console.archive, self._console.results, patient, scan)
+
+    async def sitting(self, _: Request) -> Response:
+        return HTMLResponse(sitting_page())
+
+    async def foot(self, request: Request) -> Response:
+        patient, scan = request.path_params["patient"], request.path_params["scan"]
+
+        def made() -> str:
+            version = hash(read_result(self._console.results, patient, scan, "measures.json"))
+            return self._foot(patient, scan, version)
+
+        return HTMLResponse(await run_in_threadpool(made))
+
+    async def pair(self, request: Request) -> Response:
+        names = (request.path_params[name] for name in ("patient", "left", "right"))
+        return HTMLResponse(await run_in_threadpool(pair_page, self._console.results, *names))
+
+    async def result(self, request: Request) -> Response:
+        patient, scan, name = (request.path_params[part] for part in ("patient", "scan", "name"))
+        content = await run_in_threadpool(read_result, self._console.results, patient, scan, name)
+        if name.endswith(".html"):
+            return Response(content, media_type=KINDS[".html"], headers={"content-security-policy": REPORT_POLICY})
+        headers = {"content-disposition": f'attachment; filename="{patient}-{scan}-{name}"'}
+        return Response(content, media_type=KINDS[Path(name).suffix], headers=headers)
+
+    async def picture(self, request: Request) -> Response:
+        camera = request.path_params["camera"]
+        jpeg = self._console.scanner.picture(camera)
+        if jpeg is None:
+            return Response(status_code=204)
+        try:
+            drawn, points = await run_in_threadpool(self._pictures.drawn, camera, jpeg)
+        except ValueError:
+            return Response(status_code=204)
+        return Response(drawn, media_type="image/jpeg", headers={"x-stripe-points": str(points)})
+
+    async def events(self, request: Request) -> Response:
+        page = request.query_params.get("page", "")
+        if PAGE.fullmatch(page) is None:
+            return PlainTextResponse("footscan: expected the page's own name\n", 400)
+        return StreamingResponse(self._told(page), media_type="text/event-stream")
+
+    async def _told(self, page: str) -> AsyncIterator[str]:
+        """The state now and whenever it changes, as server-sent events."""
+        console, loop, changed = self._console, asyncio.get_running_loop(), asyncio.Event()
+
+        def told() -> None:
+            loop.call_soon_threadsafe(changed.set)
+
+        unhear = console.hear(told)
+        await run_in_threadpool(console.enter, page)
+        try:
+            before = None
+            while not console.closing.is_set():
+                changed.clear()
+                state = json.dumps(console.seen_by(page), allow_nan=False)
+                yield ": here\n\n" if state == before else f"data: {state}\n\n"
+                before = state
+                try:
+                    await asyncio.wait_for(changed.wait(), ALIVE_SECONDS)
+                except TimeoutError:
+                    continue
+        finally:
+            unhear()
+            console.leave(page)
+
+
+async def _do(act: Callable[[str, bytes], None], request: Request) -> Response:
+    """Carries out what the page in charge orders; what is wrong is told in one line."""
+    try:
+        body = await _body(request)
+        await run_in_threadpool(act, request.headers[PAGE_HEADER], body)
+    except RefusedInput as error:
+        return JSONResponse({"problem": str(error)}, 409)
+    except Fault as error:
+        return JSONResponse({"problem": str(error)}, 502)
+    except ValidationError:
+        return JSONResponse({"problem": "expected other fields, or other values in them"}, 400)
+    return Response(status_code=204)
+
+
+async def _body(request: Request) -> bytes:
+    """The body of a request, which the guard has let in by the length that it told."""
+    body = b""
+    try:
+        async for part in request.stream():
+            body += part
+            if len(body) > LARGEST_BODY:
+                raise RefusedInput("request", f"is too long, expected up to {LARGEST_BODY} bytes")
+    except ClientDisconnect:
+        raise RefusedInput("request", "ended too early") from None
+    return body
+
+
+def _scan(console: Console, page: str, body: bytes) -> None:
+    asked = ScanAsked.model_validate_json(body)
+    console.scan(page, asked.patient, asked.side, asked.keep_partial)
+
+
+def _jog(console: Console, page: str, body: bytes) -> None:
+    asked = JogAsked.model_validate_json(body)
+    console.jog(page, asked.mm, asked.head)
+
+
+async def _static(request: Request) -> Response:
+    name = request.path_params["name"]
+    if name == "console.css":
+        return Response(STYLE + (STATIC / name).read_text(encoding="utf-8"), media_type="text/css")
+    if name == "viewer.js":
+        return Response(SCRIPT, media_type="text/javascript")
+    if name in SCRIPTS:
+        return Response((STATIC / name).read_text(encoding="utf-8"), media_type="text/javascript")
+    return PlainTextResponse("footscan: there is no such file\n", 404)
+
+
+async def _not_there(_: Request, error: Exception) -> Response:
+    """Of results that are not there, or that were changed by hand."""
+    assert isinstance(error, FootscanError)
+    return PlainTextResponse(f"footscan: {error}\n", 404)

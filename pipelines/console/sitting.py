@@ -1,0 +1,75 @@
+"""The feet of the person who is here, and what became of each."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from footscan.report.quality_lights import Level, quality_lights, worst
+from pipelines.console.results import read_measures, read_quality
+from pipelines.console.scanner import Scanned
+from schemas.errors import RefusedInput
+
+
+@dataclass(frozen=True)
+class ScannedFoot:
+    """A scan of this sitting."""
+
+    scanned: Scanned
+    level: Level
+    length_mm: float | None = None
+
+    @property
+    def href(self) -> str | None:
+        """Address of its page; None where it was not measured."""
+        one = self.scanned
+        return None if one.problem else f"/foot/{one.patient}/{one.scan}"
+
+
+@dataclass(frozen=True)
+class Sitting:
+    """Who is here, and the scans in the order in which they were made."""
+
+    patient: str = ""
+    feet: tuple[ScannedFoot, ...] = ()
+
+    def begun(self, patient: str) -> "Sitting":
+        """The sitting of `patient`: this one, or a new one of somebody else."""
+        return self if patient == self.patient else Sitting(patient)
+
+    def added(self, foot: ScannedFoot) -> "Sitting":
+        """The sitting with one scan more."""
+        return replace(self, feet=(*self.feet, foot))
+
+    def pair_href(self) -> str | None:
+        """Address of the page of both feet: the last measured one of each side; None where one is missing."""
+        last = {foot.scanned.side: foot.scanned.scan for foot in self.feet if foot.href}
+        return f"/pair/{self.patient}/{last['left']}/{last['right']}" if len(last) == 2 else None
+
+    def as_json(self) -> dict[str, Any]:
+        """For the page."""
+        feet = [
+            {
+                "side": foot.scanned.side,
+                "scan": foot.scanned.scan,
+                "href": foot.href,
+                "problem": foot.scanned.problem,
+                "level": foot.level,
+                "length_mm": foot.length_mm,
+                "left_out": [f"camera {camera}: {why}" for camera, why in sorted(foot.scanned.left_out.items())],
+            }
+            for foot in self.feet
+        ]
+        return {"patient": self.patient, "feet": feet, "pair": self.pair_href()}
+
+
+def judged(scanned: Scanned, results: Path) -> ScannedFoot:
+    """A scan with the judgement of its results."""
+    if scanned.problem is not None:
+        return ScannedFoot(scanned, "poor")
+    try:
+        measures = read_measures(results, scanned.patient, scanned.scan)
+        quality = read_quality(results, scanned.patient, scanned.scan)
+    except RefusedInput as error:
+        return ScannedFoot(Scanned(scanned.patient, scanned.scan, scanned.side, str(error)), "poor")
+    length = measures.measures.get("foot_length")
+    return ScannedFoot(scanned, worst(quality_lights(measures, quality)), None if length is None else length.value)

@@ -1,0 +1,135 @@
+// The link between a page and the server: the state as it changes, orders, and the stop that is always there.
+"use strict";
+const footscan = (() => {
+  const NAMES = {disconnected: "Not connected", idle: "Ready", homing: "Homing", filming: "Filming", storing: "Storing",
+    reconstructing: "Reconstructing", done: "Done", failed: "Failed", "door open": "Door open", alarm: "Alarm"};
+  const LEVELS = {disconnected: "bad", idle: "ok", done: "ok", failed: "bad", alarm: "bad", "door open": "warning"};
+  const listeners = [];
+  let latest = null;
+
+  // The name by which the server knows this page; it lives as long as the tab does.
+  function pageName() {
+    let name = sessionStorage.getItem("page");
+    if (!name) {
+      name = [...crypto.getRandomValues(new Uint8Array(16))].map(byte => byte.toString(16).padStart(2, "0")).join("");
+      sessionStorage.setItem("page", name);
+    }
+    return name;
+  }
+
+  const page = pageName(), element = id => document.getElementById(id);
+
+  // Elements that are read aloud change only where there is something new to say.
+  function say(node, words) {
+    if (node.textContent !== words) node.textContent = words;
+  }
+
+  function told(words) {
+    say(element("told"), words);
+    element("told").hidden = !words;
+  }
+
+  // Gives an order; resolves to what is wrong, or to null.
+  async function act(name, body = {}) {
+    let problem = null;
+    try {
+      const answer = await fetch(`/do/${name}`, {method: "POST", body: JSON.stringify(body),
+        headers: {"X-Footscan-Page": page, "Content-Type": "application/json"}});
+      if (!answer.ok) problem = await problemOf(answer);
+    } catch {
+      problem = "The server does not answer. Where light is to end at once, use the scanner’s own switch.";
+    }
+    told(problem || "");
+    return problem;
+  }
+
+  async function problemOf(answer) {
+    const text = await answer.text();
+    try {
+      return JSON.parse(text).problem;
+    } catch {
+      return text.trim();
+    }
+  }
+
+  function show(seen) {
+    latest = seen;
+    const {name, words, progress} = seen.state;
+    element("state").dataset.level = LEVELS[name] || "busy";
+    say(element("state-name"), NAMES[name] || name);
+    say(element("state-words"), name === "done" ? "" : words);
+    element("count").textContent = name === "filming" ? countOf(seen.frames) : "";
+    element("progress").hidden = progress === null;
+    if (progress !== null) element("progress").value = progress;
+    element("others").hidden = seen.in_charge || !seen.others;
+    told(seen.problem && !words.includes(seen.problem) ? seen.problem : "");
+    for (const listener of listeners) listener(seen);
+  }
+
+  // Not read aloud: it changes every second.
+  function countOf(frames) {
+    const counts = Object.values(frames);
+    return `${counts.reduce((sum, count) => sum + count, 0).toLocaleString("en")} frames of ${counts.length} cameras`;
+  }
+
+  function lost() {
+    element("state").dataset.level = "bad";
+    say(element("state-name"), "No connection to the server");
+    say(element("state-words"), "Is “footscan console” still running? This page tries again by itself.");
+    element("progress").hidden = true;
+    element("count").textContent = "";
+  }
+
+  function stop() {
+    element("stop").classList.add("pressed");
+    setTimeout(() => element("stop").classList.remove("pressed"), 600);
+    return act("stop");
+  }
+
+  function follow() {
+    const events = new EventSource(`/events?page=${page}`);
+    events.onmessage = event => show(JSON.parse(event.data));
+    events.onerror = () => {
+      lost();
+      if (events.readyState === EventSource.CLOSED) setTimeout(follow, 2000);
+    };
+    addEventListener("pagehide", () => events.close());
+  }
+
+  addEventListener("pageshow", event => { if (event.persisted) location.reload(); });
+  element("stop").addEventListener("click", stop);
+  document.addEventListener("keydown", event => {
+    if (event.key !== "Escape" || event.repeat) return;
+    event.preventDefault();
+    stop();
+  }, true);
+  element("take-over").addEventListener("click", () => act("take-over"));
+  follow();
+
+  return {
+    act, say, element,
+    // Calls `listener` with each state, and with the one that is known.
+    listen(listener) {
+      listeners.push(listener);
+      if (latest) listener(latest);
+    },
+    // A button that stays where the focus is, but does nothing, while `why` is something.
+    allow(button, why) {
+      button.setAttribute("aria-disabled", String(Boolean(why)));
+      button.title = why || "";
+    },
+    // Has `order` called by a click on a button that is allowed.
+    press(button, order) {
+      button.addEventListener("click", event => {
+        event.preventDefault();
+        if (button.getAttribute("aria-disabled") !== "true") order();
+      });
+    },
+    // Why no order can be given; "" where one can.
+    hindrance(seen) {
+      if (!seen.in_charge && seen.others) return "Another page is in charge.";
+      if (seen.action !== null) return "The scanner is busy.";
+      return "";
+    },
+  };
+})();

@@ -1,0 +1,189 @@
+// The page that a scan is made from.
+"use strict";
+(() => {
+  const {act, allow, element, hindrance, listen, press, say} = footscan;
+  const SIDES = {right: "Right foot", left: "Left foot"};
+  const MARKS = {ok: "✓", warning: "!", bad: "✕", unknown: "?"};
+  const CLEAR_POINTS = 100;  // glints of the scanner itself give some
+  const PSEUDONYM = /^[A-Za-z0-9_-]{1,64}$/;
+  const patient = element("patient"), form = element("scan");
+  let seen = null, before = null, pictured = "", listed = "", fed = "";
+
+  const chosenSide = () => form.elements.side.value;
+
+  function made(tag, words = "", kind = "") {
+    const node = document.createElement(tag);
+    node.textContent = words;
+    if (kind) node.className = kind;
+    return node;
+  }
+
+  // Checked as typed: what is wrong is said at once, and what is missing only on the way to the start.
+  function patientProblem() {
+    const name = patient.value;
+    if (PSEUDONYM.test(name)) return "";
+    const wrong = [...new Set([...name].filter(letter => !/[A-Za-z0-9_-]/.test(letter)))];
+    if (wrong.length)
+      return `Only letters, digits, - and _ may be in it, no ${wrong.map(w => w === " " ? "space" : `“${w}”`).join(", ")}.`;
+    return name ? "At most 64 letters." : "";
+  }
+
+  function checkPatient() {
+    const problem = patientProblem();
+    patient.setAttribute("aria-invalid", String(Boolean(problem)));
+    say(element("patient-told"), problem || "1 to 64 letters, digits, - and _");
+    element("patient-told").classList.toggle("wrong", Boolean(problem));
+    showStart();
+  }
+
+  function showStart() {
+    if (!seen) return;
+    const why = hindrance(seen) || (seen.state.name === "disconnected" ? "Connect the scanner first." : "")
+      || (seen.state.name === "door open" ? "Close the door first." : "")
+      || (seen.state.name === "alarm" ? "Home the heads first." : "")
+      || (PSEUDONYM.test(patient.value) ? "" : patient.value ? "The pseudonym is not right yet." : "A pseudonym is missing.");
+    allow(element("start"), why);
+    say(element("start-told"), why);
+    say(element("start"), `Scan the ${chosenSide()} foot`);
+  }
+
+  async function start() {
+    if (element("start").getAttribute("aria-disabled") === "true") {
+      if (!PSEUDONYM.test(patient.value)) patient.focus();
+      return;
+    }
+    await act("scan", {patient: patient.value, side: chosenSide(), keep_partial: element("keep").checked});
+  }
+
+  function showSitting({patient: name, feet, pair}) {
+    const now = JSON.stringify([name, feet, pair]);
+    if (now === fed) return;
+    const first = fed === "";
+    fed = now;
+    if (name && (first || !patient.value)) patient.value = name;
+    say(element("who"), name || "Nobody yet.");
+    element("feet").replaceChildren(...feet.map(foot => {
+      const item = made("li"), length = foot.length_mm === null ? "" : `${foot.length_mm.toFixed(1)} mm`;
+      item.append(foot.href ? Object.assign(made("a", SIDES[foot.side]), {href: foot.href}) : made("b", SIDES[foot.side]));
+      item.append(" ", made("span", foot.problem ? "not measured" : foot.level, `light ${foot.level}`), " ", length);
+      for (const words of [foot.problem, ...foot.left_out]) if (words) item.append(made("p", words, "note"));
+      return item;
+    }));
+    const last = feet.at(-1);
+    if (last && last.href && feet.every(foot => !foot.href || foot.side === last.side))
+      form.elements.side.value = last.side === "right" ? "left" : "right";
+    element("pair").hidden = !pair;
+    if (pair) element("pair").href = pair;
+    element("new-person").hidden = !name;
+    checkPatient();
+  }
+
+  function showDevices(devices) {
+    const now = JSON.stringify(devices);
+    if (now === listed) return;
+    listed = now;
+    element("device-list").replaceChildren(...devices.map(device => {
+      const item = made("li"), mark = made("i", MARKS[device.level]), words = made("div");
+      item.dataset.level = device.level;
+      mark.setAttribute("role", "img");
+      mark.setAttribute("aria-label", device.level);
+      words.append(made("b", device.name), " ", made("span", device.words));
+      if (device.remedy) words.append(made("p", device.remedy, "note"));
+      item.append(mark, words);
+      return item;
+    }));
+    const worst = ["bad", "warning", "unknown", "ok"].find(level => devices.some(device => device.level === level));
+    element("devices").dataset.level = worst || "unknown";
+  }
+
+  function showCameras({cameras, devices, frames, state}) {
+    if (pictured !== String(cameras)) {
+      pictured = String(cameras);
+      element("pictures").replaceChildren(...cameras.map(camera => {
+        const figure = made("figure"), caption = made("figcaption"), picture = made("img");
+        figure.id = `camera-${camera}`;
+        picture.alt = "";
+        picture.hidden = true;
+        caption.append(made("b", `Camera ${camera}`), " ", made("span", "no picture yet"));
+        figure.append(picture, made("div", "no picture", "dark"), caption);
+        return figure;
+      }));
+    }
+    for (const camera of cameras) {
+      const figure = element(`camera-${camera}`);
+      const device = devices.find(one => one.name === `Camera ${camera}`);
+      figure.dataset.level = device ? device.level : "unknown";
+      if (state.name === "filming") say(figure.querySelector("span"), `${frames[camera] ?? 0} frames`);
+    }
+  }
+
+  // One picture after another, so that a slow line carries no more than it can; rarely while there is filming to do.
+  async function lookOn() {
+    for (let turn = 0; ; turn++) {
+      const cameras = seen ? seen.cameras : [], filming = seen && seen.state.name === "filming";
+      await new Promise(done => setTimeout(done, !cameras.length || document.hidden ? 1000 : filming ? 500 : 120));
+      if (cameras.length && !document.hidden) await look(cameras[turn % cameras.length]);
+    }
+  }
+
+  async function look(camera) {
+    const figure = element(`camera-${camera}`);
+    if (!figure) return;
+    const picture = figure.querySelector("img"), said = figure.querySelector("span");
+    try {
+      const answer = await fetch(`/cameras/${camera}.jpg`), is = answer.status === 200;
+      const old = picture.src;
+      if (is) picture.src = URL.createObjectURL(await answer.blob());
+      if (old) URL.revokeObjectURL(old);
+      if (!is) picture.removeAttribute("src");
+      picture.hidden = !is;
+      figure.querySelector(".dark").hidden = is;
+      const points = Number(answer.headers.get("X-Stripe-Points") || 0);
+      picture.alt = is ? `Camera ${camera} now, ${points < CLEAR_POINTS ? "no clear stripe in it" : "with the stripe found"}` : "";
+      if (seen.state.name !== "filming")
+        say(said, is ? (points < CLEAR_POINTS ? "no clear stripe" : `stripe: ${points} points`) : "no picture");
+    } catch {
+      picture.hidden = true;
+      figure.querySelector(".dark").hidden = false;
+    }
+  }
+
+  // Of the page in charge, which saw the scan end.
+  function goToResult(now) {
+    const ended = before && before.action === "scan" && now.action === null && !now.problem;
+    const last = now.sitting.feet.at(-1);
+    if (ended && now.in_charge && last && last.href)
+      location.assign(last.href);
+  }
+
+  listen(now => {
+    seen = now;
+    say(element("do-words"), now.do);
+    element("do").hidden = !now.do;
+    showSitting(now.sitting);
+    showDevices(now.devices);
+    showCameras(now);
+    const why = hindrance(now), there = now.state.name === "disconnected" ? "Connect the scanner first." : "";
+    for (const id of ["connect", "new-person"]) allow(element(id), why);
+    for (const button of [element("home"), element("shine"), ...document.querySelectorAll("[data-jog]")])
+      allow(button, why || there);
+    element("resume").hidden = !(now.resumable && now.action === "scan");
+    showStart();
+    goToResult(now);
+    before = now;
+  });
+
+  patient.addEventListener("input", checkPatient);
+  form.addEventListener("change", showStart);
+  form.addEventListener("submit", event => { event.preventDefault(); start(); });
+  for (const id of ["connect", "home", "shine", "resume"]) press(element(id), () => act(id));
+  for (const button of document.querySelectorAll("[data-jog]"))
+    press(button, () => act("jog", {mm: Number(button.dataset.jog), head: Number(element("jog-head").value) || null}));
+  press(element("new-person"), async () => {
+    if (await act("new-person")) return;
+    patient.value = "";
+    fed = "";
+    patient.focus();
+  });
+  lookOn();
+})();

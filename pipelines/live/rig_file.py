@@ -1,0 +1,26 @@
+"""rig.yaml, read and written."""
+
+from pathlib import Path
+
+import yaml
+
+from pipelines.engine.atomic import write_atomically
+from schemas.documents import read_yaml
+from schemas.rig import Rig
+
+
+def read_rig(path: Path) -> Rig:
+    """The scanner that `path` describes; its calibration is relative to it. RefusedInput where it breaks its format."""
+    rig = read_yaml(path, Rig)
+    if rig.calibration is None:
+        return rig
+    return rig.model_copy(update={"calibration": str(path.resolve().parent / rig.calibration)})
+
+
+def write_rig(path: Path, rig: Rig) -> None:
+    """Writes a rig, its calibration relative to it where that is below."""
+    document = rig.model_dump(mode="json", exclude_none=True)
+    if rig.calibration is not None and Path(rig.calibration).is_relative_to(path.resolve().parent):
+        document["calibration"] = Path(rig.calibration).relative_to(path.resolve().parent).as_posix()
+    text = yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120)
+    write_atomically(path, text.encode())

@@ -1,0 +1,327 @@
+"""The live scanner: one object that a command, a page or a test drives, from connecting to a measured foot."""
+
+import datetime
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from footscan.capture.camera_deck import CameraDeck
+from footscan.capture.camera_stream import CapturedFrame
+from footscan.capture.heads import Heads
+from footscan.capture.passes import FilmedPass, PassPlan, film_name, film_pass
+from footscan.capture.recording import ScanRecording
+from footscan.capture.usb_bus import Pass
+from pipelines.live.devices import heads_of, passes_of, sources_of, timing_of
+from pipelines.live.light import ScanLight, fix_light, measured_light
+from pipelines.live.measuring import Measured, measure_scan
+from pipelines.live.state import OnState, ScannerState, StateBoard, with_board
+from pipelines.live.storing import FilmedScan, ScanName, ScanStory, store_scan
+from schemas.errors import Fault, FootscanError, RefusedInput
+from schemas.rig import Rig
+
+FRAME_BYTES = 40_000
+"""Of a picture, before any has come."""
+WATCH_SECONDS = 0.1
+UNDER_WAY = ("moving", "jogging", "homing", "held", "door")
+"""States of the board that a stop ends."""
+STOPPED = "stopped; nothing of this scan is kept"
+
+
+@dataclass(frozen=True)
+class ScanOrder:
+    """What is to be scanned, and where it goes."""
+
+    name: ScanName
+    archive: Path
+    results: Path | None = None
+    """None: the scan is stored, and not measured."""
+    calibration: Path | None = None
+    """The one of the rig where absent."""
+    light: ScanLight | None = None
+    """None: chosen by what the cameras see."""
+    texture: bool = False
+    """Whether the way back is filmed in the dark: laser-off frames all along the foot, for the colours of its skin."""
+    keep_partial: bool = False
+    """Whether a scan is stored in spite of cameras whose films are not whole; they are left out."""
+
+
+@dataclass(frozen=True)
+class LiveResult:
+    """What a scan came to."""
+
+    stored: FilmedScan
+    measured: Measured | None
+
+
+class LiveScanner:
+    """The scanner that a rig describes. A context manager: its end leaves lasers off and nothing half done."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        self._board = StateBoard()
+        self._heads: Heads | None = None
+        self._deck = CameraDeck(sources_of(rig))
+        self._stopped = threading.Event()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def state(self) -> ScannerState:
+        """What is true now; of any thread."""
+        heads = self._heads
+        return with_board(self._board.state, None if heads is None else heads.state)
+
+    def listen(self, listener: OnState) -> Callable[[], None]:
+        """Has `listener` called with each new state, in the thread that works; returns what ends that."""
+        return self._board.listen(listener)
+
+    @property
+    def deck(self) -> CameraDeck:
+        """The cameras: their health, and live pictures."""
+        return self._deck
+
+    @property
+    def heads(self) -> Heads:
+        """The heads; Fault where the scanner is not connected."""
+        if self._heads is None:
+            raise Fault("the scanner is not connected")
+        return self._heads
+
+    def connect(self, *, cameras: bool = True) -> dict[int, str]:
+        """Opens the board, and the cameras of the first pass.
+
+        Returns
+        -------
+        problems : of cameras that give no pictures.
+        """
+        with self._board.at_work("disconnected", "connecting"):
+            self._connect_board()
+            problems = self._open_first() if cameras else {}
+            self._board.tell("idle")
+            return problems
+
+    def home(self) -> None:
+        """Homes the heads and aligns them."""
+        with self._board.at_work("homing"):
+            self._connect_board()
+            self.heads.home()
+            self._board.tell("idle")
+
+    def jog(self, by_mm: float, mm_per_s: float, head: int | None = None) -> tuple[float, float, float]:
+        """Moves all heads, or one, in the dark, and waits until they stand; where they stand then."""
+        with self._board.at_work("idle", "moving"):
+            self._connect_board()
+            heads = self.heads
+            heads.jog(by_mm, mm_per_s, head)
+            limit = time.monotonic() + 2.0 * abs(by_mm) / mm_per_s + 5.0
+            x_mm = heads.position_mm()  # asked anew, so that the state is that after the order
+            while heads.state.name == "jogging" and time.monotonic() < limit:
+                time.sleep(WATCH_SECONDS)
+                x_mm = heads.position_mm()
+            self._board.tell("idle")
+            return x_mm
+
+    def stop(self) -> None:
+        """Ends what is under way; lasers are off afterwards, and nothing of a scan that was being filmed is kept.
+
+        Where nothing moves or shines, nothing happens.
+        """
+        self._stopped.set()
+        heads = self._heads
+        if heads is not None and heads.state.name in UNDER_WAY:
+            heads.stop()
+
+    def scan(self, order: ScanOrder) -> LiveResult:
+        """Films, stores, reconstructs and measures.
+
+        Raises
+        ------
+        RefusedInput
+            The rig lacks what a scan needs, the scan is there already, or the scanner is busy.
+        Finding
+            The films are not whole, and `keep_partial` was not asked for. Nothing is stored.
+        Fault
+            A device or the disk failed. Nothing is stored.
+        """
+        self._stopped.clear()
+        with self._board.at_work("filming"):
+            calibration = self._calibration(order)
+            stored = self.film(order)
+            measured = None
+            if order.results is not None and calibration is not None:
+                self._board.tell("reconstructing", progress=0.0)
+                measured = measure_scan(stored.place, calibration, order.results, self._board.progress)
+            if measured is not None and measured.problem is not None:
+                self._board.tell("failed", measured.problem)
+            else:
+                self._board.tell("done", str(stored.place))
+            return LiveResult(stored, measured)
+
+    def film(self, order: ScanOrder) -> FilmedScan:
+        """The part of `scan` that needs the devices, for who is at work already."""
+        for camera in self.rig.cameras:
+            timing_of(camera)
+        self._connect_board()
+        self._home_if_needed()
+        passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])
+        travel = self.rig.travel
+        light = order.light or self._measured_light(passes)
+        plan = PassPlan(travel.start_mm, travel.end_mm, travel.mm_per_s, light.power, order.texture)
+        story = ScanStory(datetime.datetime.now().astimezone(), light, passes, plan)
+        place = order.archive / order.name.patient / order.name.scan
+        with ScanRecording(place, self._expected_bytes(plan)) as recording:
+            for number, one in enumerate(passes, start=1):
+                self._refuse_stopped()
+                words = f"pass {number} of {len(passes)}" if len(passes) > 1 else ""
+                filmed = self.film_one_pass(one, plan, light, recording, words, story)
+                story.filmed.append(filmed)
+            self._board.tell("storing")
+            recording.settle()
+            return store_scan(self.rig, order.name, story, self.heads, recording, order.keep_partial)
+
+    @contextmanager
+    def ready_to_film(self) -> Iterator[None]:
+        """Connected and homed, and nobody else at work, for who films passes of his own."""
+        self._stopped.clear()
+        with self._board.at_work("filming"):
+            self._connect_board()
+            self._home_if_needed()
+            yield
+            self._board.tell("idle")
+
+    def film_one_pass(
+        self,
+        one: Pass,
+        plan: PassPlan,
+        light: ScanLight,
+        recording: ScanRecording,
+        words: str = "",
+        story: ScanStory | None = None,
+    ) -> FilmedPass:
+        """Opens the cameras of a pass and films it into a recording."""
+        self._board.tell("filming", words, 0.0)
+        problems = self._deck.open_only(one.cameras)
+        if problems:
+            raise Fault("; ".join(problems.values()))
+        fixed = fix_light(self.rig, self._deck, light.exposure_ms)
+        if story is not None:
+            story.fixed |= fixed
+        for camera in one.cameras:
+            recording.open_film(film_name(camera))
+            recording.open_film(film_name(camera, background=True))
+
+        def take(name: str, frame: CapturedFrame) -> None:
+            recording.take(name, frame.arrival, frame.jpeg)
+
+        with self._watched(plan, recording):
+            return film_pass(self.heads, self._deck, one.cameras, plan, take, recording.check)
+
+    def shine(self, power: float, seconds: float) -> None:
+        """Lights the heads where they stand for a moment, so that live pictures show the stripe."""
+        with self._board.at_work("idle", "lasers on"):
+            self._connect_board()
+            self._home_if_needed()
+            self.heads.shine(power, seconds)
+            self._board.tell("idle")
+
+    def close(self) -> None:
+        """Lets all devices go, with the lasers off."""
+        with ExitStack() as stack:
+            stack.callback(self._board.tell, "disconnected")
+            stack.callback(self._deck.close)
+            if self._heads is not None:
+                stack.callback(self._heads.close)
+            self._heads = None
+
+    def _refuse_stopped(self) -> None:
+        if self._stopped.is_set():
+            raise Fault(STOPPED)
+
+    def _connect_board(self) -> None:
+        if self._heads is not None and self._heads.state.name in {"lost", "closed"}:
+            self._heads.close()
+            self._heads = None
+        if self._heads is None:
+            self._heads = Heads(self.rig.port, heads=heads_of(self.rig))
+
+    def _home_if_needed(self) -> None:
+        if not self.heads.board.homed:
+            self._board.tell("homing")
+            self.heads.home()
+
+    def _open_first(self) -> dict[int, str]:
+        passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])
+        return self._deck.open_only(passes[0].cameras)
+
+    def _measured_light(self, passes: Sequence[Pass]) -> ScanLight:
+        """The light for all passes, by those cameras that film together at least."""
+        exposures: dict[int, float] = {}
+        reasons: dict[int, str] = {}
+        powers, looks = [], 0
+        for one in passes:
+            self._board.tell("filming", "looking at the light")
+            self._deck.open_only(one.cameras)
+            light = measured_light(self.rig, self._deck, self.heads)
+            exposures |= light.exposure_ms
+            reasons |= light.reasons
+            powers.append(light.power)
+            looks += light.looks
+        weakest = min(powers)
+        for one, power in zip(passes, powers, strict=True):  # one power for all: what is lit less is exposed longer
+            for camera in one.cameras:
+                exposures[camera] = min(exposures[camera] * power / weakest, self.rig.light.longest_ms)
+        return ScanLight(weakest, exposures, reasons, looks, is_measured=True)
+
+    def _calibration(self, order: ScanOrder) -> Path | None:
+        if order.calibration is not None:
+            return order.calibration
+        if self.rig.calibration is not None:
+            return Path(self.rig.calibration)
+        if order.results is not None:
+            raise RefusedInput("rig", "names none, expected the scanner's calibration file", field="calibration")
+        return None
+
+    def _expected_bytes(self, plan: PassPlan) -> int:
+        seconds = abs(plan.end_mm - plan.start_mm) / plan.mm_per_s * (2 if plan.dark_return else 1)
+        return round(len(self.rig.cameras) * seconds * self.rig.frames_per_second * FRAME_BYTES)
+
+    @contextmanager
+    def _watched(self, plan: PassPlan, recording: ScanRecording) -> Iterator[None]:
+        """Tells how far the heads are, and ends the pass where the disk fails, or it is told to stop."""
+        ended = threading.Event()
+        heads = self.heads
+
+        def watch() -> None:
+            while not ended.wait(WATCH_SECONDS):
+                try:
+                    recording.check()
+                except Fault:
+                    heads.stop()
+                    return
+                for latest in heads.log.between(time.monotonic() - 1.0, math.inf)[-1:]:
+                    self._board.progress((latest.x_mm[0] - plan.start_mm) / (plan.end_mm - plan.start_mm))
+
+        thread = threading.Thread(target=watch, name="watch over the pass", daemon=True)
+        thread.start()
+        try:
+            yield
+        except FootscanError:
+            recording.check()  # the disk's failure, which ended the pass, says more
+            if self._stopped.is_set():
+                raise Fault(STOPPED) from None
+            raise
+        finally:
+            ended.set()
+            thread.join()

@@ -1,0 +1,111 @@
+"""What the live scanner does now, for all who want to know: a command, a page, a test."""
+
+import logging
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from footscan.capture.board_state import BoardState
+from schemas.errors import FootscanError, RefusedInput
+
+log = logging.getLogger("footscan.live")
+
+Activity = Literal["disconnected", "idle", "homing", "filming", "storing", "reconstructing", "done", "failed"]
+StateName = Activity | Literal["door open", "alarm"]
+
+
+@dataclass(frozen=True)
+class ScannerState:
+    """One state."""
+
+    name: StateName
+    words: str = ""
+    """What is done, or why it failed."""
+    progress: float | None = None
+    """Share that is done, 0 to 1; None where it is not known."""
+
+    def __str__(self) -> str:
+        share = "" if self.progress is None else f" {100 * self.progress:.0f} %"
+        return self.name + share + (f": {self.words}" if self.words else "")
+
+
+OnState = Callable[[ScannerState], None]
+
+
+class StateBoard:
+    """Holds the state; any thread may read it, and listeners hear of each change, in the thread that makes it."""
+
+    def __init__(self) -> None:
+        self._state = ScannerState("disconnected")
+        self._listeners: list[OnState] = []
+        self._lock = threading.Lock()
+        self._working = threading.Lock()
+
+    @property
+    def state(self) -> ScannerState:
+        """What was told last."""
+        return self._state
+
+    def listen(self, listener: OnState) -> Callable[[], None]:
+        """Has `listener` called with each new state; returns what ends that."""
+        with self._lock:
+            self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener)
+
+    def tell(self, name: Activity, words: str = "", progress: float | None = None) -> None:
+        """A new state."""
+        with self._lock:
+            self._state = state = ScannerState(name, words, progress)
+            listeners = list(self._listeners)
+        for listener in listeners:
+            listener(state)
+
+    def progress(self, share: float) -> None:
+        """How far the present activity is."""
+        with self._lock:
+            self._state = state = replace(self._state, progress=min(max(share, 0.0), 1.0))
+            listeners = list(self._listeners)
+        for listener in listeners:
+            listener(state)
+
+    @contextmanager
+    def at_work(self, first: Activity, words: str = "") -> Iterator[None]:
+        """One thing at a time; a failure becomes the state, and goes on to the caller.
+
+        Raises
+        ------
+        RefusedInput
+            The scanner does something else.
+        """
+        if not self._working.acquire(blocking=False):
+            raise RefusedInput("scanner", f"is {self._state.name}, expected it to be idle")
+        try:
+            self.tell(first, words)
+            yield
+        except FootscanError as error:
+            self.tell("failed", str(error))
+            raise
+        except KeyboardInterrupt:
+            self.tell("failed", "interrupted")
+            raise
+        except BaseException as error:
+            self.tell("failed", f"{type(error).__name__}: {error}")
+            raise
+        finally:
+            self._working.release()
+
+
+def with_board(state: ScannerState, board: BoardState | None) -> ScannerState:
+    """The state, unless the board says that something else matters more: the lid, an alarm, a lost connection."""
+    if board is None:
+        return state
+    match board.name:
+        case "door":
+            return ScannerState("door open", str(board), state.progress)
+        case "alarm":
+            return ScannerState("alarm", str(board))
+        case "lost" | "closed":
+            return ScannerState("disconnected", str(board))
+    return state

@@ -1,0 +1,37 @@
+"""The parametric foot of a suite, filmed by the virtual scanner; the result tells what the foot is and was filmed."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from footscan.virtual.foot import make_foot
+from footscan.virtual.record import record_scan
+from pipelines.engine.digest import sha256
+from pipelines.virtual_objects import stand_in_the_middle
+from schemas.parameters.virtual_scan import VirtualScan
+
+PATIENT = "virtual"
+
+
+def run(inputs: Mapping[str, bytes], parameters: VirtualScan, places: Mapping[str, Path]) -> bytes:
+    """`places`: the `folder` of the scan, which bears its name.
+
+    The result has the foot's `known` measures in mm by name, and the digests of the `films`.
+    """
+    del inputs
+    folder, settings = places["folder"], parameters.settings
+    foot = make_foot(side=parameters.side)
+    record_scan(
+        stand_in_the_middle(foot.vertices, settings),
+        foot.faces.astype(np.int64),
+        folder,
+        patient=PATIENT,
+        scan=folder.name,
+        side=parameters.side,
+        settings=settings,
+        laser_off=parameters.laser_off,
+    )
+    films = {film.name: sha256(film.read_bytes()) for film in sorted(folder.glob("*.avi"))}
+    return (json.dumps({"known": foot.measures, "films": films}, indent=2, sort_keys=True) + "\n").encode()

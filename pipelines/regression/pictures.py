@@ -1,0 +1,62 @@
+"""How far last night's shape lies from the accepted one, as far as the store still has both."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.cloud.points import coordinates
+from footscan.report.deviation import deviation_of, deviation_pictures
+from footscan.surface.export import Shape
+from footscan.verify.compare import vertex_distances
+from footscan.verify.regions import foot_regions
+from pipelines.arrays import unpack
+from pipelines.engine.store import Store
+from schemas.errors import FootscanError
+from schemas.regression import AcceptedStep
+
+SHAPES = ("surface", "orient")
+"""The steps whose results are shapes: a mesh, and the cloud that it is made of, which stands in for it."""
+
+
+def difference_pictures(
+    accepted: Sequence[AcceptedStep], present: Mapping[str, str], store: Store
+) -> tuple[dict[str, bytes], str | None]:
+    """PNG pictures by caption of the first shape that differs, and a note where there should be some and are none.
+
+    Parameters
+    ----------
+    present : results of the steps by name, as in `AcceptedStep`
+    """
+    was = {step.step: step.result for step in accepted}
+    differing = [name for name in SHAPES if name in was and name in present and was[name] != present[name]]
+    for name in differing:
+        before, now = _shape(store, was[name]), _shape(store, present[name])
+        if before is None or now is None:
+            continue
+        try:
+            return _pictures(before, now), None
+        except FootscanError as error:
+            return {}, f"{name}: no pictures, {error}"
+    note = "No pictures: the store does not have the accepted shape any more." if differing else None
+    return {}, note
+
+
+def _pictures(before: Shape, now: Shape) -> dict[str, bytes]:
+    distances = vertex_distances(now, before)
+    deviation = deviation_of(now, distances, foot_regions(before) or foot_regions(now))
+    what = "surface" if len(now[1]) else "cloud"
+    largest = float(np.max(np.abs(deviation.distance), initial=0.0))
+    said = f"{what}: distance to the accepted one, at most {largest:.3f} mm"
+    return {f"{said}; from {file.removesuffix('.png')}": png for file, png in deviation_pictures(deviation).items()}
+
+
+def _shape(store: Store, digest: str) -> Shape | None:
+    """The mesh or cloud that a result is; None where it is not there."""
+    if len(digest) != 64 or (data := store.get(digest)) is None:
+        return None
+    arrays = unpack(data)
+    if "faces" in arrays:
+        return arrays["vertices"], arrays["faces"]
+    points: NDArray[np.float64] = coordinates(arrays["cloud"])
+    return points, np.empty((0, 3), np.int64)

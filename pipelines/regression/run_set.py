@@ -1,0 +1,83 @@
+"""A data set through the engine's cache, and through an empty one for its time."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from pipelines.archive import Job, PlannedJob, ScanEnd, draw_steps, plan_job, run_job
+from pipelines.engine.plan import make_plan
+from pipelines.engine.pool import OnStepEnd, Threads
+from pipelines.engine.step import Outcome, Step, Success
+from pipelines.engine.store import Store
+from pipelines.recorded import read_scan
+from pipelines.regression.costs import cost_figures, unsteady
+from pipelines.regression.figures import result_figures
+from pipelines.regression.first_step import PresentStep, present_steps
+from pipelines.regression.sets import PreparedSet
+from pipelines.regression.timed import Pass, take_times
+
+
+@dataclass(frozen=True)
+class SetRun:
+    """What a data set came to."""
+
+    problem: str | None = None
+    """Why it was not run to its end."""
+    is_fault: bool = False
+    figures: Mapping[str, float | None] = field(default_factory=dict)
+    known: Mapping[str, float] = field(default_factory=dict)
+    """True measures of the foot by name."""
+    steps: Sequence[PresentStep] = ()
+    timed: Sequence[Sequence[Pass]] = ()
+    """The passes of each process that was timed."""
+    job: Job | None = None
+    store: Store | None = None
+
+
+def run_set(prepared: PreparedSet, passes: int, on_step_end: OnStepEnd) -> SetRun:
+    """Run a prepared set, then `passes` times with an empty cache.
+
+    Raises
+    ------
+    Fault
+        The process that is timed died.
+    """
+    job = prepared.job
+    planned = plan_job(job)
+    [end] = run_job(planned, Threads(job.threads), on_step_end)
+    if planned.refused:
+        return SetRun(problem=end.problem, known=prepared.known)
+    again = plan_job(job)
+    steps, outcomes = _outcomes(prepared, again)
+    if again.store.memory is not None:
+        again.store.memory.close()
+    store = Store(again.store.files)  # what follows reads a few results once
+    present = present_steps(steps, outcomes)
+    figures = _figures(end, steps, outcomes, store)
+    figures |= {"steps.all": len(steps), "steps.run_again": again.to_run}
+    timed = [take_times(job, passes)] if passes and end.problem is None else []
+    if timed:
+        results = {step.name: step.result for step in present}
+        figures |= {"steps.unsteady": len(unsteady(timed, results)), **cost_figures(timed)}
+    is_fault = end.kind in {"fault", "damaged"}
+    return SetRun(end.problem, is_fault, figures, prepared.known, present, timed, job, store)
+
+
+def _outcomes(prepared: PreparedSet, planned: PlannedJob) -> tuple[list[Step], dict[str, Outcome]]:
+    """All steps of a set that has been run, those that filmed it first, and what they came to."""
+    [folder] = prepared.job.folders
+    steps = draw_steps(read_scan(folder, prepared.job.archive_of(folder)), planned)
+    plan = make_plan(steps, planned.store)
+    outcomes = dict(prepared.outcomes) | {p.step.name: p.outcome for p in plan.steps if p.outcome is not None}
+    return [step for step in [*prepared.filming, *steps] if step.name in outcomes], outcomes
+
+
+def _figures(
+    end: ScanEnd, steps: Sequence[Step], outcomes: Mapping[str, Outcome], store: Store
+) -> dict[str, float | None]:
+    """The figures of the documents that there are."""
+    documents: dict[str, bytes] = {}
+    for step in steps:
+        outcome = outcomes[step.name]
+        if step.kind in {"quality", "measure", "texture"} and isinstance(outcome, Success):
+            documents[step.kind] = store.get(outcome.digest) or b""
+    return result_figures(documents) if {"quality", "measure"} <= documents.keys() and end.folder else {}

@@ -1,0 +1,117 @@
+"""The data sets of a suite as jobs of the engine; virtual ones are filmed and calibrated first."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pipelines.archive import Job, cores
+from pipelines.calibration_choice import CalibrationPlace
+from pipelines.deliver import deliver
+from pipelines.engine.digest import FileDigests, sha256
+from pipelines.engine.plan import make_plan
+from pipelines.engine.pool import OnStepEnd, Threads
+from pipelines.engine.run import run_plan
+from pipelines.engine.step import Outcome, Step
+from pipelines.engine.store import Store, open_store
+from pipelines.filming import calibration_steps, digests_of
+from pipelines.recorded import SCAN_FILE
+from pipelines.regression.film import PATIENT
+from schemas.documents import canonical_json, validate
+from schemas.errors import Fault, RefusedInput
+from schemas.parameters.simulation import SimulationSettings
+from schemas.parameters.virtual_scan import VirtualScan
+from schemas.regression import Suite
+from schemas.workflow import ScanParameters
+
+OF_A_RECORDING = SimulationSettings().model_dump(include={"seed", "start_mm", "step_mm", "frames", "ambient"})
+"""What differs from recording to recording: a scanner is calibrated once, in ordinary light."""
+
+
+@dataclass(frozen=True)
+class PreparedSet:
+    """A data set that can be run."""
+
+    name: str
+    job: Job
+    known: Mapping[str, float] = field(default_factory=dict)
+    """True measures of the foot by name, as far as they are known."""
+    filming: Sequence[Step] = ()
+    """The steps that filmed it."""
+    outcomes: Mapping[str, Outcome] = field(default_factory=dict)
+    """Theirs, by name."""
+
+
+def prepare(name: str, suite: Suite, base: Path, out: Path, on_step_end: OnStepEnd) -> PreparedSet:
+    """The data set `name` of a suite.
+
+    Parameters
+    ----------
+    base : folder that the suite's paths are relative to
+    out : folder of films, cache and results
+
+    Raises
+    ------
+    Fault
+        It could not be filmed.
+    """
+    data_set = suite.sets[name]
+    parameters = parameters_of(name, suite)
+    if data_set.virtual is not None:
+        return _virtual(name, data_set.virtual, parameters, out, on_step_end)
+    assert data_set.scan is not None, "the suite was checked for it"
+    calibration = None if data_set.calibration is None else base / data_set.calibration
+    return PreparedSet(name, _job(name, base / data_set.scan, calibration, parameters, out))
+
+
+def parameters_of(name: str, suite: Suite) -> ScanParameters:
+    """Those of the suite with the set's own in their place; RefusedInput where they break a model."""
+    values: dict[str, Any] = suite.parameters.model_dump(mode="json")
+    for section, changed in suite.sets[name].parameters.items():
+        values[section] = {**values.get(section, {}), **changed}
+    try:
+        return validate("parameters", ScanParameters, values)
+    except RefusedInput as error:
+        raise RefusedInput(f"sets.{name}.parameters", error.problem, field=error.field) from None
+
+
+def store_of(out: Path) -> Store:
+    """Where all sets of a suite keep what was computed."""
+    return open_store(out / "cache")
+
+
+def _virtual(
+    name: str, virtual: VirtualScan, parameters: ScanParameters, out: Path, on_step_end: OnStepEnd
+) -> PreparedSet:
+    films = out / "films"
+    scan = films / PATIENT / name
+    once = virtual.settings.model_copy(update=OF_A_RECORDING)
+    capture = films / "captures" / sha256(canonical_json(once.model_dump(mode="json")).encode())[:12]
+    film = Step(
+        name, "film", "pipelines.regression.film", virtual, places={"folder": scan}, writes=scan / SCAN_FILE
+    )  # fmt: skip
+    filming = [film, *calibration_steps(name, capture, once)]
+    store = store_of(out)
+    outcomes = run_plan(make_plan(filming, store), store, pool=Threads(1), on_step_end=on_step_end)
+    digests = digests_of(filming, outcomes)
+    calibration = films / "calibrations" / name / "calibration.json"
+    files = FileDigests.load(out / "cache" / "files.json")
+    if problem := deliver({calibration.name: digests["calibrate"]}, store, files, calibration.parent):
+        raise Fault(problem)
+    filmed = json.loads(store.get(digests["film"]) or b"{}")
+    job = _job(name, scan, calibration, parameters, out)
+    return PreparedSet(name, job, filmed.get("known", {}), filming, outcomes)
+
+
+def _job(name: str, folder: Path, calibration: Path | None, parameters: ScanParameters, out: Path) -> Job:
+    return Job(
+        folders=[folder],
+        archives=(),
+        calibrations=() if calibration is None else (CalibrationPlace(calibration),),
+        calibration_wins=True,
+        results=out / "results" / name,
+        cache=out / "cache",
+        parameters=parameters,
+        threads=cores(),
+    )

@@ -1,0 +1,155 @@
+"""Scans under other parameters: the steps that lead to their figures, through the engine's cache."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from pipelines.archive import WINDOW, PlannedJob, draw_steps
+from pipelines.engine.plan import make_plan
+from pipelines.engine.pool import OnStepEnd, Pool, StepEnd
+from pipelines.engine.run import run_plan
+from pipelines.engine.step import Failure, Outcome, Output, Step, Success
+from pipelines.recorded import RecordedScan
+from pipelines.scan import source_files
+from pipelines.tuning.clock import Clock
+from pipelines.tuning.objectives import Judged, figures_of, lengths_of
+from schemas.errors import Fault, RefusedInput
+from schemas.measures import Measures
+from schemas.quality import Quality
+from schemas.workflow import ScanParameters
+
+OWN = "tune/"
+"""Before the names of the steps: what a trial runs does not become the last that was run of a scan."""
+OF_TRUTH = {"completeness", "false_points"}
+"""Objectives that the step `judge` is for."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Where sets of parameters are tried."""
+
+    planned: PlannedJob
+    pool: Pool
+    on_step_end: OnStepEnd
+    goals: frozenset[str]
+    """Names of the objectives: nothing runs that none of them asks for."""
+    clock: Clock
+
+    def judge(
+        self, parameters: ScanParameters, scans: Sequence[RecordedScan]
+    ) -> tuple[dict[str, Judged], dict[str, float]]:
+        """What becomes of scans with these parameters.
+
+        Returns
+        -------
+        judged : dict
+            Figures, or the problem, of each scan by its name.
+        seconds : dict
+            How long the steps took that were run for it, by the key of their action.
+
+        Raises
+        ------
+        Fault
+            Nothing came out of any scan, by a fault of the machine.
+        """
+        judged: dict[str, Judged] = {}
+        seconds: dict[str, float] = {}
+        at_once = WINDOW * self.pool.count
+        for first in range(0, len(scans), at_once):
+            some, noted = self._judge_together(parameters, scans[first : first + at_once])
+            judged |= some
+            seconds |= noted
+        faults = [one.problem for one in judged.values() if one.kind == "fault"]
+        if faults and len(faults) == len(judged):
+            raise Fault(str(faults[0]))
+        return judged, seconds
+
+    def results(self, parameters: ScanParameters, scan: RecordedScan) -> dict[str, bytes]:
+        """What the steps of a scan come to, as far as the filter of outliers, by kind and camera (`extract-1`); what
+        has failed is left out."""
+        steps = self._steps(parameters, scan, {"clean"})
+        outcomes = self._run(steps)
+        read = {step.name.rpartition("/")[2]: self._read(step.name, outcomes) for step in steps}
+        return {name: result for name, result in read.items() if result is not None}
+
+    def _judge_together(
+        self, parameters: ScanParameters, scans: Sequence[RecordedScan]
+    ) -> tuple[dict[str, Judged], dict[str, float]]:
+        kinds = {"quality"} | ({"judge"} if self.goals & OF_TRUTH else set())
+        kinds |= {"measure"} if "repeatability" in self.goals else set()
+        judged: dict[str, Judged] = {}
+        steps: dict[str, list[Step]] = {}
+        for scan in scans:
+            try:
+                steps[scan.name] = self._steps(parameters, scan, kinds)
+            except RefusedInput as error:
+                judged[scan.name] = Judged(problem=str(error), kind="refused")
+        together = [step for of_scan in steps.values() for step in of_scan]
+        outcomes = self._run(together)
+        seconds = self.clock.note(together, outcomes)
+        judged |= {name: self._judged(name, of_scan, outcomes) for name, of_scan in steps.items()}
+        return judged, seconds
+
+    def _steps(self, parameters: ScanParameters, scan: RecordedScan, kinds: set[str]) -> list[Step]:
+        """The steps of a scan that lead to those of some kinds, under names of their own."""
+        job = replace(self.planned.job, parameters=parameters)
+        steps = draw_steps(scan, replace(self.planned, job=job))
+        if scan.truth is not None:
+            truth = source_files(scan.truth, self.planned.digests)
+            made = {"oriented": Output(f"{scan.name}/orient"), "surface": Output(f"{scan.name}/surface")}
+            places = {"truth": scan.truth}
+            steps.append(
+                Step(scan.name, "judge", "pipelines.tuning.judge", None, {**made, "truth": truth}, places=places)
+            )
+        return _leading_to(kinds, steps)
+
+    def _run(self, steps: Sequence[Step]) -> dict[str, Outcome]:
+        """Run steps; what turns out to be damaged has been set aside then, and is made anew by another run of them."""
+
+        def on_step_end(end: StepEnd) -> None:
+            self.clock.on_step_end(end)
+            self.on_step_end(end)
+
+        told: set[str] = set()
+        while True:
+            plan = make_plan(steps, self.planned.store)
+            outcomes = run_plan(plan, self.planned.store, pool=self.pool, on_step_end=on_step_end)
+            damage = {o.problem for o in outcomes.values() if isinstance(o, Failure) and o.kind == "damaged"} - told
+            if not damage:
+                return outcomes
+            told |= damage
+
+    def _judged(self, scan: str, steps: Sequence[Step], outcomes: Mapping[str, Outcome]) -> Judged:
+        for step in steps:
+            if isinstance(outcome := outcomes[step.name], Failure):
+                return Judged(problem=outcome.problem, kind="fault" if outcome.kind == "damaged" else outcome.kind)
+        quality, shares, measures = (
+            self._read(f"{OWN}{scan}/{kind}", outcomes) for kind in ("quality", "judge", "measure")
+        )
+        if quality is None:
+            return Judged(problem=f"{scan}: its quality is damaged, run again to make it anew", kind="fault")
+        figures = figures_of(Quality.model_validate_json(quality), shares)
+        if "time" in self.goals:
+            figures["time"] = self.clock.of(steps, outcomes, self.planned.store)
+        return Judged(figures, {} if measures is None else lengths_of(Measures.model_validate_json(measures)))
+
+    def _read(self, step: str, outcomes: Mapping[str, Outcome]) -> bytes | None:
+        """A step's result; None where it has none, or there is no such step."""
+        outcome = outcomes.get(step)
+        return self.planned.store.get(outcome.digest) if isinstance(outcome, Success) else None
+
+
+def _leading_to(kinds: set[str], steps: Sequence[Step]) -> list[Step]:
+    """Those of the steps, under names of their own, that the results of some kinds rest on."""
+    needed: set[str] = set()
+    found: list[Step] = []
+    for step in reversed(steps):
+        if step.kind not in kinds and step.name not in needed:
+            continue
+        before = {source.step for source in step.inputs.values() if isinstance(source, Output)}
+        needed |= before
+        inputs = {
+            name: Output(OWN + source.step) if isinstance(source, Output) else source
+            for name, source in step.inputs.items()
+        }
+        found.append(step._replace(scan=OWN + step.scan, inputs=inputs))
+    return found[::-1]

@@ -1,0 +1,79 @@
+"""The frames in which two sets of parameters keep the most different points."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.cloud.outliers import KEPT
+from footscan.frames.reader import read_frame
+from footscan.report.stripe_change import change_by_frame
+from footscan.report.tune_result import FrameChange
+from footscan.stripe.points import STRIPE_DTYPE, StripePoints
+from pipelines.arrays import unpack
+from pipelines.recorded import RecordedScan
+from pipelines.tuning.bench import Bench
+from schemas.errors import DamagedError
+from schemas.frames import FrameManifest
+from schemas.workflow import ScanParameters
+
+SCANS, FRAMES = 3, 8
+"""How many scans are looked through, and how many frames are shown."""
+APART = 5
+"""Frames of a film that are nearer look alike: only one of them is shown."""
+
+
+def frame_changes(
+    bench: Bench, present: ScanParameters, winner: ScanParameters, scans: Sequence[RecordedScan]
+) -> list[FrameChange]:
+    """The frames of the first few scans in which the points that are kept differ most, the greatest change first."""
+    found: list[tuple[float, int, RecordedScan, int, int]] = []
+    results = {}
+    for place, scan in enumerate(scans[:SCANS]):
+        pair = bench.results(present, scan), bench.results(winner, scan)
+        kept = [_kept(made, scan) for made in pair]
+        for camera in sorted(kept[0]):
+            if f"ingest-{camera}" not in pair[0]:
+                continue
+            manifest = FrameManifest.model_validate_json(pair[0][f"ingest-{camera}"])
+            results[scan.name, camera] = manifest, kept[0][camera], kept[1][camera]
+            change = change_by_frame(kept[0][camera], kept[1][camera], len(manifest.frames))
+            found += [(-c, place, scan, camera, frame) for frame, c in enumerate(change.tolist()) if c]
+    shown: list[FrameChange] = []
+    for _, _, scan, camera, frame in sorted(found, key=lambda one: (one[0], one[1], one[3], one[4])):
+        if len(shown) == FRAMES:
+            break
+        if any((s.scan, s.camera) == (scan.name, camera) and abs(s.frame - frame) < APART for s in shown):
+            continue
+        manifest, before, after = results[scan.name, camera]
+        array = next(scan.array(film) for film in scan.document.cameras if film.id == camera)
+        try:
+            image = read_frame(array, manifest, frame)
+        except DamagedError:  # a picture less; the next run ingests it anew
+            continue
+        if image is not None:
+            shown.append(
+                FrameChange(scan.name, camera, frame, image.copy(), _places(before, frame), _places(after, frame))
+            )
+    return shown
+
+
+def _kept(made: Mapping[str, bytes], scan: RecordedScan) -> dict[int, StripePoints]:
+    """The stripe points of each camera that the filter of outliers left, by camera."""
+    codes = unpack(made["clean"])["codes"] if "clean" in made else None
+    kept: dict[int, StripePoints] = {}
+    first = 0
+    for camera in sorted(film.id for film in scan.document.cameras):
+        if f"map-{camera}" not in made or codes is None:
+            kept[camera] = np.zeros(0, STRIPE_DTYPE)
+            continue
+        points = unpack(made[f"map-{camera}"])["points"]
+        stay = points[codes[first : first + len(points)] == KEPT]
+        kept[camera] = unpack(made[f"extract-{camera}"])["stripe"][stay["source"]]
+        first += len(points)
+    return kept
+
+
+def _places(points: StripePoints, frame: int) -> NDArray[np.float64]:
+    there = points[points["frame"] == frame]
+    return np.column_stack([there["i"], there["j"]])

@@ -1,0 +1,98 @@
+"""What a search leaves in its folder: the winner as a workflow, a table of trials, and a page."""
+
+import csv
+import io
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from footscan.report.tune_page import tune_page
+from footscan.report.tune_result import Trial, TuneResult
+from pipelines.engine.atomic import write_atomically
+from schemas.documents import canonical_json
+from schemas.workflow import ScanParameters, Workflow
+
+BEST, CSV, PARQUET, PAGE = "best.yaml", "trials.csv", "trials.parquet", "index.html"
+
+Cell = str | int | float | None
+
+
+def write_files(
+    folder: Path, workflow: Path, document: Workflow, result: TuneResult, parameters: ScanParameters
+) -> None:
+    """Write all of it; Fault where the disk refuses."""
+    rows = [_row(trial, result) for trial in result.trials]
+    write_atomically(folder / BEST, best_yaml(folder, workflow, document, result, parameters).encode())
+    write_atomically(folder / CSV, _as_csv(rows).encode())
+    write_atomically(folder / PARQUET, _as_parquet(rows))
+    write_atomically(folder / PAGE, tune_page(result).encode())
+
+
+def best_yaml(folder: Path, workflow: Path, document: Workflow, result: TuneResult, parameters: ScanParameters) -> str:
+    """The workflow with the winner's parameters, for a file in `folder`: its paths lead where they did."""
+    base = workflow.resolve().parent
+
+    def moved(path: str) -> str:
+        return path if "://" in path or Path(path).is_absolute() else os.path.relpath(base / path, folder.resolve())
+
+    values = document.model_dump(mode="json", exclude_unset=True)
+    values["archive"] = [moved(archive) for archive in document.archive]
+    values["results"] = moved(document.results)
+    for name in {"calibration", "cache"} & values.keys():
+        values[name] = None if values[name] is None else moved(values[name])
+    for calibration in values.get("calibrations", []):
+        calibration["file"] = moved(calibration["file"])
+    values["parameters"] = parameters.model_dump(mode="json", exclude_unset=True)
+    trial = f"trial {result.winner.number} of {len(result.trials) - 1}" if result.winner.number else "as it was before"
+    head = f"# Found by footscan tune: {trial}. Paths are relative to this file's folder.\n"
+    return head + yaml.safe_dump(values, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110)
+
+
+def _row(trial: Trial, result: TuneResult) -> dict[str, Cell]:
+    row: dict[str, Cell] = {
+        "trial": trial.number,
+        "winner": int(trial.number == result.winner.number),
+        "on_front": int(trial.on_front),
+        "scans_failed": len(trial.problems),
+        "problem": next(iter(trial.problems.values()), None),
+    }
+    row |= {
+        name: value if isinstance(value, str | int | float) else canonical_json(value)
+        for name, value in trial.point.items()
+    }
+    for goal in result.goals:
+        column = f"{goal.name}_{'percent' if goal.unit == '%' else goal.unit}"
+        row[column] = trial.values[goal.name]
+        row |= {f"{column}:{name}": value for name, value in trial.of_sets[goal.name].items()}
+    return row
+
+
+def _as_csv(rows: Sequence[dict[str, Cell]]) -> str:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _as_parquet(rows: Sequence[dict[str, Cell]]) -> bytes:
+    import pyarrow
+    from pyarrow import parquet
+
+    columns = {name: [row[name] for row in rows] for name in rows[0]}
+    table = pyarrow.table({name: pyarrow.array(cells, _type(cells)) for name, cells in columns.items()})
+    out = io.BytesIO()
+    parquet.write_table(table, out)
+    return out.getvalue()
+
+
+def _type(cells: Sequence[Cell]) -> Any:
+    import pyarrow
+
+    known = {type(cell) for cell in cells if cell is not None}
+    if known and known <= {int, bool}:
+        return pyarrow.bool_() if known == {bool} else pyarrow.int64()
+    return pyarrow.float64() if known and known <= {int, float} else pyarrow.string()

@@ -1,0 +1,75 @@
+"""What a search has tried so far, in a file beside its results: a search that was interrupted goes on from there."""
+
+import contextlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from pipelines.engine.atomic import write_atomically
+from pipelines.engine.digest import sha256
+from schemas.documents import canonical_json
+from schemas.errors import Fault
+from schemas.tuning import TriedPoint, TuneJournal, Tuning
+
+
+class Journal:
+    """A file of JSON lines: what was sought, then each point whose steps have all been run.
+
+    Each search has a file of its own: its data sets and the number of its trials may change, for what was tried of it
+    stays tried.
+    """
+
+    def __init__(self, folder: Path, tuning: Tuning) -> None:
+        search = tuning.model_dump(mode="json")["search"]
+        head = TuneJournal(search=search, sampler=tuning.sampler, seed=tuning.seed, objectives=tuning.objectives)
+        self._names = list(search)
+        self._head = canonical_json(head.model_dump(mode="json"))
+        self._folder = folder
+        self._path = folder / f"trials-{sha256(self._head.encode())[:12]}.jsonl"
+
+    def read(self) -> list[TriedPoint]:
+        """What was tried, in that order, up to a line that is damaged: that and what follows is taken away."""
+        text = _text(self._path)
+        lines = text.splitlines()
+        tried = [self._in_order(one) for one in _points(lines)] if lines[:1] == [self._head] else []
+        sound = "".join(f"{line}\n" for line in [self._head, *lines[1 : len(tried) + 1]])
+        if text != sound:
+            write_atomically(self._path, sound.encode())
+        return tried
+
+    def _in_order(self, tried: TriedPoint) -> TriedPoint:
+        """With its values in the order of the search: lines of JSON are sorted by name."""
+        point = tried.point and {name: tried.point[name] for name in self._names}
+        return tried.model_copy(update={"point": point})
+
+    def append(self, tried: TriedPoint) -> None:
+        """Add a point."""
+        try:
+            with self._path.open("ab", buffering=0) as file:  # a line as a whole: another search may write there, too
+                file.write(canonical_json(tried.model_dump(mode="json")).encode() + b"\n")
+        except OSError as error:
+            raise Fault(f"{self._path}: cannot be written ({error.strerror or error})") from None
+
+    def seconds(self) -> dict[str, float]:
+        """How long steps took that any search in this folder has run, by the key of their action."""
+        known: dict[str, float] = {}
+        for path in sorted(self._folder.glob("trials-*.jsonl")):
+            for tried in _points(_text(path).splitlines()):
+                known |= tried.seconds
+        return known
+
+
+def _text(path: Path) -> str:
+    with contextlib.suppress(OSError, UnicodeDecodeError):
+        return path.read_text(encoding="utf-8")
+    return ""
+
+
+def _points(lines: list[str]) -> Iterator[TriedPoint]:
+    for line in lines[1:]:
+        try:
+            yield TriedPoint.model_validate(json.loads(line))
+        except (ValueError, ValidationError):
+            return

@@ -1,0 +1,240 @@
+"""The live scanner with a virtual board and two cameras that film a made-up foot: what it keeps, says and refuses."""
+
+import datetime
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import simplejpeg
+
+from footscan.capture import frame_positions
+from footscan.frames.film import encoded_frames, open_film
+from footscan.frames.travel import read_positions
+from footscan.virtual.board import Board
+from footscan.virtual.streams import VirtualStreams, free_running
+from pipelines.live import storing
+from pipelines.live.light import light_by_hand
+from pipelines.live.scanner import LiveScanner, ScanOrder
+from pipelines.live.storing import ScanName, next_scan_name
+from pipelines.recorded import read_scan
+from schemas.documents import read_json
+from schemas.errors import Fault, Finding, RefusedInput
+from schemas.recording import Recording
+from schemas.rig import Rig, RigCamera, RigLatency, RigTravel
+
+DARK = bytes(simplejpeg.encode_jpeg(np.full((480, 640, 3), 20, np.uint8), 90, "RGB", "420"))
+DAY = datetime.date(2026, 11, 20)
+RATE = 20.0
+LATENCY_S = 0.04
+STEP_MM = 10.0
+"""Between two pictures of the made-up foot."""
+
+
+@dataclass
+class Bench:
+    """A scanner, its world, and where its scans go."""
+
+    scanner: LiveScanner
+    board: Board
+    streams: VirtualStreams
+    home: Path
+    states: list[str]
+
+    def order(self, **changes: Any) -> ScanOrder:
+        scan = next_scan_name(self.home / "archive", "P7", "right", DAY)
+        order = ScanOrder(
+            ScanName("P7", scan, "right", DAY),
+            self.home / "archive",
+            light=light_by_hand(self.scanner.rig, 1.0, 10.0),
+        )
+        return replace(order, **changes)
+
+    def assert_dark_and_empty(self) -> None:
+        assert self.board.laser_at(time.monotonic()) == 0.0
+        assert not (self.home / "archive").exists()
+
+
+@pytest.fixture
+def bench(pristine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    # A busy host times frames badly and says so: how well places must be known is not what is tested here.
+    monkeypatch.setattr(storing, "LARGEST_SD_MM", 5.0)
+    monkeypatch.setattr(frame_positions, "LARGEST_SD_MM", 5.0)
+    with open_bench(pristine, tmp_path) as one:
+        yield one
+
+
+@contextmanager
+def open_bench(pristine: Path, home: Path) -> Iterator[Bench]:
+    films = {}
+    for camera in (1, 5):
+        film = open_film(pristine / f"archive/P0001/S1/cam{camera}.avi")
+        films[camera] = [frame or b"" for frame in encoded_frames(film)]
+    with Board(heads_at=(-4.0, -4.0, -4.0)) as board:
+
+        def picture(camera: int, seconds: float) -> bytes:
+            if not board.laser_at(seconds):
+                return DARK
+            x = board.position_at(seconds)[0 if camera == 1 else 2]
+            return films[camera][int(np.clip(round(x / STEP_MM), 0, len(films[camera]) - 1))]
+
+        with VirtualStreams((1, 5), picture, free_running(RATE), latency_s=LATENCY_S) as streams:
+            latency = RigLatency(seconds=LATENCY_S, sd_s=0.001, frame_sd_s=0.002)
+            rig = Rig(
+                format="footscan.rig/1",
+                scanner="bench",
+                port=board.port,
+                cameras=[RigCamera(id=c, device=streams.url(c), latency=latency) for c in (1, 5)],
+                travel=RigTravel(start_mm=0.0, length_mm=190.0, mm_per_s=60.0),
+                frames_per_second=RATE,
+            )
+            states: list[str] = []
+            with LiveScanner(rig) as scanner:
+                scanner.listen(lambda state: states.append(state.name))
+                assert scanner.connect() == {}
+                yield Bench(scanner, board, streams, home, states)
+
+
+def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
+    calibration, results = pristine / "calibration.json", bench.home / "results"
+    result = bench.scanner.scan(bench.order(calibration=calibration, results=results))
+    assert bench.scanner.state.name == "done"
+    begun = [name for name, before in zip(bench.states, ["", *bench.states], strict=False) if name != before]
+    assert begun == [
+        "disconnected", "idle", "filming", "homing", "filming", "storing", "reconstructing", "done"
+    ]  # fmt: skip
+    assert bench.board.laser_at(time.monotonic()) == 0.0
+    scan = read_scan(result.stored.place)
+    assert (scan.name, scan.document.scanner, scan.document.day) == ("P7/2026-11-20-R", "bench", DAY)
+    recording = read_json(scan.folder / "recording.json", Recording)
+    for camera, told in zip(scan.document.cameras, recording.cameras, strict=True):
+        x = read_positions(scan.folder / str(camera.positions))
+        assert np.all(np.diff(x) > 0)
+        assert x[0] < 4 * 3.0
+        assert x[-1] > 190.0 - 4 * 3.0
+        assert open_film(scan.film(camera)).frames == len(x) == told.stored + len(told.lost)
+        background = scan.background(camera)
+        assert background is not None
+        assert open_film(background).frames == 1
+    assert result.measured is not None
+    assert result.measured.kind in {None, "finding"}
+    assert result.measured.folder == results / "P7/2026-11-20-R"
+    assert next_scan_name(bench.home / "archive", "P7", "right", DAY) == "2026-11-20-R-2"
+
+
+def test_a_camera_that_fails_costs_the_scan_unless_it_is_to_be_kept(bench: Bench) -> None:
+    bench.scanner.home()
+    cut = bench.streams._cameras[5]
+    when_filming(bench, lambda: cut._cut(True))
+    with pytest.raises(Finding, match="the scan is not whole: camera 5"):
+        bench.scanner.scan(bench.order())
+    assert bench.scanner.state.name == "failed"
+    bench.assert_dark_and_empty()
+    cut._cut(False)
+    when_filming(bench, lambda: cut._cut(True))
+    result = bench.scanner.scan(bench.order(keep_partial=True))
+    assert set(result.stored.films) == {1}
+    assert set(result.stored.left_out) == {5}
+    assert [camera.id for camera in read_scan(result.stored.place).document.cameras] == [1]
+    recording = read_json(result.stored.place / "recording.json", Recording)
+    assert any("camera 5 is left out" in warning for warning in recording.warnings)
+    cut._cut(False)
+    assert len(bench.scanner.scan(bench.order()).stored.films) == 2
+
+
+def test_stopping_leaves_nothing_and_the_next_scan_works(bench: Bench) -> None:
+    bench.scanner.home()
+    when_filming(bench, bench.scanner.stop)
+    with pytest.raises(Fault, match="stopped; nothing of this scan is kept"):
+        bench.scanner.scan(bench.order())
+    bench.assert_dark_and_empty()
+    assert bench.scanner.scan(bench.order()).stored.left_out == {}
+
+
+def test_one_thing_at_a_time(bench: Bench) -> None:
+    refused: list[str] = []
+
+    def home_too() -> None:
+        with pytest.raises(RefusedInput) as error:
+            bench.scanner.home()
+        refused.append(str(error.value))
+
+    bench.scanner.home()
+    when_filming(bench, home_too)
+    bench.scanner.scan(bench.order())
+    assert refused == ["scanner: is filming, expected it to be idle"]
+
+
+def test_an_open_lid_is_told_and_the_scan_goes_on_when_it_is_closed(bench: Bench) -> None:
+    seen: list[str] = []
+
+    def open_and_close() -> None:
+        bench.board.open_door()
+        wait_until(lambda: bench.scanner.state.name == "door open" and bench.board.laser_at(time.monotonic()) == 0)
+        seen.append(bench.scanner.state.name)
+        bench.board.close_door()
+        wait_until(lambda: "closed again" in bench.scanner.state.words)
+        bench.scanner.heads.resume()
+
+    bench.scanner.home()
+    when_filming(bench, open_and_close)
+    result = bench.scanner.scan(bench.order())
+    assert seen == ["door open"]
+    assert result.stored.left_out == {}
+
+
+def test_a_disk_that_fills_up_ends_the_travel(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    from footscan.frames.ingest import FrameWriter
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    bench.scanner.home()
+    when_filming(bench, lambda: monkeypatch.setattr(FrameWriter, "add", full))
+    with pytest.raises(Fault, match="cannot be written"):
+        bench.scanner.scan(bench.order())
+    bench.assert_dark_and_empty()
+
+
+def test_a_camera_without_a_latency_is_refused_before_anything_moves(bench: Bench) -> None:
+    cameras = [camera.model_copy(update={"latency": None}) for camera in bench.scanner.rig.cameras]
+    bench.scanner.rig = bench.scanner.rig.model_copy(update={"cameras": cameras})
+    with pytest.raises(RefusedInput, match="camera 1: latency: has none in the rig"):
+        bench.scanner.scan(bench.order())
+    bench.assert_dark_and_empty()
+
+
+def test_the_light_is_chosen_where_none_is_given(bench: Bench) -> None:
+    result = bench.scanner.scan(bench.order(light=None))
+    recording = read_json(result.stored.place / "recording.json", Recording)
+    assert recording.light.is_measured
+    assert recording.light.power == 1.0
+    assert recording.light.looks >= 2
+    assert all(camera.light_reason for camera in recording.cameras)
+    assert all("cannot be set from here" in camera.not_fixed[0] for camera in recording.cameras)
+
+
+def when_filming(bench: Bench, happens: object) -> None:
+    """Has something happen in the middle of the next travel with light."""
+    assert callable(happens)
+
+    def watch() -> None:
+        wait_until(
+            lambda: bench.board.laser_at(time.monotonic()) > 0 and bench.board.position_at(time.monotonic())[0] > 60
+        )
+        happens()
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def wait_until(happened: object) -> None:
+    assert callable(happened)
+    deadline = time.monotonic() + 60
+    while not happened():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
