@@ -53,7 +53,7 @@ def parse_stl(content: bytes) -> Mesh:
         if len(words) % 3 or any(len(word) != 3 for word in words):
             raise ValueError("expected three vertices of three coordinates in each facet")
         corners = np.array(words, np.float64).reshape(-1, 3)
-    elif b"\0" not in content:
+    elif content and b"\0" not in content:
         raise ValueError("is text that does not begin with 'solid', expected STL")
     else:
         expected = f"expected {START + count * TRIANGLE.itemsize} for its {count} triangles" if count >= 0 else ""
