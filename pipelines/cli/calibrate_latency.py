@@ -37,7 +37,7 @@ def latency(
     world = plain_world(virtual, virtual_folder, "block")
     with opened_rig(rig, virtual_folder, world) as opened:
         if world is not None:
-            from pipelines.live.virtual_rig import block_range_mm
+            from pipelines.live.virtual_world import block_range_mm
 
             from_mm, to_mm = block_range_mm(world)
         travel, light = opened.rig.travel, light_by_hand(opened.rig, power, exposure_ms)

@@ -23,7 +23,7 @@ from pipelines.live.light import light_by_hand
 from pipelines.live.rig_file import read_rig, write_rig
 from pipelines.live.scanner import LiveScanner
 from pipelines.live.virtual_process import WorldProcess
-from pipelines.live.virtual_world import BLOCK_REACH_MM, CAMERAS, EXPOSURE_MS, RUN_UP_MM, World
+from pipelines.live.virtual_world import CAMERAS, EXPOSURE_MS, World, block_range_mm
 from schemas.errors import Fault
 from schemas.parameters.simulation import SimulationSettings
 from schemas.rig import Rig, RigCamera
@@ -70,13 +70,6 @@ def virtual_rig(
             write_rig(file, rig)
             process.put(world.subject, pictures)
         yield VirtualRig(rig, file, process)
-
-
-def block_range_mm(world: World) -> tuple[float, float]:
-    """Between which places the heads must travel for the latencies."""
-    middle = (world.start_mm + world.end_mm) / 2
-    reach = BLOCK_REACH_MM - RUN_UP_MM
-    return middle - reach, middle + reach
 
 
 def _known_rig(file: Path, world: World) -> Rig:

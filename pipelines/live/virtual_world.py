@@ -20,6 +20,7 @@ import numpy as np
 from pydantic import Field
 
 from footscan.virtual.board import Board
+from footscan.virtual.board_memory import SET_UP
 from footscan.virtual.board_rails import Gait
 from footscan.virtual.foot import Foot, FootShape, make_foot, sample_shape
 from footscan.virtual.reference_stage import NOTHING, block_subject
@@ -40,9 +41,11 @@ LATENCIES_S = (0.02, 0.06)
 WATCHED_EVERY_S = 0.02
 MOVES_SECONDS = 0.1
 RAIL_MM = (-20.0, 412.0)
-RUN_UP_MM = 36.0
-"""Heads gain speed before a travel and lose it behind, with light."""
-BLOCK_REACH_MM = 122.0
+ACCELERATIONS = (120, 121, 122)
+"""The board's settings of them, mm/s^2."""
+SLACK_MM = 2.0
+"""Heads are that far at most from where they were sent, or from one another."""
+BLOCK_REACH_MM = 86.0
 """Before and behind the middle: the block is nowhere else, and heads need not be either."""
 
 SubjectName = Literal["right", "left", "block", "nothing"]
@@ -62,6 +65,8 @@ class World(Document):
     """Of mounting and lenses, and of the latencies of its cameras, which nobody is told."""
     start_mm: float = 0.0
     end_mm: float = 400.0
+    mm_per_s: Annotated[float, Field(gt=0, le=200)] = 400.0 / 11.0
+    """The fastest that heads travel with light."""
     grid_mm: Annotated[float, Field(gt=0, le=10)] = 0.5
     """Of the places that there are pictures of with light."""
     dark_grid_mm: Annotated[float, Field(gt=0, le=400)] = 100.0
@@ -76,6 +81,11 @@ class World(Document):
     """How much later than usual a picture may be sent."""
     brightness: Scale = 24.0
     """Of the lasers at full power, see `SimulationSettings.laser_exposure`."""
+
+    @property
+    def run_up_mm(self) -> float:
+        """How far before a travel and behind it the heads gain and lose their speed, with light."""
+        return self.mm_per_s**2 / (2.0 * min(SET_UP[axis] for axis in ACCELERATIONS)) + SLACK_MM
 
 
 class VirtualWorld:
@@ -145,8 +155,8 @@ class VirtualWorld:
         """Where heads come with light."""
         start, end = self._world.start_mm, self._world.end_mm
         if subject == "block":
-            return (start + end) / 2 - BLOCK_REACH_MM, (start + end) / 2 + BLOCK_REACH_MM
-        return max(start - RUN_UP_MM, RAIL_MM[0]), min(end + RUN_UP_MM, RAIL_MM[1])
+            start, end = block_range_mm(self._world)
+        return max(start - self._world.run_up_mm, RAIL_MM[0]), min(end + self._world.run_up_mm, RAIL_MM[1])
 
     def _shown_at(self, seconds: float) -> Positions:
         """Where the heads are shown: where they are, or in the dark near there."""
@@ -193,6 +203,12 @@ class VirtualWorld:
             if self.board.laser_at(now) and before is not None and (before < middle_mm) != (x < middle_mm):
                 self.board.pause(self._world.pause_s)
             before = x
+
+
+def block_range_mm(world: World) -> tuple[float, float]:
+    """Between which places the heads travel for the latencies: past all of the block."""
+    middle = (world.start_mm + world.end_mm) / 2
+    return middle - BLOCK_REACH_MM, middle + BLOCK_REACH_MM
 
 
 def virtual_foot(world: World, side: Literal["right", "left"]) -> Foot:
