@@ -26,6 +26,8 @@ BEND_MM = 16.0
 NOTABLE = 3.0
 """Standard deviations of its fit by which a bend exceeds those at the borders of the window: others are the skin's
 roughness."""
+LEAST_BEND = 0.01
+"""1/mm: what bends less than a circle of 100 mm radius is the even back of the foot, not a bone."""
 NEAR_MM = 10.0
 BELOW_CUT_MM = 3.0
 
@@ -77,7 +79,7 @@ def instep_point(points: Floats, length: float) -> tuple[Point, bool] | None:
         return None
     k = int(inside[np.argmax(bend[inside])])
     stands_out = bend[k] - max(bend[inside[0]], bend[inside[-1]], 0.0) > NOTABLE * sd[k]
-    told = inside[0] < k < inside[-1] and stands_out
+    told = inside[0] < k < inside[-1] and stands_out and bend[k] > LEAST_BEND
     x = float(stations[k]) if told else INSTEP_OTHERWISE * length
     if told:  # between the stations
         before, at, after = bend[k - 1 : k + 2]

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from footscan.measure.frame import foot_frame
 from footscan.measure.landmarks import Landmark, check_manual, find_landmarks
+from footscan.measure.landmarks_dorsal import instep_point
 from footscan.surface.export import read_mesh
 from footscan.virtual.foot import Foot, make_foot, sample_shape
 from schemas.errors import Finding
@@ -160,3 +161,16 @@ def test_landmarks_of_a_real_foot() -> None:
     assert share["metatarsale_fibulare"][0] == pytest.approx(0.64, abs=0.03)
     assert share["junction_point"][0] == pytest.approx(0.40, abs=0.08)
     assert share["medial_malleolus"][2] == pytest.approx(0.31, abs=0.05)
+
+
+@pytest.mark.parametrize(("bone_mm", "expected", "told"), [(4.0, 0.53, True), (0.3, 0.5, False), (0.0, 0.5, False)])
+def test_instep_point_is_where_a_bone_stands_out_else_half_way(bone_mm: float, expected: float, told: bool) -> None:
+    length = 260.0
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(60.0, 220.0), np.arange(-20.0, 21.0)))
+    bone = bone_mm * np.exp(-0.5 * (x - 0.53 * length) ** 2 / 10.0**2)
+    back = np.column_stack([x, y, 100.0 - 0.3 * x + bone - y**2 / 60.0])
+    found = instep_point(back, length)
+    assert found is not None
+    point, by_its_bend = found
+    assert by_its_bend == told
+    assert point[0] == pytest.approx(expected * length, abs=1.5)
