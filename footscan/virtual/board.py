@@ -7,6 +7,7 @@ power at every moment; what really happens can be asked for, and mishaps of ever
 """
 
 import argparse
+import signal
 import sys
 import tempfile
 import threading
@@ -198,17 +199,17 @@ class Board:
 
 
 def main() -> None:
-    """Runs a board until it is ended by Ctrl-C."""
+    """Runs a board until Ctrl-C or a request to terminate, also where a shell has it ignore them."""
     parser = argparse.ArgumentParser(description="A virtual Grbl 1.1 board with three heads and lasers.")
     parser.add_argument("--port", type=Path, help="name of the terminal, a symbolic link; one is made up by default")
     arguments = parser.parse_args()
+    asked_to_end = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: asked_to_end.set())
     with Board(port=arguments.port) as board:
         print(board.port)
         sys.stdout.flush()
-        try:
-            threading.Event().wait()
-        except KeyboardInterrupt:
-            return
+        asked_to_end.wait()
 
 
 if __name__ == "__main__":

@@ -158,12 +158,15 @@ def test_mounts_make_world_coordinates_of_rails() -> None:
 
 def test_runs_alone() -> None:
     with subprocess.Popen([sys.executable, "-m", "footscan.virtual.board"], stdout=subprocess.PIPE) as program:
-        assert program.stdout is not None
-        host = Host(program.stdout.readline().decode().strip())
-        host.expect(b"Grbl 1.1h")
-        program.send_signal(signal.SIGINT)
-        assert program.wait(LONG_SECONDS) == 0
-        host.close()
+        try:
+            assert program.stdout is not None
+            host = Host(program.stdout.readline().decode().strip())
+            host.expect(b"Grbl 1.1h")
+            program.send_signal(signal.SIGINT)
+            assert program.wait(LONG_SECONDS) == 0
+            host.close()
+        finally:
+            program.kill()
 
 
 def test_a_move_takes_as_long_as_a_trapezoid() -> None:
