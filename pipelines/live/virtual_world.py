@@ -65,8 +65,8 @@ class World(Document):
     """Of mounting and lenses, and of the latencies of its cameras, which nobody is told."""
     start_mm: float = 0.0
     end_mm: float = 400.0
-    mm_per_s: Annotated[float, Field(gt=0, le=200)] = 400.0 / 11.0
-    """The fastest that heads travel with light."""
+    mm_per_s: Annotated[float, Field(gt=0, le=200)] = 90.0
+    """The fastest that heads travel with light: for the latencies 2.4 times as fast as in a usual scan."""
     grid_mm: Annotated[float, Field(gt=0, le=10)] = 0.5
     """Of the places that there are pictures of with light."""
     dark_grid_mm: Annotated[float, Field(gt=0, le=400)] = 100.0
