@@ -116,11 +116,15 @@ class StagePictures:
             self._processes().submit(_render, camera, light, part, self._path(camera, 0, light).parent)
             for camera, part in tasks
         ]
-        for future, (_, part) in zip(futures, tasks, strict=True):
-            future.result()
-            done += len(part)
-            if progress is not None:
-                progress(done, total)
+        try:
+            for future, (_, part) in zip(futures, tasks, strict=True):
+                future.result()
+                done += len(part)
+                if progress is not None:
+                    progress(done, total)
+        except BaseException:  # such as a pipe that nobody listens to any more: the rest is for nobody
+            self.close()
+            raise
         return total
 
     def with_grain(self, jpeg: bytes, number: int) -> bytes:
