@@ -87,7 +87,7 @@ def scan(
         world = World(
             pictures=str(virtual_folder / "pictures"), subject=side, foot_seed=foot_seed, light=light, ripple=ripple,
             pause_s=pause, jitter_ms=jitter_ms, grid_mm=grid_mm, start_mm=0.0 if from_mm is None else from_mm,
-            end_mm=400.0 if to_mm is None else to_mm, mm_per_s=max(speed or 0.0, 90.0),
+            end_mm=400.0 if to_mm is None else to_mm, mm_per_s=speed or 400.0 / 11.0,
             dark_grid_mm=grid_mm if texture else DARK_GRID_MM,
         )  # fmt: skip
     with opened_rig(rig, virtual_folder, world, calibrated=True) as opened:

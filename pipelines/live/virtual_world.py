@@ -41,6 +41,10 @@ LATENCIES_S = (0.02, 0.06)
 WATCHED_EVERY_S = 0.02
 MOVES_SECONDS = 0.1
 RAIL_MM = (-20.0, 412.0)
+BLOCK_MM_PER_S = 90.0
+"""No faster do heads pass the block."""
+EVEN_SECONDS = 0.3
+"""Heads move evenly, with light, for so long before a travel and behind it; before that they gain speed."""
 ACCELERATIONS = (120, 121, 122)
 """The board's settings of them, mm/s^2."""
 SLACK_MM = 2.0
@@ -65,8 +69,8 @@ class World(Document):
     """Of mounting and lenses, and of the latencies of its cameras, which nobody is told."""
     start_mm: float = 0.0
     end_mm: float = 400.0
-    mm_per_s: Annotated[float, Field(gt=0, le=200)] = 90.0
-    """The fastest that heads travel with light: for the latencies 2.4 times as fast as in a usual scan."""
+    mm_per_s: Annotated[float, Field(gt=0, le=200)] = 400.0 / 11.0
+    """How fast heads travel along a foot."""
     grid_mm: Annotated[float, Field(gt=0, le=10)] = 0.5
     """Of the places that there are pictures of with light."""
     dark_grid_mm: Annotated[float, Field(gt=0, le=400)] = 100.0
@@ -81,11 +85,6 @@ class World(Document):
     """How much later than usual a picture may be sent."""
     brightness: Scale = 24.0
     """Of the lasers at full power, see `SimulationSettings.laser_exposure`."""
-
-    @property
-    def run_up_mm(self) -> float:
-        """How far before a travel and behind it the heads gain and lose their speed, with light."""
-        return self.mm_per_s**2 / (2.0 * min(SET_UP[axis] for axis in ACCELERATIONS)) + SLACK_MM
 
 
 class VirtualWorld:
@@ -153,10 +152,12 @@ class VirtualWorld:
 
     def _lit_mm(self, subject: SubjectName) -> tuple[float, float]:
         """Where heads come with light."""
-        start, end = self._world.start_mm, self._world.end_mm
+        start, end, speed = self._world.start_mm, self._world.end_mm, self._world.mm_per_s
         if subject == "block":
             start, end = block_range_mm(self._world)
-        return max(start - self._world.run_up_mm, RAIL_MM[0]), min(end + self._world.run_up_mm, RAIL_MM[1])
+            speed = BLOCK_MM_PER_S
+        run_up = EVEN_SECONDS * speed + speed**2 / (2.0 * min(SET_UP[axis] for axis in ACCELERATIONS)) + SLACK_MM
+        return max(start - run_up, RAIL_MM[0]), min(end + run_up, RAIL_MM[1])
 
     def _shown_at(self, seconds: float) -> Positions:
         """Where the heads are shown: where they are, or in the dark near there."""
