@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.compiled import compiled
+
 Floats = NDArray[np.float64]
 
 MOST = 64
@@ -15,14 +17,35 @@ def dense_points(vertices: Floats, faces: NDArray[np.integer], spacing: float) -
     Each such triangle holds an even lattice, the same however the mesh lies in space: what is measured on these points
     moves and is mirrored with the mesh. On edges that two triangles share they stand twice.
     """
-    corners = vertices[faces]
-    edges = corners - np.roll(corners, 1, axis=1)
-    longest = np.sqrt(np.einsum("nki,nki->nk", edges, edges).max(axis=1, initial=0.0))
-    parts = np.clip(np.ceil(longest / spacing - 1e-6), 1, MOST).astype(np.intp)
-    points = [vertices]
-    for count in np.unique(parts[parts > 1]):
-        a, b = (grid.reshape(-1) for grid in np.meshgrid(np.arange(count + 1), np.arange(count + 1)))
-        inside = (a + b <= count) & (np.maximum(np.maximum(a, b), count - a - b) < count)
-        shares = np.column_stack([a, b, count - a - b])[inside] / count
-        points.append(np.einsum("pk,nki->npi", shares, corners[parts == count]).reshape(-1, 3))
-    return np.concatenate(points)
+    return _lattices(np.ascontiguousarray(vertices, np.float64), np.ascontiguousarray(faces, np.int64), spacing)
+
+
+@compiled
+def _lattices(vertices: Floats, faces: NDArray[np.int64], spacing: float) -> Floats:
+    parts = np.empty(len(faces), np.int64)
+    total = len(vertices)
+    for face in range(len(faces)):
+        longest = 0.0
+        for k in range(3):
+            start, end = faces[face, k], faces[face, (k + 1) % 3]
+            squared = 0.0
+            for axis in range(3):
+                squared += (vertices[end, axis] - vertices[start, axis]) ** 2
+            longest = max(longest, squared)
+        parts[face] = min(max(np.ceil(np.sqrt(longest) / spacing - 1e-6), 1), MOST)
+        total += (parts[face] + 1) * (parts[face] + 2) // 2 - 3  # the corners stand among the vertices
+    points = np.empty((total, 3))
+    points[: len(vertices)] = vertices
+    place = len(vertices)
+    for face in range(len(faces)):
+        a, b, c = faces[face]
+        count = parts[face]
+        for i in range(count + 1):
+            for j in range(count + 1 - i):
+                if max(i, j, count - i - j) == count:
+                    continue
+                first, second, third = j / count, i / count, (count - i - j) / count
+                for axis in range(3):
+                    points[place, axis] = first * vertices[a, axis] + second * vertices[b, axis] + third * vertices[c, axis]
+                place += 1
+    return points

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.measure.dense_points import dense_points
-from footscan.measure.landmarks_extreme import Cap, Floats, Point, height_at, saddle
+from footscan.measure.landmarks_extreme import Cap, Floats, Point, height_at, highest_of_each, saddle
 from footscan.measure.landmarks_sides import FULL_SIZE_MM
 from footscan.surface.topology import used_vertices
 
@@ -48,9 +48,7 @@ def junction_point(vertices: Floats, faces: NDArray[np.integer], length: float, 
     angle, radius, y, z = angle[ahead], radius[ahead], points[ahead, 1], points[ahead, 2]
     edges = np.deg2rad(np.linspace(*SECTOR_DEG, SECTORS + 1))
     sector = np.clip(np.searchsorted(edges, angle) - 1, 0, SECTORS - 1)
-    order = np.argsort(radius, kind="stable")
-    farthest = np.full(SECTORS, -1)
-    farthest[sector[order]] = order
+    farthest = highest_of_each(sector, radius, SECTORS)
     outline = np.where(farthest >= 0, radius[farthest], np.inf) if len(radius) else np.full(SECTORS, np.inf)
     outline[z[farthest] > min(top - BELOW_CUT_MM, CREASE_MM * scale)] = np.inf  # the cut is no outline
     nearest = int(np.argmin(outline))

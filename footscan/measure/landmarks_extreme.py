@@ -189,3 +189,13 @@ def height_at(position: Floats, height: Floats, place: Floats, radius: float) ->
     """The height in mm at `place` of a surface over the plane, (N, 2) positions and (N,) heights."""
     fitted = _fit(position - place, height, Cap(np.eye(2) / radius, radius, LEAST_MISFIT_MM))
     return None if fitted is None else float(fitted[0][0])
+
+
+def highest_of_each(group: NDArray[np.integer], height: Floats, count: int) -> NDArray[np.int64]:
+    """(count,) the last of the highest of (N,) points in each of so many groups; -1 where a group is empty."""
+    top = np.full(count, -np.inf)
+    np.maximum.at(top, group, height)
+    at_top = np.flatnonzero(height == top[group])
+    highest = np.full(count, -1)
+    highest[group[at_top]] = at_top
+    return highest

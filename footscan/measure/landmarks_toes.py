@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from footscan.measure.landmarks_extreme import Floats, Point, Summit, summit
+from footscan.measure.landmarks_extreme import Floats, Point, Summit, highest_of_each, summit
 
 FOREFOOT = 0.74
 """Toes lie ahead of this part of the length."""
@@ -91,9 +91,7 @@ def _peaks(toes: Floats, length: float, sides: tuple[float, float]) -> list[tupl
     toes, rise = toes[rise > -CLEFT * length], rise[rise > -CLEFT * length]
     lowest = float(toes[:, 1].min())
     strip = 1 + ((toes[:, 1] - lowest) / STRIP_MM).astype(np.intp)
-    order = np.argsort(rise, kind="stable")
-    foremost = np.full(int(strip.max()) + 2, -1)
-    foremost[strip[order]] = order  # the foremost point of a strip comes last
+    foremost = highest_of_each(strip, rise, int(strip.max()) + 2)
     seen = np.flatnonzero(foremost >= 0)
     outline = np.interp(np.arange(len(foremost)), seen, rise[foremost[seen]])
     outline[[0, -1]] = -CLEFT * length

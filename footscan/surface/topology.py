@@ -33,11 +33,10 @@ def face_components(faces: Faces) -> NDArray[np.int32]:
     if not len(faces):
         return np.zeros(0, np.int32)
     size = int(faces.max()) + 1
-    edges = directed_edges(faces)
-    graph = coo_array((np.ones(len(edges), np.int8), (edges[:, 0], edges[:, 1])), shape=(size, size))
+    first, second = faces[:, :2].ravel(), faces[:, 1:].ravel()  # two edges join the corners of a face
+    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(size, size))
     _, label = connected_components(graph, directed=False)
-    _, component = np.unique(label[faces[:, 0]], return_inverse=True)
-    return component.astype(np.int32)
+    return _renumbered(label[faces[:, 0]])[1]
 
 
 def largest_component(faces: Faces) -> NDArray[np.int32]:
@@ -56,8 +55,16 @@ def keep_large_components(faces: Faces, share: float) -> NDArray[np.int32]:
 
 def used_vertices(vertices: NDArray[np.float64], faces: Faces) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """The vertices that `faces` use, in their order, and the faces renumbered to them."""
-    used, renumbered = np.unique(faces, return_inverse=True)
-    return vertices[used], renumbered.reshape(faces.shape).astype(np.int32)
+    used, renumbered = _renumbered(faces)
+    return vertices[used], renumbered
+
+
+def _renumbered(numbers: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Which numbers there are, from 0 on, in their order, and the place of each among these: `np.unique`, unsorted."""
+    is_used = np.zeros(int(numbers.max(initial=-1)) + 1, np.bool_)
+    is_used[numbers] = True
+    place = np.cumsum(is_used, dtype=np.int32) - np.int32(1)
+    return np.flatnonzero(is_used), place[numbers]
 
 
 def vertex_normals(vertices: NDArray[np.float64], faces: Faces) -> NDArray[np.float64]:
