@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.compiled import compiled
 from footscan.measure.frame import FootFrame
 from footscan.measure.landmark_errors import saddle_gradient, summit_gradient
 from footscan.measure.landmarks import Landmark
@@ -175,22 +176,27 @@ def nearest_loop(loops: list[Loop], plane: Plane, seed: Floats, least: float = L
     centre = plane.flat(seed[None])[0]
     around, passing = [], []
     for loop in loops:
-        flat = plane.flat(loop.points) - centre
-        x, y = flat.T
-        length = float(np.hypot(np.diff(x, append=x[0]), np.diff(y, append=y[0])).sum())
+        length, nearest, is_around = _seen_from_origin(plane.flat(loop.points) - centre)
         if length < least:
             continue
-        if _holds_origin(flat):
+        if is_around:
             around.append((length, loop))
-        passing.append((float(np.hypot(x, y).min()), loop))
+        passing.append((nearest, loop))
     if around:
         return max(around, key=lambda found: found[0])[1]
     return min(passing, key=lambda found: found[0])[1] if passing else None
 
 
-def _holds_origin(polygon: Floats) -> bool:
-    """Whether the origin is within the (N, 2) polygon: a ray from it crosses an odd number of its sides."""
-    ahead = np.roll(polygon, -1, axis=0)
-    spans = (polygon[:, 1] > 0) != (ahead[:, 1] > 0)
-    start, end = polygon[spans], ahead[spans]
-    return bool(np.count_nonzero(start[:, 0] - start[:, 1] * (end - start)[:, 0] / (end - start)[:, 1] > 0) % 2)
+@compiled
+def _seen_from_origin(polygon: Floats) -> tuple[float, float, bool]:
+    """Length of the (N, 2) polygon, how near a corner of it is to the origin, and whether the origin is within: a ray
+    from there crosses an odd number of its sides."""
+    length, nearest, is_around = 0.0, np.inf, False
+    for k in range(len(polygon)):
+        x, y = polygon[k]
+        end_x, end_y = polygon[(k + 1) % len(polygon)]
+        length += np.hypot(end_x - x, end_y - y)
+        nearest = min(nearest, np.hypot(x, y))
+        if (y > 0) != (end_y > 0) and x - y * (end_x - x) / (end_y - y) > 0:
+            is_around = not is_around
+    return length, nearest, is_around

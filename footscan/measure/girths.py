@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from footscan.measure.foot_surface import ACROSS, UP, FootSurface, Place
+from footscan.measure.hull import hull_corners
 from footscan.measure.outline import Outline, Plane
 from footscan.measure.quantity import NotThere, Quantity, combined
 
@@ -175,16 +175,16 @@ def tape(outline: Outline) -> Tape:
     NotThere
         The outline holds no area.
     """
-    try:
-        corners = ConvexHull(outline.points).vertices
-    except QhullError:
-        raise NotThere("the section of the surface holds no area") from None
+    corners = hull_corners(outline.points)
+    if len(corners) < 3:
+        raise NotThere("the section of the surface holds no area")
     around = outline.points[corners]
-    back, ahead = around - np.roll(around, 1, axis=0), around - np.roll(around, -1, axis=0)
-    back_length, ahead_length = np.linalg.norm(back, axis=1), np.linalg.norm(ahead, axis=1)
+    ahead = around[[*range(1, len(around)), 0]] - around
+    length = np.hypot(ahead[:, 0], ahead[:, 1])
+    direction = ahead / length[:, None]
     gradient = np.zeros_like(outline.points)
-    gradient[corners] = back / back_length[:, None] + ahead / ahead_length[:, None]
-    return Tape(float(back_length.sum()), gradient, corners)
+    gradient[corners] = direction[[-1, *range(len(around) - 1)]] - direction
+    return Tape(float(length.sum()), gradient, corners)
 
 
 def _excess(foot: FootSurface, outline: Outline, length: float) -> float:

@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import fft, fftfreq, ifft, next_fast_len
 
+from footscan.compiled import compiled
 from footscan.measure.sections import Loop
 
 Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 STEP_MM = 0.5
 """Between the places along a loop at which it is smoothed."""
@@ -44,7 +46,7 @@ class Plane(NamedTuple):
     def flat(self, points: Floats) -> Floats:
         """(N, 2) coordinates in the plane of (N, 3) `points`, mm."""
         away: Floats = points - self.point
-        return np.column_stack([away @ self.first, away @ self.second])
+        return away @ np.array([self.first, self.second]).T
 
     def solid(self, points: Floats) -> Floats:
         """(N, 3) points of the plane from their (N, 2) coordinates."""
@@ -87,14 +89,15 @@ def smooth_outline(loop: Loop, plane: Plane, noise: Floats) -> Outline:
     noise : (N, 2) standard deviation, in the plane, of the vertices of the loop's edges, mm
     """
     points = plane.flat(loop.points)
-    of_points = np.hypot((1 - loop.shares) * noise[:, 0], loop.shares * noise[:, 1])
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0, append=points[:1]), axis=1))])
+    usual = float(np.median(np.hypot((1 - loop.shares) * noise[:, 0], loop.shares * noise[:, 1])))
+    ahead = points[[*range(1, len(points)), 0]] - points
+    along = np.append(0.0, np.cumsum(np.hypot(ahead[:, 0], ahead[:, 1])))
     count = next_fast_len(max(int(np.ceil(along[-1] / STEP_MM)), 8))
     places = along[:-1] * (count / along[-1])
     frequencies = fftfreq(count, along[-1] / count)
-    wavelength = _wavelength(float(np.median(of_points)), along[-1] / len(points))
+    wavelength = _wavelength(usual, along[-1] / len(points))
     answer = 1.0 / (1.0 + (wavelength * frequencies) ** (2 * ORDER)) if wavelength > 2 * STEP_MM else None
-    outline = Outline(points, plane, loop, places, answer, float(np.median(of_points)))
+    outline = Outline(points, plane, loop, places, answer, usual)
     return outline._replace(points=outline.smoothed(points))
 
 
@@ -107,44 +110,67 @@ def _wavelength(noise: float, spacing: float) -> float:
     return float(2 * np.pi * np.cbrt(noise**2 * spacing / (3 * np.pi * SLOPE_VARIANCE)))
 
 
-def _sampled(points: Floats, places: Floats, count: int) -> Floats:
-    """(M, 2) the closed polygon at even places along it."""
-    at = np.arange(count)
-    ring = np.append(places, count)
-    return np.column_stack([np.interp(at, ring, np.append(points[:, k], points[0, k])) for k in range(2)])
+@compiled
+def _sampled(points: Floats, places: Floats, count: int) -> Complex:
+    """(M,) the closed polygon at even places along it, X + iY."""
+    sampled = np.empty(count, np.complex128)
+    before, share = _spans(places, count)
+    for k in range(count):
+        start, end = points[before[k]], points[(before[k] + 1) % len(points)]
+        x, y = start[0] + share[k] * (end[0] - start[0]), start[1] + share[k] * (end[1] - start[1])
+        sampled[k] = complex(x, y)
+    return sampled
 
 
-def _interpolated(sampled: Floats, places: Floats) -> Floats:
+@compiled
+def _interpolated(sampled: Complex, places: Floats) -> Floats:
     """(N, 2) even samples at `places` between them."""
-    ring = np.arange(len(sampled) + 1)
-    return np.column_stack([np.interp(places, ring, np.append(sampled[:, k], sampled[0, k])) for k in range(2)])
+    points = np.empty((len(places), 2))
+    for n in range(len(places)):
+        before = min(int(places[n]), len(sampled) - 1)
+        start, end = sampled[before], sampled[(before + 1) % len(sampled)]
+        point = start + (places[n] - before) * (end - start)
+        points[n, 0], points[n, 1] = point.real, point.imag
+    return points
 
 
-def _filtered(sampled: Floats, answer: Floats) -> Floats:
-    signal = ifft(fft(sampled[:, 0] + 1j * sampled[:, 1]) * answer)
-    return np.column_stack([signal.real, signal.imag])
+@compiled
+def _spans(places: Floats, count: int) -> tuple[NDArray[np.int64], Floats]:
+    """(M,) the point of the polygon before each even place along it, and (M,) the share of the way to the next one."""
+    before, share = np.empty(count, np.int64), np.empty(count)
+    point = 0
+    for k in range(count):
+        while point + 1 < len(places) and places[point + 1] <= k:
+            point += 1
+        end = places[point + 1] if point + 1 < len(places) else float(count)
+        before[k], share[k] = point, (k - places[point]) / max(end - places[point], 1e-12)
+    return before, share
 
 
-def _spread_back(gradient: Floats, places: Floats, count: int) -> Floats:
+def _filtered(sampled: Complex, answer: Floats) -> Complex:
+    signal: Complex = ifft(fft(sampled) * answer)
+    return signal
+
+
+@compiled
+def _spread_back(gradient: Floats, places: Floats, count: int) -> Complex:
     """The transpose of `_interpolated`."""
-    before = np.minimum(places.astype(np.int64), count - 1)
-    share = places - before
-    return np.column_stack(
-        [
-            np.bincount(before, (1 - share) * gradient[:, k], count)
-            + np.bincount((before + 1) % count, share * gradient[:, k], count)
-            for k in range(2)
-        ]
-    )
+    back = np.zeros(count, np.complex128)
+    for n in range(len(places)):
+        before = min(int(places[n]), count - 1)
+        moved = complex(gradient[n, 0], gradient[n, 1])
+        back[before] += (1 - (places[n] - before)) * moved
+        back[(before + 1) % count] += (places[n] - before) * moved
+    return back
 
 
-def _sampled_back(gradient: Floats, places: Floats) -> Floats:
+@compiled
+def _sampled_back(gradient: Complex, places: Floats) -> Floats:
     """The transpose of `_sampled`."""
-    at = np.arange(len(gradient))
-    ring = np.append(places, len(gradient))
-    before = np.clip(np.searchsorted(ring, at, side="right") - 1, 0, len(places) - 1)
-    share = ((at - ring[before]) / np.maximum(ring[before + 1] - ring[before], 1e-12))[:, None]
     back = np.zeros((len(places), 2))
-    np.add.at(back, before, (1 - share) * gradient)
-    np.add.at(back, (before + 1) % len(places), share * gradient)
+    before, share = _spans(places, len(gradient))
+    for k in range(len(gradient)):
+        for point, part in ((before[k], 1 - share[k]), ((before[k] + 1) % len(places), share[k])):
+            back[point, 0] += part * gradient[k].real
+            back[point, 1] += part * gradient[k].imag
     return back

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from footscan.measure.foot_surface import CLOSED_GAP_MM, UP, FootSurface
+from footscan.measure.hull import hull_corners
 from footscan.measure.outline import Outline, Plane
 from footscan.measure.quantity import NotThere, Quantity, combined
 
@@ -113,7 +113,7 @@ def clarke_angle(foot: FootSurface) -> Quantity:
     points, thirds = largest.points, contact.rear + (contact.front - contact.rear) * np.array([1 / 3, 2 / 3])
     if not (points[:, 0].min() < thirds[0] and points[:, 0].max() > thirds[1]):
         raise NotThere("the print is in two parts: its medial border does not run from heel to ball")
-    corners = ConvexHull(points).vertices
+    corners = hull_corners(points)
     start, end = points[corners], points[np.roll(corners, -1)]
     middle = np.mean(thirds)
     over = np.flatnonzero((np.minimum(start[:, 0], end[:, 0]) < middle) & (np.maximum(start[:, 0], end[:, 0]) > middle))

@@ -80,7 +80,7 @@ def _fits(vertices: Floats, normals: Floats, faces: Ints, starts: Ints, around: 
         covered[patch[:near]] = True
         is_smooth = count > CUBIC
         for k in range(count):
-            is_smooth = is_smooth and np.dot(normals[patch[k]], normals[vertex]) > SMOOTH
+            is_smooth = is_smooth and _dot(normals[patch[k]], normals[vertex]) > SMOOTH
         if not is_smooth:
             continue
         quadratic, cubic = _residual_variances(vertices, vertex, normals[vertex], patch[:count])
@@ -123,19 +123,20 @@ def _residual_variances(vertices: Floats, vertex: int, normal: Floats, patch: In
     across = np.zeros(3)
     across[axis] = 1.0
     across -= normal[axis] * normal
-    across /= np.sqrt(np.dot(across, across))
+    across /= np.sqrt(_dot(across, across))
     up = np.cross(normal, across)
-    away = np.empty((len(patch), 3))
+    away, scale = np.empty((len(patch), 3)), 0.0
     for k in range(len(patch)):
-        away[k] = vertices[patch[k]] - vertices[vertex]
-    scale = np.abs(away).max()
+        for axis in range(3):
+            away[k, axis] = vertices[patch[k], axis] - vertices[vertex, axis]
+            scale = max(scale, abs(away[k, axis]))
     if scale == 0.0:
         return -1.0, -1.0
     terms = np.empty(CUBIC)
     matrix, right = np.zeros((CUBIC, CUBIC)), np.zeros(CUBIC)
     squares = 0.0
     for k in range(len(patch)):
-        u, v, height = np.dot(away[k], across) / scale, np.dot(away[k], up) / scale, np.dot(away[k], normal)
+        u, v, height = _dot(away[k], across) / scale, _dot(away[k], up) / scale, _dot(away[k], normal)
         terms[0], terms[1], terms[2], terms[3], terms[4], terms[5] = 1.0, u, v, u * u, u * v, v * v
         terms[6], terms[7], terms[8], terms[9] = u * u * u, u * u * v, u * v * v, v * v * v
         squares += height * height
@@ -149,6 +150,13 @@ def _residual_variances(vertices: Floats, vertex: int, normal: Floats, patch: In
     quadratic = squares - np.sum(right[:QUADRATIC] ** 2)
     cubic = max(quadratic - np.sum(right[QUADRATIC:] ** 2), 0.0)
     return quadratic / (len(patch) - QUADRATIC), cubic / (len(patch) - CUBIC)
+
+
+@compiled
+def _dot(first: Floats, second: Floats) -> float:
+    """Of (3,) vectors, for which a call of BLAS takes longer."""
+    product: float = first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+    return product
 
 
 @compiled

@@ -1,5 +1,6 @@
 """Plane sections of a triangle mesh as closed loops."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -73,18 +74,27 @@ def cut(mesh: Cuttable, point: Floats, normal: Floats) -> list[Loop]:
     Where the mesh is open, ends of curves are joined straight, the nearest first.
     """
     height = mesh.vertices @ normal - point @ normal
-    edges, ends, closed = _traced(mesh.faces, mesh.neighbours, height)
-    curves = np.split(edges, ends)[:-1]
+    edges, ends, closed = _traced(mesh.faces, mesh.neighbours, height >= 0)
+    curves = [edges[start:end] for start, end in pairwise((0, *ends.tolist()))]
     loops = [_loop(mesh.vertices, height, curve, 0.0) for curve, whole in zip(curves, closed, strict=True) if whole]
     open_curves = [curve for curve, whole in zip(curves, closed, strict=True) if not whole]
     return loops + _joined(mesh.vertices, height, open_curves)
 
 
 def _loop(vertices: Floats, height: Floats, edges: Ints, gap: float) -> Loop:
-    first, second = edges[:, 0], edges[:, 1]
-    shares = height[first] / (height[first] - height[second])
-    points = vertices[first] + shares[:, None] * (vertices[second] - vertices[first])
-    return Loop(points, edges, shares, gap)
+    return Loop(*_crossings(vertices, height, edges), gap)
+
+
+@compiled
+def _crossings(vertices: Floats, height: Floats, edges: Ints) -> tuple[Floats, Ints, Floats]:
+    """(N, 3) where (N, 2) edges run through height 0, the edges, and (N,) the shares of them there."""
+    points, shares = np.empty((len(edges), 3)), np.empty(len(edges))
+    for k in range(len(edges)):
+        first, second = edges[k]
+        shares[k] = height[first] / (height[first] - height[second])
+        for axis in range(3):
+            points[k, axis] = vertices[first, axis] + shares[k] * (vertices[second, axis] - vertices[first, axis])
+    return points, edges, shares
 
 
 def _joined(vertices: Floats, height: Floats, curves: list[Ints]) -> list[Loop]:
@@ -121,27 +131,28 @@ def _nearest_pairs(points: Floats) -> tuple[Ints, Floats]:
 
 
 @compiled
-def _traced(faces: Ints, neighbours: Ints, height: Floats) -> tuple[Ints, Ints, NDArray[np.bool_]]:
-    """Follows the curves where `height`, (V,), changes its sign, from face to face: open ones first.
+def _traced(faces: Ints, neighbours: Ints, above: NDArray[np.bool_]) -> tuple[Ints, Ints, NDArray[np.bool_]]:
+    """Follows the curves that part the vertices `above`, (V,), from the others, from face to face: open ones first.
 
     Returns (N, 2) the vertices of the edges crossed, (C,) where each curve ends in them, (C,) whether it is closed.
     """
-    crossing = np.zeros(len(faces), np.bool_)
+    crossing, crossed = np.zeros(len(faces), np.bool_), np.empty(len(faces), np.int64)
     count = 0
     for face in range(len(faces)):
-        first = height[faces[face, 0]] >= 0
-        if first != (height[faces[face, 1]] >= 0) or first != (height[faces[face, 2]] >= 0):
+        first = above[faces[face, 0]]
+        if first != above[faces[face, 1]] or first != above[faces[face, 2]]:
             crossing[face] = True
+            crossed[count] = face
             count += 1
     edges = np.empty((2 * count + 1, 2), np.int64)
     ends, closed = np.empty(count, np.int64), np.empty(count, np.bool_)
     length = curves = 0
     for seek_open in (True, False):
-        for start in range(len(faces)):
+        for start in crossed[:count]:
             if not crossing[start]:
                 continue
-            slot = _crossed(faces, height, start, -1)
-            other = _crossed(faces, height, start, slot)
+            slot = _crossed(faces, above, start, -1)
+            other = _crossed(faces, above, start, slot)
             if seek_open:
                 if neighbours[start, slot] >= 0:
                     slot, other = other, slot
@@ -152,7 +163,7 @@ def _traced(faces: Ints, neighbours: Ints, height: Floats) -> tuple[Ints, Ints, 
             length += 1
             while face >= 0 and crossing[face]:
                 crossing[face] = False
-                leave = _crossed(faces, height, face, entry)
+                leave = _crossed(faces, above, face, entry)
                 a, b = faces[face, leave], faces[face, (leave + 1) % 3]
                 edges[length, 0], edges[length, 1] = a, b
                 length += 1
@@ -177,9 +188,9 @@ def _edge(faces: Ints, face: int, a: int, b: int) -> int:
 
 
 @compiled
-def _crossed(faces: Ints, height: Floats, face: int, other_than: int) -> int:
+def _crossed(faces: Ints, above: NDArray[np.bool_], face: int, other_than: int) -> int:
     """The first edge of the face that is crossed, `other_than` one left out."""
     for k in range(3):
-        if k != other_than and (height[faces[face, k]] >= 0) != (height[faces[face, (k + 1) % 3]] >= 0):
+        if k != other_than and above[faces[face, k]] != above[faces[face, (k + 1) % 3]]:
             return k
     return -1

@@ -65,10 +65,11 @@ def _area_below(vertices: Floats, faces: NDArray[np.int64], level: float) -> flo
     """What of a triangle lies below is a share of it: of both edges from the corner that is alone on its side."""
     total = 0.0
     for face in range(len(faces)):
-        a, b, c = vertices[faces[face, 0]], vertices[faces[face, 1]], vertices[faces[face, 2]]
-        below = int(a[2] < level) + int(b[2] < level) + int(c[2] < level)
+        i, j, k = faces[face]
+        below = int(vertices[i, 2] < level) + int(vertices[j, 2] < level) + int(vertices[k, 2] < level)
         if below == 0:
             continue
+        a, b, c = vertices[i], vertices[j], vertices[k]
         x = (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1])
         y = (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2])
         z = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
