@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.compiled import compiled
 from footscan.measure.polynomial import LEAST_MISFIT_MM, climb, held_back, robust_fit, slope, terms_at
 
 Floats = NDArray[np.float64]
@@ -85,15 +86,15 @@ def summit(points: Floats, axis: int, sign: int, window: Window, depth: float) -
     """
     across = [k for k in range(3) if k != axis]
     low, high = np.array(window, np.float64).T
-    position, height = points[:, across], sign * points[:, axis]
-    first, second = position.T
+    first, second = np.ascontiguousarray(points[:, across].T)
+    height = sign * points[:, axis]
     inside = (first >= low[0]) & (first <= high[0]) & (second >= low[1]) & (second <= high[1])
     if np.count_nonzero(inside) < 3:
         return None
-    centre, top = _start(position[inside], height[inside], depth)
+    centre, top = _start(np.column_stack([first[inside], second[inside]]), height[inside], depth)
     near = height > top - 4 * depth - 2.0
     near &= (np.abs(first - centre[0]) < 2 * RADIUS_MM[2]) & (np.abs(second - centre[1]) < 2 * RADIUS_MM[2])
-    position, height = np.ascontiguousarray(position[near]), height[near]
+    position, height = np.column_stack([first[near], second[near]]), height[near]
     cap, fitted_cap = Cap(np.eye(2) / NEAR_MM, depth, LEAST_MISFIT_MM), None
     for round_ in range(ROUNDS):
         fitted = _fit(position - centre, height, cap)
@@ -137,31 +138,39 @@ def _fit(offset: Floats, height: Floats, cap: Cap) -> tuple[Floats, float] | Non
     return None if noise < 0 else (factors, noise)
 
 
+@compiled
 def _highest(factors: Floats, centre: Floats, spread: Floats, low: Floats, high: Floats) -> tuple[Floats, float]:
     """Where in the cap and in the window the polynomial is highest, mm, and its height there."""
     back = np.linalg.inv(spread)
-    positions = np.clip(centre + DISC @ back, low, high)
+    positions = np.minimum(np.maximum(centre + DISC @ back, low), high)
     heights = terms_at((positions - centre) @ spread) @ factors
-    best: Floats = positions[heights >= heights.max() - FLAT_MM].mean(axis=0)  # of a blunt end the middle
-    refined: Floats = centre + climb(factors, (best - centre) @ spread) @ back
+    at_top = heights >= heights.max() - FLAT_MM  # of a blunt end the middle
+    best = np.array([positions[at_top, 0].mean(), positions[at_top, 1].mean()])
+    refined = centre + climb(factors, (best - centre) @ spread) @ back
     if np.all((refined > low) & (refined < high)):
         best = refined
-    return best, float((terms_at(((best - centre) @ spread)[None]) @ factors)[0])
+    return best, (terms_at(((best - centre) @ spread).reshape(1, 2)) @ factors)[0]
 
 
 def _cap(factors: Floats, cap: Cap, depth: float, offset: Floats) -> Cap:
     """The cap of `depth`, or deeper against noise, by the curvature of the polynomial over the last one."""
+    spread, depth = _spread(factors, cap.spread, cap.noise, depth, offset)
+    return Cap(spread, depth, cap.noise)
+
+
+@compiled
+def _spread(factors: Floats, last: Floats, noise: float, depth: float, offset: Floats) -> tuple[Floats, float]:
     least, greatest, noisy = RADIUS_MM
-    greatest = min(greatest + NOISE_WIDENS * cap.noise, noisy)
-    places = offset @ cap.spread
-    count = max(int(np.count_nonzero(np.einsum("ni,ni->n", places, places) < 1.0)), 1)
-    spacing = np.sqrt(np.pi / abs(np.linalg.det(cap.spread)) / count)
-    depth = max(depth, NOISES_DEEP * cap.noise * min(spacing, SCARCEST_MM) ** SCARCE_POWER)
+    greatest = min(greatest + NOISE_WIDENS * noise, noisy)
+    places = offset @ last
+    count = max(np.count_nonzero(places[:, 0] ** 2 + places[:, 1] ** 2 < 1.0), 1)
+    spacing = np.sqrt(np.pi / abs(np.linalg.det(last)) / count)
+    depth = max(depth, NOISES_DEEP * noise * min(spacing, SCARCEST_MM) ** SCARCE_POWER)
     _, second = slope(factors, np.zeros(2))
-    curvature, directions = np.linalg.eigh(-(cap.spread @ second @ cap.spread.T))
+    curvature, directions = np.linalg.eigh(-(last @ second @ last.T))
     radii = np.sqrt(2 * depth / np.maximum(curvature, 2 * depth / greatest**2))
     radii = np.maximum(radii, min(max(least, SPACINGS * spacing), noisy))
-    return Cap((directions / radii) @ directions.T, depth, cap.noise)
+    return (directions / radii) @ directions.T, depth
 
 
 def saddle(position: Floats, height: Floats, start: Floats, radius: float) -> tuple[Floats, float, Cap] | None:
@@ -191,11 +200,12 @@ def height_at(position: Floats, height: Floats, place: Floats, radius: float) ->
     return None if fitted is None else float(fitted[0][0])
 
 
-def highest_of_each(group: NDArray[np.integer], height: Floats, count: int) -> NDArray[np.int64]:
-    """(count,) the last of the highest of (N,) points in each of so many groups; -1 where a group is empty."""
-    top = np.full(count, -np.inf)
-    np.maximum.at(top, group, height)
-    at_top = np.flatnonzero(height == top[group])
+@compiled
+def highest_of_each(group: NDArray[np.int64], height: Floats, count: int) -> NDArray[np.int64]:
+    """(count,) which of (N,) points is the highest in each of so many groups, the last of equals; -1 where a group is
+    empty."""
     highest = np.full(count, -1)
-    highest[group[at_top]] = at_top
+    for k in range(len(group)):
+        if highest[group[k]] < 0 or height[k] >= height[highest[group[k]]]:
+            highest[group[k]] = k
     return highest

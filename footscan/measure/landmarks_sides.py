@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.measure.landmarks_extreme import Summit, summit
+from footscan.measure.place import FREE, points_within
 
 Floats = NDArray[np.float64]
 
@@ -25,20 +26,18 @@ END_DEPTH_MM, SIDE_DEPTH_MM = 1.0, 0.7
 REACH = 0.06
 """Surface so far outside a window supports the fit at its border."""
 
-EVERYWHERE = (-np.inf, np.inf)
-
 
 def pternion(points: Floats, length: float, low: float) -> Summit | None:
     """The rearmost point of the heel, up to the height `low` in mm."""
-    first = points[:, 0] - points[:, 0].min(initial=np.inf)
-    heel = points[(first < HEEL * length) & (points[:, 2] <= low)]
-    return summit(heel, 0, -1, (EVERYWHERE, EVERYWHERE), END_DEPTH_MM)
+    rear = points[:, 0].min(initial=np.inf)
+    heel = points_within(points, x=(rear, rear + HEEL * length), z=(-np.inf, low))
+    return summit(heel, 0, -1, (FREE, FREE), END_DEPTH_MM)
 
 
 def foremost(points: Floats, length: float, low: float) -> Summit | None:
     """The tip of the longest toe."""
-    toes = points[(points[:, 0] > LONGEST_TOE * length) & (points[:, 2] <= low)]
-    return summit(toes, 0, 1, (EVERYWHERE, EVERYWHERE), END_DEPTH_MM)
+    toes = points_within(points, x=(LONGEST_TOE * length, np.inf), z=(-np.inf, low))
+    return summit(toes, 0, 1, (FREE, FREE), END_DEPTH_MM)
 
 
 def metatarsale_tibiale(points: Floats, length: float) -> Summit | None:
@@ -72,7 +71,5 @@ def outermost_in(
     points: Floats, side: int, along: tuple[float, float], heights: tuple[float, float], reach: float
 ) -> Summit | None:
     """The point farthest to one `side` in a window of X and Z; `reach` is how far outside it the fit may lean on. mm"""
-    near = np.ones(len(points), np.bool_)
-    for axis, (first, last) in ((0, along), (2, heights)):
-        near &= (points[:, axis] > first - reach) & (points[:, axis] < last + reach)
-    return summit(points[near], 1, side, (along, heights), SIDE_DEPTH_MM)
+    x, z = ((first - reach, last + reach) for first, last in (along, heights))
+    return summit(points_within(points, x=x, z=z), 1, side, (along, heights), SIDE_DEPTH_MM)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from footscan.measure.landmarks_extreme import Floats, Point, Summit, highest_of_each, summit
+from footscan.measure.place import points_within
 
 FOREFOOT = 0.74
 """Toes lie ahead of this part of the length."""
@@ -58,8 +59,7 @@ def toe_tips(
     sides : Y of the heads of the first and fifth metatarsal, mm
     wanted : the numbers of those toes whose tips are asked for
     """
-    outline = dense[(dense[:, 0] >= FOREFOOT * length) & (dense[:, 2] <= low)]
-    toes = points[(points[:, 0] >= FOREFOOT * length) & (points[:, 2] <= low)]
+    outline, toes = (points_within(of, x=(FOREFOOT * length, np.inf), z=(-np.inf, low)) for of in (dense, points))
     if not len(outline):
         return ToeTips({}, False)
     peaks = sorted(_peaks(outline, length, sides), key=lambda peak: -float(peak[0][1]))
@@ -71,7 +71,7 @@ def toe_tips(
 def _placed(toes: Floats, peak: Point, left: float, right: float) -> Summit:
     """The tip between two clefts."""
     window = ((left, right), (-np.inf, np.inf))
-    tip = summit(toes[(toes[:, 1] > left) & (toes[:, 1] < right)], 0, 1, window, DEPTH_MM)
+    tip = summit(points_within(toes, y=(left, right)), 0, 1, window, DEPTH_MM)
     # A toe that points aside has its foremost place beside the tip.
     return Summit(peak, 0.0, True) if tip is None or tip.at_border else tip
 

@@ -6,6 +6,11 @@ from numpy.typing import NDArray
 from footscan.compiled import compiled
 
 Floats = NDArray[np.float64]
+Bounds = tuple[float, float]
+"""Lower and upper, mm."""
+
+FREE = (-np.inf, np.inf)
+"""Bounds of everything."""
 
 LOW_MM, LOW_SHARE = 60.0, 0.24
 """Below this height, and this part of the length, there is foot and no leg; the pternion is at 0.06 to 0.13 of it."""
@@ -32,9 +37,26 @@ def low_height(length: float) -> float:
 def _moved(transform: Floats, points: Floats) -> Floats:
     """Faster than a product of matrices so thin."""
     moved = np.empty((len(points), 3))
-    for k in range(len(points)):
-        x, y, z = points[k]
-        for axis in range(3):
-            along = transform[axis]
-            moved[k, axis] = along[0] * x + along[1] * y + along[2] * z + along[3]
+    for axis in range(3):
+        x, y, z, shift = transform[axis, 0], transform[axis, 1], transform[axis, 2], transform[axis, 3]
+        for k in range(len(points)):
+            moved[k, axis] = x * points[k, 0] + y * points[k, 1] + z * points[k, 2] + shift
     return moved
+
+
+def points_within(points: Floats, x: Bounds = FREE, y: Bounds = FREE, z: Bounds = FREE) -> Floats:
+    """Those of (N, 3) `points` that lie within a box, its bounds included."""
+    return _within(points, np.array([x, y, z], np.float64))
+
+
+@compiled
+def _within(points: Floats, bounds: Floats) -> Floats:
+    kept, count = np.empty(points.shape), 0
+    for k in range(len(points)):
+        is_within = True
+        for axis in range(3):
+            is_within &= bounds[axis, 0] <= points[k, axis] <= bounds[axis, 1]
+        if is_within:
+            kept[count] = points[k]
+            count += 1
+    return kept[:count].copy()

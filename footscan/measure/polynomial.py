@@ -45,7 +45,7 @@ def robust_fit(places: Floats, height: Floats, noise: float, unevenness: float) 
     count, size = len(inside), len(POWERS)
     if count < QUADRIC:
         return np.zeros(size), -1.0
-    terms = terms_at(places[inside])
+    terms, heights = terms_at(places[inside]), height[inside]
     weight = (1.0 - squared[inside]) ** 2
     kept, away, factors = weight.copy(), np.empty(count), np.zeros(size)
     for _ in range(REWEIGHTED):
@@ -53,7 +53,7 @@ def robust_fit(places: Floats, height: Floats, noise: float, unevenness: float) 
         for k in range(count):
             for i in range(size):
                 weighted = kept[k] * terms[k, i]
-                both[i, 0] += weighted * height[inside[k]]
+                both[i, 0] += weighted * heights[k]
                 for j in range(i + 1):
                     both[i, j + 1] += weighted * terms[k, j]
         for i in range(size):
@@ -67,13 +67,11 @@ def robust_fit(places: Floats, height: Floats, noise: float, unevenness: float) 
         used = 0.0
         for i in range(size):
             used += free[i, i + 1]
-        for k in range(count):
-            away[k] = abs(height[inside[k]] - np.dot(terms[k], free[:, 0]))
+        away[:] = np.abs(heights - terms @ np.ascontiguousarray(free[:, 0]))
         left = max(1.0 - used / count, LEAST_FREE)
         noise = max(MEDIAN_TO_SD * np.sort(away)[count // 2] / np.sqrt(left), LEAST_NOISE_MM)
-        for k in range(count):
-            off = abs(height[inside[k]] - np.dot(terms[k], factors)) / (TUKEY * max(noise, LEAST_MISFIT_MM))
-            kept[k] = weight[k] * max(1.0 - off * off, 0.0) ** 2
+        off = (heights - terms @ factors) / (TUKEY * max(noise, LEAST_MISFIT_MM))
+        kept[:] = weight * np.maximum(1.0 - off * off, 0.0) ** 2
     return factors, noise
 
 
