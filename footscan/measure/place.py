@@ -46,17 +46,16 @@ def _moved(transform: Floats, points: Floats) -> Floats:
 
 def points_within(points: Floats, x: Bounds = FREE, y: Bounds = FREE, z: Bounds = FREE) -> Floats:
     """Those of (N, 3) `points` that lie within a box, its bounds included."""
-    return _within(points, np.array([x, y, z], np.float64))
+    low, high = np.array([x, y, z], np.float64).T.copy()
+    return _within(points, low, high)
 
 
 @compiled
-def _within(points: Floats, bounds: Floats) -> Floats:
+def _within(points: Floats, low: Floats, high: Floats) -> Floats:
     kept, count = np.empty(points.shape), 0
     for k in range(len(points)):
-        is_within = True
-        for axis in range(3):
-            is_within &= bounds[axis, 0] <= points[k, axis] <= bounds[axis, 1]
-        if is_within:
-            kept[count] = points[k]
+        x, y, z = points[k, 0], points[k, 1], points[k, 2]
+        if low[0] <= x <= high[0] and low[1] <= y <= high[1] and low[2] <= z <= high[2]:
+            kept[count, 0], kept[count, 1], kept[count, 2] = x, y, z
             count += 1
     return kept[:count].copy()

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from footscan.compiled import compiled
 from footscan.measure.sections import face_neighbours
+from footscan.surface.topology import vertex_normals_and_areas
 from schemas.errors import Finding
 
 Floats = NDArray[np.float64]
@@ -100,15 +102,7 @@ class _Skin(NamedTuple):
 
 
 def _skin(vertices: Floats, faces: NDArray[np.integer]) -> _Skin:
-    corners = vertices[faces]
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    doubled = np.sqrt(np.einsum("ni,ni->n", crosses, crosses))
-    count = len(vertices)
-    areas = sum(np.bincount(faces[:, k], doubled, minlength=count) for k in range(3)) / 6
-    sums = [sum(np.bincount(faces[:, k], crosses[:, i], minlength=count) for k in range(3)) for i in range(3)]
-    normals = np.column_stack(sums)
-    lengths = np.linalg.norm(normals, axis=1)
-    return _Skin(normals / np.where(lengths > 0, lengths, 1.0)[:, None], np.asarray(areas), _rims(vertices, faces))
+    return _Skin(*vertex_normals_and_areas(vertices, faces), _rims(vertices, faces))
 
 
 def _rims(vertices: Floats, faces: NDArray[np.integer]) -> Floats:
@@ -134,8 +128,8 @@ def _hull_faces(vertices: Floats, hull: ConvexHull) -> list[tuple[Floats, float]
     areas = np.sqrt(np.einsum("ni,ni->n", crosses, crosses)) / 2
     normals = hull.equations[:, :3]
     # A flat part is cut into many triangles: those of about one direction count together.
-    _, coarse = np.unique(np.rint(normals * COARSE).astype(np.int64), axis=0, return_inverse=True)
-    coarse, left, faces = coarse.reshape(-1), areas.copy(), []
+    coarse = (np.rint(normals * COARSE) + COARSE).astype(np.int64) @ (2 * COARSE + 1) ** np.arange(3)
+    left, faces = areas.copy(), []
     for _ in range(CANDIDATES):
         together = coarse == np.argmax(np.bincount(coarse, left))
         normal = (normals[together] * left[together, None]).sum(axis=0)
@@ -161,10 +155,12 @@ def _standing(vertices: Floats, skin: _Skin, up: Floats) -> _Standing:
     height = vertices @ up
     height = height - height.min()
     flat = vertices @ _across(up)
-    low = height <= LOW * np.linalg.norm(np.ptp(flat, axis=0))
+    first, second = np.ascontiguousarray(flat.T)
+    low = height <= LOW * np.hypot(np.ptp(first), np.ptp(second))
     for _ in range(2):
-        direction = _long_direction(flat[low], skin.areas[low])
-        x, y = flat @ direction, flat @ [-direction[1], direction[0]]
+        _, spread = _spread(flat, np.where(low, np.maximum(skin.areas, 1e-12), 0.0))
+        direction = np.linalg.eigh(spread)[1][:, -1]
+        x, y = direction[0] * first + direction[1] * second, direction[0] * second - direction[1] * first
         length = float(np.ptp(x[low]))
         low = height <= LOW * length
     x = x - x[low].min()
@@ -185,11 +181,21 @@ def _across(up: Floats) -> Floats:
     return np.column_stack([first, np.cross(up, first)])
 
 
-def _long_direction(flat: Floats, areas: Floats) -> Floats:
-    """(2,) direction in which points that stand for `areas` spread most."""
-    _, directions = np.linalg.eigh(np.cov(flat.T, aweights=np.maximum(areas, 1e-12)))
-    longest: Floats = directions[:, -1]
-    return longest
+@compiled
+def _spread(points: Floats, weights: Floats) -> tuple[Floats, Floats]:
+    """(D,) mean and (D, D) covariance of (N, D) points by their (N,) weights, which are not all 0."""
+    size = points.shape[1]
+    middle, covariance, total = np.zeros(size), np.zeros((size, size)), weights.sum()
+    for k in range(len(points)):
+        if weights[k] > 0:
+            for i in range(size):
+                middle[i] += weights[k] / total * points[k, i]
+    for k in range(len(points)):
+        if weights[k] > 0:
+            for i in range(size):
+                for j in range(size):
+                    covariance[i, j] += weights[k] / total * (points[k, i] - middle[i]) * (points[k, j] - middle[j])
+    return middle, covariance
 
 
 def _floor(vertices: Floats, skin: _Skin, hull: ConvexHull, standing: _Standing) -> tuple[Floats, float, float, bool]:
@@ -209,12 +215,12 @@ def _floor(vertices: Floats, skin: _Skin, hull: ConvexHull, standing: _Standing)
         weights = areas * down * np.clip(1.0 - away**2, 0.0, None) ** 2
         if np.count_nonzero(weights) < 3:
             break
-        middle = np.average(places, axis=0, weights=weights)
-        _, directions = np.linalg.eigh(np.cov(places.T, aweights=weights))
+        middle, spread = _spread(places, weights)
+        _, directions = np.linalg.eigh(spread)
         fitted = directions[:, 0] if directions[:, 0] @ up > 0 else -directions[:, 0]
         change = float(np.linalg.norm(fitted - up)) + abs(float(middle @ fitted) - offset) / length
         up, offset = fitted, float(middle @ fitted)
-        scatter = float(np.sqrt(np.average(((places - middle) @ up) ** 2, weights=weights)))
+        scatter = float(np.sqrt(weights @ (places @ up - offset) ** 2 / weights.sum()))
         narrower = max(SCATTERS_WIDE * scatter, LEAST_REACH * length)
         if narrower >= 0.99 * reach and change < 1e-9:
             break

@@ -5,6 +5,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from footscan.compiled import compiled
+
 Faces = NDArray[np.integer]
 
 
@@ -69,12 +71,36 @@ def _renumbered(numbers: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArra
 
 def vertex_normals(vertices: NDArray[np.float64], faces: Faces) -> NDArray[np.float64]:
     """(V, 3) unit vectors: the mean of the faces around each vertex, by their areas; 0 where there is none."""
-    corners = vertices[faces]
-    of_faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = np.empty_like(vertices)
-    for axis in range(3):
-        sums = [np.bincount(faces[:, k], of_faces[:, axis], minlength=len(vertices)) for k in range(3)]
-        normals[:, axis] = sums[0] + sums[1] + sums[2]
-    length = np.sqrt(np.einsum("ni,ni->n", normals, normals))
-    unit: NDArray[np.float64] = normals / np.where(length > 0, length, 1.0)[:, None]
-    return unit
+    return vertex_normals_and_areas(vertices, faces)[0]
+
+
+def vertex_normals_and_areas(
+    vertices: NDArray[np.float64], faces: Faces
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The normals of `vertex_normals`, and (V,) a third of the area of the faces around each vertex."""
+    return _normals_and_areas(np.ascontiguousarray(vertices, np.float64), np.ascontiguousarray(faces, np.int64))
+
+
+@compiled
+def _normals_and_areas(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    normals, areas = np.zeros((len(vertices), 3)), np.zeros(len(vertices))
+    first, second, normal = np.empty(3), np.empty(3), np.empty(3)
+    for face in range(len(faces)):
+        for axis in range(3):
+            first[axis] = vertices[faces[face, 1], axis] - vertices[faces[face, 0], axis]
+            second[axis] = vertices[faces[face, 2], axis] - vertices[faces[face, 0], axis]
+        normal[0] = first[1] * second[2] - first[2] * second[1]
+        normal[1] = first[2] * second[0] - first[0] * second[2]
+        normal[2] = first[0] * second[1] - first[1] * second[0]
+        doubled = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+        for vertex in faces[face]:
+            areas[vertex] += doubled / 6
+            for axis in range(3):
+                normals[vertex, axis] += normal[axis]
+    for vertex in range(len(vertices)):
+        length = np.sqrt(normals[vertex, 0] ** 2 + normals[vertex, 1] ** 2 + normals[vertex, 2] ** 2)
+        if length > 0:
+            normals[vertex] /= length
+    return normals, areas
