@@ -46,6 +46,8 @@ def _lattices(vertices: Floats, faces: NDArray[np.int64], spacing: float) -> Flo
                     continue
                 first, second, third = j / count, i / count, (count - i - j) / count
                 for axis in range(3):
-                    points[place, axis] = first * vertices[a, axis] + second * vertices[b, axis] + third * vertices[c, axis]
+                    points[place, axis] = (
+                        first * vertices[a, axis] + second * vertices[b, axis] + third * vertices[c, axis]
+                    )
                 place += 1
     return points

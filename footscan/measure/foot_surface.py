@@ -1,8 +1,8 @@
 """A foot's surface made ready for being measured: sections, landmarks, noise."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from footscan.measure.sections import Cuttable, Loop, cut, cuttable
 from footscan.surface.topology import vertex_normals
 
 Floats = NDArray[np.float64]
+_Taken = TypeVar("_Taken")
 
 ACROSS = np.array([1.0, 0.0, 0.0])
 UP = np.array([0.0, 0.0, 1.0])
@@ -64,6 +65,8 @@ class FootSurface:
         self.errors, self.noise = roughness(foot.vertices, self.normals, foot.faces)
         self.landmarks = landmarks
         self._places: dict[str, Place] = {}
+        self._outlines: dict[tuple[float, ...], Outline] = {}
+        self._taken: dict[Callable[[FootSurface], Any], Any] = {}
 
     @cached_property
     def midfoot(self) -> Outline:
@@ -139,16 +142,27 @@ class FootSurface:
         NotThere
             There is none, or it is open by more than CLOSED_GAP_MM.
         """
-        loop = nearest_loop(self.sections(plane), plane, seed)
-        if loop is None:
-            raise NotThere("the surface has no section here")
-        if loop.gap >= CLOSED_GAP_MM:
-            raise NotThere(f"the surface has a gap of {loop.gap:.0f} mm here")
-        return self.smooth(loop, plane)
+        where = tuple(np.concatenate([plane.point, plane.normal, seed]).tolist())
+        if where not in self._outlines:
+            loop = nearest_loop(self.sections(plane), plane, seed)
+            if loop is None:
+                raise NotThere("the surface has no section here")
+            if loop.gap >= CLOSED_GAP_MM:
+                raise NotThere(f"the surface has a gap of {loop.gap:.0f} mm here")
+            self._outlines[where] = self.smooth(loop, plane)
+        return self._outlines[where]
+
+    def once(self, take: "Callable[[FootSurface], _Taken]") -> _Taken:
+        """What `take` makes of this surface, which is taken once."""
+        if take not in self._taken:
+            self._taken[take] = take(self)
+        taken: _Taken = self._taken[take]
+        return taken
 
     def smooth(self, loop: Loop, plane: Plane) -> Outline:
         """The loop without noise."""
-        moves = np.hypot(*self.outwards(plane, loop.edges.ravel()).T).reshape(-1, 2)
+        x, y = self.outwards(plane, loop.edges.ravel()).T
+        moves = np.hypot(x, y).reshape(-1, 2)
         return smooth_outline(loop, plane, moves * self.noise[loop.edges])
 
     def gradient(self, outline: Outline, by_points: Floats) -> Floats:
@@ -164,11 +178,7 @@ class FootSurface:
     def outwards(self, plane: Plane, vertices: NDArray[np.int64]) -> Floats:
         """(N, 2) how a section moves where (N,) vertices move outwards by 1: by 1 over the sine of the angle between
         plane and normal, LEAST_SINE at least."""
-        normals = self.normals[vertices]
-        in_plane = normals @ np.column_stack([plane.first, plane.second])
-        squared = in_plane[:, 0] ** 2 + in_plane[:, 1] ** 2
-        moved: Floats = in_plane / np.maximum(squared, LEAST_SINE**2)[:, None]
-        return moved
+        return _outwards(self.normals, vertices, plane.first, plane.second)
 
 
 def nearest_loop(loops: list[Loop], plane: Plane, seed: Floats, least: float = LEAST_LOOP_MM) -> Loop | None:
@@ -185,6 +195,17 @@ def nearest_loop(loops: list[Loop], plane: Plane, seed: Floats, least: float = L
     if around:
         return max(around, key=lambda found: found[0])[1]
     return min(passing, key=lambda found: found[0])[1] if passing else None
+
+
+@compiled
+def _outwards(normals: Floats, vertices: NDArray[np.int64], first: Floats, second: Floats) -> Floats:
+    moved = np.empty((len(vertices), 2))
+    for k in range(len(vertices)):
+        x, y, z = normals[vertices[k], 0], normals[vertices[k], 1], normals[vertices[k], 2]
+        u, v = x * first[0] + y * first[1] + z * first[2], x * second[0] + y * second[1] + z * second[2]
+        squared = max(u * u + v * v, LEAST_SINE**2)
+        moved[k, 0], moved[k, 1] = u / squared, v / squared
+    return moved
 
 
 @compiled

@@ -84,7 +84,7 @@ def heel_breadth(foot: FootSurface) -> Quantity:
 
 def midfoot_breadth(foot: FootSurface) -> Quantity:
     """Of the section at half the foot length."""
-    medial, lateral = _midfoot_sides(foot)
+    medial, lateral = foot.once(_midfoot_sides)
     return combined(medial.value + lateral.value, (1.0, medial), (1.0, lateral))
 
 
@@ -119,7 +119,7 @@ def instep_height(foot: FootSurface) -> Quantity:
 
 def arch_height_index(foot: FootSurface) -> Quantity:
     """Instep height over the length from the heel to the head of the first metatarsal."""
-    top, length = instep_height(foot), along_axis(foot, "metatarsale_tibiale")
+    top, length = foot.once(instep_height), along_axis(foot, "metatarsale_tibiale")
     index = top.value / length.value
     return combined(index, (1 / length.value, top), (-index / length.value, length))
 
@@ -145,7 +145,7 @@ def toe_height(foot: FootSurface) -> Quantity:
 
 def arch_height(foot: FootSurface) -> Quantity:
     """Of the sole, on the line parallel to the axis that is a third of the midfoot's breadth from its medial edge."""
-    medial, lateral = _midfoot_sides(foot)
+    medial, lateral = foot.once(_midfoot_sides)
     inside = foot.midfoot.plane.point
     y = medial.value - (medial.value + lateral.value) / 3
     at = np.array([inside[0], y, inside[2]])

@@ -89,9 +89,7 @@ def smooth_outline(loop: Loop, plane: Plane, noise: Floats) -> Outline:
     noise : (N, 2) standard deviation, in the plane, of the vertices of the loop's edges, mm
     """
     points = plane.flat(loop.points)
-    usual = float(np.median(np.hypot((1 - loop.shares) * noise[:, 0], loop.shares * noise[:, 1])))
-    ahead = points[[*range(1, len(points)), 0]] - points
-    along = np.append(0.0, np.cumsum(np.hypot(ahead[:, 0], ahead[:, 1])))
+    usual, along = _usual_noise(loop.shares, noise), _lengths_along(points)
     count = next_fast_len(max(int(np.ceil(along[-1] / STEP_MM)), 8))
     places = along[:-1] * (count / along[-1])
     frequencies = fftfreq(count, along[-1] / count)
@@ -99,6 +97,22 @@ def smooth_outline(loop: Loop, plane: Plane, noise: Floats) -> Outline:
     answer = 1.0 / (1.0 + (wavelength * frequencies) ** (2 * ORDER)) if wavelength > 2 * STEP_MM else None
     outline = Outline(points, plane, loop, places, answer, usual)
     return outline._replace(points=outline.smoothed(points))
+
+
+@compiled
+def _usual_noise(shares: Floats, noise: Floats) -> float:
+    """The median of that of points which lie at (N,) shares of edges with (N, 2) noise at their ends, mm."""
+    return float(np.median(np.hypot((1 - shares) * noise[:, 0], shares * noise[:, 1])))
+
+
+@compiled
+def _lengths_along(polygon: Floats) -> Floats:
+    """(N + 1,) how far from its first point each point of a closed (N, 2) polygon is along it, mm; the first one last."""
+    along = np.zeros(len(polygon) + 1)
+    for k in range(len(polygon)):
+        start, end = polygon[k], polygon[(k + 1) % len(polygon)]
+        along[k + 1] = along[k] + np.hypot(end[0] - start[0], end[1] - start[1])
+    return along
 
 
 def _wavelength(noise: float, spacing: float) -> float:

@@ -79,7 +79,7 @@ def footprint(foot: FootSurface) -> Print:
 def arch_index(foot: FootSurface) -> Quantity:
     """Middle third over the whole: Cavanagh and Rodgers, "The arch index: a useful measure from footprints",
     J. Biomech. 20(5), 1987, doi:10.1016/0021-9290(87)90255-7."""
-    contact = footprint(foot)
+    contact = foot.once(footprint)
     third = (contact.front - contact.rear) / 3
     is_middle = (contact.stations > contact.rear + third) & (contact.stations <= contact.rear + 2 * third)
     index = float(contact.widths[is_middle].sum() / contact.widths.sum())
@@ -97,18 +97,18 @@ def arch_index(foot: FootSurface) -> Quantity:
 
 def chippaux_smirak(foot: FootSurface) -> Quantity:
     """Least width of the middle third over the greatest of the front third."""
-    return _ratio(foot, footprint(foot), 2)
+    return _ratio(foot, foot.once(footprint), 2)
 
 
 def staheli(foot: FootSurface) -> Quantity:
     """Least width of the middle third over the greatest of the rear third."""
-    return _ratio(foot, footprint(foot), 0)
+    return _ratio(foot, foot.once(footprint), 0)
 
 
 def clarke_angle(foot: FootSurface) -> Quantity:
     """On the medial tangent of the print, beside the head of the first metatarsal: between that tangent and the line to
     the deepest point of the arch, degrees."""
-    contact = footprint(foot)
+    contact = foot.once(footprint)
     largest = max(contact.outlines, key=lambda outline: abs(_area(outline.points)))
     points, thirds = largest.points, contact.rear + (contact.front - contact.rear) * np.array([1 / 3, 2 / 3])
     if not (points[:, 0].min() < thirds[0] and points[:, 0].max() > thirds[1]):

@@ -88,8 +88,18 @@ def find_pose(vertices: Floats, faces: NDArray[np.integer]) -> Pose:
 
 def volume(vertices: Floats, faces: NDArray[np.integer]) -> float:
     """Of a closed mesh, below 0 where its faces look inwards; of an open one about what it encloses."""
-    corners = (vertices - vertices.mean(axis=0))[faces]
-    return float(np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6)
+    return _volume(vertices - vertices.mean(axis=0), np.ascontiguousarray(faces, np.int64))
+
+
+@compiled
+def _volume(vertices: Floats, faces: NDArray[np.int64]) -> float:
+    total = 0.0
+    for face in range(len(faces)):
+        a, b, c = vertices[faces[face, 0]], vertices[faces[face, 1]], vertices[faces[face, 2]]
+        total += a[0] * (b[1] * c[2] - b[2] * c[1])
+        total += a[1] * (b[2] * c[0] - b[0] * c[2])
+        total += a[2] * (b[0] * c[1] - b[1] * c[0])
+    return total / 6
 
 
 class _Skin(NamedTuple):
