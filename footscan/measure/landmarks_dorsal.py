@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from footscan.measure.dense_points import dense_points
 from footscan.measure.landmarks_extreme import Cap, Floats, Point, height_at, highest_of_each, saddle
 from footscan.measure.landmarks_sides import FULL_SIZE_MM
+from footscan.measure.place import points_within
 from footscan.surface.topology import used_vertices
 
 CORNER_MM = (50.0, 20.0)
@@ -89,8 +90,9 @@ def instep_point(points: Floats, length: float) -> tuple[Point, bool] | None:
 def metatarsal_top(points: Floats, tibiale: Point, fibulare: Point, share: float) -> Point | None:
     """The back of the foot above the line between both metatarsal points, a `share` of the way from the medial one."""
     place = tibiale[:2] + share * (fibulare[:2] - tibiale[:2])
-    above = points[:, 2] > (tibiale[2] + fibulare[2]) / 2
-    height = height_at(points[above, :2], points[above, 2], place, NEAR_MM)
+    x, y = ((float(at) - NEAR_MM, float(at) + NEAR_MM) for at in place)
+    above = points_within(points, x, y, ((tibiale[2] + fibulare[2]) / 2, np.inf))
+    height = height_at(above[:, :2], above[:, 2], place, NEAR_MM)
     return None if height is None else np.array([*place, height])
 
 

@@ -86,7 +86,7 @@ def summit(points: Floats, axis: int, sign: int, window: Window, depth: float) -
     """
     across = [k for k in range(3) if k != axis]
     low, high = np.array(window, np.float64).T
-    first, second = np.ascontiguousarray(points[:, across].T)
+    first, second = (points[:, k].copy() for k in across)
     height = sign * points[:, axis]
     inside = (first >= low[0]) & (first <= high[0]) & (second >= low[1]) & (second <= high[1])
     if np.count_nonzero(inside) < 3:

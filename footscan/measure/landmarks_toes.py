@@ -108,13 +108,13 @@ def _prominent(outline: Floats) -> list[int]:
     """Places of peaks that rise `PROMINENCE_MM` above the saddle towards a higher one."""
     peaks: list[int] = []
     for k in np.argsort(-outline, kind="stable").tolist():
-        rises = True
-        for other in peaks:
-            between = outline[min(k, other) : max(k, other) + 1]
-            if abs(k - other) * STRIP_MM < SPACING_MM or between.min() > outline[k] - PROMINENCE_MM:
-                rises = False
-                break
-        if rises and 0 < k < len(outline) - 1 and outline[k] >= max(outline[k - 1], outline[k + 1]):
+        if not (0 < k < len(outline) - 1 and outline[k] >= max(outline[k - 1], outline[k + 1])):
+            continue
+        if all(
+            abs(k - other) * STRIP_MM >= SPACING_MM
+            and outline[min(k, other) : max(k, other) + 1].min() <= outline[k] - PROMINENCE_MM
+            for other in peaks
+        ):
             peaks.append(k)
     return sorted(peaks)
 

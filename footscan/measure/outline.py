@@ -45,8 +45,8 @@ class Plane(NamedTuple):
 
     def flat(self, points: Floats) -> Floats:
         """(N, 2) coordinates in the plane of (N, 3) `points`, mm."""
-        away: Floats = points - self.point
-        return away @ np.array([self.first, self.second]).T
+        flat: Floats = (points - self.point) @ np.array([self.first, self.second]).T
+        return flat
 
     def solid(self, points: Floats) -> Floats:
         """(N, 3) points of the plane from their (N, 2) coordinates."""
@@ -107,7 +107,7 @@ def _usual_noise(shares: Floats, noise: Floats) -> float:
 
 @compiled
 def _lengths_along(polygon: Floats) -> Floats:
-    """(N + 1,) how far from its first point each point of a closed (N, 2) polygon is along it, mm; the first one last."""
+    """(N + 1,) how far along a closed (N, 2) polygon each of its points is, mm; the first one once more at the end."""
     along = np.zeros(len(polygon) + 1)
     for k in range(len(polygon)):
         start, end = polygon[k], polygon[(k + 1) % len(polygon)]

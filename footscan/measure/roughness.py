@@ -127,9 +127,9 @@ def _residual_variances(vertices: Floats, vertex: int, normal: Floats, patch: In
     up = np.cross(normal, across)
     away, scale = np.empty((len(patch), 3)), 0.0
     for k in range(len(patch)):
-        for axis in range(3):
-            away[k, axis] = vertices[patch[k], axis] - vertices[vertex, axis]
-            scale = max(scale, abs(away[k, axis]))
+        for i in range(3):
+            away[k, i] = vertices[patch[k], i] - vertices[vertex, i]
+            scale = max(scale, abs(away[k, i]))
     if scale == 0.0:
         return -1.0, -1.0
     terms = np.empty(CUBIC)
