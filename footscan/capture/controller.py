@@ -243,14 +243,11 @@ class Controller:
 
         The position is kept where the heads can slow down in time; the board is reset in any case.
         """
+        homing = self._board.poll.homing  # it says nothing meanwhile, and has no position to be kept
         self._board.let_go()
         try:
-            report = self.status().report
-            if report.state in ("Run", "Jog"):
-                self.hold()
-            deadline = time.monotonic() + self._board.patience_seconds
-            while _slows_down(report) and time.monotonic() < deadline:
-                report = self.status().report
+            if not homing:
+                self._slow_down()
         finally:
             self.reset()
 
@@ -316,6 +313,15 @@ class Controller:
             return ""
         pressed = ", ".join(f"head {head}" for head, axis in enumerate("XYZ", start=1) if axis in pins)
         return f" (end switches pressed: {pressed or 'none'})"
+
+    def _slow_down(self) -> None:
+        """Brings the heads to a halt, as far as that takes no longer than patience."""
+        report = self.status().report
+        if report.state in ("Run", "Jog"):
+            self.hold()
+        deadline = time.monotonic() + self._board.patience_seconds
+        while _slows_down(report) and time.monotonic() < deadline:
+            report = self.status().report
 
     def _stop_quietly(self) -> None:
         """Stops; where even that fails, the state tells it, and the error under way says more."""

@@ -2,7 +2,7 @@
 
 import time
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -58,8 +58,10 @@ def fix_light(rig: Rig, deck: CameraDeck, exposure_ms: Mapping[int, float]) -> d
     return fixed
 
 
-def measured_light(rig: Rig, deck: CameraDeck, heads: Heads) -> ScanLight:
+def measured_light(rig: Rig, deck: CameraDeck, heads: Heads, check: Callable[[], None]) -> ScanLight:
     """The light in which the open cameras see the stripe best, with the heads at some places along the travel.
+
+    `check` is called before each look; what it raises ends it.
 
     Raises
     ------
@@ -75,7 +77,9 @@ def measured_light(rig: Rig, deck: CameraDeck, heads: Heads) -> ScanLight:
         fix_light(rig, deck, exposures)
         frames: dict[int, list[Rgb]] = defaultdict(list)
         for place in places:
+            check()
             heads.travel_to(place)
+            check()
             for camera, pictures in _look(deck, heads, power).items():
                 frames[camera] += pictures
         return dict(frames)

@@ -5,7 +5,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -20,7 +20,7 @@ from footscan.capture.usb_bus import Pass
 from pipelines.live.devices import heads_of, passes_of, sources_of, timing_of
 from pipelines.live.light import ScanLight, fix_light, measured_light
 from pipelines.live.measuring import Measured, measure_scan
-from pipelines.live.state import OnState, ScannerState, StateBoard, with_board
+from pipelines.live.state import Activity, OnState, ScannerState, StateBoard, with_board
 from pipelines.live.storing import FilmedScan, ScanName, ScanStory, store_scan
 from schemas.errors import Fault, FootscanError, RefusedInput
 from schemas.rig import Rig
@@ -68,6 +68,7 @@ class LiveScanner:
         self._heads: Heads | None = None
         self._deck = CameraDeck(sources_of(rig))
         self._stopped = threading.Event()
+        self._stopping = threading.Lock()
 
     def __enter__(self) -> Self:
         return self
@@ -106,7 +107,7 @@ class LiveScanner:
         -------
         problems : of cameras that give no pictures.
         """
-        with self._board.at_work("disconnected", "connecting"):
+        with self._at_work("disconnected", "connecting"):
             self._connect_board()
             problems = self._open_first() if cameras else {}
             self._board.tell("idle")
@@ -114,14 +115,14 @@ class LiveScanner:
 
     def home(self) -> None:
         """Homes the heads and aligns them."""
-        with self._board.at_work("homing"):
+        with self._at_work("homing"):
             self._connect_board()
             self.heads.home()
             self._board.tell("idle")
 
     def jog(self, by_mm: float, mm_per_s: float, head: int | None = None) -> tuple[float, float, float]:
         """Moves all heads, or one, in the dark, and waits until they stand; where they stand then."""
-        with self._board.at_work("idle", "moving"):
+        with self._at_work("idle", "moving"):
             self._connect_board()
             heads = self.heads
             heads.jog(by_mm, mm_per_s, head)
@@ -139,9 +140,7 @@ class LiveScanner:
         Where nothing moves or shines, nothing happens.
         """
         self._stopped.set()
-        heads = self._heads
-        if heads is not None and heads.state.name in UNDER_WAY:
-            heads.stop()
+        self._end_motion()
 
     def scan(self, order: ScanOrder) -> LiveResult:
         """Films, stores, reconstructs and measures.
@@ -155,8 +154,7 @@ class LiveScanner:
         Fault
             A device or the disk failed. Nothing is stored.
         """
-        self._stopped.clear()
-        with self._board.at_work("filming"):
+        with self._at_work("filming"):
             calibration = self._calibration(order)
             stored = self.film(order)
             measured = None
@@ -173,29 +171,27 @@ class LiveScanner:
         """The part of `scan` that needs the devices, for who is at work already."""
         for camera in self.rig.cameras:
             timing_of(camera)
-        self._connect_board()
-        self._home_if_needed()
-        passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])
-        travel = self.rig.travel
-        light = order.light or self._measured_light(passes)
-        plan = PassPlan(travel.start_mm, travel.end_mm, travel.mm_per_s, light.power, order.texture)
-        story = ScanStory(datetime.datetime.now().astimezone(), light, passes, plan)
-        place = order.archive / order.name.patient / order.name.scan
-        with ScanRecording(place, self._expected_bytes(plan)) as recording:
-            for number, one in enumerate(passes, start=1):
-                self._refuse_stopped()
-                words = f"pass {number} of {len(passes)}" if len(passes) > 1 else ""
-                filmed = self.film_one_pass(one, plan, light, recording, words, story)
-                story.filmed.append(filmed)
-            self._board.tell("storing")
-            recording.settle()
-            return store_scan(self.rig, order.name, story, self.heads, recording, order.keep_partial)
+        with self._stop_said():
+            self._connect_board()
+            self._home_if_needed()
+            passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])
+            travel = self.rig.travel
+            light = order.light or self._measured_light(passes)
+            plan = PassPlan(travel.start_mm, travel.end_mm, travel.mm_per_s, light.power, order.texture)
+            story = ScanStory(datetime.datetime.now().astimezone(), light, passes, plan)
+            place = order.archive / order.name.patient / order.name.scan
+            with ScanRecording(place, self._expected_bytes(plan)) as recording:
+                for number, one in enumerate(passes, start=1):
+                    words = f"pass {number} of {len(passes)}" if len(passes) > 1 else ""
+                    story.filmed.append(self.film_one_pass(one, plan, light, recording, words, story))
+                self._board.tell("storing")
+                recording.settle()
+                return store_scan(self.rig, order.name, story, self.heads, recording, order.keep_partial)
 
     @contextmanager
     def ready_to_film(self) -> Iterator[None]:
         """Connected and homed, and nobody else at work, for who films passes of his own."""
-        self._stopped.clear()
-        with self._board.at_work("filming"):
+        with self._at_work("filming"), self._stop_said():
             self._connect_board()
             self._home_if_needed()
             yield
@@ -225,12 +221,17 @@ class LiveScanner:
         def take(name: str, frame: CapturedFrame) -> None:
             recording.take(name, frame.arrival, frame.jpeg)
 
+        def check() -> None:
+            recording.check()
+            self._refuse_stopped()
+
+        check()
         with self._watched(plan, recording):
-            return film_pass(self.heads, self._deck, one.cameras, plan, take, recording.check)
+            return film_pass(self.heads, self._deck, one.cameras, plan, take, check)
 
     def shine(self, power: float, seconds: float) -> None:
         """Lights the heads where they stand for a moment, so that live pictures show the stripe."""
-        with self._board.at_work("idle", "lasers on"):
+        with self._at_work("idle", "lasers on"):
             self._connect_board()
             self._home_if_needed()
             self.heads.shine(power, seconds)
@@ -245,9 +246,30 @@ class LiveScanner:
                 stack.callback(self._heads.close)
             self._heads = None
 
+    @contextmanager
+    def _at_work(self, first: Activity, words: str = "") -> Iterator[None]:
+        with self._board.at_work(first, words):
+            self._stopped.clear()  # a stop is of what was under way when it was pressed
+            yield
+
+    @contextmanager
+    def _stop_said(self) -> Iterator[None]:
+        """Whatever a stop made to fail, it was the stop."""
+        try:
+            yield
+        except FootscanError:
+            self._refuse_stopped()
+            raise
+
     def _refuse_stopped(self) -> None:
         if self._stopped.is_set():
             raise Fault(STOPPED)
+
+    def _end_motion(self) -> None:
+        with self._stopping:
+            heads = self._heads
+            if heads is not None and heads.state.name in UNDER_WAY:
+                heads.stop()
 
     def _connect_board(self) -> None:
         if self._heads is not None and self._heads.state.name in {"lost", "closed"}:
@@ -257,9 +279,11 @@ class LiveScanner:
             self._heads = Heads(self.rig.port, heads=heads_of(self.rig))
 
     def _home_if_needed(self) -> None:
+        self._refuse_stopped()
         if not self.heads.board.homed:
             self._board.tell("homing")
             self.heads.home()
+            self._refuse_stopped()
 
     def _open_first(self) -> dict[int, str]:
         passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])
@@ -273,7 +297,7 @@ class LiveScanner:
         for one in passes:
             self._board.tell("filming", "looking at the light")
             self._deck.open_only(one.cameras)
-            light = measured_light(self.rig, self._deck, self.heads)
+            light = measured_light(self.rig, self._deck, self.heads, self._refuse_stopped)
             exposures |= light.exposure_ms
             reasons |= light.reasons
             powers.append(light.power)
@@ -307,9 +331,10 @@ class LiveScanner:
             while not ended.wait(WATCH_SECONDS):
                 try:
                     recording.check()
+                    self._refuse_stopped()
                 except Fault:
-                    heads.stop()
-                    return
+                    with suppress(Fault):  # the state tells it
+                        self._end_motion()
                 for latest in heads.log.between(time.monotonic() - 1.0, math.inf)[-1:]:
                     self._board.progress((latest.x_mm[0] - plan.start_mm) / (plan.end_mm - plan.start_mm))
 
@@ -319,8 +344,6 @@ class LiveScanner:
             yield
         except FootscanError:
             recording.check()  # the disk's failure, which ended the pass, says more
-            if self._stopped.is_set():
-                raise Fault(STOPPED) from None
             raise
         finally:
             ended.set()

@@ -21,6 +21,7 @@ from footscan.virtual.streams import VirtualStreams, free_running
 from pipelines.live import storing
 from pipelines.live.light import light_by_hand
 from pipelines.live.scanner import LiveScanner, ScanOrder
+from pipelines.live.state import ScannerState
 from pipelines.live.storing import ScanName, next_scan_name
 from pipelines.recorded import read_scan
 from schemas.documents import read_json
@@ -154,6 +155,41 @@ def test_stopping_leaves_nothing_and_the_next_scan_works(bench: Bench) -> None:
         bench.scanner.scan(bench.order())
     bench.assert_dark_and_empty()
     assert bench.scanner.scan(bench.order()).stored.left_out == {}
+
+
+@pytest.mark.parametrize("doing", ["homing", "filming: looking at the light", "filming 0 %"])
+def test_a_stop_ends_a_scan_while_nothing_is_filmed_yet(bench: Bench, doing: str) -> None:
+    if doing != "homing":
+        bench.scanner.home()
+    pressed: list[float] = []
+
+    def press(state: ScannerState) -> None:
+        if str(state) == doing and not pressed:
+            pressed.append(time.monotonic() + 0.2)
+            threading.Timer(0.2, bench.scanner.stop).start()
+
+    bench.scanner.listen(press)
+    with pytest.raises(Fault, match="stopped; nothing of this scan is kept"):
+        bench.scanner.scan(bench.order(light=None) if "light" in doing else bench.order())
+    assert time.monotonic() < pressed[0] + 2.0
+    assert bench.states[-1] == "failed"
+    bench.assert_dark_and_empty()
+    time.sleep(0.5)
+    seconds = np.arange(pressed[0] + 0.3, time.monotonic(), 0.001)
+    assert max(bench.board.laser_at(one) for one in seconds) == 0.0
+    assert bench.scanner.scan(bench.order()).stored.left_out == {}
+
+
+def test_a_scan_that_is_refused_leaves_a_stop_as_it_is(bench: Bench) -> None:
+    def stop_and_scan() -> None:
+        bench.scanner.stop()
+        with pytest.raises(RefusedInput):
+            bench.scanner.scan(bench.order())
+
+    bench.scanner.home()
+    bench.scanner.listen(lambda state: stop_and_scan() if str(state) == "filming 0 %" else None)
+    with pytest.raises(Fault, match="stopped"):
+        bench.scanner.scan(bench.order())
 
 
 def test_one_thing_at_a_time(bench: Bench) -> None:
