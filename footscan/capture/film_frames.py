@@ -1,12 +1,13 @@
 """Which of the frames that came are the film's: each at a place that is known, a lost one at an empty place."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from footscan.capture.frame_clock import FrameTimes
-from footscan.capture.frame_positions import FramePositions, Timed, frame_positions
+from footscan.capture.frame_positions import STANDING_MM, FramePositions, Timed, frame_positions
 from footscan.capture.head_motion import HeadMotion, HeadReports, smooth_motion
 from footscan.capture.heads import Travel
 from footscan.capture.passes import FilmTally
@@ -62,9 +63,13 @@ class FilmFrames:
 
 def motion_of_head(log: PositionLog, head: int, travel: Travel) -> HeadMotion:
     """The motion of head 1, 2 or 3 on a travel."""
-    seconds, x_mm, sd = log.arrays(travel.begin_seconds - MARGIN_SECONDS, travel.end_seconds + MARGIN_SECONDS)
+    entries = log.between(travel.begin_seconds - MARGIN_SECONDS, travel.end_seconds + MARGIN_SECONDS)
+    seconds = np.array([entry.seconds for entry in entries], np.float64)
+    sd = np.array([entry.seconds_sd for entry in entries], np.float64)
+    x_mm = np.array([entry.x_mm[head - 1] for entry in entries], np.float64)
+    stands = np.array([not entry.is_moving for entry in entries], bool)
     ascending = np.diff(seconds, prepend=-np.inf) > 0
-    return smooth_motion(HeadReports(seconds[ascending], sd[ascending], x_mm[ascending, head - 1]))
+    return smooth_motion(HeadReports(seconds[ascending], sd[ascending], x_mm[ascending], stands[ascending]))
 
 
 def is_on_time(clock: FrameTimes) -> Bools:
@@ -117,6 +122,7 @@ def place_frames(
         why = next(iter(placed.dropped.values()), "none was taken between its ends")
         raise Finding(f"gave no frame on the travel whose place is known: {why}")
     wrong = {int(clock.number[bad]): problem for bad, problem in problems.items() if 0 <= bad < len(clock.number)}
+    unseen = _unseen_at_ends(number, seconds - timing.latency.seconds, clock.period_s, motion, travel, (low, high))
     arrivals, lost = {}, {}
     for k, place in enumerate(inside.tolist()):
         camera_number = int(placed.number[place])
@@ -126,7 +132,7 @@ def place_frames(
             lost[k] = f"its place is known to {placed.sd_mm[place]:.2f} mm only"
         else:
             arrivals[k] = by_number[camera_number] + first
-    problem = _problem(placed, inside, arrivals, lost, (low, high))
+    problem = _problem(placed, inside, arrivals, [*lost.values(), *unseen.values()], (low, high))
     return FilmFrames(
         arrivals=arrivals,
         x_mm=placed.x_mm[inside],
@@ -135,7 +141,7 @@ def place_frames(
         mm_per_s=placed.mm_per_s,
         number=placed.number[inside],
         lost=lost,
-        left_out=placed.dropped,
+        left_out=placed.dropped | {one: wrong.get(one, why) for one, why in unseen.items()},
         problem=problem,
     )
 
@@ -171,16 +177,32 @@ def nearest_frames(film: FilmFrames, dark: FilmFrames) -> dict[int, int]:
     return {k: dark.arrivals[known[nearest[k]]] for k in np.flatnonzero(near).tolist()}
 
 
+def _unseen_at_ends(
+    number: Ints, taken: Floats, period_s: float, motion: HeadMotion, travel: Travel, ends_mm: tuple[float, float]
+) -> dict[int, str]:
+    """Exposures of the film, by their number, before the first sound frame on the travel and behind the last one."""
+    begin, end = max(travel.begin_seconds, motion.seconds[0]), min(travel.end_seconds, motion.seconds[-1])
+    before = np.arange(1, int((taken[0] - begin) / period_s) + 1)
+    behind = np.arange(1, int((end - taken[-1]) / period_s) + 1)
+    beyond = np.concatenate([number[0] - before, number[-1] + behind])
+    seconds = np.concatenate([taken[0] - period_s * before, taken[-1] + period_s * behind])
+    x, _, _ = motion.at(seconds)
+    of_film = (beyond >= 0) & (x >= ends_mm[0]) & (x <= ends_mm[1])
+    of_film &= ~motion.may_stand(seconds, np.full(len(seconds), STANDING_MM))
+    return dict.fromkeys(sorted(beyond[of_film].tolist()), "lost at an end of the film")
+
+
 def _problem(
     placed: FramePositions,
     inside: NDArray[np.intp],
     arrivals: dict[int, int],
-    lost: dict[int, str],
+    lost: Sequence[str],
     ends_mm: tuple[float, float],
 ) -> str | None:
     x = placed.x_mm[inside]
-    if len(lost) > MOST_LOST * len(inside):
-        return f"{len(lost)} of {len(inside)} frames are lost, the first one: {next(iter(lost.values()))}"
+    frames = len(arrivals) + len(lost)
+    if len(lost) > MOST_LOST * frames:
+        return f"{len(lost)} of {frames} frames are lost, the first one: {lost[0]}"
     step = float(np.median(np.abs(np.diff(x)))) if len(x) > 1 else float("inf")
     pictured = np.sort(x[sorted(arrivals)])
     gaps = np.diff(np.concatenate([[ends_mm[0]], pictured, [ends_mm[1]]]))

@@ -3,7 +3,8 @@
 Later steps want each frame at a place of its own. Nothing minds places in falling order or uneven steps; but a head
 that stands films one stripe again and again. What stands still in a tenth of a film is taken for a glint of the
 hardware and dropped, and stripes of one camera less than a quarter of a millimetre apart count as one, so that nothing
-is gained by several. Of frames that were taken within `STANDING_MM` the first is kept.
+is gained by several. Of frames that were taken within `STANDING_MM` the first is kept; of a head that the controller
+held, with its lasers off, none.
 """
 
 from collections.abc import Iterable
@@ -84,12 +85,15 @@ def frame_positions(number: Ints, seconds: Floats, sd_s: Floats, motion: HeadMot
         dropped[int(every[frame])] = f"taken {place} report of the head's place"
     x, speed, of_motion = motion.at(np.where(inside, taken, motion.seconds[0]))
     own = np.hypot(of_motion, speed * taken_sd)
+    is_dark = inside & motion.may_stand(np.where(inside, taken, motion.seconds[0]), np.maximum(STANDING_MM, 2.0 * own))
     kept: list[int] = []
     for frame in np.flatnonzero(inside):
         if own[frame] > LARGEST_SD_MM:
             dropped[int(every[frame])] = (
                 f"its place is known to {own[frame]:.1f} mm only: reports are missing around it"
             )
+        elif is_dark[frame]:
+            dropped[int(every[frame])] = "the controller held the head, and lasers are off then"
         elif kept and abs(x[frame] - x[kept[-1]]) < STANDING_MM:
             # A picture at this place that was lost is replaced by the next one that was not.
             if given[frame] and not given[kept[-1]]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from schemas.errors import RefusedInput
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 STEP_MM = 0.0125
 """One step of 80 a millimetre: places between two are not told apart."""
@@ -35,6 +36,8 @@ class HeadReports:
     """Standard deviation of these."""
     x_mm: Floats
     """X in mm, scanner frame."""
+    stands: Bools | None = None
+    """Where the controller says that it holds the head, or has sent it nowhere; None: nowhere."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,8 @@ class HeadMotion:
     head that has stopped does not swing back."""
     wander: Floats
     """(L - 1,) spectral density of the acceleration between two reports, mm^2/s^3."""
+    stands: Bools
+    """(L,) where the controller says that the head stands."""
 
     def at(self, seconds: Floats) -> tuple[Floats, Floats, Floats]:
         """X in mm, speed in mm/s and standard deviation of X in mm at times within the reports, each (N,)."""
@@ -75,6 +80,14 @@ class HeadMotion:
         sd = np.sqrt(np.maximum(of_ends + between, 0.0))
         x = np.clip(np.einsum("na,na->n", place, ends), *self.range_mm[k].T)
         return x, np.einsum("na,na->n", slope, ends), sd
+
+    def may_stand(self, seconds: Floats, within_mm: Floats) -> Bools:
+        """(N,) whether the controller may have held the head at times within the reports: the report before or behind
+        says so, and the head was no farther from there. Of a motor that pauses the controller knows nothing."""
+        x, _, _ = self.at(seconds)
+        before = np.clip(np.searchsorted(self.seconds, seconds, side="right") - 1, 0, len(self.wander) - 1)
+        near = [self.stands[k] & (np.abs(x - self.states[k, 0]) <= within_mm) for k in (before, before + 1)]
+        return np.asarray(near[0] | near[1])
 
 
 def smooth_motion(reports: HeadReports, step_mm: float = STEP_MM) -> HeadMotion:
@@ -116,7 +129,8 @@ def smooth_motion(reports: HeadReports, step_mm: float = STEP_MM) -> HeadMotion:
         crossed[k] = back @ covariances[k + 1]
     around = np.lib.stride_tricks.sliding_window_view(np.pad(reports.x_mm, 1, mode="edge"), 4)
     range_mm = np.stack([around.min(axis=1), around.max(axis=1)], axis=1)
-    return HeadMotion(reports.seconds, states, covariances, crossed, range_mm, wander)
+    stands = np.zeros(count, bool) if reports.stands is None else reports.stands
+    return HeadMotion(reports.seconds, states, covariances, crossed, range_mm, wander, stands)
 
 
 def _wander(steps: Floats, speeds: Floats, variances: Floats) -> Floats:
