@@ -111,9 +111,14 @@ class CameraStream:
         return health
 
     def wait_for_frames(self, frames: int, timeout_s: float) -> None:
-        """Returns when so many frames have come since the stream was made; Fault where they do not."""
+        """Returns when so many frames have come since the stream was made, and the camera is connected; Fault where
+        that is not so in time."""
+
+        def is_so() -> bool:
+            return self._health.state == "streaming" and self._health.received >= frames
+
         with self._came:
-            if self._came.wait_for(lambda: self._health.received >= frames, timeout_s):
+            if self._came.wait_for(is_so, timeout_s):
                 return
             received = self._health.received
         problem = self.health.problem or "the camera sends too slowly"

@@ -200,9 +200,9 @@ def test_a_cable_that_is_pulled_and_put_back_is_told() -> None:
             world.fail(1, [StreamFault("cut", 0, 40)])
             until(lambda: stream.health.state == "lost")
             assert str(stream.health.problem).startswith(f"camera 1: {world.url(1)}: ")
-            until(lambda: stream.health.connections == 2)
+            stream.wait_for_frames(5, LIMIT_S)
+            assert (stream.health.state, stream.health.connections) == ("streaming", 2)
             stream.wait_for_frames(stream.health.received + 5, LIMIT_S)
-            assert stream.health.state == "streaming"
         assert [f.problem for f in frames if f.problem] == ["reconnected: first after a lost connection"]
 
 
