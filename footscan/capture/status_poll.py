@@ -17,8 +17,8 @@ MOVING_SECONDS, STANDING_SECONDS = 0.05, 0.2
 AGAIN_SECONDS = 0.25
 """When a query is repeated that has no answer: a byte may be lost."""
 QUIET_SECONDS = 0.2
-"""How long nothing is asked after a query that was repeated: a second answer must not pass for that of the next one."""
-LOST_QUERY_SECONDS = AGAIN_SECONDS + QUIET_SECONDS
+"""How long nothing is asked after the answer to a repeated query is due: it must not pass for that of the next one."""
+LOST_QUERY_SECONDS = 2.0 * AGAIN_SECONDS + QUIET_SECONDS
 """How much longer a report takes where a byte was lost."""
 KEPT_ROUND_TRIPS = 200
 
@@ -97,8 +97,8 @@ class StatusPoll:
         """
         with self._lock:
             asked, self._asked = self._asked, None
-            if asked is not None and self._asked_again != asked:
-                self._quiet_until = arrived + QUIET_SECONDS
+            if asked is not None and self._asked_again != asked:  # its own answer may take as long as this one took
+                self._quiet_until = self._asked_again + (arrived - asked) + QUIET_SECONDS
         if asked is None:
             return None
         on_the_way = length / BYTES_PER_SECOND
