@@ -13,8 +13,9 @@ setup:    ## system libraries, .venv, pinned packages; starts at once when they 
 demo: setup   ## films, calibrates, scans and measures a foot; the result is in demo/
 	@$(BIN)/footscan demo
 
-test: lint    ## lint, then every test
-	$(BIN)/pytest -n 2
+test: lint    ## lint, then every test; those that keep time with virtual hardware when no others compute
+	$(BIN)/pytest -n 2 -m "not real_time"
+	$(BIN)/pytest -n 2 -m real_time
 
 lint: setup   ## style, layout and types
 	$(BIN)/ruff check

@@ -28,6 +28,19 @@ HALF_BREADTHS_MM = (24.0, 26.0, 28.0, 32.0, 32.0, 22.0)
 HEIGHTS_MM = (52.0, 52.0, 34.0, 20.0, 12.0, 8.0)
 DEPTHS_MM = (9.0, 10.5, 11.0, 11.5, 11.0, 9.0)
 
+REAL_TIME = (
+    "footscan/capture/",
+    "footscan/virtual/test_board",
+    "footscan/virtual/test_stage",
+    "footscan/virtual/test_stream",
+    "pipelines/console/",
+    "pipelines/live/",
+    "end_to_end/test_console",
+    "end_to_end/test_live_scan",
+    "fuzz/test_fuzz_scanner",
+)
+"""Tests that keep time with virtual hardware: `make test` runs them when no others compute."""
+
 WORKFLOW = """\
 format: footscan.workflow/1
 archive: archive
@@ -106,3 +119,11 @@ def _frame(camera: int, half_breadth: float, height: float, depth: float) -> byt
     light = 200 * np.exp(-0.5 * (distance / 1.8) ** 2) * is_seen
     image = np.clip(light[..., None] * [1.0, 0.12, 0.1] + 20, 0, 255).astype(np.uint8)
     return bytes(simplejpeg.encode_jpeg(image, 90, "RGB", "420"))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks the tests that keep time."""
+    root = Path(__file__).parent
+    for item in items:
+        if item.path.relative_to(root).as_posix().startswith(REAL_TIME):
+            item.add_marker(pytest.mark.real_time)
