@@ -15,7 +15,7 @@ demo: setup   ## films, calibrates, scans and measures a foot; the result is in 
 
 test: lint    ## lint, then every test; those that keep time with virtual hardware when no others compute
 	$(BIN)/pytest -n 2 -m "not real_time"
-	$(BIN)/pytest -n 2 -m real_time
+	$(BIN)/pytest -n 2 -m real_time --reruns 2 -r fER
 
 lint: setup   ## style, layout and types
 	$(BIN)/ruff check
