@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from footscan.surface.export import read_mesh
 from footscan.virtual.block import make_block
 from footscan.virtual.foot import make_foot
+from footscan.virtual.standing import stand_on_glass
 from schemas.errors import RefusedInput
 from schemas.parameters.simulation import SimulationSettings
 from schemas.scan import Side
@@ -16,8 +17,6 @@ from schemas.scan import Side
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
-BLOCK_TURN_DEG = 5.0
-"""How the block stands, as one would place it: no stripe runs over a face that is square to the travel."""
 DIAGONAL_MM = (20.0, 600.0)
 """A mesh outside of this is in another unit, or no thing for a foot scanner."""
 
@@ -43,10 +42,5 @@ def virtual_object(
 
 def stand_in_the_middle(vertices: Vertices, settings: SimulationSettings, turn_deg: float = 0.0) -> Vertices:
     """`vertices` turned about Z and shifted onto the glass (Z = 0), to the middle of the travel and to Y = 0."""
-    cos, sin = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
-    if turn_deg:
-        vertices = vertices @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
     travel_middle = settings.start_mm + settings.step_mm * (settings.frames - 1) / 2
-    shift = np.array([travel_middle - (low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]])
-    return np.asarray(vertices + shift, np.float64)
+    return stand_on_glass(vertices, travel_middle, turn_deg)

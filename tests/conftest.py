@@ -3,6 +3,7 @@
 A folder with `workflow.yaml`, `calibration.json` and the scan `archive/P0001/S1`.
 """
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 
 from footscan.virtual.film import write_film
 from schemas.calibration import Calibration, CameraCalibration, HomographyMap, Source
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 CAMERAS = {1: 1.0, 5: -1.0}
 """On which side of a plane along the foot each stands; the plane leans, so that one is above and one below."""

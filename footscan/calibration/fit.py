@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from footscan.calibration.maps import Model
 from footscan.calibration.observations import Observations
 from footscan.compiled import compiled
+from footscan.robust import MAD_TO_SD
 from schemas.calibration import LARGEST
 
 Floats = NDArray[np.float64]
@@ -96,7 +97,7 @@ def _jacobian(model: Model, observations: Observations, parameters: Floats) -> F
 
 def _remoteness(residuals: Floats) -> Floats:
     """(residual / largest with weight)^2, 1 for those beyond: the weight of Tukey's biweight is (1 - that)^2."""
-    spread = max(1.4826 * float(np.median(np.abs(residuals))), LEAST_SPREAD_MM)
+    spread = max(MAD_TO_SD * float(np.median(np.abs(residuals))), LEAST_SPREAD_MM)
     return np.asarray(np.clip((residuals / (TUKEY * spread)) ** 2, None, 1.0))
 
 

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from footscan.robust import MAD_TO_SD
+
 Floats = NDArray[np.float64]
 
 SHORTEST_PX = 12.0
@@ -336,7 +338,7 @@ def _parabola(s: Floats, off: Floats) -> tuple[Floats, Floats, float]:
 def _spread(residuals: Floats) -> float:
     """Standard deviation by the (upper) median of absolute residuals, as of a normal distribution."""
     middle = len(residuals) // 2
-    return 1.4826 * float(np.partition(residuals, middle)[middle])
+    return MAD_TO_SD * float(np.partition(residuals, middle)[middle])
 
 
 def _extent(points: Floats) -> float:

@@ -15,6 +15,7 @@ from footscan.calibration.fit import Fit, UndeterminedError, fit
 from footscan.calibration.homography import HomographyModel
 from footscan.calibration.reference import Edges
 from footscan.calibration.selection import held_out_residuals, rms
+from footscan.robust import MAD_TO_SD
 
 Floats = NDArray[np.float64]
 ToWorld = Callable[[Floats], Floats]
@@ -89,7 +90,7 @@ def fit_to_edges(
     found = fitted(first, GATES_MM[0])
     for gate in GATES_MM[1:]:
         found = fitted(found.world, gate)
-    spread = 1.4826 * float(np.median(np.abs(found.fit.residuals)))
+    spread = MAD_TO_SD * float(np.median(np.abs(found.fit.residuals)))
     return fitted(found.world, max(SPREADS * spread, LEAST_GATE_MM))
 
 

@@ -12,6 +12,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.robust import MAD_TO_SD
 from schemas.errors import RefusedInput
 
 Floats = NDArray[np.float64]
@@ -215,7 +216,7 @@ def _fitted(stamps: Floats, number: Ints, before: _Line) -> _Line:
     if len(stamps) < 3 or number[0] == number[-1]:
         return before
     middle = np.median(residual)
-    jitter = float(1.4826 * np.median(np.abs(residual - middle)))
+    jitter = float(MAD_TO_SD * np.median(np.abs(residual - middle)))
     is_near = np.abs(residual - middle) <= max(3 * jitter, 1e-6)
     stamps, number = stamps[is_near], number[is_near]
     if len(stamps) < 3:

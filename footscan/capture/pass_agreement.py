@@ -15,6 +15,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.ndimage import uniform_filter1d
 
 from footscan.capture.head_motion import HeadMotion
+from footscan.robust import MAD_TO_SD
 
 Floats = NDArray[np.float64]
 
@@ -132,7 +133,7 @@ class Agreement:
         told = np.sum(times**2, axis=1)
         clear = told >= np.quantile(told, 0.8)
         errors = np.sum(times * self.residuals, axis=1)[clear] / told[clear]
-        return float(1.4826 * np.median(np.abs(errors)))
+        return float(MAD_TO_SD * np.median(np.abs(errors)))
 
     def _information(self, prior: Prior) -> Floats:
         told = np.einsum("n,nma,nmb->ab", self.weights, self.jacobian, self.jacobian)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from footscan.cloud.points import stripe_step
 from footscan.cloud.stripes import Floats, Stripes, boxes, meet
 from footscan.compiled import compiled
+from footscan.robust import MAD_TO_SD
 from schemas.fusion import Disagreement
 
 Pairs = dict[tuple[int, int], tuple[int, Disagreement]]
@@ -18,8 +19,6 @@ COMPARED = 12_000
 """About so many points are compared with all other cameras."""
 GAP_STEPS = 1.5
 """Between the stripes of two planes the skin is taken to be straight, if these are no more steps apart."""
-MAD = 1.4826
-"""Standard deviation of normal data by the median of their absolute deviations."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +90,7 @@ def _disagreement(apart: Floats) -> Disagreement:
     median = float(np.median(apart))
     return Disagreement(
         median_mm=median,
-        deviation_mm=MAD * float(np.median(np.abs(apart - median))),
+        deviation_mm=MAD_TO_SD * float(np.median(np.abs(apart - median))),
         rms_mm=float(np.sqrt(np.mean(apart**2))),
     )
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from footscan.compiled import compiled
 from footscan.frames.image import Rgb
+from footscan.robust import MAD_TO_SD
 from footscan.stripe.points import StripePoints
 
 Singles = NDArray[np.float32]
@@ -26,8 +27,6 @@ LEAST_SHARED = 20
 """Two cameras that see fewer of them in common are not compared."""
 REWEIGHTINGS = 8
 HUBER = 1.345
-MAD = 1.4826
-"""From the median of absolute values to the standard deviation of a normal distribution."""
 
 
 def point_colours(stripe: StripePoints, laser_off: Callable[[int], Rgb | None]) -> tuple[Singles, NDArray[np.bool_]]:
@@ -97,7 +96,7 @@ def camera_gains(sums: NDArray[np.float64]) -> NDArray[np.float64]:
             total = np.bincount(first, pull, minlength=count) - np.bincount(second, pull, minlength=count)
             gains[:, channel] = inverse @ total
         left = np.sqrt(np.mean((ratio - gains[first] + gains[second]) ** 2, axis=1))
-        bound = HUBER * max(MAD * float(np.median(left)), 1e-9)
+        bound = HUBER * max(MAD_TO_SD * float(np.median(left)), 1e-9)
         trust = bound / np.maximum(left, bound)
     return gains
 

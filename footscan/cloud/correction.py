@@ -6,11 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.agreement import MAD, Overlaps, find_overlaps
+from footscan.cloud.agreement import Overlaps, find_overlaps
 from footscan.cloud.equations import Forms, solve, sum_up
 from footscan.cloud.motion import MOST, SCALE_MM, TERMS, motion_terms, moved
 from footscan.cloud.stripes import Floats, Stripes
 from footscan.cloud.terms import EVERY, STRETCHES, choose_terms, held_out, hold_the_middle
+from footscan.robust import MAD_TO_SD
 from schemas.fusion import CameraCorrection
 from schemas.parameters.fusion import FusionParameters
 
@@ -152,7 +153,7 @@ def _robust_weights(
         fit = solve(forms, np.ones(1, np.bool_), rigid)
         left = np.abs(distances - np.einsum("nt,nt->n", rows, fit[cameras[:, 0]] - fit[cameras[:, 1]]))
         left /= np.sqrt(variances)
-        left /= max(1.0, MAD * float(np.median(left)) if len(left) else 1.0)
+        left /= max(1.0, MAD_TO_SD * float(np.median(left)) if len(left) else 1.0)
         if turn < REWEIGHTINGS - 1:
             trust = HUBER / np.maximum(left, HUBER)
         else:

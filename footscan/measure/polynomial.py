@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
+from footscan.robust import MAD_TO_SD
 
 Floats = NDArray[np.float64]
 
@@ -17,7 +18,6 @@ TUKEY, LEAST_MISFIT_MM = 4.7, 0.04
 """What is farther off by so many times the noise does not count; a polynomial misses a smooth foot by the second."""
 LEAST_NOISE_MM = 0.01
 """What scatters less is no noise."""
-MEDIAN_TO_SD = 1.4826
 LEAST_FREE = 0.2
 ENOUGH = 2
 """Points for each term from which on a fit may be free."""
@@ -69,7 +69,7 @@ def robust_fit(places: Floats, height: Floats, noise: float, unevenness: float) 
             used += free[i, i + 1]
         away[:] = np.abs(heights - terms @ np.ascontiguousarray(free[:, 0]))
         left = max(1.0 - used / count, LEAST_FREE)
-        noise = max(MEDIAN_TO_SD * np.sort(away)[count // 2] / np.sqrt(left), LEAST_NOISE_MM)
+        noise = max(MAD_TO_SD * np.sort(away)[count // 2] / np.sqrt(left), LEAST_NOISE_MM)
         off = (heights - terms @ factors) / (TUKEY * max(noise, LEAST_MISFIT_MM))
         kept[:] = weight * np.maximum(1.0 - off * off, 0.0) ** 2
     return factors, noise

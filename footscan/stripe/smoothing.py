@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
+from footscan.robust import MAD_TO_SD
 from footscan.stripe.profile import WIDTH
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SPACING_PX, I, J
 
@@ -115,4 +116,4 @@ def _noise(profiles: NDArray[np.float64], chain: NDArray[np.int32]) -> float:
             count += 1
     if count < FEWEST:
         return PRIOR_PX
-    return max(1.4826 * float(np.median(off[:count])), 1e-3)
+    return max(MAD_TO_SD * float(np.median(off[:count])), 1e-3)

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.robust import MAD_TO_SD
 from schemas.errors import Finding
 from schemas.fits import Vector
 
@@ -28,7 +29,7 @@ def distinct_points(points: Floats) -> Floats:
 
 def robust_deviation(values: Floats) -> float:
     """Standard deviation of a normal distribution with the median absolute deviation of (N,) `values`; 0 for none."""
-    return 1.4826 * float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
+    return MAD_TO_SD * float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
 
 
 def as_vector(values: Floats) -> Vector:

@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from footscan.robust import MAD_TO_SD
 from footscan.verify.nearest import Floats, Surface
 
 TUKEY = 4.685
 """Standard deviations beyond which a residual has no weight: 95 % efficient for Gaussian noise."""
-SIGMA_PER_MEDIAN = 1.4826
-"""Standard deviation of a normal distribution over the median of its absolute values."""
 DAMPING = 1e-6
 """Share of the mean diagonal that is added to the normal matrix: directions that nothing holds stay where they are."""
 LONGEST_TURN = 0.3
@@ -106,7 +105,7 @@ def settle(pose: Poses, points: Floats, surface: Surface, scale: float, most_ste
         near = fit.distances[fit.within & (fit.distances < scale)]
         if not len(near):
             return pose, scale, np.inf
-        follows = max(TUKEY * SIGMA_PER_MEDIAN * float(np.median(near)), SMALLEST_SCALE_MM)
+        follows = max(TUKEY * MAD_TO_SD * float(np.median(near)), SMALLEST_SCALE_MM)
         if moved < SETTLED_MM and follows > STEADY * scale:
             break
         scale = min(scale, max(follows, SHRINKING * scale))

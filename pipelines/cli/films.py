@@ -43,8 +43,9 @@ def simulate_scan(
 ) -> None:
     """Film a mesh that stands on the glass, in the middle of the travel."""
     from footscan.virtual.record import record_scan
+    from footscan.virtual.standing import BLOCK_TURN_DEG
     from pipelines.cli.progress import frame_progress
-    from pipelines.virtual_objects import BLOCK_TURN_DEG, stand_in_the_middle, virtual_object
+    from pipelines.virtual_objects import stand_in_the_middle, virtual_object
     from schemas.documents import pseudonym
 
     if [mesh is not None, foot is not None, block].count(True) != 1:

@@ -1,6 +1,7 @@
 """`footscan scan`, `footscan home` and `footscan jog`."""
 
 import datetime
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -19,8 +20,10 @@ from pipelines.cli.output import AsJson, message, print_json
 from schemas.errors import Fault, FootscanError, RefusedInput
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from pipelines.live.light import ScanLight
-    from pipelines.live.scanner import LiveResult
+    from pipelines.live.scanner import LiveResult, LiveScanner
     from pipelines.live.virtual_world import World
     from schemas.rig import Rig
 
@@ -118,14 +121,7 @@ def home(
     as_json: AsJson = False,
 ) -> None:
     """Send the heads to their home switches, and align them."""
-    from pipelines.live.scanner import LiveScanner
-
-    with (
-        opened_rig(rig, virtual_folder, plain_world(virtual, virtual_folder)) as opened,
-        LiveScanner(opened.rig) as one,
-    ):
-        one.listen(StateTeller())
-        one.home()
+    with _homed(rig, virtual, virtual_folder) as one:
         _print_heads(one.heads.position_mm(), as_json)
 
 
@@ -139,6 +135,13 @@ def jog(
     as_json: AsJson = False,
 ) -> None:
     """Move the heads by hand, with the lasers off; heads that are not homed are homed first."""
+    with _homed(rig, virtual, virtual_folder) as one:
+        _print_heads(one.jog(mm, speed or 20.0, None if heads == "all" else int(heads)), as_json)
+
+
+@contextmanager
+def _homed(rig: RigFile, virtual: bool, virtual_folder: Path) -> "Iterator[LiveScanner]":
+    """The scanner with its heads homed; states are told."""
     from pipelines.live.scanner import LiveScanner
 
     with (
@@ -147,7 +150,7 @@ def jog(
     ):
         one.listen(StateTeller())
         one.home()
-        _print_heads(one.jog(mm, speed or 20.0, None if heads == "all" else int(heads)), as_json)
+        yield one
 
 
 def _light(rig: "Rig", power: float | None, exposure_ms: float | None, virtual: bool) -> "ScanLight | None":

@@ -12,7 +12,7 @@ import json
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -21,6 +21,7 @@ from random import Random
 import pytest
 from scanner_bench import SETTINGS, Bench, HostWatch, open_bench
 from scanner_troubles import Coming, Trouble, lift, random_trouble
+from waiting import LONG_SECONDS, wait_until
 
 from footscan.capture.heads import Heads
 from pipelines.live.scanner import STOPPED, LiveResult
@@ -30,7 +31,6 @@ CASES = int(os.environ.get("FOOTSCAN_FUZZ", "6"))
 FIRST = int(os.environ.get("FOOTSCAN_FUZZ_FIRST", "0"))
 RECORD = os.environ.get("FOOTSCAN_FUZZ_RECORD")
 AT_A_TIME = 3
-LONG_SECONDS = 60.0
 SCAN_SECONDS = 5.0
 """What a scan takes with its homing."""
 LARGEST_SD_MM = 5.0
@@ -213,11 +213,3 @@ def in_short(end: LiveResult | FootscanError, lost: int | None) -> str:
     if str(end) == STOPPED:
         return "nothing stored: stopped"
     return "nothing stored: films not whole" if isinstance(end, Finding) else f"nothing stored: {type(end).__name__}"
-
-
-def wait_until(holds: Callable[[], bool], case: str, shown: Callable[[], str] = str) -> None:
-    """Waits until `holds()`; fails where it never does."""
-    end = time.monotonic() + LONG_SECONDS
-    while not holds():
-        assert time.monotonic() < end, f"{case}; {shown()}"
-        time.sleep(0.02)

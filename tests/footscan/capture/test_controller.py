@@ -3,10 +3,11 @@
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from waiting import LONG_SECONDS, fault_of, wait_until
 
 from footscan.capture.controller import Controller
 from footscan.capture.grbl_settings import BoardSettings
@@ -14,7 +15,6 @@ from footscan.virtual.board import Board
 from footscan.virtual.board_memory import FACTORY, Build
 from schemas.errors import Fault, RefusedInput
 
-LONG_SECONDS = 30.0
 HOMING_SECONDS = 60.0
 SETTINGS = BoardSettings(
     max_mm_per_s=(400.0, 400.0, 400.0),
@@ -321,20 +321,3 @@ def test_a_port_that_is_a_file(tmp_path: Path) -> None:
     (tmp_path / "port").write_text("")
     with pytest.raises(RefusedInput, match="cannot be opened"):
         Controller(str(tmp_path / "port"))
-
-
-def fault_of(call: Callable[[], object]) -> str:
-    """What the fault said that `call` ended with."""
-    try:
-        call()
-    except Fault as fault:
-        return str(fault)
-    return ""
-
-
-def wait_until(holds: Callable[[], bool], seconds: float = LONG_SECONDS) -> None:
-    """Waits until `holds()`; fails where it never does."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)

@@ -17,6 +17,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from waiting import wait_until
 
 from footscan.capture.grbl_settings import BoardSettings
 from footscan.capture.heads import Heads
@@ -27,7 +28,6 @@ CASES = int(os.environ.get("FOOTSCAN_FUZZ", "25"))
 FIRST = int(os.environ.get("FOOTSCAN_FUZZ_FIRST", "0"))
 RECORD = os.environ.get("FOOTSCAN_FUZZ_RECORD")
 AT_A_TIME = 5
-LONG_SECONDS = 40.0
 PATIENCE_SECONDS = 0.5
 SETTINGS = BoardSettings(
     max_mm_per_s=(400.0, 400.0, 400.0),
@@ -263,11 +263,3 @@ def check_travel(heads: Heads, board: Board, case: str) -> None:
     times = [made.begin_seconds + k / 200.0 * (made.end_seconds - made.begin_seconds) for k in range(200)]
     assert max(board.laser_at(seconds) for seconds in times) == pytest.approx(0.4, abs=1e-6), case
     assert board.laser_at(time.monotonic()) == 0.0, case
-
-
-def wait_until(holds: Callable[[], bool], case: str, shown: Callable[[], str] = str) -> None:
-    """Waits until `holds()`; fails where it never does."""
-    end = time.monotonic() + LONG_SECONDS
-    while not holds():
-        assert time.monotonic() < end, f"{case}; {shown()}"
-        time.sleep(0.01)

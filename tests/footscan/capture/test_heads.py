@@ -5,10 +5,11 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from waiting import LONG_SECONDS, fault_of, wait_until
 
 from footscan.capture.grbl_settings import BoardSettings
 from footscan.capture.heads import Head, Heads
@@ -17,7 +18,6 @@ from footscan.virtual.board import Board
 from footscan.virtual.board_rails import Gait, Mount
 from schemas.errors import Fault, RefusedInput
 
-LONG_SECONDS = 30.0
 SETTINGS = BoardSettings(
     max_mm_per_s=(400.0, 400.0, 400.0),
     mm_per_s2=(4000.0, 4000.0, 4000.0),
@@ -346,20 +346,3 @@ def test_a_position_log_may_be_read_in_parts() -> None:
     assert sd == pytest.approx(0.003 / 3**0.5)
     assert log.arrays(9.0)[1].shape == (0, 3)
     assert len(log) == len(list(log)) == 5
-
-
-def fault_of(call: Callable[[], object]) -> str:
-    """What the fault said that `call` ended with."""
-    try:
-        call()
-    except Fault as fault:
-        return str(fault)
-    return ""
-
-
-def wait_until(holds: Callable[[], bool], seconds: float = LONG_SECONDS) -> None:
-    """Waits until `holds()`; fails where it never does."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.005)

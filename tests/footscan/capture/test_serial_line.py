@@ -4,14 +4,13 @@ import os
 import threading
 import time
 import tty
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
+from waiting import wait_until
 
 from footscan.capture.serial_line import SerialLine
 from schemas.errors import Fault, RefusedInput
-
-LONG_SECONDS = 20.0
 
 
 class Ends:
@@ -90,11 +89,3 @@ def test_closing_ends_the_thread() -> None:
 def test_no_port(port: str) -> None:
     with pytest.raises(RefusedInput, match="cannot be opened"):
         SerialLine(port, lambda *_: None, lambda _: None)
-
-
-def wait_until(holds: Callable[[], bool]) -> None:
-    """Waits until `holds()`; fails where it never does."""
-    end = time.monotonic() + LONG_SECONDS
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)

@@ -13,6 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from waiting import LONG_SECONDS, wait_until
 
 from footscan.virtual.board import Board
 from footscan.virtual.board_line import Harm
@@ -20,7 +21,6 @@ from footscan.virtual.board_motion import Light, Motion, Move
 from footscan.virtual.board_rails import Gait, Mount, Rail
 
 QUICK = {24: 600.0, 25: 6000.0, 26: 5, 110: 6000.0, 111: 6000.0, 112: 6000.0, 120: 5000.0, 121: 5000.0, 122: 5000.0}
-LONG_SECONDS = 20.0
 
 
 class Host:
@@ -217,12 +217,3 @@ def straight_move(*, length: float, feed: float, acceleration: float) -> Motion:
     target = (-length, 0.0, 0.0)
     motion.add(Move(target, (-1.0, 0.0, 0.0), length, feed, math.inf, acceleration, Light(0.5, feed)))
     return motion
-
-
-def wait_until(holds: object, seconds: float = LONG_SECONDS) -> None:
-    """Waits until `holds()`; fails where it never does."""
-    assert callable(holds)
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)

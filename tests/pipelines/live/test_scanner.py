@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import simplejpeg
+from waiting import wait_until
 
 from footscan.capture import frame_positions
 from footscan.frames.film import encoded_frames, open_film
@@ -266,11 +267,3 @@ def when_filming(bench: Bench, happens: object) -> None:
         happens()
 
     threading.Thread(target=watch, daemon=True).start()
-
-
-def wait_until(happened: object) -> None:
-    assert callable(happened)
-    deadline = time.monotonic() + 60
-    while not happened():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)

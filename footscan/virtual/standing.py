@@ -1,0 +1,20 @@
+"""How a thing is put onto the virtual scanner's glass."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+BLOCK_TURN_DEG = 5.0
+"""How the block stands, as one would place it: stripes run in over its turned edges bit by bit, which tells where the
+heads are, and none runs over a face that is square to the travel."""
+
+
+def stand_on_glass(vertices: Floats, middle_x_mm: float, turn_deg: float = 0.0) -> Floats:
+    """(N, 3) `vertices`, mm, turned about Z and shifted onto the glass (Z = 0), with their middle at X and at Y = 0."""
+    if turn_deg:
+        cos, sin = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
+        vertices = vertices @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    middle = (low + high) / 2.0
+    return np.asarray(vertices + np.array([middle_x_mm - middle[0], -middle[1], -low[2]]), np.float64)
