@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from footscan.calibration.observations import Observations
 from footscan.calibration.reference import Edges, nearest_edge
+from footscan.rows import distinct_rows
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +61,7 @@ class EdgePoints:
 
     def observations(self) -> Observations:
         """What a map is fitted to; whole edges are held out where enough were seen, or else parts of them."""
-        edges = np.unique(np.column_stack([self.placement, self.edge]), axis=0)
+        edges = distinct_rows(np.column_stack([self.placement, self.edge])).rows
         block = np.floor(self.along / BLOCK_MM).astype(np.intp)
         whole = self.placement * (self.edge.max(initial=0) + 1) + self.edge
         if len(edges) >= FEWEST_GROUPS:
@@ -73,7 +74,7 @@ class EdgePoints:
                 share = (self.along[members] - low) / max(high - low, 1e-9)
                 part[members] = np.minimum((PARTS * share).astype(np.intp), PARTS - 1)
             group = whole * PARTS + part
-        blocks = np.unique(np.column_stack([group, block]), axis=0, return_inverse=True)[1].ravel()
+        blocks = distinct_rows(np.column_stack([group, block])).number
         return Observations(self.pixels, self.normals, self.offsets, np.arange(len(self)), blocks, group)
 
 
@@ -136,7 +137,7 @@ def _on_a_stretch(
     placement: NDArray[np.intp], edge: NDArray[np.intp], along: Floats, near: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Which points lie on an edge of which the points that are near cover a stretch that is long enough."""
-    number = np.unique(np.column_stack([placement, edge]), axis=0, return_inverse=True)[1].ravel()
+    number = distinct_rows(np.column_stack([placement, edge])).number
     low = np.full(number.max(initial=-1) + 1, np.inf)
     high = -low
     np.minimum.at(low, number[near], along[near])

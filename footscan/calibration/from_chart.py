@@ -15,6 +15,7 @@ from footscan.calibration.quadratic import ORDER as QUADRATIC
 from footscan.calibration.quadratic import QuadraticFit, fit_quadratic
 from footscan.calibration.region import region_of
 from footscan.calibration.selection import ModelTrial, asked_for, candidates, rms, select, try_model
+from footscan.rows import distinct_rows
 from schemas.calibration import Calibration, CameraCalibration, Residual, Source
 from schemas.errors import RefusedInput
 from schemas.parameters.calibration import CalibrationParameters
@@ -213,7 +214,7 @@ def _groups(chart: Chart) -> NDArray[np.intp]:
     group = np.empty(len(order), np.intp)
     group[order] = np.arange(len(order))
     for positions in (chart.world, chart.pixels):
-        same = np.unique(positions, axis=0, return_inverse=True)[1].ravel()
+        same = distinct_rows(positions).number
         for number in range(same.max() + 1):
             touched = np.isin(group, group[same == number])
             group[touched] = group[touched].min()

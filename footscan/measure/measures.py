@@ -14,6 +14,7 @@ from footscan.measure.frame import FootFrame, foot_frame
 from footscan.measure.landmarks import Landmark, find_landmarks
 from footscan.measure.place import apply
 from footscan.measure.quantity import NotThere, Quantity
+from footscan.rows import distinct_rows
 from schemas.measures import Axis, Measure, MeasuredLandmark, Measures, Place, Status, Unit
 from schemas.scan import Side
 
@@ -260,8 +261,7 @@ def _cubes(vertices: Floats, edge: float) -> NDArray[np.int64] | None:
     """(V,) the number of the cube in which each vertex lies."""
     if edge <= 0:
         return None
-    _, cube = np.unique(np.floor(vertices / edge), axis=0, return_inverse=True)
-    return cube.ravel()
+    return distinct_rows(np.floor(vertices / edge)).number
 
 
 def _measure(

@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from footscan.measure.frame import CONVEX
 from footscan.measure.place import apply
 from footscan.measure.pose import find_pose, volume
+from footscan.rows import distinct_rows
 from footscan.surface.topology import directed_edges, face_components, used_vertices
 from schemas.errors import Finding
 
@@ -98,11 +99,10 @@ def take_in(vertices: NDArray[np.floating], faces: NDArray[np.integer], unit: Me
 def _clean(vertices: Floats, faces: Faces) -> tuple[Floats, Faces]:
     """Without vertices that stand twice and triangles without area."""
     if len(faces):
-        merged, place = vertices, np.zeros(0, np.intp)
         if np.any(_meetings(faces).counts == 1):  # a closed surface has none that stand twice
-            merged, place = np.unique(vertices, axis=0, return_inverse=True)
-        if len(merged) < len(vertices):
-            vertices, faces = merged, place.reshape(-1)[faces].astype(np.int32)
+            merged = distinct_rows(vertices)
+            if len(merged.rows) < len(vertices):
+                vertices, faces = merged.rows, merged.number[faces].astype(np.int32)
         a, b, c = (vertices[faces[:, k]] for k in range(3))
         doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         extent = float(np.linalg.norm(np.ptp(vertices, axis=0)))

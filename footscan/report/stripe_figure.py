@@ -10,6 +10,7 @@ from PIL import Image
 
 from footscan.frames.image import Rgb
 from footscan.report.panels import png_of
+from footscan.rows import distinct_rows
 from footscan.stripe.points import StripePoints
 
 if TYPE_CHECKING:
@@ -330,7 +331,7 @@ def _draw_coverage(panel: "Axes", points: StripePoints, count: int, size: tuple[
         ("i", size[1], COLUMNS, "columns that hold a point"),
         ("j", size[0], ROWS, "rows that hold a point"),
     ):
-        held = np.unique(np.column_stack([points["frame"], np.rint(points[name])]), axis=0)
+        held = distinct_rows(np.column_stack([points["frame"], np.rint(points[name])])).rows
         share = np.bincount(held[:, 0].astype(np.intp), minlength=count) / lines
         _draw_line(panel, 100 * share, lost, colour, label)
     panel.set(ylabel="covered, % of the image", ylim=(0, None))

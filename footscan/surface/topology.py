@@ -6,6 +6,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from footscan.compiled import compiled
+from footscan.rows import distinct_rows
 
 Faces = NDArray[np.integer]
 
@@ -17,15 +18,15 @@ def directed_edges(faces: Faces) -> NDArray[np.int64]:
 
 def edge_counts(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """(E, 2) the edges of (F, 3) `faces`, smaller vertex first, and (E,) how many faces meet at each."""
-    edges, counts = np.unique(np.sort(directed_edges(faces), axis=1), axis=0, return_counts=True)
-    return edges, counts.astype(np.int64)
+    edges = distinct_rows(np.sort(directed_edges(faces), axis=1))
+    return edges.rows, edges.counts.astype(np.int64)
 
 
 def drop_tangles(faces: Faces) -> NDArray[np.int32]:
     """`faces` without those at edges where more than two meet, or where two run the same way."""
     edges = directed_edges(faces)
-    _, undirected, meeting = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
-    _, directed, same_way = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    _, _, undirected, meeting = distinct_rows(np.sort(edges, axis=1))
+    _, _, directed, same_way = distinct_rows(edges)
     tangled = (meeting[undirected] > 2) | (same_way[directed] > 1)
     return faces[~tangled.reshape(3, -1).any(axis=0)].astype(np.int32)
 

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.rows import distinct_rows
 from footscan.verify.icp import Poses, fit_of, normal_equations, tukey_weights
 from footscan.verify.nearest import Floats, Surface
 
@@ -48,5 +49,4 @@ def evidence(best: Floats, other: Floats, patches: NDArray[np.integer]) -> float
 def patches_of(points: Floats) -> NDArray[np.intp]:
     """(N,) number of the patch that each of (N, 3) `points` is in."""
     cell = float(np.linalg.norm(np.ptp(points, axis=0))) / PATCHES
-    _, patch = np.unique(np.rint(points / cell).astype(np.int64), axis=0, return_inverse=True)
-    return patch.reshape(-1)
+    return distinct_rows(np.rint(points / cell).astype(np.int64)).number

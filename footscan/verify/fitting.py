@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.robust import MAD_TO_SD
+from footscan.rows import distinct_rows
 from schemas.errors import Finding
 from schemas.fits import Vector
 
@@ -21,10 +22,7 @@ def distinct_points(points: Floats) -> Floats:
     points = np.asarray(points, np.float64).reshape(-1, 3)
     if not np.isfinite(points).all():
         raise Finding("some coordinates are no numbers, expected mm")
-    ordered: Floats = points[np.lexsort(points.T[::-1])]
-    new = np.ones(len(ordered), np.bool_)
-    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    return ordered[new]
+    return distinct_rows(points).rows
 
 
 def robust_deviation(values: Floats) -> float:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.rows import distinct_rows
 from footscan.surface.export import Shape
 from footscan.surface.topology import face_components
 
@@ -60,12 +61,12 @@ def sides(mesh: Shape) -> Sides:
 
 def _merged(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> tuple[Floats, NDArray[np.int32]]:
     """Vertices that stand at one place become one; faces without area or that repeat another are left out."""
-    places, of_vertex = np.unique(np.asarray(vertices, np.float64) + 0.0, axis=0, return_inverse=True)
-    merged = of_vertex.reshape(-1)[faces]
+    places, _, of_vertex, _ = distinct_rows(np.asarray(vertices, np.float64) + 0.0)
+    merged = of_vertex[faces]
     area = np.linalg.norm(_area_vectors(places[merged]), axis=1)
     merged = merged[area > 0]
-    _, first = np.unique(np.sort(merged, axis=1), axis=0, return_index=True)
-    return places, merged[np.sort(first)].astype(np.int32)
+    first = np.sort(distinct_rows(np.sort(merged, axis=1)).first)
+    return places, merged[first].astype(np.int32)
 
 
 def _edges(faces: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int8], NDArray[np.int64]]:

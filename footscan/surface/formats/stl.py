@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.rows import distinct_rows
 from footscan.surface.mesh import KNOWN_OF_A_MESH, Mesh
 
 START = 84
@@ -58,8 +59,8 @@ def parse_stl(content: bytes) -> Mesh:
     else:
         expected = f"expected {START + count * TRIANGLE.itemsize} for its {count} triangles" if count >= 0 else ""
         raise ValueError(f"{len(content)} bytes, {expected or 'expected at least 84'}")
-    vertices, faces = np.unique(corners.astype(np.float64) + 0.0, axis=0, return_inverse=True)
-    return Mesh(vertices, faces.reshape(-1, 3).astype(np.int32), metadata=metadata)
+    merged = distinct_rows(corners.astype(np.float64) + 0.0)
+    return Mesh(merged.rows, merged.number.reshape(-1, 3).astype(np.int32), metadata=metadata)
 
 
 def _header(metadata: Mapping[str, str]) -> str:
