@@ -25,6 +25,8 @@ class RecordedBoard(Document):
     """How often it said where the heads were, while they travelled."""
     report_sd_s: Deviation
     """Standard deviation of the time that such a report stands for, root mean square."""
+    lost_steps_mm: tuple[float, float, float] | None = None
+    """How far heads 1, 2, 3 were off along X after the last travel, felt at their home switches; to 0.1 mm."""
 
 
 class RecordedPass(Document):

@@ -26,8 +26,8 @@ SLACK_MM = 0.05
 STEPS_LOST_MM = 0.3
 """From how far on a head's home switch is not where it was: a few times what a cheap switch repeats to."""
 FEELER_STEP_MM = 0.1
-LIMITS = (20, 21)
-"""The settings of soft and hard limits."""
+SOFT_LIMITS, HARD_LIMITS = 20, 21
+"""The settings' numbers."""
 FEELER_MM = 1.5
 """How far before and beyond where it should be a switch is looked for."""
 WELL_TIMED_SECONDS = 0.1
@@ -85,7 +85,13 @@ class Heads:
         self._power = 0.0
         self._brightest = 0.0
         self._suspect: HeadPosition | None = None
-        self.board = Controller(port, self.settings, patience_seconds=patience_seconds)
+        self.board = Controller(port, patience_seconds=patience_seconds)
+        try:
+            self._restore_limits()
+            self.board.check(self.settings)
+        except BaseException:
+            self.board.close()
+            raise
         self.board.on_report(self._log)
 
     def __enter__(self) -> Self:
@@ -123,6 +129,7 @@ class Heads:
         """Finds the home switches, then aligns all heads at one X next to them; Fault where a head fails to."""
         self._suspect = None
         self.board.home(self._homing_limit())
+        self._restore_limits()
         low, high = self.reach_mm
         at = self._world(self.board.status().report)
         self.travel_to(low if abs(at[0] - low) < abs(at[0] - high) else high)
@@ -227,19 +234,24 @@ class Heads:
         The firmware counts the steps it gives and never learns of one that a motor did not make. This goes back to the
         home switches, feels for them in steps of 0.1 mm, and compares. A head that never meets its switch is as bad.
         Limits are off meanwhile ($20=0, $21=0), as the switches must be touched: four writes into the board's memory.
+        Whatever ends it before its time, heads must be homed again, and that switches them on.
         """
         low, high = self.reach_mm
         home = low if abs(self.heads[0].world(0.0) - low) < abs(self.heads[0].world(0.0) - high) else high
-        self.travel_to(home)
-        for number in LIMITS:
-            self.board.change(number, 0)
+        slow = self.settings.homing_slow_mm_per_s
         try:
+            self.travel_to(home)
+            self._go_machine([-FEELER_MM] * 3, slow, 0.0)
+            self.board.change(SOFT_LIMITS, 0)
+            self.board.change(HARD_LIMITS, 0)
             tripped = self._feel_switches()
-            self._go_machine([-self.settings.pull_off_mm] * 3, self.settings.homing_slow_mm_per_s, 0.0)
-        finally:
-            for number in LIMITS:
-                self.board.change(number, 1)
-        self.travel_to(home)
+            self.board.change(SOFT_LIMITS, 1)  # before the way back, hard ones behind it: leaving a switch trips them
+            self._go_machine([-self.settings.pull_off_mm] * 3, slow, 0.0)
+            self.board.change(HARD_LIMITS, 1)
+            self.travel_to(home)
+        except BaseException:
+            self.board.doubt_home()
+            raise
         lost = [math.inf if at is None else head.direction * at for head, at in zip(self.heads, tripped, strict=True)]
         wrong = [f"head {one} {_off(by)}" for one, by in zip(HEADS, lost, strict=True) if abs(by) > STEPS_LOST_MM]
         if wrong:
@@ -247,6 +259,13 @@ class Heads:
             remedy = "see what holds them, then home the heads again"
             raise Fault(f"heads are not where their steps say: {', '.join(wrong)}; {remedy}")
         return lost[0], lost[1], lost[2]
+
+    def _restore_limits(self) -> None:
+        """Switches those on that feeling for the switches left off, as where the cable was pulled meanwhile."""
+        found = self.board.settings()
+        for number in (SOFT_LIMITS, HARD_LIMITS):
+            if found.get(number) == 0:
+                self.board.change(number, 1)
 
     def _run(self, begin_mm: float, end_mm: float, mm_per_s: float, power: float) -> Travel:
         """One straight run of all heads to `end_mm`; `mm_per_s` is that of a head that comes from `begin_mm`."""
@@ -294,18 +313,23 @@ class Heads:
             raise Fault(f"the lasers were not as bright as they should be on this travel ({told}); try again")
 
     def _feel_switches(self) -> list[float | None]:
-        """Machine position at which each home switch trips, mm; None where it does not."""
+        """Machine position at which each home switch trips, mm; None where it does not.
+
+        No limit stops a head here, so each step is a short word of its own: a byte that is lost or doubled on the line
+        makes of it at most one of a millimetre.
+        """
         tripped: list[float | None] = [None, None, None]
-        at = -FEELER_MM
-        while None in tripped and at < FEELER_MM:
-            at += FEELER_STEP_MM
-            words = "".join(f"{axis}{at:.3f}" for axis in "XYZ")
-            self.board.send(f"G53G1{words}F{60.0 * self.settings.homing_slow_mm_per_s * math.sqrt(3.0):.1f}")
+        feed = 60.0 * self.settings.homing_slow_mm_per_s * math.sqrt(3.0)
+        step = "".join(f"{axis}{FEELER_STEP_MM:g}".replace("0.", ".") for axis in "XYZ")
+        for _ in range(round(2.0 * FEELER_MM / FEELER_STEP_MM)):
+            self.board.send(f"G91G1{step}F{feed:.0f}")
             self.board.send(DWELL, limit_seconds=1.0)
-            pins = self.board.status().report.pins
+            report = self.board.status().report
             for index, axis in enumerate("XYZ"):
-                if axis in pins and tripped[index] is None:
-                    tripped[index] = at - FEELER_STEP_MM / 2.0
+                if axis in report.pins and tripped[index] is None and report.machine_mm is not None:
+                    tripped[index] = report.machine_mm[index] - FEELER_STEP_MM / 2.0
+            if None not in tripped:
+                break
         return tripped
 
     def _check_travel(self, start_mm: float, end_mm: float, mm_per_s: float) -> None:

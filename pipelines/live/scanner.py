@@ -15,6 +15,7 @@ from footscan.capture.camera_deck import CameraDeck
 from footscan.capture.camera_stream import CapturedFrame
 from footscan.capture.heads import Heads
 from footscan.capture.passes import FilmedPass, PassPlan, film_name, film_pass
+from footscan.capture.position_log import Triple
 from footscan.capture.recording import ScanRecording
 from footscan.capture.usb_bus import Pass
 from pipelines.live.devices import heads_of, passes_of, sources_of, timing_of
@@ -184,17 +185,19 @@ class LiveScanner:
                 for number, one in enumerate(passes, start=1):
                     words = f"pass {number} of {len(passes)}" if len(passes) > 1 else ""
                     story.filmed.append(self.film_one_pass(one, plan, light, recording, words, story))
+                story.lost_steps_mm = self._check_steps()
                 self._board.tell("storing")
                 recording.settle()
                 return store_scan(self.rig, order.name, story, self.heads, recording, order.keep_partial)
 
     @contextmanager
     def ready_to_film(self) -> Iterator[None]:
-        """Connected and homed, and nobody else at work, for who films passes of his own."""
+        """Connected and homed, and nobody else at work, for who films passes of his own; then no steps may be lost."""
         with self._at_work("filming"), self._stop_said():
             self._connect_board()
             self._home_if_needed()
             yield
+            self._check_steps()
             self._board.tell("idle")
 
     def film_one_pass(
@@ -284,6 +287,13 @@ class LiveScanner:
             self._board.tell("homing")
             self.heads.home()
             self._refuse_stopped()
+
+    def _check_steps(self) -> Triple:
+        """Whether the heads were where they were told to be: nothing that was filmed counts otherwise."""
+        self._board.tell("filming", "checking that the heads lost no steps")
+        lost_mm = self.heads.lost_steps_mm()
+        self._refuse_stopped()
+        return lost_mm
 
     def _open_first(self) -> dict[int, str]:
         passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])

@@ -17,6 +17,7 @@ from footscan.capture.film_frames import (
 from footscan.capture.frame_positions import write_positions
 from footscan.capture.heads import Heads
 from footscan.capture.passes import FilmedPass, PassPlan, film_name
+from footscan.capture.position_log import Triple
 from footscan.capture.recording import ScanRecording
 from footscan.capture.usb_bus import Pass
 from footscan.capture.video_controls import FixedControl
@@ -65,6 +66,8 @@ class ScanStory:
     """As `passes`."""
     fixed: dict[int, list[FixedControl]] = field(default_factory=dict)
     """What each camera made of its settings."""
+    lost_steps_mm: Triple | None = None
+    """How far heads 1, 2, 3 were off after the last travel, by their home switches."""
 
     def timing(self, camera: RigCamera) -> CameraTiming:
         """What is known of the times of a camera in the light of the scan."""

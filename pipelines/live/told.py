@@ -36,6 +36,7 @@ def recording_document(
             settings_sha256=sha256(canonical_json(settings).encode()),
             reports=len(times_sd),
             report_sd_s=_rms(times_sd),
+            lost_steps_mm=story.lost_steps_mm,
         ),
         light=RecordedLight(power=story.light.power, looks=story.light.looks, is_measured=story.light.is_measured),
         passes=[

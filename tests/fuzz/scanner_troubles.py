@@ -30,7 +30,7 @@ class Trouble:
     is_unheard: bool = False
     """Whether the board cannot be talked to afterwards, or not as before."""
     held: frozenset[int] = frozenset()
-    """Heads that do not go where they are driven, which nobody is told."""
+    """Heads that do not go where they are driven, which is found at the end of a scan only."""
 
 
 def random_trouble(random: Random, bench: Bench) -> Trouble:

@@ -240,6 +240,25 @@ def test_lost_steps_are_found_by_feeling_for_the_switches(shared: tuple[Board, H
     assert heads.lost_steps_mm() == pytest.approx((0.0, 0.0, 0.0), abs=0.05)
 
 
+def test_limits_are_on_again_however_feeling_for_the_switches_ends(shared: tuple[Board, Heads]) -> None:
+    board, heads = shared
+    held = threading.Thread(target=lambda: fault_of(heads.lost_steps_mm))
+    held.start()
+    wait_until(lambda: board.memory[21] == 0)
+    heads.stop()
+    held.join(LONG_SECONDS)
+    assert heads.state.name == "not homed"
+    heads.home()
+    assert board.memory[20] == board.memory[21] == 1
+
+
+def test_limits_that_were_left_off_are_switched_on_by_the_next_connection() -> None:
+    settings = {**QUICK, 20: 0, 21: 0}
+    with Board(settings=settings, heads_at=NEAR) as board, Heads(board.port, SETTINGS) as heads:
+        assert board.memory[20] == board.memory[21] == 1
+        heads.home()
+
+
 def test_a_head_that_stood_still_is_found_after_the_travel(shared: tuple[Board, Heads]) -> None:
     board, heads = shared
     heads.travel_to(20.0)

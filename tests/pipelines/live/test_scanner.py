@@ -114,6 +114,7 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
     scan = read_scan(result.stored.place)
     assert (scan.name, scan.document.scanner, scan.document.day) == ("P7/2026-11-20-R", "bench", DAY)
     recording = read_json(scan.folder / "recording.json", Recording)
+    assert recording.board.lost_steps_mm == pytest.approx((0.0, 0.0, 0.0), abs=0.06)
     for camera, told in zip(scan.document.cameras, recording.cameras, strict=True):
         x = read_positions(scan.folder / str(camera.positions))
         assert np.all(np.diff(x) > 0)
@@ -127,6 +128,20 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
     assert result.measured.kind in {None, "finding"}
     assert result.measured.folder == results / "P7/2026-11-20-R"
     assert next_scan_name(bench.home / "archive", "P7", "right", DAY) == "2026-11-20-R-2"
+
+
+def test_a_head_that_was_held_costs_the_scan(bench: Bench) -> None:
+    def hold_for_a_while() -> None:
+        bench.board.stick(2)
+        threading.Timer(0.3, lambda: bench.board.stick(2, False)).start()
+
+    bench.scanner.home()
+    when_filming(bench, hold_for_a_while)
+    with pytest.raises(Fault, match=r"heads are not where their steps say: head 2|switch"):
+        bench.scanner.scan(bench.order())
+    assert bench.scanner.state.name in ("failed", "alarm")
+    bench.assert_dark_and_empty()
+    assert bench.scanner.scan(bench.order()).stored.left_out == {}
 
 
 def test_a_camera_that_fails_costs_the_scan_unless_it_is_to_be_kept(bench: Bench) -> None:
