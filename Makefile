@@ -13,7 +13,8 @@ setup:    ## system libraries, .venv, pinned packages; starts at once when they 
 demo: setup   ## films, calibrates, scans and measures a foot; the result is in demo/
 	@$(BIN)/footscan demo
 
-test: lint    ## lint, then every test; those that keep time with virtual hardware when no others compute
+test: lint    ## lint, then every test, in the end those that keep time; pages in Debian's Chromium
+	@scripts/browser.sh
 	$(BIN)/pytest -n 2 -m "not real_time"
 	$(BIN)/pytest -n 2 -m real_time --reruns 2 -r fER
 
