@@ -91,8 +91,7 @@ def _residuals(model: Model, observations: Observations, parameters: Floats) -> 
 
 
 def _jacobian(model: Model, observations: Observations, parameters: Floats) -> Floats:
-    by_parameters = model.by_parameters(parameters, observations.pixels)
-    return np.asarray(np.einsum("nk,nkp->np", observations.normals, by_parameters))
+    return _along(observations.normals, model.by_parameters(parameters, observations.pixels))
 
 
 def _remoteness(residuals: Floats) -> Floats:
@@ -137,6 +136,16 @@ def _minimise(model: Model, observations: Observations, weights: Floats, start: 
             break
         cost = lower
     return parameters
+
+
+@compiled
+def _along(normals: Floats, by_parameters: Floats) -> Floats:
+    """(N, P) derivatives along the normals (N, 2), of those of places (N, 2, P)."""
+    along = np.empty((by_parameters.shape[0], by_parameters.shape[2]))
+    for n in range(along.shape[0]):
+        for p in range(along.shape[1]):
+            along[n, p] = normals[n, 0] * by_parameters[n, 0, p] + normals[n, 1] * by_parameters[n, 1, p]
+    return along
 
 
 @compiled

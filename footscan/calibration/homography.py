@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.polynomial import derivatives, design_matrix, terms
+from footscan.calibration.polynomial import derivatives, design_matrix, sum_terms, terms
+from footscan.compiled import compiled
 from schemas.calibration import Correction, Distortion, HomographyMap
 from schemas.parameters.calibration import ModelName
 
@@ -80,7 +81,7 @@ class HomographyModel:
         uv = self._normalised(pixels)
         plane, _ = project(_matrix(parameters), self._ideal(parameters, uv))
         if self.correction is not None:
-            plane = plane + np.einsum("nt,kt->nk", self._correction_matrix(uv), self._correction(parameters))
+            plane = plane + sum_terms(self._correction_matrix(uv), self._correction(parameters))
         return plane
 
     def by_parameters(self, parameters: Floats, pixels: Floats) -> Floats:
@@ -89,13 +90,9 @@ class HomographyModel:
         ideal = self._ideal(parameters, uv)
         plane, depth = project(_matrix(parameters), ideal)
         jacobian = np.zeros((len(uv), 2, self.unknowns))
-        over_depth = np.column_stack([ideal, np.ones(len(uv))]) / depth[:, np.newaxis]
-        jacobian[:, 0, 0:3] = over_depth
-        jacobian[:, 1, 3:6] = over_depth
-        jacobian[:, :, 6:8] = -plane[:, :, np.newaxis] * over_depth[:, np.newaxis, :2]
+        _fill_by_matrix(jacobian, ideal, plane, depth)
         if self.distorted:
-            by_ideal = slopes(_matrix(parameters), plane, depth)
-            jacobian[:, :, MATRIX : MATRIX + 4] = by_ideal @ _distortion_terms(uv)
+            _fill_by_lens(jacobian, slopes(_matrix(parameters), plane, depth), _distortion_terms(uv))
         if self.correction is not None:
             matrix = self._correction_matrix(uv)
             jacobian[:, 0, self._corrected : self._corrected + matrix.shape[1]] = matrix
@@ -152,7 +149,7 @@ class HomographyModel:
     def _ideal(self, parameters: Floats, uv: Floats) -> Floats:
         if not self.distorted:
             return uv
-        return uv + _distortion_terms(uv) @ parameters[MATRIX : MATRIX + 4]
+        return _through_lens(uv, _distortion_terms(uv), parameters[MATRIX : MATRIX + 4])
 
     def _ideal_by_uv(self, parameters: Floats, uv: Floats) -> Floats:
         identity = np.broadcast_to(np.eye(2), (len(uv), 2, 2))
@@ -195,16 +192,28 @@ def algebraic_homography(uv: Floats, normals: Floats, offsets: Floats) -> Floats
     return np.asarray(matrix / (matrix[2, 2] if abs(matrix[2, 2]) > least else least))
 
 
+@compiled
 def project(matrix: Floats, points: Floats) -> tuple[Floats, Floats]:
     """Where a homography (3, 3) takes `points` (N, 2), (N, 2), and the depths (N,) by which they were divided."""
-    taken = np.einsum("nk,lk->nl", points, matrix[:, :2]) + matrix[:, 2]
-    depth = np.where(np.abs(taken[:, 2]) < 1e-9, 1e-9, taken[:, 2])  # on the horizon: far away, not infinite
-    return taken[:, :2] / depth[:, np.newaxis], depth
+    plane, depth = np.empty((len(points), 2)), np.empty(len(points))
+    for n in range(len(points)):
+        x, y = points[n, 0], points[n, 1]
+        by = x * matrix[2, 0] + y * matrix[2, 1] + matrix[2, 2]
+        depth[n] = 1e-9 if abs(by) < 1e-9 else by  # on the horizon: far away, not infinite
+        for k in range(2):
+            plane[n, k] = (x * matrix[k, 0] + y * matrix[k, 1] + matrix[k, 2]) / depth[n]
+    return plane, depth
 
 
+@compiled
 def slopes(matrix: Floats, plane: Floats, depth: Floats) -> Floats:
     """Derivatives (N, 2, 2) of what `project` gave by its points."""
-    return np.asarray((matrix[:2, :2] - plane[:, :, np.newaxis] * matrix[2, :2]) / depth[:, np.newaxis, np.newaxis])
+    by_points = np.empty((len(plane), 2, 2))
+    for n in range(len(plane)):
+        for k in range(2):
+            for m in range(2):
+                by_points[n, k, m] = (matrix[k, m] - plane[n, k] * matrix[2, m]) / depth[n]
+    return by_points
 
 
 def image_frame(image_px: tuple[int, int]) -> tuple[tuple[float, float], float]:
@@ -222,10 +231,45 @@ def _matrix(parameters: Floats) -> Floats:
     return np.append(parameters[:MATRIX], 1.0).reshape(3, 3)
 
 
+@compiled
 def _distortion_terms(uv: Floats) -> Floats:
     """(N, 2, 4): what k1, k2, p1 and p2 are multiplied with."""
-    u, v = uv.T
-    r2 = u * u + v * v
-    along_u = np.stack([u * r2, u * r2 * r2, 2.0 * u * v, r2 + 2.0 * u * u], axis=-1)
-    along_v = np.stack([v * r2, v * r2 * r2, r2 + 2.0 * v * v, 2.0 * u * v], axis=-1)
-    return np.stack([along_u, along_v], axis=1)
+    found = np.empty((len(uv), 2, 4))
+    for n in range(len(uv)):
+        u, v = uv[n, 0], uv[n, 1]
+        r2 = u * u + v * v
+        found[n, 0, 0], found[n, 0, 1], found[n, 0, 2], found[n, 0, 3] = u * r2, u * r2 * r2, 2 * u * v, r2 + 2 * u * u
+        found[n, 1, 0], found[n, 1, 1], found[n, 1, 2], found[n, 1, 3] = v * r2, v * r2 * r2, r2 + 2 * v * v, 2 * u * v
+    return found
+
+
+@compiled
+def _through_lens(uv: Floats, distortion: Floats, lens: Floats) -> Floats:
+    """(N, 2) ideal places of what is seen at `uv` (N, 2), by what k1, k2, p1 and p2 are multiplied with (N, 2, 4)."""
+    ideal = uv.copy()
+    for n in range(len(uv)):
+        for k in range(2):
+            for t in range(4):
+                ideal[n, k] += distortion[n, k, t] * lens[t]
+    return ideal
+
+
+@compiled
+def _fill_by_matrix(jacobian: Floats, ideal: Floats, plane: Floats, depth: Floats) -> None:
+    """Derivatives of the (N, 2) places on the plane by the matrix, into (N, 2, P)."""
+    for n in range(len(ideal)):
+        x, y, one = ideal[n, 0] / depth[n], ideal[n, 1] / depth[n], 1.0 / depth[n]
+        for k in range(2):
+            jacobian[n, k, 3 * k], jacobian[n, k, 3 * k + 1], jacobian[n, k, 3 * k + 2] = x, y, one
+            jacobian[n, k, 6], jacobian[n, k, 7] = -plane[n, k] * x, -plane[n, k] * y
+
+
+@compiled
+def _fill_by_lens(jacobian: Floats, by_ideal: Floats, distortion: Floats) -> None:
+    """Those by k1, k2, p1 and p2, into (N, 2, P)."""
+    for n in range(len(jacobian)):
+        for k in range(2):
+            for t in range(4):
+                jacobian[n, k, MATRIX + t] = (
+                    by_ideal[n, k, 0] * distortion[n, 0, t] + by_ideal[n, k, 1] * distortion[n, 1, t]
+                )

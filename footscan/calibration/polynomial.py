@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from footscan.compiled import compiled
 from schemas.calibration import PolynomialMap
 from schemas.parameters.calibration import ModelName
 
@@ -44,7 +45,7 @@ class PolynomialModel:
     def world(self, parameters: Floats, pixels: Floats) -> Floats:
         """Y and Z, (N, 2) mm, of `pixels` (N, 2)."""
         matrix = design_matrix(*self._normalised(pixels), self.order)
-        return np.asarray(np.einsum("nt,kt->nk", matrix, parameters.reshape(2, -1)))
+        return sum_terms(matrix, parameters.reshape(2, -1))
 
     def by_parameters(self, parameters: Floats, pixels: Floats) -> Floats:
         """Derivatives (N, 2, P) of `world` by the parameters."""
@@ -88,8 +89,8 @@ def design_matrix(u: ArrayLike, v: ArrayLike, order: int) -> Floats:
     >>> design_matrix([2.0], [3.0], 2)
     array([[1., 2., 3., 4., 6., 9.]])
     """
-    u_power, v_power = _powers(u, order), _powers(v, order)
-    return np.stack([u_power[a] * v_power[b] for a, b in _exponents(order)], axis=-1)
+    u, v = np.broadcast_arrays(np.asarray(u, np.float64), np.asarray(v, np.float64))
+    return np.asarray(_design(u.ravel(), v.ravel(), order).reshape(*u.shape, terms(order)))
 
 
 def derivatives(u: ArrayLike, v: ArrayLike, order: int) -> tuple[Floats, Floats]:
@@ -102,6 +103,32 @@ def derivatives(u: ArrayLike, v: ArrayLike, order: int) -> tuple[Floats, Floats]
     by_u = [a * u_power[max(a - 1, 0)] * v_power[b] for a, b in _exponents(order)]
     by_v = [b * u_power[a] * v_power[max(b - 1, 0)] for a, b in _exponents(order)]
     return np.stack(by_u, axis=-1), np.stack(by_v, axis=-1)
+
+
+@compiled
+def sum_terms(matrix: Floats, coefficients: Floats) -> Floats:
+    """(N, K) sums of the terms (N, T) with K sets of `coefficients` (K, T)."""
+    sums = np.zeros((len(matrix), len(coefficients)))
+    for n in range(len(matrix)):
+        for k in range(len(coefficients)):
+            for t in range(matrix.shape[1]):
+                sums[n, k] += matrix[n, t] * coefficients[k, t]
+    return sums
+
+
+@compiled
+def _design(u: Floats, v: Floats, order: int) -> Floats:
+    matrix = np.empty((len(u), (order + 1) * (order + 2) // 2))
+    u_power, v_power = np.ones(order + 1), np.ones(order + 1)
+    for n in range(len(u)):
+        for a in range(order):
+            u_power[a + 1], v_power[a + 1] = u_power[a] * u[n], v_power[a] * v[n]
+        t = 0
+        for degree in range(order + 1):
+            for b in range(degree + 1):
+                matrix[n, t] = u_power[degree - b] * v_power[b]
+                t += 1
+    return matrix
 
 
 def _exponents(order: int) -> list[tuple[int, int]]:
