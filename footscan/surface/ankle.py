@@ -68,6 +68,13 @@ def cut_flat(vertices: Floats, faces: Faces, height: float, spacing: float) -> t
     return np.concatenate(lids), np.concatenate(patches), np.concatenate([origin, np.full(total - len(below), -1)])
 
 
+def faces_on_cut(vertices: NDArray[np.floating], faces: NDArray[np.integer], cut_mm: float | None) -> NDArray[np.bool_]:
+    """(F,) which faces are the lid at Z = `cut_mm`: no skin, and so neither measured nor filled."""
+    if cut_mm is None:
+        return np.zeros(len(faces), np.bool_)
+    return np.asarray((vertices[faces, 2] == cut_mm).all(axis=1))
+
+
 def _split(
     vertices: Floats, faces: Faces, above: NDArray[np.bool_], on_cut: NDArray[np.bool_], height: float
 ) -> tuple[Floats, Faces]:

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.surface.ankle import faces_on_cut
 from footscan.surface.holes import perimeter, rims
 from footscan.surface.topology import edge_counts, face_components
 from schemas.quality import MeshQuality
@@ -30,7 +31,7 @@ def mesh_quality(
     holes = rims(faces)
     area, shape = _areas_and_shapes(points[faces])
     total = float(area.sum()) or 1.0
-    on_cut = np.zeros(len(faces), np.bool_) if cut_mm is None else (points[faces, 2] == cut_mm).all(axis=1)
+    on_cut = faces_on_cut(points, faces, cut_mm)
     is_filled = None if filled is None else filled[faces].any(axis=1) & ~on_cut
     return MeshQuality(
         vertices=len(vertices),

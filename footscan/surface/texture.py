@@ -12,6 +12,7 @@ from scipy.sparse.linalg import splu
 from footscan.cloud.colour import CLIPPED_WEIGHT, as_level, camera_gains, is_clipped
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.compiled import compiled
+from footscan.surface.ankle import faces_on_cut
 from footscan.surface.buckets import Buckets, sort_into_cubes
 from footscan.surface.topology import directed_edges
 
@@ -215,7 +216,6 @@ def _continued(light: Floats, known: NDArray[np.bool_], faces: NDArray[np.int32]
 
 def _inside_cut(vertices: Floats, faces: NDArray[np.int32], cut_mm: float) -> NDArray[np.bool_]:
     """(V,) which vertices lie on the cut with all that is around them: not its rim, which belongs to the skin."""
-    on_cut: NDArray[np.bool_] = vertices[:, 2] == cut_mm
-    inside = on_cut.copy()
-    inside[faces[~on_cut[faces].all(axis=1)]] = False
+    inside = np.asarray(vertices[:, 2] == cut_mm)
+    inside[faces[~faces_on_cut(vertices, faces, cut_mm)]] = False
     return inside

@@ -24,8 +24,8 @@ SCAN_BYTES = 40_000 * 8 * 400
 LEVELS: dict[str, Level] = {"lost": "bad", "closed": "bad", "alarm": "bad", "door": "warning", "held": "warning"}
 CABLE = "check its cable and hub, then connect again"
 
-PlaceFoot = Callable[[Side], None]
-"""Puts the foot of a side onto the glass; for a virtual scanner, whose operator cannot."""
+PlaceFoot = Callable[[Side, Callable[[int, int], None]], None]
+"""Puts the foot of a side onto the glass, and tells how far that is; for a virtual scanner, whose operator cannot."""
 
 
 class OverLive:
@@ -98,7 +98,8 @@ class OverLive:
     def film(self, patient: str, side: Side, *, keep_partial: bool) -> Scanned:
         """As `Scanner.film`."""
         if self._place_foot is not None and side != self._placed:
-            self._place_foot(side)
+            with self._scanner.waiting_for(f"a virtual {side} foot is put onto the glass") as progress:
+                self._place_foot(side, progress)
             self._placed = side
         today = datetime.datetime.now().astimezone().date()
         name = ScanName(patient, next_scan_name(self._archive, patient, side, today), side, today)

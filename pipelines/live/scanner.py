@@ -143,6 +143,14 @@ class LiveScanner:
         self._stopped.set()
         self._end_motion()
 
+    @contextmanager
+    def waiting_for(self, words: str) -> Iterator[Callable[[int, int], None]]:
+        """Nobody else at work, while something outside of the scanner is made ready; hears how much of it is done."""
+        with self._at_work("idle", words), self._stop_said():
+            yield lambda done, total: self._board.tell("idle", words, done / total)
+            self._refuse_stopped()
+            self._board.tell("idle")
+
     def scan(self, order: ScanOrder) -> LiveResult:
         """Films, stores, reconstructs and measures.
 

@@ -1,10 +1,11 @@
-"""Distances of the surface to the scan's reference model."""
+"""Distances of the surface to the scan's reference model; the lid where the leg is cut is no skin, and left out."""
 
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
+from footscan.surface.ankle import faces_on_cut
 from footscan.surface.export import read_mesh
 from footscan.verify.compare import compare
 from footscan.verify.distances import signed_distances
@@ -16,8 +17,11 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     del parameters
     surface = unpack(inputs["surface"])
     truth = read_mesh(places["truth"])
-    comparison = compare((surface["vertices"], surface["faces"]), truth)
+    vertices, faces = surface["vertices"], surface["faces"]
+    cut_mm = surface["cut_mm"].item() if "cut_mm" in surface else None
+    skin = faces[~faces_on_cut(vertices, faces, cut_mm)]
+    comparison = compare((vertices, skin), truth)
     return pack(
         comparison=np.frombuffer(comparison.model_dump_json().encode(), np.uint8),
-        vertex_distance=signed_distances(surface["vertices"], truth),
+        vertex_distance=signed_distances(vertices, truth),
     )

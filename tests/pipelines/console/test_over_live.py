@@ -1,13 +1,22 @@
 """The live scanner in words: what is not there is named, with what to do."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from pipelines.console.over_live import OverLive
-from pipelines.live.scanner import LiveScanner
+from pipelines.console.scanner import Side
+from pipelines.live.scanner import STOPPED, LiveScanner
 from schemas.errors import FootscanError
 from schemas.rig import Rig
+
+RIG = {
+    "format": "footscan.rig/1",
+    "scanner": "S1",
+    "port": "no-board",
+    "cameras": [{"id": 1, "device": "http://127.0.0.1:9/1"}],
+}
 
 
 @pytest.fixture
@@ -48,3 +57,22 @@ def test_orders_to_nothing_are_faults_and_a_stop_is_none(over_nothing: OverLive,
     assert not (tmp_path / "archive").exists()
     over_nothing.close()
     over_nothing.close()
+
+
+def test_a_foot_that_is_put_onto_the_glass_is_told_and_can_be_stopped(tmp_path: Path) -> None:
+    scanner = LiveScanner(
+        Rig.model_validate({"format": "footscan.rig/1", "scanner": "S1", "port": "no-board"} | CAMERA)
+    )
+    told: list[str] = []
+    scanner.listen(lambda state: told.append(str(state)))
+
+    def place(side: Side, progress: Callable[[int, int], None]) -> None:
+        progress(1, 4)
+        over.stop()
+        assert side == "left"
+
+    over = OverLive(scanner, tmp_path / "archive", tmp_path / "results", place_foot=place)
+    with pytest.raises(FootscanError, match="stopped"):
+        over.film("P1", "left", keep_partial=False)
+    words = "a virtual left foot is put onto the glass"
+    assert told == [f"idle: {words}", f"idle 25 %: {words}", f"failed: {STOPPED}"]
