@@ -60,9 +60,7 @@ def test_orders_to_nothing_are_faults_and_a_stop_is_none(over_nothing: OverLive,
 
 
 def test_a_foot_that_is_put_onto_the_glass_is_told_and_can_be_stopped(tmp_path: Path) -> None:
-    scanner = LiveScanner(
-        Rig.model_validate({"format": "footscan.rig/1", "scanner": "S1", "port": "no-board"} | CAMERA)
-    )
+    scanner = LiveScanner(Rig.model_validate(RIG))
     told: list[str] = []
     scanner.listen(lambda state: told.append(str(state)))
 
