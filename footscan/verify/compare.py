@@ -10,7 +10,7 @@ from footscan.measure.place import apply
 from footscan.surface.export import Shape
 from footscan.surface.mesh import Mesh
 from footscan.surface.sampling import sample_surface, surface_area
-from footscan.verify.distances import Distances, check_places, distances_to_cloud, distances_to_mesh
+from footscan.verify.distances import Distances, SearchedMesh, check_places, distances_to_cloud, distances_to_mesh
 from footscan.verify.histogram import histogram
 from footscan.verify.regions import REGIONS, FootRegions, foot_regions
 from schemas.errors import RefusedInput
@@ -36,6 +36,7 @@ def compare(
     normals_b: Normals | None = None,
     classes: int | None = None,
     both: bool = False,
+    searched_b: SearchedMesh | None = None,
 ) -> Comparison:
     """How far the surface of `a`, or its points where it is a cloud, lies from `b`; mm, both in one frame.
 
@@ -50,6 +51,7 @@ def compare(
     classes : of the histograms, > 0; none without
     both : whether `b` is held against `a`, too, which tells how complete `a` is (Seitz et al., "A comparison and
         evaluation of multi-view stereo reconstruction algorithms", CVPR 2006, doi:10.1109/CVPR.2006.19)
+    searched_b : made from `b`, for who asks for more distances to it
 
     Raises
     ------
@@ -61,7 +63,10 @@ def compare(
     check_places(b[0], "reference")
     regions = foot_regions(b) or foot_regions(a)
     points = _points(a, "shape")
-    distances = _distances(points, b, normals_b, normals_a)
+    if searched_b is None:
+        distances = _distances(points, b, normals_b, normals_a)
+    else:
+        distances = Distances.of_signed(searched_b.signed_distances(points))
     histograms = []
     if classes is not None:
         histograms.append(histogram(distances.unsigned, classes, signed=False))

@@ -1,7 +1,7 @@
 """Distances of points to a mesh or to a cloud, block by block."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,11 @@ class Distances(NamedTuple):
     """(N,) along the normal there, positive outside; None where no normal is known. As large as `unsigned` on a mesh;
     on a cloud what lies across the normal is left out, as it is for the most part the spacing of the points."""
 
+    @classmethod
+    def of_signed(cls, signed: Distances32) -> Self:
+        """Of (N,) distances to a mesh."""
+        return cls(np.abs(signed), signed)
+
 
 def distances_to_mesh(points: Floats, mesh: Shape) -> Distances:
     """Of each of (N, 3) `points` to the nearest place of `mesh`.
@@ -40,8 +45,7 @@ def distances_to_mesh(points: Floats, mesh: Shape) -> Distances:
     RefusedInput
         There are no points, no triangle has an area, or a coordinate is not finite.
     """
-    signed = signed_distances(points, mesh)
-    return Distances(np.abs(signed), signed)
+    return Distances.of_signed(signed_distances(points, mesh))
 
 
 def signed_distances(points: Floats, mesh: Shape) -> Distances32:
@@ -50,35 +54,45 @@ def signed_distances(points: Floats, mesh: Shape) -> Distances32:
     What is inside is told by the normal at the nearest place, see `footscan.verify.pseudonormals`. Errors as in
     `distances_to_mesh`.
     """
-    import open3d as o3d
+    return SearchedMesh(mesh).signed_distances(points)
 
-    check_places(points, "shape")
-    check_places(mesh[0], "reference")
-    mesh_sides = sides(mesh)
-    vertices, faces = mesh_sides.vertices, mesh_sides.faces
-    if not len(faces):
-        raise RefusedInput("reference", "has no triangle with an area, expected a mesh")
-    centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2  # the scene counts in float32: 0.01 um near its origin
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(
-        o3d.core.Tensor.from_numpy((vertices - centre).astype(np.float32)),
-        o3d.core.Tensor.from_numpy(faces.astype(np.uint32)),
-    )
 
-    def of_block(block: NDArray[np.float64], out: slice) -> None:
-        near = scene.compute_closest_points(o3d.core.Tensor.from_numpy((block - centre).astype(np.float32)))
-        face, (u, v) = (
-            near["primitive_ids"].numpy().astype(np.int64),
-            near["primitive_uvs"].numpy().T.astype(np.float64),
+class SearchedMesh:
+    """A mesh with the search tree and the normals that distances to it take: made once, asked often."""
+
+    def __init__(self, mesh: Shape) -> None:
+        """Errors are those of `distances_to_mesh` that concern the mesh."""
+        import open3d as o3d
+
+        check_places(mesh[0], "reference")
+        self._sides = sides(mesh)
+        vertices, faces = self._sides.vertices, self._sides.faces
+        if not len(faces):
+            raise RefusedInput("reference", "has no triangle with an area, expected a mesh")
+        # The scene counts in single precision: 0.01 um near its origin.
+        self._centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        self._tensor = o3d.core.Tensor.from_numpy
+        self._scene = o3d.t.geometry.RaycastingScene()
+        self._scene.add_triangles(
+            self._tensor((vertices - self._centre).astype(np.float32)), self._tensor(faces.astype(np.uint32))
         )
-        place = np.einsum("kn,nkx->nx", [1 - u - v, u, v], vertices[faces[face]])
-        offset = block - place
-        inside = np.sum(offset * _normals_at(place, face, mesh_sides), axis=1) < 0
-        signed[out] = np.where(inside, -1, 1) * np.linalg.norm(offset, axis=1)
 
-    signed = np.empty(len(points), np.float32)
-    by_blocks(points, of_block)
-    return signed
+    def signed_distances(self, points: Floats) -> Distances32:
+        """As the function of that name."""
+        check_places(points, "shape")
+        signed = np.empty(len(points), np.float32)
+        by_blocks(points, lambda block, out: self._fill(signed[out], block))
+        return signed
+
+    def _fill(self, signed: Distances32, block: NDArray[np.float64]) -> None:
+        near = self._scene.compute_closest_points(self._tensor((block - self._centre).astype(np.float32)))
+        face = near["primitive_ids"].numpy().astype(np.int64)
+        u, v = near["primitive_uvs"].numpy().T.astype(np.float64)
+        shares = np.stack([1 - u - v, u, v], axis=1)
+        place = np.einsum("nk,nkx->nx", shares, self._sides.vertices[self._sides.faces[face]])
+        offset = block - place
+        inside = np.sum(offset * _normals_at(place, shares, face, self._sides), axis=1) < 0
+        signed[:] = np.where(inside, -1, 1) * np.linalg.norm(offset, axis=1)
 
 
 def distances_to_cloud(
@@ -141,27 +155,20 @@ def by_blocks(points: Floats, of_block: Callable[[NDArray[np.float64], slice], N
         of_block(np.asarray(points[block], np.float64), block)
 
 
-def _normals_at(place: NDArray[np.float64], face: NDArray[np.int64], mesh: Sides) -> NDArray[np.float64]:
+def _normals_at(
+    place: NDArray[np.float64], shares: NDArray[np.float64], face: NDArray[np.int64], mesh: Sides
+) -> NDArray[np.float64]:
     """(N, 3) normals at (N, 3) places on the faces `face`: of the vertex or the edge that a place lies on, or of the
-    face."""
-    corners = mesh.vertices[mesh.faces[face]]
-    rows = np.arange(len(face))
+    face. `shares` (N, 3) of the corners in the places tell how far each is from the edge opposite to a corner."""
     normals = mesh.of_faces[face]
-
-    from_edges = np.stack([_to_line(place, corners[:, k - 2], corners[:, k - 1]) for k in range(3)], axis=1)
+    from_edges = shares * mesh.heights[face]
     edge = np.argmin(from_edges, axis=1)
-    on_edge = from_edges[rows, edge] < ON_MM
-    normals[on_edge] = mesh.of_edges[face[on_edge], edge[on_edge]]
+    on_edge = np.flatnonzero(from_edges[np.arange(len(face)), edge] < ON_MM)  # and so is what lies on a corner
+    place, face, edge = place[on_edge], face[on_edge], edge[on_edge]
+    normals[on_edge] = mesh.of_edges[face, edge]
 
-    from_corners = np.linalg.norm(corners - place[:, None], axis=2)
+    from_corners = np.linalg.norm(mesh.vertices[mesh.faces[face]] - place[:, None], axis=2)
     corner = np.argmin(from_corners, axis=1)
-    on_corner = from_corners[rows, corner] < ON_MM
-    normals[on_corner] = mesh.of_vertices[mesh.faces[face[on_corner], corner[on_corner]]]
+    on_corner = from_corners[np.arange(len(face)), corner] < ON_MM
+    normals[on_edge[on_corner]] = mesh.of_vertices[mesh.faces[face[on_corner], corner[on_corner]]]
     return normals
-
-
-def _to_line(place: NDArray[np.float64], a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N,) distance of each place to the line through a and b."""
-    along = b - a
-    distance: NDArray[np.float64] = np.linalg.norm(np.cross(place - a, along), axis=1) / np.linalg.norm(along, axis=1)
-    return distance

@@ -34,6 +34,8 @@ class Sides(NamedTuple):
     """(F, 3, 3) sums of the unit normals that meet at the edge opposite to each corner."""
     of_vertices: Floats
     """(V, 3) sums of the unit normals that meet at each vertex, weighted by the angles there."""
+    heights: Floats
+    """(F, 3) mm, of each corner above the edge opposite to it."""
 
 
 def sides(mesh: Shape) -> Sides:
@@ -56,7 +58,9 @@ def sides(mesh: Shape) -> Sides:
     of_edges = _sums(edge_of.ravel(), np.repeat(normals, 3, axis=0), len(meeting))
     weighted = (normals[:, None] * _angles(corners)[..., None]).reshape(-1, 3)
     of_vertices = _sums(faces.ravel(), weighted, len(vertices))
-    return Sides(vertices, faces, normals, of_edges[edge_of], of_vertices)
+    edges = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1), axis=2)
+    heights = 2 * np.linalg.norm(_area_vectors(corners), axis=1)[:, None] / edges
+    return Sides(vertices, faces, normals, of_edges[edge_of], of_vertices, heights)
 
 
 def _merged(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> tuple[Floats, NDArray[np.int32]]:

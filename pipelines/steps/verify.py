@@ -8,7 +8,7 @@ import numpy as np
 from footscan.surface.ankle import faces_on_cut
 from footscan.surface.export import read_mesh
 from footscan.verify.compare import compare
-from footscan.verify.distances import signed_distances
+from footscan.verify.distances import SearchedMesh
 from pipelines.arrays import pack, unpack
 
 
@@ -20,8 +20,9 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     vertices, faces = surface["vertices"], surface["faces"]
     cut_mm = surface["cut_mm"].item() if "cut_mm" in surface else None
     skin = faces[~faces_on_cut(vertices, faces, cut_mm)]
-    comparison = compare((vertices, skin), truth)
+    searched = SearchedMesh(truth)
+    comparison = compare((vertices, skin), truth, searched_b=searched)
     return pack(
         comparison=np.frombuffer(comparison.model_dump_json().encode(), np.uint8),
-        vertex_distance=signed_distances(vertices, truth),
+        vertex_distance=searched.signed_distances(vertices),
     )
