@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from footscan.virtual.film import write_film
 from schemas.calibration import Calibration, CameraCalibration, HomographyMap, Source
 
-sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parent / "helpers"))  # this folder itself would hide the packages
 
 CAMERAS = {1: 1.0, 5: -1.0}
 """On which side of a plane along the foot each stands; the plane leans, so that one is above and one below."""
