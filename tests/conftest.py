@@ -10,12 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import simplejpeg
+from hypothesis import settings
 from numpy.typing import NDArray
 
 from footscan.virtual.film import write_film
 from schemas.calibration import Calibration, CameraCalibration, HomographyMap, Source
 
 sys.path.insert(0, str(Path(__file__).parent / "helpers"))  # this folder itself would hide the packages
+settings.register_profile("untimed", deadline=None)  # machines stand still now and then
+settings.load_profile("untimed")
 
 CAMERAS = {1: 1.0, 5: -1.0}
 """On which side of a plane along the foot each stands; the plane leans, so that one is above and one below."""
