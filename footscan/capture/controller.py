@@ -83,7 +83,7 @@ class Controller:
                 return BoardState("lost", f"the connection to the board is lost ({board.lost})", DARK_BY_ITSELF)
             if board.deaf and board.alarm is not None:
                 return BoardState("alarm", alarm_in_words(board.alarm))
-            if board.poll.homing:
+            if board.poll.rests:
                 return BoardState("homing", "the heads look for their home switches")
             if board.restarting or latest is None:
                 return BoardState("restarting", "the board begins anew")
@@ -157,14 +157,11 @@ class Controller:
         board = self._board
         self.reset()
         board.homed = False
-        board.poll.homing = True
         try:
-            self.send("$H", limit_seconds=limit_seconds)
+            with board.poll.resting():
+                self.send("$H", limit_seconds=limit_seconds)
         except Fault as fault:
-            board.poll.homing = False
             raise Fault(f"{fault}{self._switches()}") from None
-        finally:
-            board.poll.homing = False
         with board.changed:
             board.alarm = None
             board.homed = True
@@ -243,7 +240,7 @@ class Controller:
 
         The position is kept where the heads can slow down in time; the board is reset in any case.
         """
-        homing = self._board.poll.homing  # it says nothing meanwhile, and has no position to be kept
+        homing = self._board.poll.rests  # it says nothing meanwhile, and has no position to be kept
         self._board.let_go()
         try:
             if not homing:

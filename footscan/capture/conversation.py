@@ -126,14 +126,14 @@ class Conversation:
     def status(self) -> TimedReport:
         """A report that was asked for after this call; Fault where none comes."""
         asked = self.poll.ask()
-        deadline = time.monotonic() + self.patience_seconds + LOST_QUERY_SECONDS
+        patience = self.patience_seconds + LOST_QUERY_SECONDS
         with self.changed:
-            while time.monotonic() < deadline:
+            while (left := max(asked, self.poll.quiet_until) + patience - time.monotonic()) > 0.0:
                 self.refuse_lost()
                 latest = self.poll.latest
                 if latest is not None and latest.asked >= asked and not self.restarting:
                     return latest
-                self.changed.wait(max(deadline - time.monotonic(), 0.0))
+                self.changed.wait(left)
         raise Fault("the board gave no status report")
 
     def reset(self) -> None:

@@ -4,7 +4,8 @@ import statistics
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from footscan.capture.grbl_report import Report
@@ -44,15 +45,16 @@ class StatusPoll:
     ) -> None:
         """Asks by `write`, and calls `on_silence` where nothing came for `patience_seconds`."""
         self.latest: TimedReport | None = None
-        self.homing = False
-        """Whether the board homes, during which it answers nothing."""
+        self.rests = False
+        """Whether nothing is asked."""
+        self.quiet_until = 0.0
+        """Before that nothing is asked either."""
         self._write = write
         self._on_silence = on_silence
         self._patience = patience_seconds
         self._asked: float | None = None
         """The oldest query without an answer."""
         self._asked_again = 0.0
-        self._quiet_until = 0.0
         self._round_trips: deque[float] = deque(maxlen=KEPT_ROUND_TRIPS)
         self._wanted = threading.Event()
         self._ends = False
@@ -83,6 +85,19 @@ class StatusPoll:
         self._wanted.set()
         return now
 
+    @contextmanager
+    def resting(self) -> Iterator[None]:
+        """Nothing is asked, while the board homes: it would answer all queries by one report at the end of that."""
+        self.rests = True
+        try:
+            yield
+        finally:
+            with self._lock:
+                if self._asked is not None:  # it came too late to be answered before, and is answered now
+                    self._asked = None
+                    self.quiet_until = time.monotonic() + QUIET_SECONDS
+            self.rests = False
+
     def forget(self) -> None:
         """Nothing is known, and no answer to be waited for: the board begins anew."""
         with self._lock:
@@ -98,7 +113,7 @@ class StatusPoll:
         with self._lock:
             asked, self._asked = self._asked, None
             if asked is not None and self._asked_again != asked:  # its own answer may take as long as this one took
-                self._quiet_until = self._asked_again + (arrived - asked) + QUIET_SECONDS
+                self.quiet_until = self._asked_again + (arrived - asked) + QUIET_SECONDS
         if asked is None:
             return None
         on_the_way = length / BYTES_PER_SECOND
@@ -113,6 +128,8 @@ class StatusPoll:
             self._wanted.clear()
             if self._ends:
                 return
+            if self.rests:
+                continue
             try:
                 self._ask_or_complain()
             except Fault:
@@ -123,9 +140,9 @@ class StatusPoll:
         with self._lock:
             asked = self._asked
         if asked is None:
-            if now >= self._quiet_until:
+            if now >= self.quiet_until:
                 self._query()
-        elif now - asked > self._patience and not self.homing:
+        elif now - asked > self._patience:
             self.forget()
             self._on_silence()
         elif now - self._asked_again > AGAIN_SECONDS:

@@ -69,6 +69,7 @@ def home(board: Firmware) -> Work:
             yield lambda: False
     board.motion.locked = [False, False, False]
     board.motion.watch = "none"
+    board.answer_query()  # of all queries since it began, before its own `ok`
     board.where = board.motion.steps
     board.state = "Idle"
     board.homed()

@@ -139,9 +139,8 @@ class Firmware:
             return
         self._heed_motion()
         self._heed_door()
-        if self._report_wanted and self.state != "Home":
-            self._report_wanted = False
-            self.say(status_report(self))
+        if self.state != "Home":
+            self.answer_query()
         self._pump()
 
     def alarm(self, number: int) -> None:
@@ -154,6 +153,12 @@ class Firmware:
             self.say("[MSG:Reset to continue]")
             self.critical = True
             self._report_wanted = False
+
+    def answer_query(self) -> None:
+        """Reports, where that was asked for since the last report."""
+        if self._report_wanted:
+            self._report_wanted = False
+            self.say(status_report(self))
 
     def restart(self, *, after_alarm: bool) -> None:
         """Begins anew with its motors' position kept, as after a reset; the line under way is answered with `ok`."""

@@ -102,6 +102,23 @@ def test_homing(board: Board, controller: Controller) -> None:
     assert board.position_at(time.monotonic()) == pytest.approx((-18.0, -18.0, -18.0))
 
 
+def test_a_homing_that_takes_longer_than_patience_is_not_disturbed(monkeypatch: pytest.MonkeyPatch) -> None:
+    slow = {**QUICK, 25: 600}
+    with (
+        Board(settings=slow, heads_at=(-12.0, -8.0, -20.0)) as board,
+        Controller(board.port, patience_seconds=0.3) as controller,
+    ):
+        resets: list[str] = []
+        reset = board.firmware.reset
+        monkeypatch.setattr(board.firmware, "reset", lambda: (resets.append(board.firmware.state), reset()))
+        began = time.monotonic()
+        controller.home(HOMING_SECONDS)
+        assert time.monotonic() - began > 2.0
+        time.sleep(0.5)
+        assert controller.state.name == "ready"
+        assert resets == ["Alarm"]  # before it began
+
+
 def test_homing_with_a_stuck_head_names_it(board: Board, controller: Controller) -> None:
     board.stick(3)
     with pytest.raises(

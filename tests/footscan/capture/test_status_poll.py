@@ -6,6 +6,7 @@ from collections.abc import Callable
 from itertools import count
 
 import pytest
+from waiting import wait_until
 
 from footscan.capture.grbl_report import Report
 from footscan.capture.status_poll import StatusPoll, TimedReport
@@ -50,3 +51,28 @@ def test_a_report_is_never_taken_for_the_answer_to_a_later_query(late_seconds: f
     for timed in line.taken:
         assert timed.report.machine_mm is not None
         assert abs(timed.seconds - timed.report.machine_mm[0]) <= timed.uncertain_seconds + 0.005
+
+
+def test_nothing_is_asked_while_it_rests_and_what_was_asked_before_counts_for_nothing() -> None:
+    asked: list[float] = []
+
+    def ask(_query: bytes) -> float:
+        asked.append(time.monotonic())
+        return asked[-1]
+
+    poll = StatusPoll(ask, lambda: None, patience_seconds=0.2)
+    poll.start()
+    wait_until(lambda: bool(asked))
+    with poll.resting():
+        time.sleep(1.0)  # longer than patience, and than it takes to ask again
+        begun = len(asked)
+    ended = time.monotonic()
+    assert begun <= 2
+    assert poll.take(Report("Home", None, (0.0, 0.0, 0.0)), ended, len(ANSWER)) is None
+    poll.ask()
+    wait_until(lambda: len(asked) > begun)
+    assert asked[begun] - ended > 0.1  # the late answer, on its way, must not pass for that of the next query
+    told = poll.take(Report("Idle", None, (0.0, 0.0, 0.0)), time.monotonic(), len(ANSWER))
+    assert told is not None
+    assert told.asked >= ended
+    poll.close()

@@ -123,14 +123,15 @@ def test_homing_toward_the_far_end(bench: Bench) -> None:
     assert bench.motion.rail_at(bench.now)[1] == pytest.approx(-438.0)
 
 
-def test_no_status_report_while_homing(bench: Bench) -> None:
+def test_one_status_report_for_all_queries_while_homing(bench: Bench) -> None:
     assert bench.send("$H\n", 0.1) == []
+    assert bench.send("?", 0.1) == []
     assert bench.send("?", 0.1) == []
     assert bench.firmware.state == "Home"
     bench.wait(6.0)
-    answers = bench.take()
-    assert answers[0] == "ok"
-    assert answers[1].startswith("<Idle|MPos:-2.000,-2.000,-2.000")
+    report, ok = bench.take()
+    assert report.startswith("<Home|MPos:-2.000,-2.000,-2.000")
+    assert ok == "ok"
 
 
 def test_jog_is_a_state_of_its_own_and_leaves_the_modes(homed: Bench) -> None:
