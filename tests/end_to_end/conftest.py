@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from chromium import launched
 
 from pipelines.cli.main import run_command
 
@@ -50,6 +51,13 @@ def footscan(capsys: pytest.CaptureFixture[str]) -> Footscan:
         return subprocess.CompletedProcess(arguments, status, said.out, said.err)
 
     return run
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium."""
+    with launched() as chromium:
+        yield chromium
 
 
 @pytest.fixture(scope="session")

@@ -1,8 +1,6 @@
 """The operator's page in a real browser: a whole session of two feet, by mouse and by keyboard, and what goes wrong."""
 
 import importlib.util
-import os
-import shutil
 import signal
 import socket
 import subprocess
@@ -13,34 +11,29 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from chromium import Opened as OpenedPage
+from chromium import needs_chromium
 
 from pipelines.console.console import Console
 from pipelines.console.server import listen, server_of
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
+pytestmark = needs_chromium
 
 STAND_IN = Path(__file__).parents[1] / "pipelines" / "console" / "stand_in.py"
 DESKTOP, UPRIGHT, ACROSS = (1280, 800), (768, 1024), (1024, 768)
-PATIENCE_MS = 60_000
 HOSTILE = "<img src=x onerror=document.title='owned'>"
 TARGETS_PX = 40
 """Least height of what is touched."""
 
 
-class Opened:
-    """A page in a browser, with all that it asked for and complained of."""
+class Opened(OpenedPage):
+    """A page of the console."""
 
     def __init__(self, page: Any, address: str, path: str = "") -> None:
-        self.page, self.address = page, address
-        self.requests, self.complaints = list[str](), list[str]()
-        page.set_default_timeout(PATIENCE_MS)
-        page.on("request", lambda request: self.requests.append(request.url))
-        page.on("console", lambda said: self.complaints.append(said.text))
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.goto(address + path)
+        super().__init__(page, address + path)
+        self.address = address
 
     def state(self, name: str) -> None:
         """Waits until the page tells this state."""
@@ -59,17 +52,6 @@ class Opened:
         assert self.complaints == []
         others = [url for url in self.requests if not url.startswith((self.address, f"blob:{self.address}", "data:"))]
         assert others == []
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    # Chromium's sandbox does not start as root, as in a container.
-    arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
-    sync_api.expect.set_options(timeout=PATIENCE_MS)
-    with sync_api.sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """Every page in a real browser: what it shows, what a hand changes, and that it asks nobody for anything."""
 
-import os
 import shutil
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
@@ -11,6 +10,8 @@ from urllib.parse import unquote, urlparse
 import numpy as np
 import pytest
 import trimesh
+from chromium import Opened as OpenedPage
+from chromium import needs_chromium
 
 from footscan.report.comparison_page import comparison_page
 from footscan.report.deviation import Deviation
@@ -23,10 +24,7 @@ from pipelines.archive_page import FILES, PAGE, write_archive_page
 from pipelines.cli.main import run_command
 from schemas.quality import Comparison
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
+pytestmark = needs_chromium
 
 PHONE, DESKTOP = 375, 1200
 HOSTILE = "<img src=x onerror=document.title='owned'>"
@@ -50,15 +48,11 @@ class Ink(NamedTuple):
     sum: int
 
 
-class Opened:
-    """A page as it stands in a browser, with all that it asked for and complained of."""
+class Opened(OpenedPage):
+    """A page that is a file."""
 
     def __init__(self, page: Any, file: Path) -> None:
-        self.page, self.requests, self.complaints = page, list[str](), list[str]()
-        page.on("request", lambda request: self.requests.append(request.url))
-        page.on("console", lambda said: self.complaints.append(said.text))
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.goto(file.as_uri())
+        super().__init__(page, file.as_uri())
 
     def ink(self) -> Ink:
         """What is on the canvas, after the next frame has been drawn."""
@@ -76,16 +70,6 @@ class Opened:
         self.page.mouse.down()
         self.page.mouse.move(x + across, y + down, steps=3)
         self.page.mouse.up()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    # Chromium's sandbox does not start as root, as in a container.
-    arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
-    with sync_api.sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture

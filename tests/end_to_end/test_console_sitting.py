@@ -1,0 +1,144 @@
+"""Both feet of a person in one sitting, from the page alone, over the whole virtual scanner: board, eight cameras, all.
+
+    FOOTSCAN_SITTING=folder pytest tests/end_to_end/test_console_sitting.py -s
+
+It takes about twenty minutes on two cores with nothing beside it, most of them for the pictures of the virtual feet.
+The folder keeps them, a picture of the page in each state (desktop and tablet), and what was scanned.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal
+
+import pytest
+from chromium import Opened, needs_chromium
+from waiting import wait_until
+
+from footscan.virtual.foot import make_foot
+from pipelines.console.results import read_measures
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+
+FOLDER = os.environ.get("FOOTSCAN_SITTING")
+pytestmark = [
+    needs_chromium,
+    pytest.mark.skipif(FOLDER is None, reason="FOOTSCAN_SITTING names no folder for its pictures"),
+]
+
+FOOTSCAN = Path(sys.executable).with_name("footscan")
+DESKTOP, TABLET = {"width": 1280, "height": 800}, {"width": 768, "height": 1024}
+LOADS_MS = 60_000
+FOOT_SECONDS = 1500.0
+"""The longest a foot may take from its start to its page."""
+LENGTH_MM = 0.5
+"""How far the length of a virtual foot may be off."""
+
+
+class Sitting:
+    """The console's page twice, on a desktop and on a tablet beside it."""
+
+    def __init__(self, browser: Any, address: str, folder: Path) -> None:
+        self.folder = folder
+        self.desktop, self.tablet = (
+            Opened(browser.new_context(viewport=size).new_page(), address) for size in (DESKTOP, TABLET)
+        )
+        self.page = self.desktop.page
+        self.address = address
+
+    @property
+    def state(self) -> str:
+        """What the page tells."""
+        return str(self.page.locator("#state-name").inner_text())
+
+    def picture(self, name: str) -> None:
+        """As both look now."""
+        for device, opened in (("desktop", self.desktop), ("tablet", self.tablet)):
+            opened.page.screenshot(path=self.folder / f"{name}-{device}.png", full_page=True)
+
+    def follow(self, foot: str) -> dict[str, float]:
+        """Waits for a foot's page, with a picture of each state on the way; how long each state lasted, s."""
+        began, lasted, before = time.monotonic(), dict[str, float](), ""
+        while not self.page.locator("#verdict").count():
+            assert time.monotonic() - began < FOOT_SECONDS, f"{foot}: no page in time, last {before}"
+            time.sleep(0.2)
+            if not self.page.locator("#state-name").count():
+                continue  # the foot's page is on its way
+            if (now := self.state) != before:
+                before = now
+                self.picture(f"{foot}-{now.lower().replace(' ', '-')}")
+            words = self.page.locator("#state-words").inner_text()
+            assert now != "Failed", f"{foot}: {words}"
+            lasted[now] = lasted.get(now, 0.0) + 0.2
+        sync_api.expect(self.page.locator("#canvas")).to_be_visible(timeout=LOADS_MS)
+        self.tablet.page.goto(self.page.url)
+        sync_api.expect(self.tablet.page.locator("#canvas")).to_be_visible(timeout=LOADS_MS)
+        time.sleep(2.0)  # the foot is drawn
+        self.picture(f"{foot}-measured")
+        self.tablet.page.goto(self.address)
+        return lasted
+
+    def check_measured(self, side: Literal["right", "left"]) -> None:
+        """The page is that of this side, and what was measured is as long as the foot on the glass."""
+        patient, scan = self.page.url.split("/")[-2:]
+        measured = read_measures(self.folder / "results", patient, scan)
+        length_mm = measured.measures["foot_length"].value
+        assert measured.side == side
+        assert length_mm == pytest.approx(make_foot(side=side).measures["foot_length"], abs=LENGTH_MM)
+        print(side, f"{length_mm:.2f} mm", self.page.locator("#verdict h2").inner_text())
+
+
+@contextmanager
+def console(folder: Path) -> Iterator[str]:
+    """The address of a console that runs over the virtual scanner."""
+    with (folder / "console.txt").open("w") as said:
+        process = subprocess.Popen(
+            [FOOTSCAN, "console", "--virtual", "--port", "0"],
+            cwd=folder,
+            stdout=subprocess.PIPE,
+            stderr=said,
+            text=True,
+        )
+        try:
+            assert process.stdout is not None
+            yield process.stdout.readline().strip().rstrip("/")
+            process.send_signal(signal.SIGINT)
+            assert process.wait(120) == 0
+        finally:
+            process.kill()
+            process.wait()
+
+
+def test_both_feet_in_one_sitting(browser: Any) -> None:
+    folder = Path(str(FOLDER)).resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    with console(folder) as address:
+        sitting = Sitting(browser, address, folder)
+        page = sitting.page
+        wait_until(lambda: sitting.state in ("Ready", "Not connected"))
+        sitting.picture("first")
+        if sitting.state == "Not connected":
+            page.click("#connect")
+            wait_until(lambda: sitting.state == "Ready")
+        page.fill("#patient", time.strftime("T%Y%m%d-%H%M%S"))
+        sitting.picture("ready")
+        page.click("#start")
+        print(sitting.follow("right"))
+        sitting.check_measured("right")
+        page.click("#other")
+        wait_until(lambda: page.locator("#verdict").count() == 0)
+        print(sitting.follow("left"))
+        sitting.check_measured("left")
+        page.click("#pair")
+        page.wait_for_url("**/pair/**")
+        sitting.tablet.page.goto(page.url)
+        sync_api.expect(sitting.tablet.page.locator("main")).to_contain_text("Sizes for both")
+        sitting.picture("pair")
+        for opened in (sitting.desktop, sitting.tablet):
+            assert opened.complaints == []
+            assert [url for url in opened.requests if not url.startswith((address, f"blob:{address}", "data:"))] == []
