@@ -28,6 +28,8 @@ from schemas.errors import Fault
 from schemas.parameters.simulation import SimulationSettings
 from schemas.rig import Rig, RigCamera
 
+TRIES = 3
+"""Of measuring latencies: nothing can be wrong with a virtual scanner but that its host was held up meanwhile."""
 OnProgress = Callable[[str, int, int], None]
 """Hears what is being prepared, how much of it is there, and how much there is."""
 
@@ -99,12 +101,13 @@ def _with_latencies(rig: Rig, world: World, on_progress: OnProgress) -> Rig:
     light = light_by_hand(rig, 1.0, EXPOSURE_MS)
     with LiveScanner(rig) as scanner:
         scanner.connect()
-        measured = measure_latencies(
-            scanner, *block_range_mm(world), light, lambda done, total: on_progress("latencies", done, total)
-        )
-    if measured.problems:
-        raise Fault("; ".join(measured.problems.values()))
-    return rig_with(rig, measured.latencies, light)
+        for _ in range(TRIES):
+            measured = measure_latencies(
+                scanner, *block_range_mm(world), light, lambda done, total: on_progress("latencies", done, total)
+            )
+            if not measured.problems:
+                return rig_with(rig, measured.latencies, light)
+    raise Fault("; ".join(measured.problems.values()))
 
 
 def _calibrate(folder: Path, file: Path, scanner_seed: int) -> None:

@@ -14,7 +14,7 @@ import pytest
 import simplejpeg
 from waiting import wait_until
 
-from footscan.capture import frame_positions
+from footscan.capture import frame_positions, latency
 from footscan.frames.film import encoded_frames, open_film
 from footscan.frames.travel import read_positions
 from footscan.virtual.board import Board
@@ -282,3 +282,7 @@ def when_filming(bench: Bench, happens: object) -> None:
         happens()
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+def test_frames_of_a_camera_whose_latency_is_accepted_are_not_refused_for_it() -> None:
+    assert latency.LARGEST_FRAME_SD_S * RigTravel().mm_per_s < storing.LARGEST_SD_MM
