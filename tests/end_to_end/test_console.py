@@ -31,10 +31,6 @@ TARGETS_PX = 40
 class Opened(OpenedPage):
     """A page of the console."""
 
-    def __init__(self, page: Any, address: str, path: str = "") -> None:
-        super().__init__(page, address + path)
-        self.address = address
-
     def state(self, name: str) -> None:
         """Waits until the page tells this state."""
         sync_api.expect(self.page.locator("#state-name")).to_have_text(name)
@@ -46,12 +42,6 @@ class Opened(OpenedPage):
                 return
             self.page.keyboard.press("Tab")
         raise AssertionError(f"no way to {what} by keyboard")
-
-    def is_clean(self) -> None:
-        """Nobody else was asked, and nothing went wrong."""
-        assert self.complaints == []
-        others = [url for url in self.requests if not url.startswith((self.address, f"blob:{self.address}", "data:"))]
-        assert others == []
 
 
 @pytest.fixture

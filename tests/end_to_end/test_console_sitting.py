@@ -34,7 +34,6 @@ pytestmark = [
 
 FOOTSCAN = Path(sys.executable).with_name("footscan")
 DESKTOP, TABLET = {"width": 1280, "height": 800}, {"width": 768, "height": 1024}
-LOADS_MS = 60_000
 FOOT_SECONDS = 1500.0
 """The longest a foot may take from its start to its page."""
 TRIES = 3
@@ -66,11 +65,12 @@ class Sitting:
             told = self._follow(foot)
             print(foot, "try", number, told)
             if told == "measured":
-                sync_api.expect(self.page.locator("#canvas")).to_be_visible(timeout=LOADS_MS)
+                sync_api.expect(self.page.locator("#canvas")).to_be_visible()
                 time.sleep(2.0)  # the foot is drawn
                 self.page.screenshot(path=self.folder / f"{foot}-measured.png", full_page=True)
                 return
-            self.page.click("#start")
+            if number < TRIES:
+                self.page.click("#start")
         raise AssertionError(told)
 
     def _follow(self, foot: str) -> str:
@@ -142,6 +142,4 @@ def test_both_feet_in_one_sitting(browser: Any) -> None:
         page.wait_for_url("**/pair/**")
         sync_api.expect(page.locator("main")).to_contain_text("Sizes for both")
         sitting.picture("pair")
-        assert sitting.opened.complaints == []
-        others = [url for url in sitting.opened.requests if not url.startswith((address, f"blob:{address}", "data:"))]
-        assert others == []
+        sitting.opened.is_clean()

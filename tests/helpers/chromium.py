@@ -30,11 +30,17 @@ def launched() -> Iterator[Any]:
 class Opened:
     """A page in a browser, with all that it asked for and complained of."""
 
-    def __init__(self, page: Any, address: str) -> None:
-        self.page = page
+    def __init__(self, page: Any, address: str, path: str = "") -> None:
+        self.page, self.address = page, address
         self.requests, self.complaints = list[str](), list[str]()
         page.set_default_timeout(PATIENCE_MS)
         page.on("request", lambda request: self.requests.append(request.url))
         page.on("console", lambda said: self.complaints.append(said.text))
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.goto(address)
+        page.goto(address + path)
+
+    def is_clean(self) -> None:
+        """Nobody else was asked, and nothing went wrong."""
+        assert self.complaints == []
+        others = [url for url in self.requests if not url.startswith((self.address, f"blob:{self.address}", "data:"))]
+        assert others == []
