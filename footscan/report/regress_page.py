@@ -92,7 +92,7 @@ def _change(change: Change) -> str:
     if not change.lines:
         return f"<li>{text(change.text)}</li>"
     rows = [[f"<code>{text(old)}</code>", f"<code>{text(new)}</code>"] for old, new in change.lines]
-    return f"<li>{text(change.text)}{table(['accepted', 'last night'], rows, kind='code')}</li>"
+    return f"<li>{text(change.text)}{table(['before', 'last night'], rows, kind='code')}</li>"
 
 
 def _figures(figures: Sequence[JudgedFigure]) -> str:
@@ -140,7 +140,7 @@ def _pictures(one: JudgedSet) -> str:
         f"<figcaption>{text(caption)}</figcaption></figure>"
         for caption, png in one.pictures.items()
     )
-    return f'<h3>Beside the accepted shape</h3><div class="beside">{figures}</div>'
+    return f'<h3>Beside the shape before</h3><div class="beside">{figures}</div>'
 
 
 def _accepted(night: NightResult) -> str:

@@ -48,7 +48,7 @@ class FirstStep:
     why: str
     """`its result is another`, `is no more`, `takes longer`..."""
     changes: Sequence[Change] = ()
-    """What is not as it was when the baseline was accepted; empty where that is not known."""
+    """What is not as it was in the last good night, or when the baseline was accepted; empty where it is not known."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class JudgedSet:
     otherwise: int = 0
     """Steps whose result is not the accepted one."""
     pictures: Mapping[str, bytes] = field(default_factory=dict)
-    """PNG by caption: how far the present shape lies from the accepted one."""
+    """PNG by caption: how far the present shape lies from the accepted one, or from that of the last good night."""
     note: str | None = None
     """Why there are no pictures, where there should be some."""
 

@@ -1,4 +1,7 @@
-"""The accepted figures: a file to be read by eye and as a diff, and beside it what the steps had come to."""
+"""The accepted figures: a file to be read by eye and as a diff, and beside it what the steps had come to.
+
+What they came to in the last good night of each set is kept in the folder of the nights.
+"""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -7,6 +10,7 @@ from pathlib import Path
 from pipelines.engine.atomic import write_atomically
 from pipelines.regression.figures import rounded
 from schemas.documents import read_yaml
+from schemas.errors import RefusedInput
 from schemas.regression import Acceptance, AcceptedStep, AcceptedSteps, Baseline
 
 HEAD = (
@@ -15,6 +19,9 @@ HEAD = (
 STEPS_HEAD = (
     "# What each step came to when the figures beside this file were accepted: its action's key and its result.\n"
 )
+GOOD = "good.steps.yaml"
+"""In the folder of the nights."""
+GOOD_HEAD = "# What each step came to in the last night in which nothing of its set was worse.\n"
 
 
 def read_baseline(path: Path) -> Baseline | None:
@@ -26,6 +33,19 @@ def read_steps(path: Path) -> AcceptedSteps:
     """What the steps had come to, empty where that is not known; RefusedInput where the file breaks its format."""
     beside = steps_file(path)
     return read_yaml(beside, AcceptedSteps) if beside.exists() else AcceptedSteps(sets={})
+
+
+def read_good_steps(out: Path) -> Mapping[str, Sequence[AcceptedStep]]:
+    """By set, what the steps came to in its last good night; empty where the file is not there or is damaged."""
+    try:
+        return read_yaml(out / GOOD, AcceptedSteps).sets
+    except RefusedInput:
+        return {}
+
+
+def write_good_steps(out: Path, sets: Mapping[str, Sequence[AcceptedStep]]) -> None:
+    """Keep what `read_good_steps` reads; Fault where the disk refuses."""
+    write_atomically(out / GOOD, _steps_text(GOOD_HEAD, sets).encode())
 
 
 def write_baseline(
@@ -43,7 +63,7 @@ def write_baseline(
         accepted=[acceptance, *(before.accepted if before else [])],
         sets={name: {f: rounded(f, value) for f, value in sorted(of.items())} for name, of in sorted(figures.items())},
     )
-    write_atomically(steps_file(path), _steps_text(steps).encode())
+    write_atomically(steps_file(path), _steps_text(STEPS_HEAD, steps).encode())
     write_atomically(path, _baseline_text(baseline).encode())
     return baseline
 
@@ -70,12 +90,12 @@ def _baseline_text(baseline: Baseline) -> str:
     return HEAD + "\n".join(lines) + "\n"
 
 
-def _steps_text(sets: Mapping[str, Sequence[AcceptedStep]]) -> str:
+def _steps_text(head: str, sets: Mapping[str, Sequence[AcceptedStep]]) -> str:
     lines = [f"format: {AcceptedSteps.model_fields['format'].default}", "sets:"]
     for name, steps in sorted(sets.items()):
         lines.append(f"  {name}:" + (" []" if not steps else ""))
         lines += [f"    - {{step: {s.step}, key: {_quoted(s.key)}, result: {_quoted(s.result)}}}" for s in steps]
-    return STEPS_HEAD + "\n".join(lines) + "\n"
+    return head + "\n".join(lines) + "\n"
 
 
 def _plain(value: float) -> str:

@@ -1,4 +1,8 @@
-"""Which step came out otherwise first: of all whose results differ from the accepted ones, those that rest on none."""
+"""Which step came out otherwise first: of all whose results differ from the accepted ones, those that rest on none.
+
+Another kind of processor rounds otherwise, so that with a baseline from elsewhere every step differs from the first on,
+and no figure does. What came out alike in the last good night on this machine is therefore not where it begins.
+"""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -43,6 +47,26 @@ class PresentStep:
         return AcceptedStep(step=self.name, key=self.key, result=self.result)
 
 
+@dataclass(frozen=True)
+class KnownSteps:
+    """What the steps of a set came to before."""
+
+    accepted: Sequence[AcceptedStep]
+    """When the baseline was accepted; empty where that is not known."""
+    good: Sequence[AcceptedStep] = ()
+    """In the last night on this machine in which nothing of the set was worse; empty where there was none."""
+
+    def of(self, name: str) -> list[AcceptedStep]:
+        """A step in the last good night, and when it was accepted."""
+        return [step for step in (*self.good, *self.accepted) if step.step == name]
+
+    @property
+    def lasting(self) -> list[str]:
+        """Names of the accepted steps, without those that the last good night did without."""
+        kept = {step.step for step in self.good or self.accepted}
+        return [step.step for step in self.accepted if step.step in kept]
+
+
 def present_steps(steps: Sequence[Step], outcomes: Mapping[str, Outcome]) -> list[PresentStep]:
     """What each step came to."""
     found = []
@@ -55,32 +79,30 @@ def present_steps(steps: Sequence[Step], outcomes: Mapping[str, Outcome]) -> lis
     return found
 
 
-def first_steps(accepted: Sequence[AcceptedStep], present: Sequence[PresentStep], store: Store) -> list[FirstStep]:
+def first_steps(known: KnownSteps, present: Sequence[PresentStep], store: Store) -> list[FirstStep]:
     """Where the difference between two runs begins; empty where there is none, or nothing was accepted."""
-    if not accepted:
+    if not known.accepted:
         return []
-    was = {step.step: step for step in accepted}
     names = {step.name for step in present}
-    gone = [name for name in was if name not in names]
+    gone = [name for name in known.lasting if name not in names]
     found = [FirstStep([name], "is no more") for name in _chain_starts(gone)]
     differ: set[str] = set()
     roots: list[PresentStep] = []
     for step in present:
-        before = was.get(step.name)
-        if before is None or before.result != step.result:
+        if all(before.result != step.result for before in known.of(step.name)):
             differ.add(step.name)
             follows = any(name in differ for name in _before(step.step, names))
             # What cameras come together in differs where one of them is missing.
             if not follows and (step.step.camera is not None or not gone):
                 roots.append(step)
-    found += [_explained(step, was.get(step.name), store) for step in roots]
+    found += [_explained(step, known, store) for step in roots]
     return list(_together(found))
 
 
 def costly_steps(
     figures: Sequence[JudgedFigure],
     keeps_most: str | None,
-    accepted: Sequence[AcceptedStep],
+    known: KnownSteps,
     present: Sequence[PresentStep],
     store: Store,
 ) -> list[FirstStep]:
@@ -90,7 +112,6 @@ def costly_steps(
     ----------
     keeps_most : the kind after which memory grows most from pass to pass
     """
-    was = {step.step: step for step in accepted}
     found = []
     for group, why in (("time", SLOWER), ("memory", LARGER)):
         worse = {
@@ -106,7 +127,7 @@ def costly_steps(
             kind = keeps_most if group == "memory" else _slowest(figures, kinds)
         steps = [step for step in present if step.step.kind == kind]
         if steps:
-            first = _explained(steps[0], was.get(steps[0].name), store)
+            first = _explained(steps[0], known, store)
             found.append(FirstStep([step.name for step in steps], why, first.changes))
     return found
 
@@ -142,10 +163,12 @@ def _chain_starts(gone: Sequence[str]) -> list[str]:
     return [name for camera, name in starts.items() if camera or len(starts) == 1]
 
 
-def _explained(step: PresentStep, before: AcceptedStep | None, store: Store) -> FirstStep:
-    if before is None:
+def _explained(step: PresentStep, known: KnownSteps, store: Store) -> FirstStep:
+    before = known.of(step.name)
+    if not before:
         return FirstStep([step.name], "is new")
-    row = store.row(before.key) if before.key and step.image else None
+    rows = (store.row(one.key) for one in before if one.key and step.image)
+    row = next((row for row in rows if row is not None), None)
     found: list[Change] = []
     if row is not None:
         for change in changes(step.step, row.image, json.loads(step.image), store):

@@ -12,9 +12,15 @@ from footscan.report.regress_result import Accepted, JudgedSet, NightResult, Ver
 from pipelines.engine.atomic import write_atomically
 from pipelines.engine.lease import lease
 from pipelines.engine.pool import OnStepEnd
-from pipelines.regression.baseline import read_baseline, read_steps, write_baseline
+from pipelines.regression.baseline import (
+    read_baseline,
+    read_good_steps,
+    read_steps,
+    write_baseline,
+    write_good_steps,
+)
 from pipelines.regression.costs import cost_figures, keeps_most
-from pipelines.regression.first_step import costly_steps, first_steps
+from pipelines.regression.first_step import KnownSteps, costly_steps, first_steps
 from pipelines.regression.history import History, alone, append, gaps, night_name, read_history
 from pipelines.regression.pictures import difference_pictures
 from pipelines.regression.run_set import SetRun, run_set
@@ -109,10 +115,12 @@ def run_night(regression: Regression, on_step_end: OnStepEnd, on_set: OnSet, acc
         gathered = _Run()
         judged: list[JudgedSet] = []
         with lease(store_of(out)):
+            good = read_good_steps(out)
             for data_set in suite.sets:
+                known = KnownSteps(was.sets.get(data_set, []), good.get(data_set, []))
                 accepted = {} if baseline is None else baseline.sets.get(data_set, {})
                 one = _judge_set(
-                    data_set, regression, accepted, was.sets.get(data_set, []), history, gathered, on_step_end,
+                    data_set, regression, accepted, known, history, gathered, on_step_end,
                     is_accepted=accept is not None,
                 )  # fmt: skip
                 on_set(one)
@@ -120,6 +128,10 @@ def run_night(regression: Regression, on_step_end: OnStepEnd, on_set: OnSet, acc
         judged += _gone(suite, baseline, history)
         if accept is not None and not gathered.problems:
             baseline = write_baseline(regression.baseline, accept, gathered.figures, gathered.steps)
+        if baseline is not None:
+            is_accepted = accept is not None and not gathered.problems
+            better = {one.name for one in judged if is_accepted or not (one.problem or one.count(*BAD))}
+            write_good_steps(out, {**good, **{name: of for name, of in gathered.steps.items() if name in better}})
         status = _status(judged, gathered, is_accepted=accept is not None, has_baseline=baseline is not None)
         ended = NightEnded(
             night=name,
@@ -144,7 +156,7 @@ def _judge_set(
     name: str,
     regression: Regression,
     accepted: Mapping[str, float | None],
-    was: Sequence[AcceptedStep],
+    known: KnownSteps,
     history: History,
     gathered: _Run,
     on_step_end: OnStepEnd,
@@ -179,11 +191,13 @@ def _judge_set(
     gathered.steps[name] = [step.accepted for step in run.steps]
     if run.store is None:
         return found
-    first = first_steps(was, run.steps, run.store)
-    first += costly_steps(found.figures, keeps_most(run.timed), was, run.steps, run.store)
+    first = first_steps(known, run.steps, run.store)
+    if not first and found.count(*BAD):
+        first = first_steps(KnownSteps(known.accepted), run.steps, run.store)
+    first += costly_steps(found.figures, keeps_most(run.timed), known, run.steps, run.store)
     results = {step.name: step.result for step in run.steps}
-    otherwise = sum(results.get(step.step) != step.result for step in was)
-    pictures, note = difference_pictures(was, results, run.store)
+    otherwise = sum(results.get(step.step) != step.result for step in known.accepted)
+    pictures, note = difference_pictures(known, results, run.store)
     return replace(found, first=first, otherwise=otherwise, pictures=pictures, note=note)
 
 

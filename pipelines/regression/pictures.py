@@ -1,6 +1,7 @@
-"""How far last night's shape lies from the accepted one, as far as the store still has both."""
+"""How far last night's shape lies from the accepted one, or from that of the last good night, as far as the store still
+has both."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +13,16 @@ from footscan.verify.compare import vertex_distances
 from footscan.verify.regions import foot_regions
 from pipelines.arrays import unpack
 from pipelines.engine.store import Store
+from pipelines.regression.first_step import KnownSteps
 from schemas.errors import FootscanError
-from schemas.regression import AcceptedStep
 
+LAST_GOOD = "that of the last good night"
 SHAPES = ("surface", "orient")
 """The steps whose results are shapes: a mesh, and the cloud that it is made of, which stands in for it."""
 
 
 def difference_pictures(
-    accepted: Sequence[AcceptedStep], present: Mapping[str, str], store: Store
+    known: KnownSteps, present: Mapping[str, str], store: Store
 ) -> tuple[dict[str, bytes], str | None]:
     """PNG pictures by caption of the first shape that differs, and a note where there should be some and are none.
 
@@ -28,26 +30,29 @@ def difference_pictures(
     ----------
     present : results of the steps by name, as in `AcceptedStep`
     """
-    was = {step.step: step.result for step in accepted}
+    was = {step.step: step.result for step in known.accepted}
+    lately = {step.step: step.result for step in known.good}
     differing = [name for name in SHAPES if name in was and name in present and was[name] != present[name]]
     for name in differing:
-        before, now = _shape(store, was[name]), _shape(store, present[name])
-        if before is None or now is None:
-            continue
-        try:
-            return _pictures(before, now), None
-        except FootscanError as error:
-            return {}, f"{name}: no pictures, {error}"
+        now = _shape(store, present[name])
+        for whose, result in (("the accepted one", was[name]), (LAST_GOOD, lately.get(name, ""))):
+            before = _shape(store, result)
+            if before is None or now is None or result == present[name]:
+                continue
+            try:
+                return _pictures(before, now, whose), None
+            except FootscanError as error:
+                return {}, f"{name}: no pictures, {error}"
     note = "No pictures: the store does not have the accepted shape any more." if differing else None
     return {}, note
 
 
-def _pictures(before: Shape, now: Shape) -> dict[str, bytes]:
+def _pictures(before: Shape, now: Shape, whose: str) -> dict[str, bytes]:
     distances = vertex_distances(now, before)
     deviation = deviation_of(now, distances, foot_regions(before) or foot_regions(now))
     what = "surface" if len(now[1]) else "cloud"
     largest = float(np.max(np.abs(deviation.distance), initial=0.0))
-    said = f"{what}: distance to the accepted one, at most {largest:.3f} mm"
+    said = f"{what}: distance to {whose}, at most {largest:.3f} mm"
     return {f"{said}; from {file.removesuffix('.png')}": png for file, png in deviation_pictures(deviation).items()}
 
 

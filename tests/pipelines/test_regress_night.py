@@ -1,5 +1,6 @@
 """A night with the small archive: nothing has changed, something has, and what befalls a night."""
 
+import re
 import shutil
 from datetime import UTC, datetime
 from pathlib import Path
@@ -98,6 +99,41 @@ def test_the_first_step_and_what_changed_in_it(
     assert len(one.pictures) == 4
     assert all(caption.startswith("surface: distance to the accepted one, at most ") for caption in one.pictures)
     assert f"foot: {worse}" in read_history(root / "nights").ended[-1].worse
+
+
+def test_a_baseline_of_another_kind_of_machine(root: Path) -> None:
+    """There every step came out otherwise, by rounding, and no figure did."""
+    accepted = root / "baseline.steps.yaml"
+    accepted.write_text(re.sub(r'(key|result): "[0-9a-f]{64}"', rf'\1: "{"e" * 64}"', accepted.read_text()))
+    (root / "nights/good.steps.yaml").write_text("damaged: [")
+    first = night(root)
+    assert (first.status, only(first).otherwise) == (0, 16)
+    assert [list(one.steps) for one in only(first).first] == [["ingest-1", "ingest-5"]]
+    assert (night(root).status, only(night(root)).first) == (0, [])
+    for grid_steps in (1.25, 1.3):  # a bad night does not become the one to compare with
+        worse = night(root, with_parameters(f"{{surface: {{grid_steps: {grid_steps}}}}}"))
+        [one] = only(worse).first
+        assert list(one.steps) == ["surface"]
+        assert [told.text for told in one.changes] == [f"parameter grid_steps changed: 0.625 → {grid_steps}"]
+        captions = list(only(worse).pictures)
+        assert len(captions) == 4
+        assert captions[0].startswith("surface: distance to that of the last good night, at most ")
+
+
+def test_figures_that_are_worse_than_accepted_though_no_step_has_changed(root: Path) -> None:
+    night(root, with_parameters("{surface: {grid_steps: 1.25}}"), accept="coarser")
+    night(root, accept="finer")
+    accepted = root / "baseline.yaml"
+    coarse = root / "coarse"
+    coarse.mkdir()
+    shutil.copytree(root / "nights", coarse / "nights")
+    night(root, with_parameters("{surface: {grid_steps: 1.25}}"), accept="coarser again")
+    shutil.rmtree(root / "nights")
+    shutil.move(coarse / "nights", root / "nights")  # a machine that has not seen what was accepted since
+    assert "coarser again" in accepted.read_text()
+    one = only(night(root))
+    assert figure(one, "surface.triangles").verdict == "worse"
+    assert [list(first.steps) for first in one.first] == [["surface"]]
 
 
 def test_a_camera_that_is_no_more(root: Path) -> None:
