@@ -13,11 +13,10 @@ from typing import Any
 import pytest
 from chromium import Opened as OpenedPage
 from chromium import needs_chromium
+from playwright.sync_api import expect
 
 from pipelines.console.console import Console
 from pipelines.console.server import listen, server_of
-
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
 pytestmark = needs_chromium
 
@@ -33,7 +32,7 @@ class Opened(OpenedPage):
 
     def state(self, name: str) -> None:
         """Waits until the page tells this state."""
-        sync_api.expect(self.page.locator("#state-name")).to_have_text(name)
+        expect(self.page.locator("#state-name")).to_have_text(name)
 
     def tab_to(self, what: str) -> None:
         """Goes on by the tabulator key until an element of a selector has the focus."""
@@ -99,7 +98,7 @@ def test_two_feet_by_mouse(show: Callable[..., Opened], scanner: Any) -> None:
     page.click("#connect")
     opened.state("Ready")
     page.click("#home")
-    sync_api.expect(page.locator("#device-list")).to_contain_text("Head 3 at X = -18.0 mm")
+    expect(page.locator("#device-list")).to_contain_text("Head 3 at X = -18.0 mm")
     page.fill("#patient", "P0001")
     page.click("#start")
     page.wait_for_selector("#verdict.good")
@@ -112,7 +111,7 @@ def test_two_feet_by_mouse(show: Callable[..., Opened], scanner: Any) -> None:
     assert "Sizes for both" in page.locator("main").inner_text()
     page.click("#new-person")
     page.wait_for_url(opened.address + "/")
-    sync_api.expect(page.locator("#who")).to_have_text("Nobody yet.")
+    expect(page.locator("#who")).to_have_text("Nobody yet.")
     assert page.input_value("#patient") == ""
     assert scanner.calls == ["connect", "home", "film P0001 right False", "film P0001 left False"]
     opened.is_clean()
@@ -129,12 +128,12 @@ def test_two_feet_by_keyboard_on_a_tablet(show: Callable[..., Opened], scanner: 
     keyboard.type("P-2_b")
     opened.tab_to("input[name=side]")
     keyboard.press("ArrowLeft")
-    sync_api.expect(page.locator("#start")).to_have_text("Scan the left foot")
+    expect(page.locator("#start")).to_have_text("Scan the left foot")
     opened.tab_to("#start")
     keyboard.press("Enter")
     page.wait_for_url("**/foot/P-2_b/2026-11-20-L")
     page.wait_for_selector("#verdict")
-    sync_api.expect(page.locator("#other")).to_have_attribute("aria-disabled", "false")
+    expect(page.locator("#other")).to_have_attribute("aria-disabled", "false")
     assert page.evaluate("document.activeElement.id") == "result", "what is new is read first"
     opened.tab_to("#other")
     keyboard.press("Enter")
@@ -154,17 +153,17 @@ def test_a_pseudonym_is_checked_as_typed(show: Callable[..., Opened], scanner: A
     scanner.tell_again()
     opened.state("Ready")
     told, start = page.locator("#patient-told"), page.locator("#start")
-    sync_api.expect(page.locator("#start-told")).to_have_text("A pseudonym is missing.")
+    expect(page.locator("#start-told")).to_have_text("A pseudonym is missing.")
     page.locator("#patient").press_sequentially("P 1/ä")
-    sync_api.expect(told).to_have_text("Only letters, digits, - and _ may be in it, no space, “/”, “ä”.")
+    expect(told).to_have_text("Only letters, digits, - and _ may be in it, no space, “/”, “ä”.")
     assert page.get_attribute("#patient", "aria-invalid") == "true"
     assert start.get_attribute("aria-disabled") == "true"
     page.keyboard.press("Enter")
     page.fill("#patient", HOSTILE)
-    sync_api.expect(told).to_contain_text("“<”")
+    expect(told).to_contain_text("“<”")
     assert page.title() == "footscan"
     page.fill("#patient", "P1")
-    sync_api.expect(start).to_have_attribute("aria-disabled", "false")
+    expect(start).to_have_attribute("aria-disabled", "false")
     assert scanner.calls == ["connect"]
     opened.is_clean()
 
@@ -193,7 +192,7 @@ def test_a_scan_is_stopped(way: str, show: Callable[..., Opened], scanner: Any, 
     opened.state("Failed")
     assert not scanner.lit
     assert "stop" in scanner.calls
-    sync_api.expect(page.locator("#state-words")).to_have_text("stopped; nothing of this scan is kept")
+    expect(page.locator("#state-words")).to_have_text("stopped; nothing of this scan is kept")
     assert console.seen_by("x")["sitting"]["feet"] == []
     opened.is_clean()
 
@@ -205,14 +204,14 @@ def test_door_alarm_lost_camera_and_the_way_back(show: Callable[..., Opened], sc
     scanner.connect()
     scanner.pause = {"filming"}
     opened.state("Ready")
-    sync_api.expect(page.locator("#device-list")).to_contain_text(HOSTILE)
+    expect(page.locator("#device-list")).to_contain_text(HOSTILE)
     page.fill("#patient", "P1")
     page.click("#start")
     opened.state("Filming")
     assert scanner.reached.wait(60)
-    sync_api.expect(page.locator("#progress")).to_be_visible()
-    sync_api.expect(page.locator("#count")).to_contain_text("frames of 8 cameras")
-    sync_api.expect(page.locator("#camera-8 img")).to_have_attribute("alt", "Camera 8 now, with the stripe found")
+    expect(page.locator("#progress")).to_be_visible()
+    expect(page.locator("#count")).to_contain_text("frames of 8 cameras")
+    expect(page.locator("#camera-8 img")).to_have_attribute("alt", "Camera 8 now, with the stripe found")
     scanner.door_open = True
     scanner.tell_again()
     opened.state("Door open")
@@ -220,14 +219,14 @@ def test_door_alarm_lost_camera_and_the_way_back(show: Callable[..., Opened], sc
     scanner.go.set()
     page.click("#resume")
     opened.state("Failed")
-    sync_api.expect(page.locator("#do")).to_contain_text("Camera 3: check its cable and hub, then connect.")
-    sync_api.expect(page.locator("#camera-3 .dark")).to_be_visible()
+    expect(page.locator("#do")).to_contain_text("Camera 3: check its cable and hub, then connect.")
+    expect(page.locator("#camera-3 .dark")).to_be_visible()
     page.click("#connect")
     opened.state("Ready")
     scanner.alarm = True
     scanner.tell_again()
     opened.state("Alarm")
-    sync_api.expect(page.locator("#start-told")).to_have_text("Home the heads first.")
+    expect(page.locator("#start-told")).to_have_text("Home the heads first.")
     page.click("#home")
     opened.state("Ready")
     scanner.pause = set()
@@ -243,16 +242,16 @@ def test_a_second_page_looks_on_and_takes_over(show: Callable[..., Opened], scan
     first.state("Ready")
     second = show(UPRIGHT)
     second.state("Ready")
-    sync_api.expect(first.page.locator("#others")).to_be_hidden()
-    sync_api.expect(second.page.locator("#others")).to_be_visible()
-    sync_api.expect(second.page.locator("#home")).to_have_attribute("aria-disabled", "true")
+    expect(first.page.locator("#others")).to_be_hidden()
+    expect(second.page.locator("#others")).to_be_visible()
+    expect(second.page.locator("#home")).to_have_attribute("aria-disabled", "true")
     second.page.click("#take-over")
-    sync_api.expect(first.page.locator("#others")).to_be_visible()
-    sync_api.expect(second.page.locator("#others")).to_be_hidden()
+    expect(first.page.locator("#others")).to_be_visible()
+    expect(second.page.locator("#others")).to_be_hidden()
     second.page.click("#home")
-    sync_api.expect(second.page.locator("#device-list")).to_contain_text("Head 1 at X = -18.0 mm")
+    expect(second.page.locator("#device-list")).to_contain_text("Head 1 at X = -18.0 mm")
     first.page.keyboard.press("Escape")
-    sync_api.expect(first.page.locator("#stop")).not_to_have_class("pressed")
+    expect(first.page.locator("#stop")).not_to_have_class("pressed")
     assert scanner.calls == ["connect", "home", "stop"]
     first.is_clean()
     second.is_clean()
@@ -316,7 +315,7 @@ def test_the_command_prints_its_address_and_ends_dark(started: Callable[..., Any
     context = browser.new_context()
     opened = Opened(context.new_page(), address.removesuffix("/"))
     opened.state("Failed")
-    sync_api.expect(opened.page.locator("#do")).to_contain_text("Controller: check its USB cable and its power")
+    expect(opened.page.locator("#do")).to_contain_text("Controller: check its USB cable and its power")
     command.send_signal(end)
     said = command.communicate(timeout=60)[1]
     context.close()

@@ -19,12 +19,11 @@ from typing import Any, Literal
 
 import pytest
 from chromium import Opened, needs_chromium
+from playwright.sync_api import expect
 from waiting import wait_until
 
 from footscan.virtual.foot import make_foot
 from pipelines.console.results import read_measures
-
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
 FOLDER = os.environ.get("FOOTSCAN_SITTING")
 pytestmark = [
@@ -65,7 +64,7 @@ class Sitting:
             told = self._follow(foot)
             print(foot, "try", number, told)
             if told == "measured":
-                sync_api.expect(self.page.locator("#canvas")).to_be_visible()
+                expect(self.page.locator("#canvas")).to_be_visible()
                 time.sleep(2.0)  # the foot is drawn
                 self.page.screenshot(path=self.folder / f"{foot}-measured.png", full_page=True)
                 return
@@ -140,6 +139,6 @@ def test_both_feet_in_one_sitting(browser: Any) -> None:
         sitting.check_measured("left")
         page.click("#pair")
         page.wait_for_url("**/pair/**")
-        sync_api.expect(page.locator("main")).to_contain_text("Sizes for both")
+        expect(page.locator("main")).to_contain_text("Sizes for both")
         sitting.picture("pair")
         sitting.opened.is_clean()

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
+from playwright.sync_api import expect, sync_playwright
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 PATIENCE_MS = 60_000
@@ -16,12 +17,11 @@ needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
 
 @contextmanager
 def launched() -> Iterator[Any]:
-    """The browser, as long as it is needed; a test without playwright is skipped."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    """The browser, as long as it is needed."""
     # Chromium's sandbox does not start as root, as in a container.
     arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
-    sync_api.expect.set_options(timeout=PATIENCE_MS)
-    with sync_api.sync_playwright() as playwright:
+    expect.set_options(timeout=PATIENCE_MS)
+    with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
         yield chromium
         chromium.close()
