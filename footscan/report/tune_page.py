@@ -168,7 +168,6 @@ def _trials(result: TuneResult) -> str:
         "Trial",
         *(f"{breakable(g.name)}, {text(g.unit)}" for g in result.goals),
         *map(breakable, names),
-        "",
         "Failed scans",
     ]
     shown = result.trials
@@ -177,7 +176,8 @@ def _trials(result: TuneResult) -> str:
         shown = [t for t in shown if t.on_front or t.number < SHOWN or t.number == result.winner.number]
         note = f'<p class="note">{len(shown)} of {len(result.trials)}; the others are in trials.csv.</p>'
     rows = ([*_trial(trial, names, result)] for trial in shown)
-    numeric = [*range(1, len(result.goals) + 1), len(headings) - 1]
+    words = [1 + len(result.goals) + k for k, name in enumerate(names) if isinstance(result.winner.point[name], str)]
+    numeric = [column for column in range(1, len(headings)) if column not in words]
     return note + table(headings, rows, numeric=numeric, kind="dense") + _failures(result)
 
 
@@ -193,13 +193,18 @@ def _failures(result: TuneResult) -> str:
 
 
 def _trial(trial: Trial, names: Sequence[str], result: TuneResult) -> Iterator[str]:
-    yield str(trial.number) if trial.number else "present"
+    mark = (
+        ' <span class="status ok">winner</span>'
+        if trial.number == result.winner.number
+        else " front"
+        if trial.on_front
+        else ""
+    )
+    yield (str(trial.number) if trial.number else "present") + mark
     for goal in result.goals:
         yield _value(None if trial.problems else trial.values[goal.name], goal)
     for name in names:
         yield text(_written(trial.point[name]))
-    is_winner = trial.number == result.winner.number
-    yield '<span class="status ok">winner</span>' if is_winner else "front" if trial.on_front else ""
     yield str(len(trial.problems) or "")
 
 
