@@ -12,7 +12,7 @@ from footscan.report.regress_result import Change, FirstStep, JudgedFigure
 from pipelines.engine.audit import input_digests
 from pipelines.engine.explain import changes, side_by_side
 from pipelines.engine.key import image_text, key_of
-from pipelines.engine.step import Failure, Outcome, Output, Step
+from pipelines.engine.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.store import Store
 from schemas.regression import AcceptedStep
 
@@ -68,13 +68,16 @@ class KnownSteps:
 
 
 def present_steps(steps: Sequence[Step], outcomes: Mapping[str, Outcome]) -> list[PresentStep]:
-    """What each step came to."""
+    """What each step came to; those that failed by a fault, and what waits for them, have no outcome."""
     found = []
     for step in steps:
-        outcome = outcomes[step.name]
+        outcome = outcomes.get(step.name)
         digests = input_digests(step, outcomes)
         image = image_text(step, digests) if digests.keys() == step.inputs.keys() else ""
-        result = f"no result: {outcome.kind}" if isinstance(outcome, Failure) else outcome.digest
+        if isinstance(outcome, Success):
+            result = outcome.digest
+        else:
+            result = f"no result: {outcome.kind if isinstance(outcome, Failure) else 'fault'}"
         found.append(PresentStep(step, key_of(image) if image else "", image, result))
     return found
 
@@ -93,7 +96,7 @@ def first_steps(known: KnownSteps, present: Sequence[PresentStep], store: Store)
             differ.add(step.name)
             follows = any(name in differ for name in _before(step.step, names))
             # What cameras come together in differs where one of them is missing.
-            if not follows and (step.step.camera is not None or not gone):
+            if not follows and (step.step.camera is not None or not any(map(_of_a_camera, gone))):
                 roots.append(step)
     found += [_explained(step, known, store) for step in roots]
     return list(_together(found))
@@ -158,9 +161,12 @@ def _chain_starts(gone: Sequence[str]) -> list[str]:
     """Of steps that are no more, in their order: the first of each camera, or the first of all."""
     starts: dict[str, str] = {}
     for name in gone:
-        camera = name.rpartition("-")[2]
-        starts.setdefault(camera if camera.isdecimal() else "", name)
+        starts.setdefault(name.rpartition("-")[2] if _of_a_camera(name) else "", name)
     return [name for camera, name in starts.items() if camera or len(starts) == 1]
+
+
+def _of_a_camera(name: str) -> bool:
+    return name.rpartition("-")[2].isdecimal()
 
 
 def _explained(step: PresentStep, known: KnownSteps, store: Store) -> FirstStep:

@@ -68,7 +68,7 @@ def _outcomes(prepared: PreparedSet, planned: PlannedJob) -> tuple[list[Step], d
     steps = draw_steps(read_scan(folder, prepared.job.archive_of(folder)), planned)
     plan = make_plan(steps, planned.store)
     outcomes = dict(prepared.outcomes) | {p.step.name: p.outcome for p in plan.steps if p.outcome is not None}
-    return [step for step in [*prepared.filming, *steps] if step.name in outcomes], outcomes
+    return [*prepared.filming, *steps], outcomes
 
 
 def _figures(
@@ -77,7 +77,7 @@ def _figures(
     """The figures of the documents that there are."""
     documents: dict[str, bytes] = {}
     for step in steps:
-        outcome = outcomes[step.name]
+        outcome = outcomes.get(step.name)
         if step.kind in {"quality", "measure", "texture"} and isinstance(outcome, Success):
             documents[step.kind] = store.get(outcome.digest) or b""
     return result_figures(documents) if {"quality", "measure"} <= documents.keys() and end.folder else {}

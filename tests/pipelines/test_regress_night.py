@@ -12,7 +12,7 @@ from footscan.report.regress_result import JudgedFigure, JudgedSet
 from pipelines.engine.pool import StepEnd
 from pipelines.regression.history import alone, read_history
 from pipelines.regression.night import Night, Regression, read_suite, run_night
-from pipelines.steps import clean, surface
+from pipelines.steps import clean, report, surface
 from schemas.errors import Fault, Finding, RefusedInput
 from schemas.regression import Acceptance
 
@@ -164,8 +164,19 @@ def test_a_fault_is_another_status(root: Path, monkeypatch: pytest.MonkeyPatch) 
         raise Fault("disk full")
 
     monkeypatch.setattr(surface, "run", full)
-    assert night(root, with_parameters("{surface: {grid_steps: 1.5}}")).status == 3
+    found = night(root, with_parameters("{surface: {grid_steps: 1.5}}"))
+    assert found.status == 3
+    assert [(list(first.steps), first.why) for first in only(found).first] == [(["surface"], "no result: fault")]
     assert read_history(root / "nights").ended[-1].status == 3
+
+
+def test_a_fault_far_behind_the_step_that_changed(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> bytes:
+        raise Fault("disk full")
+
+    monkeypatch.setattr(report, "run", full)
+    one = only(night(root, with_parameters("{outliers: {z_mm: [5, 120]}}")))
+    assert [list(first.steps) for first in one.first] == [["clean"]]
 
 
 def test_sets_come_and_go(root: Path) -> None:
