@@ -4,15 +4,13 @@ has both."""
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from footscan.cloud.points import coordinates
 from footscan.report.deviation import deviation_of, deviation_pictures
 from footscan.surface.export import Shape
 from footscan.verify.compare import vertex_distances
 from footscan.verify.regions import foot_regions
-from pipelines.arrays import unpack
 from pipelines.engine.store import Store
+from pipelines.regression.delivered import shape_of
 from pipelines.regression.first_step import KnownSteps
 from schemas.errors import FootscanError
 
@@ -60,8 +58,4 @@ def _shape(store: Store, digest: str) -> Shape | None:
     """The mesh or cloud that a result is; None where it is not there."""
     if len(digest) != 64 or (data := store.get(digest)) is None:
         return None
-    arrays = unpack(data)
-    if "faces" in arrays:
-        return arrays["vertices"], arrays["faces"]
-    points: NDArray[np.float64] = coordinates(arrays["cloud"])
-    return points, np.empty((0, 3), np.int64)
+    return shape_of(data)

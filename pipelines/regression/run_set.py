@@ -10,6 +10,7 @@ from pipelines.engine.step import Outcome, Step, Success
 from pipelines.engine.store import Store
 from pipelines.recorded import read_scan
 from pipelines.regression.costs import cost_figures, unsteady
+from pipelines.regression.delivered import MADE_OF, delivered_figures
 from pipelines.regression.figures import result_figures
 from pipelines.regression.first_step import PresentStep, present_steps
 from pipelines.regression.sets import PreparedSet
@@ -74,10 +75,15 @@ def _outcomes(prepared: PreparedSet, planned: PlannedJob) -> tuple[list[Step], d
 def _figures(
     end: ScanEnd, steps: Sequence[Step], outcomes: Mapping[str, Outcome], store: Store
 ) -> dict[str, float | None]:
-    """The figures of the documents that there are."""
+    """The figures of the documents and shapes that there are, and of the files that were delivered."""
+    if end.folder is None:
+        return {}
     documents: dict[str, bytes] = {}
     for step in steps:
         outcome = outcomes.get(step.name)
-        if step.kind in {"quality", "measure", "texture"} and isinstance(outcome, Success):
+        if step.kind in {"quality", "measure", "texture", *MADE_OF.values()} and isinstance(outcome, Success):
             documents[step.kind] = store.get(outcome.digest) or b""
-    return result_figures(documents) if {"quality", "measure"} <= documents.keys() and end.folder else {}
+    if not {"quality", "measure"} <= documents.keys():
+        return {}
+    shapes = {kind: documents[kind] for kind in MADE_OF.values() if documents.get(kind)}
+    return result_figures(documents) | delivered_figures(end.folder, shapes)

@@ -74,6 +74,12 @@ def test_nothing_has_changed(root: Path) -> None:
     assert {one.verdict for one in only(found).figures} == {"same"}
     assert figure(only(found), "steps.all").value == 16
     assert figure(only(found), "steps.run_again").value == 0
+    assert {f.name for f in only(found).figures if f.name.startswith("files.")} == {
+        "files.foot.stl_off_mm",
+        "files.foot.ply_off_mm",
+        "files.cloud.ply_off_mm",
+    }
+    assert all(f.value is not None and f.value < 1e-4 for f in only(found).figures if f.name.startswith("files."))
     assert len(figure(only(found), "points.stripe").history) == 3
     assert [one.reason for one in found.result.accepted] == ["first results"]
 
