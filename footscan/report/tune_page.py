@@ -193,13 +193,8 @@ def _failures(result: TuneResult) -> str:
 
 
 def _trial(trial: Trial, names: Sequence[str], result: TuneResult) -> Iterator[str]:
-    mark = (
-        ' <span class="status ok">winner</span>'
-        if trial.number == result.winner.number
-        else " front"
-        if trial.on_front
-        else ""
-    )
+    is_winner = trial.number == result.winner.number
+    mark = ' <span class="status ok">winner</span>' if is_winner else " front" if trial.on_front else ""
     yield (str(trial.number) if trial.number else "present") + mark
     for goal in result.goals:
         yield _value(None if trial.problems else trial.values[goal.name], goal)

@@ -205,8 +205,8 @@ def _together(found: Sequence[FirstStep]) -> Iterator[FirstStep]:
     """Steps of one kind of which the same is to be said, such as those of the cameras, in one."""
     alike: dict[tuple[object, ...], FirstStep] = {}
     for one in found:
-        name, _, camera = one.steps[0].rpartition("-")
-        kind = name if camera.isdecimal() else one.steps[0]
+        first = one.steps[0]
+        kind = first.rpartition("-")[0] if _of_a_camera(first) else first
         said = (kind, one.why, tuple(change.text for change in one.changes))
         known = alike.get(said)
         alike[said] = one if known is None else FirstStep([*known.steps, *one.steps], one.why, known.changes)

@@ -126,18 +126,18 @@ def run_night(regression: Regression, on_step_end: OnStepEnd, on_set: OnSet, acc
                 on_set(one)
                 judged.append(one)
         judged += _gone(suite, baseline, history)
-        if accept is not None and not gathered.problems:
-            baseline = write_baseline(regression.baseline, accept, gathered.figures, gathered.steps)
+        accepted_now = None if gathered.problems else accept
+        if accepted_now is not None:
+            baseline = write_baseline(regression.baseline, accepted_now, gathered.figures, gathered.steps)
         if baseline is not None:
-            is_accepted = accept is not None and not gathered.problems
-            better = {one.name for one in judged if is_accepted or not (one.problem or one.count(*BAD))}
+            better = {one.name for one in judged if accepted_now or not (one.problem or one.count(*BAD))}
             write_good_steps(out, {**good, **{name: of for name, of in gathered.steps.items() if name in better}})
         status = _status(judged, gathered, is_accepted=accept is not None, has_baseline=baseline is not None)
         ended = NightEnded(
             night=name,
             time=_now(),
             status=status,
-            accepted=accept.reason if accept is not None and not gathered.problems else None,
+            accepted=None if accepted_now is None else accepted_now.reason,
             worse=[f"{one.name}: {figure.name}" for one in judged for figure in one.figures if figure.verdict in BAD],
             problems=gathered.problems,
             sets=gathered.figures,
