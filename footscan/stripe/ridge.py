@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
+from footscan.portable import gaussian_kernel
 from footscan.stripe.limits import Limits
 from footscan.stripe.redness import SATURATED, SIGNAL_SCALE, SUMMED
 
@@ -42,8 +43,7 @@ I, J, NORMAL_I, NORMAL_J, SHARPNESS = range(5)  # noqa: E741 (the name of the ax
 @lru_cache
 def gaussian(sigma: float) -> NDArray[np.float32]:
     """The `TAPS` weights of a Gaussian, `sigma` in px, at most half of `RADIUS`."""
-    weights: NDArray[np.float64] = np.exp(-0.5 * (np.arange(-RADIUS, RADIUS + 1) / sigma) ** 2)
-    return np.asarray(weights / weights.sum(), np.float32)
+    return gaussian_kernel(sigma, RADIUS).astype(np.float32)
 
 
 @compiled

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from footscan.portable import cos_sin, product
 from footscan.virtual.foot_form import pternion, toe_tips
 from footscan.virtual.foot_measures import known_landmarks, known_measures
 from footscan.virtual.foot_mesh import mesh_field
@@ -66,11 +67,11 @@ def make_foot(shape: FootShape = MEAN_MAN, *, side: Side = "right", resolution_m
 
 def placed(foot: Foot, x_mm: float, y_mm: float, turn_deg: float) -> Foot:
     """The foot turned about Z (counter-clockwise seen from above, about its pternion's foot) and then shifted."""
-    cos, sin = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
+    cos, sin = cos_sin(turn_deg)
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     shift = np.array([x_mm, y_mm, 0.0])
     return replace(
         foot,
-        vertices=foot.vertices @ turn.T + shift,
-        landmarks={name: turn @ point + shift for name, point in foot.landmarks.items()},
+        vertices=product(foot.vertices, turn.T) + shift,
+        landmarks={name: product(point[None], turn.T)[0] + shift for name, point in foot.landmarks.items()},
     )

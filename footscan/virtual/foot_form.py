@@ -4,6 +4,7 @@ Stations follow a parametric foot tuned to ANSUR II's means; between them pchip 
 sampled at even knots and joined by a C2 cubic spline.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -135,7 +136,8 @@ def _body(shape: FootShape, controls: Controls) -> Tube:
     heel = _heel_level(shape)
     knots = np.linspace(-0.02, 1.0, INTERVALS + 1)
     left, right = medial_edge(knots), -lateral_edge(knots)
-    lifted = np.where((knots > 0.22) & (knots < 0.68), np.sin(np.pi * (knots - 0.22) / 0.46) ** 2, 0.0)
+    sines = np.array([math.sin(math.pi * (knot - 0.22) / 0.46) for knot in knots])
+    lifted = np.where((knots > 0.22) & (knots < 0.68), sines**2, 0.0)
     level = _curve((0.0, 0.20, 0.45, 0.64, 0.74, 0.90), (heel, heel, 20.0, 0.065 * length, 0.34 * ball, 0.36 * ball))(
         knots
     )

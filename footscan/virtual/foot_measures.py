@@ -26,6 +26,8 @@ contact (Z <= 1, X within 0.05 to 0.25 of the length); the junction point is the
 X > 50 and 20 < Z < 100, that is nearest to (50, 20).
 """
 
+import math
+
 import numpy as np
 from scipy.spatial import ConvexHull
 
@@ -138,7 +140,7 @@ def ball_girth(field: Field, tibiale: Point, fibulare: Point) -> float:
     """See the table."""
     middle = (0.5 * (tibiale[0] + fibulare[0]), 0.5 * (tibiale[1] + fibulare[1]), 15.0)
     across = np.array([tibiale[0] - fibulare[0], tibiale[1] - fibulare[1], 0.0])
-    across /= np.linalg.norm(across)
+    across /= np.sqrt((across**2).sum())
     return girth(field, middle, (across[0], across[1], 0.0), (0.0, 0.0, 1.0))
 
 
@@ -148,9 +150,10 @@ def girth(field: Field, inside: Point, first: Point, second: Point) -> float:
     Rays come from outside, so they find every point of the hull whatever the section's shape.
     """
     angles = np.linspace(0, 2 * np.pi, RAYS, endpoint=False)
-    spokes = np.cos(angles)[:, None] * np.array(first) + np.sin(angles)[:, None] * np.array(second)
+    turns = np.array([(math.cos(angle), math.sin(angle)) for angle in angles])
+    spokes = turns[:, :1] * np.array(first) + turns[:, 1:] * np.array(second)
     distances = OUTSIDE_MM - first_hits(np.array(inside) + OUTSIDE_MM * spokes, -spokes, OUTSIDE_MM, field)
-    section = distances[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    section = distances[:, None] * turns
     return float(ConvexHull(section).area)  # in two dimensions the area of the hull's border is its length
 
 
@@ -194,7 +197,7 @@ def _junction_point(field: Field) -> Point:
         origins = np.column_stack([np.full(yy.size, 320.0), yy.ravel(), zz.ravel()])
         x = 320.0 - first_hits(origins, np.tile([-1.0, 0.0, 0.0], (yy.size, 1)), 320.0, field).reshape(yy.shape)
         outline = x.max(axis=1)
-        row = int(np.argmin(np.hypot(outline - 50.0, z - 20.0)))
+        row = int(np.argmin((outline - 50.0) ** 2 + (z - 20.0) ** 2))
         column = int(np.argmax(x[row]))
         best = (float(x[row, column]), float(y[column]), float(z[row]))
         y_step, z_step = y[1] - y[0], z[1] - z[0]
@@ -206,7 +209,7 @@ def _junction_point(field: Field) -> Point:
 def _heel_girth(field: Field, landing: Point, junction: Point) -> float:
     middle = (0.5 * (landing[0] + junction[0]), 0.0, 0.5 * (landing[2] + junction[2]))
     up = np.array([junction[0] - landing[0], 0.0, junction[2] - landing[2]])
-    up /= np.linalg.norm(up)
+    up /= np.sqrt((up**2).sum())
     return girth(field, middle, (0.0, 1.0, 0.0), (up[0], 0.0, up[2]))
 
 

@@ -30,7 +30,7 @@ def sine_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
     (N,) float64, 0 <= s < 1.
     """
     offset = points[:, :2] - source[:2]
-    distance = np.hypot(offset[:, 0], offset[:, 1])
+    distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
     air = np.maximum(points[:, 2], 0.0) - THICKNESS_MM - source[2]
     glass = passes * THICKNESS_MM
     n2 = REFRACTIVE_INDEX**2
@@ -39,7 +39,7 @@ def sine_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
         # In glass: s / sqrt(n^2 - s^2) with s^2 = q^2 / (1 + q^2) is q / sqrt(n^2 + (n^2 - 1) q^2).
         root = np.sqrt(n2 + (n2 - 1.0) * tangent**2)
         excess = air * tangent + glass * tangent / root - distance
-        tangent = tangent - excess / (air + glass * n2 / root**3)
+        tangent = tangent - excess / (air + glass * n2 / (root * root * root))
     return np.asarray(tangent / np.sqrt(1.0 + tangent**2))
 
 
@@ -47,7 +47,7 @@ def directions_from_below(source: Floats, points: Floats, passes: int = 1) -> Fl
     """Unit directions, (N, 3), in which light leaves `source` below the plate to arrive at `points` above it."""
     sine = sine_from_below(source, points, passes)
     offset = points[:, :2] - source[:2]
-    distance = np.maximum(np.hypot(offset[:, 0], offset[:, 1]), 1e-12)
+    distance = np.maximum(np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2), 1e-12)
     return np.column_stack([offset * (sine / distance)[:, None], np.sqrt(1.0 - sine**2)])
 
 
@@ -56,7 +56,7 @@ def exits_above(source: Floats, directions: Floats, passes: int = 1) -> Floats:
 
     A plane-parallel plate leaves their directions as they are.
     """
-    sine = np.hypot(directions[:, 0], directions[:, 1])
+    sine = np.sqrt(directions[:, 0] ** 2 + directions[:, 1] ** 2)
     rise = directions[:, 2]
     # Horizontal way for each unit of sine: in air h / cos, in glass t / (n cos') with n cos' = sqrt(n^2 - s^2).
     way = (-THICKNESS_MM - source[2]) / rise + passes * THICKNESS_MM / np.sqrt(REFRACTIVE_INDEX**2 - sine**2)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
+from footscan.portable import cos_sin, dot, exp
 from footscan.virtual.glass import directions_from_below, exits_above, reflectance
 from footscan.virtual.scanner import FAN_DEGREES, HEIGHT, WIDTH, Laser
 from footscan.virtual.scene import Hits, Scene
@@ -37,7 +38,7 @@ def stripe_picture(
     (480, 640) float64, in units of the sensor's white.
     """
     picture = np.zeros(HEIGHT * WIDTH)
-    reach = REACH_SIGMAS * np.hypot(settings.laser_sigma_mm, DIVERGENCE * 120.0)
+    reach = REACH_SIGMAS * float(np.sqrt(settings.laser_sigma_mm**2 + (DIVERGENCE * 120.0) ** 2))
     pixels = _pixels_near(scene.patches_near(x, reach) - np.array([x, 0.0, 0.0]), view)
     if not len(pixels):
         return picture.reshape(HEIGHT, WIDTH)
@@ -120,9 +121,10 @@ def _sheet(
     cosine = np.where(facing, np.maximum(np.einsum("ij,ij->i", normals, beams.towards), 0.0), 0.0)
     distance = np.linalg.norm(points - np.asarray(laser.position), axis=1)
     variance = sigma_mm**2 + (DIVERGENCE * (distance - FOCUS_MM)) ** 2 + spread
-    profile = np.exp(-0.5 * points[:, 0] ** 2 / variance) * sigma_mm / np.sqrt(variance)
-    off_axis = np.degrees(np.arccos(np.clip(-(beams.towards @ np.asarray(laser.axis)), -1.0, 1.0)))
-    fan = np.clip((FAN_DEGREES / 2.0 - off_axis) / 2.0, 0.0, 1.0)  # a Powell lens: even, with an edge of two degrees
+    profile = exp(-0.5 * points[:, 0] ** 2 / variance) * sigma_mm / np.sqrt(variance)
+    # A Powell lens: even, with an edge of two degrees.
+    outer, inner = cos_sin(FAN_DEGREES / 2.0)[0], cos_sin(FAN_DEGREES / 2.0 - 2.0)[0]
+    fan = np.clip((-dot(beams.towards, np.asarray(laser.axis)) - outer) / (inner - outer), 0.0, 1.0)
     return np.asarray(profile * cosine * fan * beams.transmitted * FOCUS_MM / distance)
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from footscan.compiled import compiled
+from footscan.portable import gaussian_blur, gaussian_kernel
 from footscan.virtual.laser_light import stripe_picture
 from footscan.virtual.room import COARSE, LEVELS, Backdrop, backdrop, coarse_rays, lit_object
 from footscan.virtual.scanner import HEIGHT, WIDTH, VirtualScanner
@@ -104,7 +104,7 @@ def _glow(stripe: Floats, coverage: Singles, share: float, veil: float) -> tuple
     GPU Gems 3 (2007), chapter 14.
     """
     blocks = stripe.reshape(HEIGHT // _BLOCK, _BLOCK, WIDTH // _BLOCK, _BLOCK).mean(axis=(1, 3)).astype(np.float32)
-    near, far, lens = (gaussian_filter(blocks, sigma, truncate=3.0) for sigma in (1.3, 3.5, 10.0))
+    near, far, lens = (gaussian_blur(blocks, sigma, truncate=3.0) for sigma in (1.3, 3.5, 10.0))
     step = _BLOCK // COARSE
     on_object = coverage.reshape(HEIGHT // _BLOCK, step, WIDTH // _BLOCK, step).mean(axis=(1, 3))
     glow = share * (0.6 * near + 0.4 * far) * on_object
@@ -121,13 +121,11 @@ def _line(stripe: Floats, settings: SimulationSettings, random: np.random.Genera
         slice(max(rows[0] - _MARGIN_PX, 0), rows[-1] + _MARGIN_PX + 1),
         slice(max(columns[0] - _MARGIN_PX, 0), columns[-1] + _MARGIN_PX + 1),
     )
-    part = gaussian_filter(stripe[window].astype(np.float32), settings.blur_px, truncate=5.0, mode="constant")
+    part = gaussian_blur(stripe[window].astype(np.float32), settings.blur_px, truncate=5.0, mode="constant")
     if settings.speckle > 0.0:
         sigma = 0.55
-        grain = gaussian_filter(random.standard_normal(part.shape, dtype=np.float32), sigma, truncate=6.0)
-        steps = np.arange(-3, 4)
-        kernel = np.exp(-0.5 * (steps / sigma) ** 2)
-        grain /= (kernel**2).sum() / kernel.sum() ** 2  # white noise keeps this share of its standard deviation
+        grain = gaussian_blur(random.standard_normal(part.shape, dtype=np.float32), sigma, truncate=6.0)
+        grain /= (gaussian_kernel(sigma, 3) ** 2).sum()  # white noise keeps this share of its standard deviation
         part *= np.maximum(1.0 + settings.speckle * grain, 0.0)
     line[window] = part
     return line

@@ -47,7 +47,7 @@ def shoot(
         for camera, part in tasks:
             yield camera, studio.shoot(camera, part)
         return
-    # Spawned, since open3d hangs in forked processes; a few tasks ahead, so that pictures do not pile up.
+    # Spawned: a forked process has locks of threads that it has not. A few tasks ahead, lest pictures pile up.
     with ProcessPoolExecutor(workers, get_context("spawn"), _open_studio, (meshes, surface, settings)) as pool:
         todo = iter(tasks)
         running: deque[tuple[int, Future[list[bytes]]]] = deque()

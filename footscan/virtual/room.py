@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
+from footscan.portable import cos_sin, dot, exp, gaussian_blur
 from footscan.virtual.scanner import HEIGHT, WIDTH, Camera
 from footscan.virtual.scene import Scene
 from footscan.virtual.texture import Texture
@@ -92,8 +92,8 @@ def _room_light(
     points = origins[hits.ray] + hits.distance[:, None] * directions[hits.ray]
     front = np.einsum("ij,ij->i", hits.facet_normals, directions[hits.ray]) < 0.0
     up = hits.normals[:, 2]
-    lamps = np.maximum(hits.normals @ (_LAMPS / np.linalg.norm(_LAMPS)), 0.0)
-    near_glass = 1.0 - 0.6 * np.exp(-np.maximum(points[:, 2], 0.0) / 6.0) * (up < 0.3)
+    lamps = np.maximum(dot(hits.normals, _LAMPS / np.sqrt((_LAMPS**2).sum())), 0.0)
+    near_glass = 1.0 - 0.6 * exp(-np.maximum(points[:, 2], 0.0) / 6.0) * (up < 0.3)
     return hits.ray, front * (0.28 + 0.18 * up + 0.54 * lamps) * near_glass * texture.at(points)
 
 
@@ -104,14 +104,15 @@ def _hardware(random: np.random.Generator) -> Floats:
     grey = 0.16 + slope[0] * (columns / WIDTH - 0.5) + slope[1] * (rows / HEIGHT - 0.5)
     for _ in range(7):
         angle, offset, breadth = random.uniform(0.0, np.pi), random.uniform(-260.0, 260.0), random.uniform(6.0, 50.0)
-        across = np.cos(angle) * (columns - 320.0) + np.sin(angle) * (rows - 240.0) - offset
+        cos, sin = cos_sin(np.degrees(angle))
+        across = cos * (columns - 320.0) + sin * (rows - 240.0) - offset
         grey = np.where(np.abs(across) < breadth / 2.0, random.uniform(0.02, 0.3), grey)
     side, length = random.integers(4), random.uniform(100.0, 220.0)
     start = random.uniform(0.0, (WIDTH if side < 2 else HEIGHT) - length)
     along, depth = (columns, rows) if side < 2 else (rows, columns)
     depth = depth if side % 2 == 0 else depth.max() - depth
     grey = np.where((along > start) & (along < start + length) & (depth < random.uniform(15.0, 40.0)), 1.1, grey)
-    grey = gaussian_filter(np.maximum(grey, 0.01), 2.5)
+    grey = gaussian_blur(np.maximum(grey, 0.01), 2.5)
     tint = np.array([1.0, 0.97, 0.93]) * random.normal(1.0, 0.03, 3)
     return np.asarray(grey[:, :, None] * tint)
 
@@ -123,7 +124,8 @@ def _glints(random: np.random.Generator) -> Floats:
     for _ in range(3):
         i, j = random.uniform(8, WIDTH - 8), random.uniform(8, HEIGHT - 8)
         angle, size, stretch = random.uniform(0, np.pi), random.uniform(0.9, 2.2), random.uniform(1.0, 4.0)
-        along = (np.cos(angle) * (columns - i) + np.sin(angle) * (rows - j)) / (size * stretch)
-        across = (np.cos(angle) * (rows - j) - np.sin(angle) * (columns - i)) / size
-        picture += random.uniform(0.6, 5.0) * np.exp(-0.5 * (along**2 + across**2))
+        cos, sin = cos_sin(np.degrees(angle))
+        along = (cos * (columns - i) + sin * (rows - j)) / (size * stretch)
+        across = (cos * (rows - j) - sin * (columns - i)) / size
+        picture += random.uniform(0.6, 5.0) * exp(-0.5 * (along**2 + across**2))
     return picture

@@ -7,11 +7,12 @@ laser plane, at +X, where the toes point; even ones behind it, at -X; the axis o
 """
 
 from dataclasses import dataclass
-from math import cos, radians, sin
+from math import cos, radians, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.portable import product
 from footscan.virtual.glass import THICKNESS_MM, directions_from_below, exits_above
 from footscan.virtual.lens import Lens
 
@@ -61,7 +62,7 @@ class Camera:
         """
         through_glass = self.below_glass
         rays = directions_from_below(self.position, points, passes) if through_glass else points - self.position
-        return self.lens.pixels(rays @ self.rotation.T)
+        return self.lens.pixels(product(rays, self.rotation.T))
 
     def project_plane(self, y: Floats, z: Floats) -> Floats:
         """Pixels (N, 2) of points (0, y, z) on the laser plane."""
@@ -79,7 +80,7 @@ class Camera:
 
     def directions(self, pixels: Floats) -> Floats:
         """Unit directions, (N, 3), from the camera to what it sees at `pixels` (N, 2)."""
-        return self.lens.directions(pixels) @ self.rotation
+        return product(self.lens.directions(pixels), self.rotation)
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,7 @@ _LOWER_ELEVATION = -60.0
 
 def _lasers() -> tuple[Laser, ...]:
     def laser(y: float, z: float, target_z: float) -> Laser:
-        length = float(np.hypot(y, target_z - z))
+        length = sqrt(y * y + (target_z - z) ** 2)
         return Laser((0.0, y, z), (0.0, -y / length, (target_z - z) / length))
 
     return laser(205.0, 138.0, 45.0), laser(-205.0, 138.0, 45.0), laser(0.0, -190.0, 0.0)
@@ -134,11 +135,11 @@ def _camera(seed: int, camera_id: int, distortion: float) -> Camera:
     position = target + distance * outward + random.normal(0.0, 1.5, 3)
     target = target + np.array([0.0, *random.normal(0.0, 1.5, 2)])
     axis = target - position
-    axis /= np.linalg.norm(axis)
+    axis /= np.sqrt((axis**2).sum())
     # The picture's long side lies along the plane's diagonal that the camera sees without foreshortening.
     along = np.array([0.0, sin(elevation) * side, -cos(elevation)]) * (-1.0 if below else 1.0)
-    right = along - (along @ axis) * axis
-    right /= np.linalg.norm(right)
+    right = along - (along * axis).sum() * axis
+    right /= np.sqrt((right**2).sum())
     down = np.cross(axis, right)
     roll = radians(random.normal(0.0, 1.2))
     rotation = np.array([cos(roll) * right + sin(roll) * down, cos(roll) * down - sin(roll) * right, axis])

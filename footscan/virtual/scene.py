@@ -1,12 +1,13 @@
 """The filmed object: which point a ray meets, whether anything stands between two points, what lies near some X."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
+from footscan.portable import cos_sin
+from footscan.virtual.ray_tree import any_hits, first_hits, ray_tree
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -16,7 +17,7 @@ CREASE_DEGREES = 40.0
 """Faces that meet more sharply than this keep an edge; others are shaded as one smooth surface."""
 PATCH_MM = 2.0
 CLEARANCE_MM = 0.03
-"""How far a shadow ray starts from its surface: embree works in single precision, good for 3e-5 mm here."""
+"""How far a shadow ray starts from its facet, which stands for a smooth surface: its neighbours do not shade it."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +65,9 @@ class Scene:
     """A triangle mesh made ready for casting rays at it."""
 
     def __init__(self, mesh: Mesh, surface: Surface) -> None:
-        import open3d as o3d
-
         vertices, faces = mesh.vertices, mesh.faces
         self.surface = surface
-        self._tensor = o3d.core.Tensor.from_numpy
-        self._embree = o3d.t.geometry.RaycastingScene(nthreads=1)
-        self._embree.add_triangles(self._tensor(vertices.astype(np.float32)), self._tensor(faces.astype(np.uint32)))
+        self._tree = ray_tree(vertices, faces)
         corners = vertices[faces]
         crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         area = np.linalg.norm(crossed, axis=1, keepdims=True)
@@ -84,23 +81,19 @@ class Scene:
 
     def cast(self, origins: Floats, directions: Floats) -> Hits:
         """First hits of rays, each array (N, 3)."""
-        answer = self._embree.cast_rays(self._rays(origins, directions), nthreads=1)
-        distance = answer["t_hit"].numpy()
-        ray = np.flatnonzero(np.isfinite(distance))
-        face = answer["primitive_ids"].numpy()[ray].astype(np.int64)
-        u, v = answer["primitive_uvs"].numpy()[ray].astype(np.float64).T
+        met, distance, shares = first_hits(np.ascontiguousarray(origins), np.ascontiguousarray(directions), self._tree)
+        ray = np.flatnonzero(met >= 0)
+        face = met[ray]
+        u, v = shares[ray].T
         corners = self._corner_normals[face]
         normals = corners[:, 0] * (1.0 - u - v)[:, None] + corners[:, 1] * u[:, None] + corners[:, 2] * v[:, None]
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-        return Hits(ray, distance[ray].astype(np.float64), self._facet_normals[face], normals)
+        return Hits(ray, distance[ray], self._facet_normals[face], normals)
 
     def hidden(self, points: Floats, facet_normals: Floats, ends: Floats) -> NDArray[np.bool_]:
         """Whether the object stands between surface points and `ends`, all (N, 3) mm; the surface faces its end."""
         starts = points + CLEARANCE_MM * facet_normals
-        way = ends - starts
-        rays = self._rays(starts, way)
-        answer = self._embree.test_occlusions(rays, tnear=0.0, tfar=1.0 - 1e-4, nthreads=1)
-        return np.asarray(answer.numpy(), dtype=np.bool_)
+        return np.asarray(any_hits(starts, ends - starts, 1.0 - 1e-4, self._tree))
 
     def patches_near(self, x: float, reach: float) -> Floats:
         """Corners, (K, 3, 3), of small triangles that cover all of the surface within `reach` mm of X = x."""
@@ -108,20 +101,12 @@ class Scene:
         last = np.searchsorted(self._reach[:, 0], x + reach, side="right")
         return self._patches[first:last][self._reach[first:last, 1] >= x - reach]
 
-    def _rays(self, origins: Floats, directions: Floats) -> Any:
-        rays = np.empty((len(origins), 6), dtype=np.float32)
-        rays[:, :3] = origins
-        rays[:, 3:] = directions
-        return self._tensor(rays)
-
 
 def _smooth_normals(faces: Ints, crossed: Floats, facet_normals: Floats, vertices: int) -> Floats:
     """A normal for each corner of each face, (M, 3, 3): the mean of the faces around it on this side of any crease."""
     around = np.argsort(faces.ravel(), kind="stable")
     starts = np.searchsorted(faces.ravel()[around], np.arange(vertices + 1))
-    return np.asarray(
-        _mean_normals(faces, crossed, facet_normals, around // 3, starts, np.cos(np.radians(CREASE_DEGREES)))
-    )
+    return np.asarray(_mean_normals(faces, crossed, facet_normals, around // 3, starts, cos_sin(CREASE_DEGREES)[0]))
 
 
 @compiled

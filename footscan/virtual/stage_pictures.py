@@ -143,7 +143,7 @@ class StagePictures:
     def _processes(self) -> ProcessPoolExecutor:
         with self._opening:
             if self._pool is None:
-                # Spawned, since open3d hangs in forked processes.
+                # Spawned: a forked process has locks of threads that it has not.
                 spawn = get_context("spawn")
                 self._pool = ProcessPoolExecutor(self._workers, spawn, _open_studio, (self._job,))
             return self._pool

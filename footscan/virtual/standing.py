@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.portable import cos_sin, product
+
 Floats = NDArray[np.float64]
 
 BLOCK_TURN_DEG = 5.0
@@ -13,8 +15,8 @@ heads are, and none runs over a face that is square to the travel."""
 def stand_on_glass(vertices: Floats, middle_x_mm: float, turn_deg: float = 0.0) -> Floats:
     """(N, 3) `vertices`, mm, turned about Z and shifted onto the glass (Z = 0), with their middle at X and at Y = 0."""
     if turn_deg:
-        cos, sin = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
-        vertices = vertices @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        cos, sin = cos_sin(turn_deg)
+        vertices = product(vertices, np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]))
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     middle = (low + high) / 2.0
     return np.asarray(vertices + np.array([middle_x_mm - middle[0], -middle[1], -low[2]]), np.float64)

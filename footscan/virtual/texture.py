@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from footscan.compiled import compiled
+from footscan.portable import gaussian_blur
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -32,7 +32,7 @@ def random_texture(seed: int, unevenness: float) -> Texture:
     random = np.random.default_rng([seed, 3])
     field = np.zeros((_CELLS, _CELLS, _CELLS), dtype=np.float32)
     for sigma in (1.0, 6.0):
-        octave = gaussian_filter(random.standard_normal(field.shape, dtype=np.float32), sigma, mode="wrap")
+        octave = gaussian_blur(random.standard_normal(field.shape, dtype=np.float32), sigma, mode="wrap")
         field += octave / octave.std()
     return Texture(np.maximum(1.0 + unevenness / np.sqrt(2.0) * field, 0.2).astype(np.float32))
 

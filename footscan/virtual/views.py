@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.portable import dot
 from footscan.virtual.glass import exits_above, reflectance
 from footscan.virtual.scanner import HEIGHT, WIDTH, Camera
 
@@ -59,7 +60,7 @@ def camera_views(camera: Camera) -> tuple[View, View]:
     rows, columns = np.mgrid[0:HEIGHT, 0:WIDTH]
     directions = camera.directions(np.column_stack([columns.ravel(), rows.ravel()]).astype(np.float64))
     turns = _steps(directions)
-    vignetting = (directions @ camera.rotation[2]) ** 4  # the cosine-fourth law of illumination
+    vignetting = (dot(directions, camera.rotation[2]) ** 2) ** 2  # the cosine-fourth law of illumination
     once = reflectance(np.abs(directions[:, 2]))
     eye = camera.position
     if camera.below_glass:
