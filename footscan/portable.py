@@ -33,7 +33,7 @@ def exp(x: Floats) -> Floats:
     >>> exp(np.array([0.0, 1.0]))
     array([1.        , 2.71828183])
     """
-    x = np.ascontiguousarray(x, dtype=np.float64)
+    x = np.asarray(x, dtype=np.float64)
     return np.asarray(_exponentials(x.ravel()).reshape(x.shape))
 
 
