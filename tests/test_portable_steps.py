@@ -29,8 +29,8 @@ BY_PROCESSOR = {"open3d"}
 """Libraries whose results depend on the processor: Open3D by Embree."""
 DISPATCHED = {
     "exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "arcsin", "arccos", "arctan",
-    "arctan2", "sinh", "cosh", "tanh", "power", "float_power", "cbrt", "hypot", "dot", "vdot", "inner", "matmul", "tensordot",
-    "convolve", "correlate", "corrcoef", "cov", "polyfit", "lstsq",
+    "arctan2", "sinh", "cosh", "tanh", "power", "float_power", "cbrt", "hypot", "dot", "vdot", "inner", "matmul",
+    "tensordot", "convolve", "correlate", "corrcoef", "cov", "polyfit", "lstsq",
 }  # fmt: skip
 """NumPy's functions that take other instructions on other processors, with other last digits."""
 

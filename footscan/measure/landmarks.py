@@ -169,7 +169,8 @@ def _of_leg(foot: FootFrame) -> dict[str, Landmark]:
 
 
 def _under_skin(foot: FootFrame) -> dict[str, Landmark]:
-    """Bones that bulge the sides of the midfoot a little: what stands out from the straight line over their window."""
+    """Bones that bulge the sides of the midfoot a little: what stands out from the straight line over their window.
+    Without a bulge that exceeds the roughness there is no such landmark."""
     landmarks = {}
     for name, side, along, height, confidence in (
         ("navicular", 1, NAVICULAR, NAVICULAR_HEIGHT, 0.3),
@@ -184,10 +185,10 @@ def _under_skin(foot: FootFrame) -> dict[str, Landmark]:
         if most is not None:
             point = most.point + slope * most.point[0] * np.array([0.0, 1.0, 0.0])
             bulge = float(most.point[1] - (ends[0].point[1] - slope * ends[0].point[0])) * side
-            found = not most.at_border and bulge > NOTABLE_BULGE * most.residual
-            note = "a bulge of the skin; the bone lies beneath" if found else "no bulge that exceeds the roughness here"
-            method: Method = "geometric" if found else "fallback"
-            landmarks[name] = Landmark(point, method, _trust(confidence, most) * (1.0 if found else AT_BORDER), note)
+            # The outermost point of an even side lies anywhere: a last digit would move it by a centimetre.
+            if not most.at_border and bulge > NOTABLE_BULGE * most.residual:
+                note = "a bulge of the skin; the bone lies beneath"
+                landmarks[name] = Landmark(point, "geometric", _trust(confidence, most), note)
     return landmarks
 
 
