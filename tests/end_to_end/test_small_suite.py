@@ -4,12 +4,30 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+import pytest
+
+from footscan.measure.measures import measure_foot
+from footscan.surface.export import read_mesh
+
 ROOT = Path(__file__).parents[2]
+DRAWS = 6
 
 
-def test_nothing_is_worse_than_accepted(
+def test_nothing_is_worse_than_accepted_and_no_last_digit_counts(
     footscan: Callable[..., subprocess.CompletedProcess[str]], tmp_path: Path
 ) -> None:
     done = footscan("regress", ROOT / "regression/small.yaml", "--out", tmp_path, "--junit", tmp_path / "junit.xml")
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
     assert 'failures="0"' in (tmp_path / "junit.xml").read_text(encoding="utf-8")
+
+    [delivered] = (tmp_path / "results").rglob("foot.stl")
+    mesh = read_mesh(delivered)
+    vertices, faces = np.asarray(mesh.vertices, np.float64), mesh.faces
+    before = measure_foot(vertices, faces, "right").measures
+    assert len(before) > 25
+    random = np.random.default_rng(1)
+    for _ in range(DRAWS):
+        moved = measure_foot(vertices + random.normal(0.0, 1e-6, vertices.shape), faces, "right").measures
+        for name, measure in before.items():
+            assert moved[name].value == pytest.approx(measure.value, abs=0.01, rel=1e-6), name
