@@ -60,7 +60,7 @@ def make_foot(shape: FootShape = MEAN_MAN, *, side: Side = "right", resolution_m
         vertices=vertices * mirror,
         faces=faces if side == "right" else np.ascontiguousarray(faces[:, ::-1]),
         side=side,
-        measures=measures,
+        measures={name: round(value, 6) for name, value in measures.items()},
         landmarks={name: np.array(point) * mirror for name, point in landmarks.items()},
     )
 

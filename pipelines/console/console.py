@@ -2,6 +2,7 @@
 
 import logging
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
@@ -22,6 +23,7 @@ LOOKS_SECONDS = 1.0
 SHORTEST_SECONDS = 0.15
 """Between two states that pages are told of."""
 END_SECONDS = 60.0
+WARNING_SECONDS = 60.0
 
 
 class Console:
@@ -36,6 +38,7 @@ class Console:
         self._action: Action | None = None
         self._problem: str | None = None
         self._worker: threading.Thread | None = None
+        self._warning: tuple[float, str] | None = None
         self._heard: set[Callable[[], None]] = set()
         self._wake, self.closing = threading.Event(), threading.Event()
         self._seen = self._look()
@@ -131,6 +134,15 @@ class Console:
             self._sitting, self._problem = Sitting(), None
         self._wake.set()
 
+    def warn(self, words: str) -> None:
+        """Tells all pages for a while, besides the state."""
+        with self._lock:
+            self._warning = (
+                time.monotonic() + WARNING_SECONDS,
+                "".join(letter if letter.isprintable() else "?" for letter in words),
+            )
+        self._wake.set()
+
     def end(self) -> None:
         """Lasers off at once, and pages let go; may be called by a signal's handler, so it waits for nothing."""
         self.closing.set()
@@ -190,10 +202,14 @@ class Console:
         state, health = self.scanner.state, self.scanner.health()
         with self._lock:
             sitting, action, problem = self._sitting, self._action, self._problem
+            if self._warning is not None and self._warning[0] < time.monotonic():
+                self._warning = None
+            warning = None if self._warning is None else self._warning[1]
         return {
             "state": {"name": state.name, "words": state.words, "progress": state.progress},
             "action": action,
             "problem": problem,
+            "warning": warning,
             "do": guidance(state, health, action == "scan"),
             "devices": [vars(device) for device in health.devices],
             "cameras": list(health.cameras),

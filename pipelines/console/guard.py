@@ -3,6 +3,7 @@
 import hmac
 import ipaddress
 import re
+from collections.abc import Callable
 from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -14,6 +15,8 @@ COOKIE = "footscan_console"
 PAGE_HEADER = "x-footscan-page"
 PAGE = re.compile(r"[A-Za-z0-9]{8,64}")
 LARGEST_BODY = 4096
+LINKED = ("/foot/", "/pair/")
+"""What another site's page may link to, besides the first page."""
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "[::1]")
 
 POLICY = (
@@ -33,10 +36,9 @@ HEADERS = {
 class Guard:
     """Stands before the application; what it refuses, the application never sees."""
 
-    def __init__(self, app: ASGIApp, host: str, token: str | None) -> None:
+    def __init__(self, app: ASGIApp, rules: "Rules") -> None:
         self._app = app
-        self._host = host
-        self._token = token
+        self._rules = rules
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """As ASGI has it."""
@@ -54,8 +56,27 @@ class Guard:
                     headers.setdefault(name, value)
             await send(message)
 
-        answer = self._refusal(scope) or self._entrance(scope)
-        await (answer or self._app)(scope, receive, send_with_headers)
+        await (self._rules.answer(scope) or self._app)(scope, receive, send_with_headers)
+
+
+class Rules:
+    """Which requests are let in.
+
+    Parameters
+    ----------
+    host : the address that is listened on
+    token : what a browser must bring along; None where none is asked for
+    foreign : is told, in words, of each request that another site's page has made
+    """
+
+    def __init__(self, host: str, token: str | None, foreign: Callable[[str], None]) -> None:
+        self._host = host
+        self._token = token
+        self._foreign = foreign
+
+    def answer(self, scope: Scope) -> Response | None:
+        """What a request is answered that does not come in; None of one that does."""
+        return self._refusal(scope) or self._entrance(scope)
 
     def _refusal(self, scope: Scope) -> Response | None:
         """What a request is answered that must not come in; None for all others."""
@@ -64,9 +85,7 @@ class Guard:
         if len(hosts) != 1 or not self._is_ours(hosts[0]):
             return _refused(421, "this server is asked by its own address only")
         if scope["method"] in {"GET", "HEAD"}:
-            is_foreign = headers.get("sec-fetch-site") in {"cross-site", "same-site"}
-            foreign = is_foreign and headers.get("sec-fetch-mode") != "navigate"
-            return _refused(403, "another site has no business here") if foreign else None
+            return None if self._may_look(scope["path"], headers) else self._of_another_site(scope, headers)
         if scope["method"] != "POST":
             return _refused(405, "expected GET or POST")
         from_own_page = (
@@ -75,11 +94,25 @@ class Guard:
             and PAGE.fullmatch(headers.get(PAGE_HEADER, "")) is not None
         )
         if not from_own_page:
-            return _refused(403, "expected a request of this server's own page")
+            return self._of_another_site(scope, headers)
         length = headers.get("content-length", "")
         if not length.isascii() or not length.isdigit() or int(length[:9]) > LARGEST_BODY:
             return _refused(413, f"expected a body of a told length, up to {LARGEST_BODY} bytes")
         return None
+
+    def _may_look(self, path: str, headers: Headers) -> bool:
+        """Whether a page may be read: another site may link to pages, and have nothing else."""
+        if path == "/events" and "text/event-stream" not in headers.get("accept", ""):
+            return False  # a link, which would make whoever follows it look on, perhaps in charge
+        if headers.get("sec-fetch-site") not in {"cross-site", "same-site"}:
+            return True
+        is_link = headers.get("sec-fetch-mode") == "navigate"
+        return is_link and (path == "/" or path.startswith(LINKED))
+
+    def _of_another_site(self, scope: Scope, headers: Headers) -> Response:
+        by = headers.get("origin") or headers.get("referer") or "a page that does not say where it is from"
+        self._foreign(f"{by[:80]} asked this scanner for {scope['path'][:40]} and was refused")
+        return _refused(403, "expected a request of this server's own page")
 
     def _entrance(self, scope: Scope) -> Response | None:
         """The way in with a token: the first visit brings it along and is given a cookie."""

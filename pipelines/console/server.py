@@ -7,11 +7,12 @@ import signal
 import socket
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import uvicorn
 from pydantic import Field, ValidationError
@@ -26,7 +27,8 @@ from footscan.report.style import STYLE
 from footscan.report.viewer_script import SCRIPT
 from pipelines.console.console import Console
 from pipelines.console.foot_page import foot_page
-from pipelines.console.guard import LARGEST_BODY, PAGE, PAGE_HEADER, Guard
+from pipelines.console.gate import LARGEST_HEAD, Gate, Stop, hand_over_to
+from pipelines.console.guard import LARGEST_BODY, PAGE, PAGE_HEADER, Guard, Rules
 from pipelines.console.live_picture import LivePictures
 from pipelines.console.pair_page import pair_page
 from pipelines.console.results import KINDS, read_result
@@ -35,11 +37,15 @@ from pipelines.console.sitting_page import sitting_page
 from schemas.documents import Document, Pseudonym
 from schemas.errors import Fault, FootscanError, RefusedInput
 
+_Made = TypeVar("_Made")
+
 STATIC = Path(__file__).with_name("static")
 SCRIPTS = ("link.js", "sitting.js", "foot.js")
 ALIVE_SECONDS = 10.0
 """After so long without a change a page is told that the server is there."""
 PAGES_KEPT = 4
+WORKERS = 2
+"""Threads that make pages and read results."""
 REPORT_POLICY = (
     "sandbox allow-scripts; default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 )
@@ -64,9 +70,30 @@ class JogAsked(Document):
 class ConsoleServer(uvicorn.Server):
     """Ends on Ctrl-C and SIGTERM without raising them again: the command lets the scanner go afterwards."""
 
-    def __init__(self, config: uvicorn.Config, ends: Callable[[], None]) -> None:
+    def __init__(self, config: uvicorn.Config, ends: Callable[[], None], stop: Stop) -> None:
         super().__init__(config)
         self._ends = ends
+        self._stop = stop
+        self._gate: Gate | None = None
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """As uvicorn has it, but the one of `sockets` is watched by the gate."""
+        await super().startup([])
+        [listening] = sockets or []
+        self._gate = Gate(listening, hand_over_to(asyncio.get_running_loop(), self._protocol), self._stop)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """As uvicorn has it."""
+        if self._gate is not None:
+            self._gate.close()
+        await super().shutdown(sockets)
+
+    def _protocol(self) -> asyncio.Protocol:
+        made = self.config.http_protocol_class(  # type: ignore[call-arg]
+            config=self.config, server_state=self.server_state, app_state=self.lifespan.state
+        )
+        assert isinstance(made, asyncio.Protocol)
+        return made
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -106,8 +133,9 @@ def listen(host: str, port: int) -> socket.socket:
 
 def server_of(console: Console, host: str, token: str | None) -> ConsoleServer:
     """What serves the console; `run` it with the socket of `listen`, or have `serve` awaited."""
+    rules = Rules(host, token, console.warn)
     config = uvicorn.Config(
-        application(console, host, token),
+        _application(console, rules),
         log_level="critical",
         access_log=False,
         server_header=False,
@@ -116,13 +144,18 @@ def server_of(console: Console, host: str, token: str | None) -> ConsoleServer:
         http="h11",
         timeout_graceful_shutdown=3,
         timeout_keep_alive=15,
-        h11_max_incomplete_event_size=16 * 1024,
+        h11_max_incomplete_event_size=LARGEST_HEAD,
+        headers=[("connection", "close")],  # each request comes in by the gate
     )
-    return ConsoleServer(config, console.end)
+    return ConsoleServer(config, console.end, partial(_stopped, console, rules))
 
 
 def application(console: Console, host: str, token: str | None) -> Starlette:
-    """The application behind its guard; `host` and `token` as `Guard` has them."""
+    """The application behind its guard; `host` and `token` as `Rules` has them."""
+    return _application(console, Rules(host, token, console.warn))
+
+
+def _application(console: Console, rules: Rules) -> Starlette:
     pages = _Pages(console)
     actions = {
         "connect": lambda page, _: console.connect(page),
@@ -146,7 +179,7 @@ def application(console: Console, host: str, token: str | None) -> Starlette:
             Route("/cameras/{camera:int}.jpg", pages.picture),
             *(Route(f"/do/{name}", partial(_do, act), methods=["POST"], name=name) for name, act in actions.items()),
         ],
-        middleware=[Middleware(Guard, host=host, token=token)],
+        middleware=[Middleware(Guard, rules=rules)],
         exception_handlers={RefusedInput: _not_there},
     )
 
@@ -156,11 +189,16 @@ class _Pages:
 
     def __init__(self, console: Console) -> None:
         self._console = console
+        self._workers = ThreadPoolExecutor(WORKERS, thread_name_prefix="console: pages")
         self._pictures = LivePictures()
         self._foot = lru_cache(PAGES_KEPT)(self._foot_page)
 
     def _foot_page(self, patient: str, scan: str, _version: int) -> str:
         return foot_page(self._console.archive, self._console.results, patient, scan)
+
+    async def _worked(self, make: Callable[[], _Made]) -> _Made:
+        """What `make` makes in one of a few threads: more of them would take the processor from Stop and the board."""
+        return await asyncio.get_running_loop().run_in_executor(self._workers, make)
 
     async def sitting(self, _: Request) -> Response:
         return HTMLResponse(sitting_page())
@@ -172,15 +210,15 @@ class _Pages:
             version = hash(read_result(self._console.results, patient, scan, "measures.json"))
             return self._foot(patient, scan, version)
 
-        return HTMLResponse(await run_in_threadpool(made))
+        return HTMLResponse(await self._worked(made))
 
     async def pair(self, request: Request) -> Response:
         names = (request.path_params[name] for name in ("patient", "left", "right"))
-        return HTMLResponse(await run_in_threadpool(pair_page, self._console.results, *names))
+        return HTMLResponse(await self._worked(partial(pair_page, self._console.results, *names)))
 
     async def result(self, request: Request) -> Response:
         patient, scan, name = (request.path_params[part] for part in ("patient", "scan", "name"))
-        content = await run_in_threadpool(read_result, self._console.results, patient, scan, name)
+        content = await self._worked(partial(read_result, self._console.results, patient, scan, name))
         if name.endswith(".html"):
             return Response(content, media_type=KINDS[".html"], headers={"content-security-policy": REPORT_POLICY})
         headers = {"content-disposition": f'attachment; filename="{patient}-{scan}-{name}"'}
@@ -192,7 +230,7 @@ class _Pages:
         if jpeg is None:
             return Response(status_code=204)
         try:
-            drawn, points = await run_in_threadpool(self._pictures.drawn, camera, jpeg)
+            drawn, points = await self._worked(partial(self._pictures.drawn, camera, jpeg))
         except ValueError:
             return Response(status_code=204)
         return Response(drawn, media_type="image/jpeg", headers={"x-stripe-points": str(points)})
@@ -226,6 +264,18 @@ class _Pages:
         finally:
             unhear()
             console.leave(page)
+
+
+def _stopped(console: Console, rules: Rules, scope: dict[str, Any]) -> tuple[int, bytes]:
+    """Stops, where the request may: the status and body of the answer."""
+    refusal = rules.answer(scope)
+    if refusal is not None:
+        return refusal.status_code, bytes(refusal.body)
+    try:
+        console.stop()
+    except FootscanError as error:
+        return (409 if isinstance(error, RefusedInput) else 502), json.dumps({"problem": str(error)}).encode()
+    return 204, b""
 
 
 async def _do(act: Callable[[str, bytes], None], request: Request) -> Response:

@@ -62,7 +62,7 @@ const footscan = (() => {
     element("progress").hidden = progress === null;
     if (progress !== null) element("progress").value = progress;
     element("others").hidden = seen.in_charge || !seen.others;
-    told(seen.problem && !words.includes(seen.problem) ? seen.problem : "");
+    told([seen.warning, words.includes(seen.problem) ? null : seen.problem].filter(Boolean).join(". "));
     for (const listener of listeners) listener(seen);
   }
 
