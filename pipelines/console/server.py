@@ -22,6 +22,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
+from footscan.capture.way_out import ending_signals
 from footscan.report.style import STYLE
 from footscan.report.viewer_script import SCRIPT
 from pipelines.console.console import Console
@@ -62,11 +63,16 @@ class JogAsked(Document):
 
 
 class ConsoleServer(uvicorn.Server):
-    """Ends on Ctrl-C and SIGTERM without raising them again: the command lets the scanner go afterwards."""
+    """Ends on signals without raising them again: the command lets the scanner go afterwards.
+
+    The heads stop at once, see `signals_end_the_program`; they do not wait for what is done here.
+    """
 
     def __init__(self, config: uvicorn.Config, ends: Callable[[], None]) -> None:
         super().__init__(config)
         self._ends = ends
+        self.ended_by: int | None = None
+        """The signal that ended it."""
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -74,7 +80,7 @@ class ConsoleServer(uvicorn.Server):
         if threading.current_thread() is not threading.main_thread():
             yield
             return
-        before = {number: signal.signal(number, self.handle_exit) for number in (signal.SIGINT, signal.SIGTERM)}
+        before = {number: signal.signal(number, self.handle_exit) for number in ending_signals()}
         try:
             yield
         finally:
@@ -83,6 +89,7 @@ class ConsoleServer(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """As uvicorn has it."""
+        self.ended_by = self.ended_by or sig
         self._ends()
         super().handle_exit(sig, frame)
 
