@@ -32,7 +32,7 @@ class LastStop:
 
         Returns
         -------
-        confirmed : whether the board has begun anew, or told an alarm. A board whose connection is lost does not count as stopped.
+        confirmed : whether the board has begun anew, or told an alarm. One whose connection is lost has not.
         """
         with self._stopping:
             if self._confirmed is not None:

@@ -150,6 +150,7 @@ def application(console: Console, host: str, token: str | None) -> Starlette:
             Route("/results/{patient}/{scan}/{name}", pages.result),
             Route("/static/{name}", _static),
             Route("/events", pages.events),
+            Route("/here", pages.here, methods=["POST"]),
             Route("/cameras/{camera:int}.jpg", pages.picture),
             *(Route(f"/do/{name}", partial(_do, act), methods=["POST"], name=name) for name, act in actions.items()),
         ],
@@ -203,6 +204,11 @@ class _Pages:
         except ValueError:
             return Response(status_code=204)
         return Response(drawn, media_type="image/jpeg", headers={"x-stripe-points": str(points)})
+
+    async def here(self, request: Request) -> Response:
+        """Of a page that moves heads: no thread of the pool is needed, for it may not come late."""
+        self._console.here(request.headers[PAGE_HEADER])
+        return Response(status_code=204)
 
     async def events(self, request: Request) -> Response:
         page = request.query_params.get("page", "")
