@@ -14,12 +14,14 @@ from typing import Self
 from footscan.capture.board_state import BoardState, state_from
 from footscan.capture.conversation import Conversation
 from footscan.capture.grbl_codes import alarm_in_words
-from footscan.capture.grbl_report import Feedback, Message, Report, Setting
+from footscan.capture.grbl_report import Feedback, Message, Setting
 from footscan.capture.grbl_settings import SAME, BoardSettings, setting_line
+from footscan.capture.last_stop import HOLD, LastStop, slows_down
 from footscan.capture.status_poll import TimedReport
+from footscan.capture.way_out import BOARDS
 from schemas.errors import Fault, RefusedInput
 
-HOLD, RESUME, DOOR, JOG_CANCEL, RESET = b"!", b"~", b"\x84", b"\x85", b"\x18"
+RESUME, DOOR, JOG_CANCEL, RESET = b"~", b"\x84", b"\x85", b"\x18"
 OVERRIDES_AWAY = b"\x90\x95\x99"
 """Feed, rapids and power as programmed: a disturbed byte may have changed them."""
 CONNECT_SECONDS = 8.0
@@ -54,8 +56,10 @@ class Controller:
         self._closing = threading.Lock()
         self._closed = False
         self._board = Conversation(port, patience_seconds)
+        self._last_stop = LastStop(self._board)
         atexit.register(self.close)
         try:
+            BOARDS.enlist(self._last_stop)
             self._connect()
             if settings is not None:
                 self.check(settings)
@@ -269,6 +273,7 @@ class Controller:
                 if self._board.lost is None and self._board.welcomes:
                     self._stop_quietly()
             finally:
+                BOARDS.dismiss(self._last_stop)
                 self._closed = True
                 self._board.close()
 
@@ -317,7 +322,7 @@ class Controller:
         if report.state in ("Run", "Jog"):
             self.hold()
         deadline = time.monotonic() + self._board.patience_seconds
-        while _slows_down(report) and time.monotonic() < deadline:
+        while slows_down(report) and time.monotonic() < deadline:
             report = self.status().report
 
     def _stop_quietly(self) -> None:
@@ -326,11 +331,6 @@ class Controller:
             self.stop()
         except Fault:
             return
-
-
-def _slows_down(report: Report) -> bool:
-    """Whether heads move that are to come to a halt."""
-    return report.state in ("Run", "Jog") or (report.state, report.substate) in (("Hold", 1), ("Door", 2))
 
 
 def _holds(line: str, found: dict[int, float]) -> bool:

@@ -20,6 +20,8 @@ from schemas.errors import Fault, RefusedInput
 RX_BYTES = 127
 """What the board's receive buffer of 128 bytes holds for certain."""
 LONGEST_LINE = 79
+CLOSED = "closed"
+"""Why a connection is lost that we have ended."""
 RESET = b"\x18"
 RESETS = 3
 """How often a reset is tried: its byte may be lost."""
@@ -68,6 +70,8 @@ class Conversation:
         self.lost: str | None = None
         """Why there is no connection any longer."""
         self.welcomes = 0
+        self.standstills = 0
+        """How often it said welcome or told an alarm: motion and light had ended."""
         self.changed = threading.Condition()
         """Told of everything that is heard."""
         self._ending = False
@@ -80,7 +84,7 @@ class Conversation:
     def close(self) -> None:
         """Ends all threads; every line that waits fails."""
         self.poll.close()
-        self.lose("closed")
+        self.lose(CLOSED)
         self._line.close()
 
     def write(self, data: bytes) -> float:
@@ -157,11 +161,25 @@ class Conversation:
             self.refuse_lost()
             return self.welcomes > before
 
-    def let_go(self) -> None:
-        """Every line that waits fails, and answers mean nothing until a reset, which must follow."""
-        with self.changed:
-            self._ending = True
-            self._fail_pending("stopped")
+    def write_past_all(self, data: bytes) -> bool:
+        """Sends realtime commands although another thread's write hangs; whether they went."""
+        return self._line.write_past_all(data)
+
+    def seal(self, why: str | None) -> None:
+        """From now on nothing goes out but queries, holds and resets, and all else fails with `why`; None ends that."""
+        self._line.sealed = why
+
+    def let_go(self, why: str = "stopped", wait_seconds: float = -1.0) -> None:
+        """Every line that waits fails and says `why`, and answers mean nothing until a reset, which must follow.
+
+        Gives up where another thread holds on to the conversation for `wait_seconds`; without them it waits.
+        """
+        if self.changed.acquire(timeout=wait_seconds):
+            try:
+                self._ending = True
+                self._fail_pending(why)
+            finally:
+                self.changed.release()
 
     def refuse_lost(self) -> None:
         """Fault where there is no connection."""
@@ -257,6 +275,7 @@ class Conversation:
 
     def _take_alarm(self, number: int) -> None:
         self.alarm = number
+        self.standstills += 1
         self.homed = False
         self.deaf = number in DEAF
         self.restarting = number not in NO_RESTART
@@ -266,6 +285,7 @@ class Conversation:
     def _take_welcome(self, version: str) -> None:
         self.version = version
         self.welcomes += 1
+        self.standstills += 1
         self.restarting = self.deaf = self._ending = False
         self.poll.forget()
         self._fail_pending("the board has begun anew")

@@ -16,6 +16,10 @@ BYTES_PER_SECOND = BAUD / 10
 LOOKS_EVERY_SECONDS = 0.2
 """How long a read waits for bytes; a line that is closed ends within this."""
 WRITE_SECONDS = 1.0
+PAST_ALL_SECONDS = 0.02
+"""How long the last stop waits for another thread's write, which takes no time where the system takes the bytes."""
+HARMLESS = (b"?", b"!", b"\x18")
+"""Query, feed hold and reset: they move and light nothing."""
 GONE = (errno.EIO, errno.ENODEV, errno.ENXIO, errno.EBADF)
 """What the system says of a port whose cable was pulled."""
 LONGEST_LINE = 400
@@ -44,6 +48,8 @@ class SerialLine:
         self._on_line = on_line
         self._on_lost = on_lost
         self._open = True
+        self.sealed: str | None = None
+        """Why nothing goes out but what stops the board; None where all does."""
         self._writing = threading.Lock()
         self._losing = threading.Lock()
         self._port = _opened(port)
@@ -59,12 +65,25 @@ class SerialLine:
             with self._writing:
                 if not self._open:
                     raise Fault("the connection to the board is closed")
+                if self.sealed is not None and data not in HARMLESS:
+                    raise Fault(self.sealed)
                 seconds = time.monotonic()
                 self._port.write(data)
                 return seconds
         except (OSError, termios_error) as error:  # SerialException is an OSError
             self._lose(error)
             raise Fault(f"the connection to the board is lost ({_reason(error)})") from None
+
+    def write_past_all(self, data: bytes) -> bool:
+        """Sends a realtime command although another thread's write hangs; whether it went. It may stand amid a line."""
+        waited = self._writing.acquire(timeout=PAST_ALL_SECONDS)
+        try:
+            return self._open and os.write(self._port.fileno(), data) == len(data)
+        except (OSError, termios_error, TypeError):  # pyserial's own state is gone when closed under it
+            return False
+        finally:
+            if waited:
+                self._writing.release()
 
     def close(self) -> None:
         """Ends the thread and closes the port."""

@@ -1,6 +1,7 @@
 """`footscan console`."""
 
 import secrets
+import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from footscan.capture.way_out import EndedBySignal
 from pipelines.cli.live_options import VIRTUAL_FOLDER, RigFile, Virtual, VirtualFolder, opened_rig, plain_world
 from pipelines.cli.output import message
 
@@ -15,6 +17,8 @@ if TYPE_CHECKING:
     from pipelines.console.scanner import Scanner
 
 LOOPBACK = "127.0.0.1"
+ASKED_TO_END = (None, signal.SIGINT, signal.SIGTERM)
+"""The ordinary ways to end a console; after others its exit status tells the signal."""
 EVERYWHERE = ("0.0.0.0", "::")
 
 
@@ -51,7 +55,10 @@ def console(
             shown = "ADDRESS-OF-THIS-COMPUTER"
         print(f"http://{shown}:{socket.getsockname()[1]}/{f'?token={token}' if token else ''}", flush=True)
         one.connect()
-        server_of(one, host, token).run(sockets=[socket])
+        server = server_of(one, host, token)
+        server.run(sockets=[socket])
+    if server.ended_by not in ASKED_TO_END:
+        raise EndedBySignal(server.ended_by)
     message("the lasers are off, the console has ended")
 
 

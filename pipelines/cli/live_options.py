@@ -39,19 +39,24 @@ class OpenRig:
 
 @contextmanager
 def opened_rig(rig: Path | None, folder: Path, world: "World | None", *, calibrated: bool = False) -> Iterator[OpenRig]:
-    """The rig of a file, or the virtual one of `folder` in a `world`; `calibrated` as in `virtual_rig`."""
+    """The rig of a file, or the virtual one of `folder` in a `world`; `calibrated` as in `virtual_rig`.
+
+    While it is open, a signal that ends the program stops heads and lasers first.
+    """
+    from footscan.capture.way_out import signals_end_the_program
     from pipelines.live.rig_file import read_rig
 
-    if world is None:
-        file = rig or RIG
-        yield OpenRig(read_rig(file), file)
-        return
-    if rig is not None:
-        raise RefusedInput("--rig", "goes without --virtual, which has a rig of its own")
-    from pipelines.live.virtual_rig import virtual_rig
+    with signals_end_the_program():
+        if world is None:
+            file = rig or RIG
+            yield OpenRig(read_rig(file), file)
+            return
+        if rig is not None:
+            raise RefusedInput("--rig", "goes without --virtual, which has a rig of its own")
+        from pipelines.live.virtual_rig import virtual_rig
 
-    with virtual_rig(folder, world, _Told(), calibrated=calibrated) as one:
-        yield OpenRig(one.rig, one.file, one.world)
+        with virtual_rig(folder, world, _Told(), calibrated=calibrated) as one:
+            yield OpenRig(one.rig, one.file, one.world)
 
 
 def plain_world(virtual: bool, folder: Path, subject: Literal["block", "nothing"] = "nothing") -> "World | None":

@@ -7,6 +7,7 @@ import sys
 
 import typer
 
+from footscan.capture.way_out import EndedBySignal
 from pipelines.cli import (
     cache,
     calibration,
@@ -30,6 +31,7 @@ from pipelines.cli import (
     verify,
     why,
 )
+from pipelines.cli.output import drop_unwritten, message
 from schemas.errors import Fault, FootscanError, RefusedInput, one_line
 
 INTERRUPTED = 130
@@ -38,7 +40,8 @@ app = typer.Typer(
     name="footscan",
     help="Turn the films of a laser-stripe foot scanner into a measured 3D foot.",
     epilog="Exit status: 0 done; 1 done, with scans that failed, a calibration beyond its tolerance or a damaged "
-    "cache; 2 wrong use or refused input; 3 fault of the machine.",
+    "cache; 2 wrong use or refused input; 3 fault of the machine; 128 and the signal's number when ended by one "
+    "(130 Ctrl-C, 143 SIGTERM, 129 SIGHUP, 131 SIGQUIT).",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -77,7 +80,9 @@ def main() -> None:
     logging.basicConfig(format="footscan: %(message)s", level=logging.WARNING)
     if os.environ.get("FOOTSCAN_DEBUG"):
         logging.getLogger("footscan").setLevel(logging.DEBUG)
-    sys.exit(run_command(sys.argv[1:]))
+    status = run_command(sys.argv[1:])
+    drop_unwritten()
+    sys.exit(status)
 
 
 def run_command(arguments: list[str]) -> int:
@@ -90,8 +95,11 @@ def run_command(arguments: list[str]) -> int:
     except (FootscanError, typer.TyperException, typer.Abort, KeyboardInterrupt, OSError, MemoryError) as error:
         problem, status = _explain(error)
         if problem:
-            print(f"footscan: {problem}", file=sys.stderr)
+            message(f"footscan: {problem}")
         return status
+    except EndedBySignal as end:
+        message(f"footscan: {end}")
+        return 128 + end.number
 
 
 def _explain(error: BaseException) -> tuple[str, int]:

@@ -4,6 +4,7 @@ import json
 import os
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,8 +16,20 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document in
 
 
 def message(text: str) -> None:
-    """A line for the person at the terminal."""
-    print(text, file=sys.stderr)
+    """A line for the person at the terminal; where that is gone, nobody can read it."""
+    with suppress(OSError):
+        print(text, file=sys.stderr)
+
+
+def drop_unwritten() -> None:
+    """Keeps what a terminal or a pipe that is gone did not take from changing the exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, stream.fileno())
+            os.close(nowhere)
 
 
 def keep_inputs(outputs: Iterable[Path | None], *inputs: Path) -> None:

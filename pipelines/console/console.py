@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from pipelines.console.charge import Charge
 from pipelines.console.guidance import guidance
+from pipelines.console.presence import Presence
 from pipelines.console.scanner import Scanner, Side
 from pipelines.console.sitting import ScannedFoot, Sitting, judged
 from schemas.documents import pseudonym
@@ -35,6 +36,7 @@ class Console:
         self._lock = threading.Lock()
         self._charge = Charge()
         self._sitting = Sitting()
+        self._presence = Presence()
         self._action: Action | None = None
         self._problem: str | None = None
         self._worker: threading.Thread | None = None
@@ -94,8 +96,17 @@ class Console:
         self._begin(page, "home", self.scanner.home)
 
     def jog(self, page: str, by_mm: float, head: int | None) -> None:
-        """Begins to move heads in the dark."""
-        self._begin(page, "jog", lambda: self.scanner.jog(by_mm, head))
+        """Begins to move heads in the dark; they stop where the page is not `here` any longer."""
+
+        def move() -> None:
+            with self._presence.needed(page, self.scanner.stop):
+                self.scanner.jog(by_mm, head)
+
+        self._begin(page, "jog", move)
+
+    def here(self, page: str) -> None:
+        """A page that moves heads is still there; waits for nothing."""
+        self._presence.here(page)
 
     def shine(self, page: str) -> None:
         """Lights the heads for a few seconds."""

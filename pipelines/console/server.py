@@ -23,6 +23,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
+from footscan.capture.way_out import ending_signals
 from footscan.report.style import STYLE
 from footscan.report.viewer_script import SCRIPT
 from pipelines.console.console import Console
@@ -43,6 +44,8 @@ STATIC = Path(__file__).with_name("static")
 SCRIPTS = ("link.js", "sitting.js", "foot.js")
 ALIVE_SECONDS = 10.0
 """After so long without a change a page is told that the server is there."""
+CONFIRM_SECONDS = 0.15
+"""How long the answer to Stop waits for the board."""
 PAGES_KEPT = 4
 WORKERS = 2
 """Threads that make pages and read results."""
@@ -68,13 +71,18 @@ class JogAsked(Document):
 
 
 class ConsoleServer(uvicorn.Server):
-    """Ends on Ctrl-C and SIGTERM without raising them again: the command lets the scanner go afterwards."""
+    """Ends on signals without raising them again: the command lets the scanner go afterwards.
+
+    The heads stop at once, see `signals_end_the_program`; they do not wait for what is done here.
+    """
 
     def __init__(self, config: uvicorn.Config, ends: Callable[[], None], stop: Stop) -> None:
         super().__init__(config)
         self._ends = ends
         self._stop = stop
         self._gate: Gate | None = None
+        self.ended_by: int | None = None
+        """The signal that ended it."""
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """As uvicorn has it, but the one of `sockets` is watched by the gate."""
@@ -101,7 +109,7 @@ class ConsoleServer(uvicorn.Server):
         if threading.current_thread() is not threading.main_thread():
             yield
             return
-        before = {number: signal.signal(number, self.handle_exit) for number in (signal.SIGINT, signal.SIGTERM)}
+        before = {number: signal.signal(number, self.handle_exit) for number in ending_signals()}
         try:
             yield
         finally:
@@ -110,6 +118,7 @@ class ConsoleServer(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """As uvicorn has it."""
+        self.ended_by = self.ended_by or sig
         self._ends()
         super().handle_exit(sig, frame)
 
@@ -176,6 +185,7 @@ def _application(console: Console, rules: Rules) -> Starlette:
             Route("/results/{patient}/{scan}/{name}", pages.result),
             Route("/static/{name}", _static),
             Route("/events", pages.events),
+            Route("/here", pages.here, methods=["POST"]),
             Route("/cameras/{camera:int}.jpg", pages.picture),
             *(Route(f"/do/{name}", partial(_do, act), methods=["POST"], name=name) for name, act in actions.items()),
         ],
@@ -235,6 +245,11 @@ class _Pages:
             return Response(status_code=204)
         return Response(drawn, media_type="image/jpeg", headers={"x-stripe-points": str(points)})
 
+    async def here(self, request: Request) -> Response:
+        """Of a page that moves heads: no thread of the pool is needed, for it may not come late."""
+        self._console.here(request.headers[PAGE_HEADER])
+        return Response(status_code=204)
+
     async def events(self, request: Request) -> Response:
         page = request.query_params.get("page", "")
         if PAGE.fullmatch(page) is None:
@@ -267,14 +282,29 @@ class _Pages:
 
 
 def _stopped(console: Console, rules: Rules, scope: dict[str, Any]) -> tuple[int, bytes]:
-    """Stops, where the request may: the status and body of the answer."""
+    """Stops, where the request may: the status and body of the answer.
+
+    The answer does not wait for a board that takes long to confirm; where it never does, the state tells so.
+    """
     refusal = rules.answer(scope)
     if refusal is not None:
         return refusal.status_code, bytes(refusal.body)
-    try:
-        console.stop()
-    except FootscanError as error:
-        return (409 if isinstance(error, RefusedInput) else 502), json.dumps({"problem": str(error)}).encode()
+    problems: list[FootscanError] = []
+
+    def stop() -> None:
+        try:
+            console.stop()
+        except FootscanError as error:
+            problems.append(error)
+            console.warn(f"Stop: {error}")
+
+    stopping = threading.Thread(target=stop, name="console: stop the board", daemon=True)
+    stopping.start()
+    stopping.join(CONFIRM_SECONDS)
+    if problems:
+        return (409 if isinstance(problems[0], RefusedInput) else 502), json.dumps(
+            {"problem": str(problems[0])}
+        ).encode()
     return 204, b""
 
 

@@ -13,7 +13,7 @@ from typing import Self
 
 from footscan.capture.camera_deck import CameraDeck
 from footscan.capture.camera_stream import CapturedFrame
-from footscan.capture.heads import Heads
+from footscan.capture.heads import HEADS, SLACK_MM, Heads
 from footscan.capture.passes import FilmedPass, PassPlan, film_name, film_pass
 from footscan.capture.position_log import Triple
 from footscan.capture.recording import ScanRecording
@@ -118,6 +118,7 @@ class LiveScanner:
         """Homes the heads and aligns them."""
         with self._at_work("homing"):
             self._connect_board()
+            self._refuse_stopped()
             self.heads.home()
             self._board.tell("idle")
 
@@ -126,12 +127,23 @@ class LiveScanner:
         with self._at_work("idle", "moving"):
             self._connect_board()
             heads = self.heads
+            before = heads.position_mm()
+            self._refuse_stopped()
             heads.jog(by_mm, mm_per_s, head)
-            limit = time.monotonic() + 2.0 * abs(by_mm) / mm_per_s + 5.0
-            x_mm = heads.position_mm()  # asked anew, so that the state is that after the order
-            while heads.state.name == "jogging" and time.monotonic() < limit:
-                time.sleep(WATCH_SECONDS)
-                x_mm = heads.position_mm()
+            try:
+                limit = time.monotonic() + 2.0 * abs(by_mm) / mm_per_s + 5.0
+                x_mm = heads.position_mm()  # asked anew, so that the state is that after the order
+                while heads.state.name == "jogging" and time.monotonic() < limit:
+                    time.sleep(WATCH_SECONDS)
+                    x_mm = heads.position_mm()
+                way = [by_mm if head in {None, each} else 0.0 for each in HEADS]
+                if any(abs(x - at - by) > SLACK_MM for x, at, by in zip(x_mm, before, way, strict=True)):
+                    stand = ", ".join(f"{x:.2f}" for x in x_mm)
+                    raise Fault(f"the heads were stopped at X = {stand} mm, before they were where they were sent")
+            except BaseException:
+                with suppress(Fault):  # the state tells it
+                    heads.stop()
+                raise
             self._board.tell("idle")
             return x_mm
 
@@ -261,7 +273,27 @@ class LiveScanner:
     def _at_work(self, first: Activity, words: str = "") -> Iterator[None]:
         with self._board.at_work(first, words):
             self._stopped.clear()  # a stop is of what was under way when it was pressed
+            with self._held_to_stops():
+                yield
+
+    @contextmanager
+    def _held_to_stops(self) -> Iterator[None]:
+        """Ends motion that began just after a stop was pressed, before the board had told of it."""
+        ended = threading.Event()
+
+        def watch() -> None:
+            while not ended.wait(WATCH_SECONDS):
+                if self._stopped.is_set():
+                    with suppress(Fault):  # the state tells it
+                        self._end_motion()
+
+        thread = threading.Thread(target=watch, name="watch for a stop", daemon=True)
+        thread.start()
+        try:
             yield
+        finally:
+            ended.set()
+            thread.join()
 
     @contextmanager
     def _stop_said(self) -> Iterator[None]:

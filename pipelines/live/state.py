@@ -87,7 +87,7 @@ class StateBoard:
         except FootscanError as error:
             self.tell("failed", str(error))
             raise
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SystemExit):
             self.tell("failed", "interrupted")
             raise
         except BaseException as error:

@@ -4,6 +4,7 @@ const footscan = (() => {
   const NAMES = {disconnected: "Not connected", idle: "Ready", homing: "Homing", filming: "Filming", storing: "Storing",
     reconstructing: "Reconstructing", done: "Done", failed: "Failed", "door open": "Door open", alarm: "Alarm"};
   const LEVELS = {disconnected: "bad", idle: "ok", done: "ok", failed: "bad", alarm: "bad", "door open": "warning"};
+  const PRESENT_MS = 150;
   const listeners = [];
   let latest = null;
 
@@ -29,9 +30,29 @@ const footscan = (() => {
     element("told").hidden = !words;
   }
 
+  // While heads are moved by hand the server hears several times a second that this page is there, or it stops them.
+  let present = null;
+  function stayPresent(is) {
+    if (is === (present !== null)) return;
+    let waits = false;
+    const speak = async () => {
+      if (waits) return;
+      waits = true;
+      try {
+        await fetch("/here", {method: "POST", headers: {"X-Footscan-Page": page}, priority: "high"});
+      } catch {
+        // Who does not hear it stops the heads.
+      }
+      waits = false;
+    };
+    if (!is) clearInterval(present);
+    present = is ? setInterval(speak, PRESENT_MS) : null;
+  }
+
   // Gives an order; resolves to what is wrong, or to null.
   async function act(name, body = {}) {
     let problem = null;
+    if (name === "jog") stayPresent(true);
     try {
       const answer = await fetch(`/do/${name}`, {method: "POST", body: JSON.stringify(body),
         headers: {"X-Footscan-Page": page, "Content-Type": "application/json"}});
@@ -39,6 +60,7 @@ const footscan = (() => {
     } catch {
       problem = "The server does not answer. Where light is to end at once, use the scanner’s own switch.";
     }
+    if (name === "jog" && problem) stayPresent(false);
     told(problem || "");
     return problem;
   }
@@ -53,6 +75,7 @@ const footscan = (() => {
   }
 
   function show(seen) {
+    if (latest && latest.action === "jog" && seen.action !== "jog") stayPresent(false);
     latest = seen;
     const {name, words, progress} = seen.state;
     element("state").dataset.level = LEVELS[name] || "busy";
@@ -96,6 +119,10 @@ const footscan = (() => {
     addEventListener("pagehide", () => events.close());
   }
 
+  // A page that is left, hidden or frozen shows nobody what the heads do, nor a button to stop them.
+  addEventListener("pagehide", () => stayPresent(false));
+  document.addEventListener("freeze", () => stayPresent(false));
+  document.addEventListener("visibilitychange", () => { if (document.hidden) stayPresent(false); });
   addEventListener("pageshow", event => { if (event.persisted) location.reload(); });
   element("stop").addEventListener("click", stop);
   document.addEventListener("keydown", event => {
