@@ -81,7 +81,7 @@ def main() -> None:
 
 
 def run_command(arguments: list[str]) -> int:
-    """The exit status of `footscan ARGUMENTS`; what went wrong stands on standard error in one line."""
+    """The exit status of `footscan ARGUMENTS`; what went wrong stands on standard error, each mistake in one line."""
     try:
         status = int(app(arguments, standalone_mode=False, prog_name="footscan") or 0)
         if status == INTERRUPTED:  # which is what Typer makes of it
@@ -91,6 +91,8 @@ def run_command(arguments: list[str]) -> int:
         problem, status = _explain(error)
         if problem:
             print(f"footscan: {problem}", file=sys.stderr)
+        for other in error.others if isinstance(error, RefusedInput) else ():
+            print(f"footscan: {other}", file=sys.stderr)
         return status
 
 
