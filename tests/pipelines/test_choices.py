@@ -1,0 +1,112 @@
+"""Every value of every choice among the parameters goes from films to measures."""
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from enum import Enum
+from itertools import chain
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+import pytest
+from pydantic import BaseModel
+
+from pipelines.archive import job_of_workflow, plan_job, run_job
+from pipelines.engine.pool import Threads
+from schemas.measures import Measures
+from schemas.overrides import overridden
+from schemas.quality import Quality
+from schemas.workflow import ScanParameters
+
+Choice = tuple[str, object]
+"""A parameter as `--set` names it, and one of its values."""
+
+
+def choices(model: type[BaseModel], section: str = "") -> Iterator[Choice]:
+    """Every value but the default of each parameter that takes one of a few, in `model` and in what it holds."""
+    for name, field in model.model_fields.items():
+        annotation = field.annotation
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            yield from choices(annotation, f"{section}{name}.")
+        else:
+            yield from ((f"{section}{name}", value) for value in _values(annotation) if value != field.default)
+
+
+def _values(annotation: Any) -> list[object]:
+    """The values of a choice, also of one within a union; none of what is no choice."""
+    if annotation is bool:
+        return [False, True]
+    if isinstance(annotation, type) and issubclass(annotation, Enum):
+        return [member.value for member in annotation]
+    if get_origin(annotation) is Literal:
+        return list(get_args(annotation))
+    return list(chain.from_iterable(map(_values, get_args(annotation))))
+
+
+STEP_MM = 10.0
+"""From frame to frame of the archive's films: heel and toes are known no better."""
+CHOICES = list(choices(ScanParameters))
+
+
+def test_choices_are_found_wherever_they_stand() -> None:
+    class Colour(Enum):
+        RED = "red"
+        BLUE = "blue"
+
+    class Inner(BaseModel):
+        colour: Colour = Colour.RED
+        size: Literal["small", "large"] | None = None
+        length_mm: float = 1.0
+
+    class Outer(BaseModel):
+        inner: Inner = Inner()
+        fast: bool = True
+
+    found = [("inner.colour", "red"), ("inner.colour", "blue"), ("inner.size", "small"), ("inner.size", "large")]
+    assert list(choices(Outer)) == [*found, ("fast", False)]
+    assert ("surface.method", "ball_pivoting") in CHOICES
+
+
+@pytest.fixture(scope="module")
+def bench(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The archive after a run by the defaults; each choice adds to its cache, and has results of its own."""
+    return Path(shutil.copytree(finished, tmp_path_factory.mktemp("choices") / "home"))
+
+
+@pytest.mark.parametrize(("name", "value"), CHOICES)
+def test_every_choice_runs_from_films_to_measures(bench: Path, tmp_path: Path, name: str, value: object) -> None:
+    results = run(bench, tmp_path, f"{name}={value}")
+    assert {file.name for file in results.iterdir()} == {
+        "cloud.ply", "foot.stl", "foot.ply", "measures.json", "quality.json", "report.html"
+    }  # fmt: skip
+    measures = Measures.model_validate_json((results / "measures.json").read_bytes())
+    assert measures.finding is None
+    by_default = Measures.model_validate_json((bench / "results/P0001/S1/measures.json").read_bytes())
+    assert length_mm(measures) == pytest.approx(length_mm(by_default), abs=STEP_MM)
+
+
+def test_an_open_surface_has_no_volume_and_no_skin(bench: Path, tmp_path: Path) -> None:
+    results = run(bench, tmp_path, "surface.method=ball_pivoting", "surface.hole_mm=0", "surface.slit_mm=0")
+    quality = Quality.model_validate_json((results / "quality.json").read_bytes())
+    assert quality.mesh.holes > 0
+    assert quality.mesh.filled_share == 0.0  # nothing was closed, so all of it is measured
+    measures = Measures.model_validate_json((results / "measures.json").read_bytes()).measures
+    for name in ("foot_volume", "foot_surface"):
+        assert (measures[name].value, measures[name].status) == (None, "incomplete")
+        assert "the surface has a hole of" in (measures[name].note or "")
+    print({n: (m.value, m.status, m.note) for n, m in measures.items()})
+
+
+def length_mm(measures: Measures) -> float | None:
+    return measures.measures["foot_length"].value
+
+
+def run(bench: Path, results: Path, *settings: str) -> Path:
+    """The results of the archive's scan, run with `settings` as `--set` takes them, by the archive's own cache."""
+    job = job_of_workflow(bench / "workflow.yaml")
+    parameters = overridden(ScanParameters, job.parameters.model_dump(mode="json"), settings)
+    planned = plan_job(replace(job, parameters=parameters, results=results, cache=bench / "results/.footscan"))
+    [end] = run_job(planned, Threads(2), lambda _: None)
+    assert (end.scan, end.problem) == ("P0001/S1", None)
+    assert end.folder is not None
+    return end.folder
