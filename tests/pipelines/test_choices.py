@@ -15,7 +15,6 @@ from pipelines.archive import job_of_workflow, plan_job, run_job
 from pipelines.engine.pool import Threads
 from schemas.measures import Measures
 from schemas.overrides import overridden
-from schemas.quality import Quality
 from schemas.workflow import ScanParameters
 
 Choice = tuple[str, object]
@@ -83,18 +82,6 @@ def test_every_choice_runs_from_films_to_measures(bench: Path, tmp_path: Path, n
     assert measures.finding is None
     by_default = Measures.model_validate_json((bench / "results/P0001/S1/measures.json").read_bytes())
     assert length_mm(measures) == pytest.approx(length_mm(by_default), abs=STEP_MM)
-
-
-def test_an_open_surface_has_no_volume_and_no_skin(bench: Path, tmp_path: Path) -> None:
-    results = run(bench, tmp_path, "surface.method=ball_pivoting", "surface.hole_mm=0", "surface.slit_mm=0")
-    quality = Quality.model_validate_json((results / "quality.json").read_bytes())
-    assert quality.mesh.holes > 0
-    assert quality.mesh.filled_share == 0.0  # nothing was closed, so all of it is measured
-    measures = Measures.model_validate_json((results / "measures.json").read_bytes()).measures
-    for name in ("foot_volume", "foot_surface"):
-        assert (measures[name].value, measures[name].status) == (None, "incomplete")
-        assert "the surface has a hole of" in (measures[name].note or "")
-    print({n: (m.value, m.status, m.note) for n, m in measures.items()})
 
 
 def length_mm(measures: Measures) -> float | None:
