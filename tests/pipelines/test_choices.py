@@ -1,20 +1,26 @@
 """Every value of every choice among the parameters goes from films to measures."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from enum import Enum
 from itertools import chain
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
+import numpy as np
 import pytest
 from pydantic import BaseModel
 
+from footscan.calibration.maps import to_world
 from pipelines.archive import job_of_workflow, plan_job, run_job
+from pipelines.calibration_choice import CalibrationPlace
+from pipelines.cli.main import run_command
 from pipelines.engine.pool import Threads
+from schemas.calibration import Calibration
 from schemas.measures import Measures
 from schemas.overrides import overridden
+from schemas.parameters.calibration import CalibrationParameters
 from schemas.workflow import ScanParameters
 
 Choice = tuple[str, object]
@@ -80,19 +86,41 @@ def test_every_choice_runs_from_films_to_measures(bench: Path, tmp_path: Path, n
     }  # fmt: skip
     measures = Measures.model_validate_json((results / "measures.json").read_bytes())
     assert measures.finding is None
-    by_default = Measures.model_validate_json((bench / "results/P0001/S1/measures.json").read_bytes())
-    assert length_mm(measures) == pytest.approx(length_mm(by_default), abs=STEP_MM)
+    assert length_mm(results) == pytest.approx(length_mm(bench / "results/P0001/S1"), abs=STEP_MM)
 
 
-def length_mm(measures: Measures) -> float | None:
-    return measures.measures["foot_length"].value
+@pytest.mark.parametrize(("name", "value"), list(choices(CalibrationParameters)))
+def test_every_choice_of_a_calibration_leads_to_measures(
+    bench: Path, tmp_path: Path, calibration: Callable[[], Calibration], name: str, value: object
+) -> None:
+    chart, made = tmp_path / "chart.csv", tmp_path / "calibration.json"
+    chart.write_text(chart_of(calibration()))
+    assert run_command(["calibrate", "chart", str(chart), f"--{name}", str(value), "--out", str(made)]) == 0
+    results = run(bench, tmp_path / "results", calibration=made)
+    assert length_mm(results) == pytest.approx(length_mm(bench / "results/P0001/S1"), abs=STEP_MM)
 
 
-def run(bench: Path, results: Path, *settings: str) -> Path:
+def chart_of(calibration: Calibration) -> str:
+    """Control points all over the pictures, by the maps of a calibration."""
+    lines = ["camera,point,x_mm,y_mm,z_mm,i,j"]
+    pixels = np.stack(np.meshgrid(np.arange(40.0, 620.0, 60.0), np.arange(40.0, 460.0, 60.0)), axis=-1).reshape(-1, 2)
+    for camera in calibration.cameras:
+        for number, ((i, j), (y, z)) in enumerate(zip(pixels, to_world(camera, pixels), strict=True)):
+            lines.append(f"{camera.camera},P{number},0,{y:.4f},{z:.4f},{i},{j}")
+    return "\n".join(lines) + "\n"
+
+
+def length_mm(results: Path) -> float | None:
+    return Measures.model_validate_json((results / "measures.json").read_bytes()).measures["foot_length"].value
+
+
+def run(bench: Path, results: Path, *settings: str, calibration: Path | None = None) -> Path:
     """The results of the archive's scan, run with `settings` as `--set` takes them, by the archive's own cache."""
     job = job_of_workflow(bench / "workflow.yaml")
     parameters = overridden(ScanParameters, job.parameters.model_dump(mode="json"), settings)
-    planned = plan_job(replace(job, parameters=parameters, results=results, cache=bench / "results/.footscan"))
+    places = job.calibrations if calibration is None else (CalibrationPlace(calibration),)
+    changed = replace(job, parameters=parameters, calibrations=places)
+    planned = plan_job(replace(changed, results=results, cache=bench / "results/.footscan"))
     [end] = run_job(planned, Threads(2), lambda _: None)
     assert (end.scan, end.problem) == ("P0001/S1", None)
     assert end.folder is not None
