@@ -22,12 +22,13 @@ from pipelines.engine.store import Store, open_store
 from pipelines.engine.trust import warn_if_others_can_write
 from pipelines.recorded import RecordedScan, read_scan, scan_folders
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
+from pipelines.workflow_file import check_archives, read_workflow
 from schemas.calibration import calibration_from_json
-from schemas.documents import read_text, read_yaml
+from schemas.documents import read_text
 from schemas.errors import RefusedInput
 from schemas.measures import Measures
 from schemas.scan import Scan
-from schemas.workflow import ScanParameters, Workflow
+from schemas.workflow import ScanParameters
 
 CACHE = ".footscan"
 WINDOW = 8
@@ -143,9 +144,10 @@ def job_of_workflow(path: Path, threads: int | None = None, *, may_be_empty: boo
     Raises
     ------
     RefusedInput
-        It breaks its format, the archive is empty and may not be so, or no store can lie where it says.
+        It breaks its format, an archive is missing, or empty and may not be so, or no store can lie where it says.
     """
-    workflow = read_yaml(path, Workflow)
+    workflow = read_workflow(path)
+    check_archives(path, workflow)
     base = path.resolve().parent
     archives = tuple(base / archive for archive in workflow.archive)
     results = base / workflow.results

@@ -23,11 +23,13 @@ class RefusedInput(FootscanError):
         self.source = str(source)
         self.field = field
         self.problem = problem
+        self.others: tuple[RefusedInput, ...] = ()
+        """Further mistakes in the same document, where all are told at once."""
         super().__init__(": ".join(one_line(part) for part in (self.source, field, problem) if part))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What another process makes it anew from."""
-        return partial(RefusedInput, field=self.field), (self.source, self.problem)
+        return partial(RefusedInput, field=self.field), (self.source, self.problem), {"others": self.others}
 
 
 class Finding(FootscanError):

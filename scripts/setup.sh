@@ -9,14 +9,17 @@ readonly ENVIRONMENT=.venv
 readonly STAMP=$ENVIRONMENT/ready # written last: an environment without it is not trusted
 readonly DECLARED=(pyproject.toml constraints.txt scripts/setup.sh)
 
-# Shared libraries that Open3D links even without a screen, each with its Debian package.
+# Shared libraries that Open3D, pymeshlab's plugins and Playwright's driver link even without a screen, each with its
+# Debian package. tests/test_shared_libraries.py names what is missing here.
 readonly LIBRARIES=(
   libusb-1.0.so.0=libusb-1.0-0
   libGL.so.1=libgl1
+  libOpenGL.so.0=libopengl0
   libEGL.so.1=libegl1
   libX11.so.6=libx11-6
   libudev.so.1=libudev1
   libidn2.so.0=libidn2-0
+  libatomic.so.1=libatomic1
 )
 
 main() {

@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from footscan.cloud.cells import cell_means, group_by_cell
 from footscan.surface.holes import close_holes
@@ -54,6 +55,25 @@ def mesh_cloud(
         vertices, faces = close_holes(vertices, faces, parameters.hole_mm, slit, spacing)
         faces = drop_tangles(faces)
     return used_vertices(vertices, faces)
+
+
+def nearest_points(
+    vertices: NDArray[np.floating], points: NDArray[np.floating], gap_mm: float
+) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    """Which vertices were filled: those of a patch that lie farther than `gap_mm` from all points.
+
+    Parameters
+    ----------
+    vertices : (V, 3) mm
+    points : (N, 3) mm, that the surface was made of
+
+    Returns
+    -------
+    filled : (V,)
+    nearest : (V,) number of the point that is nearest to each vertex
+    """
+    distance, nearest = KDTree(points).query(vertices)
+    return np.asarray(distance > gap_mm), np.asarray(nearest, np.int64)
 
 
 def _space_evenly(

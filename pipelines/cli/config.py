@@ -13,20 +13,19 @@ from schemas.errors import RefusedInput
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from schemas.workflow import Workflow
-
 config = typer.Typer(help="What a workflow says, and what is wrong with it.", no_args_is_help=True)
 
 
 @config.command("show")
 def show(workflow: WorkflowFile = None, settings: Settings = None, as_json: AsJson = False) -> None:
     """Every value in force, and where it comes from: a line of the file, --set, or the default."""
-    from schemas.documents import read_text, read_yaml
+    from pipelines.workflow_file import read_workflow
+    from schemas.documents import read_text
     from schemas.overrides import overridden, parse_settings
-    from schemas.workflow import ScanParameters, Workflow
+    from schemas.workflow import ScanParameters
 
     path = workflow or WORKFLOW
-    document, text = read_yaml(path, Workflow), read_text(path)
+    document, text = read_workflow(path), read_text(path)
     given = parse_settings(settings or [])
     changed = overridden(ScanParameters, document.parameters.model_dump(mode="json"), settings or [])
     rows = []
@@ -45,54 +44,17 @@ def show(workflow: WorkflowFile = None, settings: Settings = None, as_json: AsJs
 @config.command("check")
 def check(workflow: WorkflowFile = None, as_json: AsJson = False) -> int:
     """Every mistake in a workflow, with its line and column and what was expected."""
-    found = [*_mistakes(workflow or WORKFLOW)]
+    from pipelines.workflow_file import workflow_mistakes
+
+    path = workflow or WORKFLOW
+    found = workflow_mistakes(path)
     if as_json:
-        print_json(found)
-    for mistake in [] if as_json else found:
-        print("{file}:{line}:{column}: {field}: {problem}".format_map(mistake).replace(" : ", " "))
+        print_json([{"file": str(path), **mistake._asdict()} for mistake in found])
+    for line, column, field, problem in [] if as_json else found:
+        print(f"{path}:{line}:{column}: {field}: {problem}".replace(" : ", " "))
     if not found and not as_json:
-        print(f"{workflow or WORKFLOW}: nothing is wrong")
+        print(f"{path}: nothing is wrong")
     return RefusedInput.exit_status if found else 0
-
-
-def _mistakes(path: Path) -> Iterator[dict[str, Any]]:
-    """All that is wrong; a text that is no YAML has one mistake, and is told as by any other command."""
-    from pydantic import ValidationError
-
-    from schemas.documents import read_text, read_yaml_text, validate
-    from schemas.mistakes import Mistake, mistakes
-    from schemas.workflow import Workflow
-    from schemas.yaml_text import place_in_yaml
-
-    text = read_text(path)
-    value = read_yaml_text(path, text)
-    if not isinstance(value, dict):
-        validate(path, Workflow, value)
-    try:
-        document = Workflow.model_validate(value)
-        found = [Mistake(names, problem, is_name=False) for names, problem in _missing_files(path, document)]
-    except ValidationError as error:
-        found = mistakes(Workflow, error)
-    for mistake in sorted(found, key=lambda mistake: place_in_yaml(text, mistake.path, of_name=mistake.is_name)):
-        line, column = place_in_yaml(text, mistake.path, of_name=mistake.is_name)
-        field = ".".join(map(str, mistake.path))
-        yield {"file": str(path), "line": line, "column": column, "field": field, "problem": mistake.problem}
-
-
-def _missing_files(path: Path, document: "Workflow") -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """What the workflow names and is not there."""
-    base = path.resolve().parent
-    for number, archive in enumerate(document.archive):
-        if not (base / archive).is_dir():
-            yield ("archive", number), f"no such folder, expected one with scans, found {archive[:80]!r}"
-    files: list[tuple[tuple[str | int, ...], str]] = [
-        (("calibrations", n, "file"), c.file) for n, c in enumerate(document.calibrations)
-    ]
-    if document.calibration is not None:
-        files.append((("calibration",), document.calibration))
-    for names, file in files:
-        if not (base / file).is_file():
-            yield names, f"no such file, expected a calibration, found {file[:80]!r}"
 
 
 def _values(document: "BaseModel", above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:

@@ -86,7 +86,7 @@ def main() -> None:
 
 
 def run_command(arguments: list[str]) -> int:
-    """The exit status of `footscan ARGUMENTS`; what went wrong stands on standard error in one line."""
+    """The exit status of `footscan ARGUMENTS`; what went wrong stands on standard error, each mistake in one line."""
     try:
         status = int(app(arguments, standalone_mode=False, prog_name="footscan") or 0)
         if status == INTERRUPTED:  # which is what Typer makes of it
@@ -96,6 +96,8 @@ def run_command(arguments: list[str]) -> int:
         problem, status = _explain(error)
         if problem:
             message(f"footscan: {problem}")
+        for other in error.others if isinstance(error, RefusedInput) else ():
+            message(f"footscan: {other}")
         return status
     except EndedBySignal as end:
         message(f"footscan: {end}")

@@ -29,12 +29,11 @@ def tune(
     from pipelines.cli.progress import StepProgress
     from pipelines.tuning.files import write_files
     from pipelines.tuning.search import FOLDER, tune
-    from schemas.documents import read_yaml
-    from schemas.workflow import Workflow
+    from pipelines.workflow_file import read_workflow
 
     check_workers(threads, workers, cluster)
     path = workflow or WORKFLOW
-    document = read_yaml(path, Workflow)
+    document = read_workflow(path)
     if document.tune is None:
         raise RefusedInput(path, "is missing, expected what is sought", field="tune")
     job = with_settings(job_of_workflow(path, threads), settings)

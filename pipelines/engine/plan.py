@@ -119,10 +119,12 @@ def _plan_step(step: Step, planned: dict[str, PlannedStep], store: Store) -> Pla
 
 
 def _reason(step: Step, image: str, store: Store) -> str:
+    latest = store.latest(step.name)
+    if latest is None:
+        return "never run"
     if step.writes is not None and not step.writes.exists():
         return f"{step.writes.parent.name} is not there"
-    latest = store.latest(step.name)
-    row = None if latest is None else store.row(latest.key)
+    row = store.row(latest.key)
     return "never run" if row is None else reason(changes(step, row.image, json.loads(image), store))
 
 

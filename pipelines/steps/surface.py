@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from footscan.cloud.points import coordinates, stripe_step
-from footscan.surface.ball_pivoting import mesh_cloud
+from footscan.surface.ball_pivoting import mesh_cloud, nearest_points
 from footscan.surface.closed_surface import close_surface
 from footscan.surface.topology import vertex_normals
 from pipelines.arrays import pack, unpack
@@ -21,7 +21,11 @@ def run(inputs: Mapping[str, bytes], parameters: SurfaceParameters, places: Mapp
     points, step_mm = coordinates(cloud), stripe_step(cloud)
     if parameters.method == "ball_pivoting":
         vertices, faces = mesh_cloud(points, normals, step_mm, parameters)
-        return pack(vertices=vertices, faces=faces, normals=vertex_normals(vertices, faces))
+        filled, nearest = nearest_points(vertices, points, parameters.gap_steps * step_mm)
+        camera = np.where(filled, 0, cloud["camera"][nearest]).astype(np.uint8)
+        return pack(
+            vertices=vertices, faces=faces, normals=vertex_normals(vertices, faces), camera=camera, filled=filled
+        )
     mesh = close_surface(points, normals, cloud["camera"], step_mm, parameters)
     known = {"normals": mesh.normals, "camera": mesh.camera, "filled": mesh.filled}
     cut = {"cut_mm": np.array(float(mesh.metadata["cut_mm"]))} if "cut_mm" in mesh.metadata else {}

@@ -21,7 +21,7 @@ class SurfaceParameters(Document):
     reach_steps: Annotated[float, Field(ge=1, le=10)] = 1.75
     """Radius of the neighbourhood whose points draw a vertex; it must reach the next stripes."""
     gap_steps: Annotated[float, Field(gt=0, le=10)] = 0.6
-    """`closed`: a vertex that lies farther from all points counts as filled; half a step is the middle between two."""
+    """A vertex that lies farther from all points counts as filled; half a step is the middle between two."""
     spacing_steps: Annotated[float, Field(ge=0.2, le=5)] = 0.75
     """`ball_pivoting`, as all that follow: spacing that the cloud is thinned to before meshing."""
     ball_radii_steps: Annotated[tuple[Radius, ...], Field(min_length=1, max_length=8)] = (0.75, 1.25)

@@ -66,7 +66,7 @@ def test_wrong_use(
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("archive: archive", "archive: nowhere", "nowhere: no such folder"),
+        ("archive: archive", "archive: nowhere", "archive.0: no such folder, expected one with scans, found 'nowhere'"),
         ("results: results", "result: results", "unknown field, did you mean 'results'?"),
         ("results: results", "results: results\nparameters: {outliers: {z_mm: [9, 1]}}", "parameters.outliers: "),
         ("results: results", "results: results\nparameters: {outlier: {}}", "did you mean 'outliers'?"),
@@ -74,10 +74,14 @@ def test_wrong_use(
         ("workflow/1", "scan/1", "format: "),
     ],
 )
-def test_broken_workflow(refuse: Refuse, bench: Path, old: str, new: str, told: str) -> None:
+def test_broken_workflow(footscan: Footscan, bench: Path, old: str, new: str, told: str) -> None:
     file = bench / "workflow.yaml"
     file.write_text(file.read_text().replace(old, new))
-    assert told in refuse("run", file)
+    done = footscan("run", file)
+    assert (done.returncode, done.stdout) == (2, "")
+    lines = done.stderr.splitlines()
+    assert all(line.startswith(f"footscan: {file}: ") and line.endswith(")") for line in lines), done.stderr
+    assert any(told in line for line in lines), done.stderr
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def test_steps_stand_behind_those_whose_results_they_take(
 def test_nothing_has_run(archive: Any) -> None:
     steps, reasons = archive.plan()
     assert (steps, set(reasons)) == (16, ALL)
-    assert reasons["ingest-1"] == "cam1 is not there"
+    assert reasons["ingest-1"] == "never run"
     assert reasons["extract-5"] == "waits for ingest of camera 5"
     assert reasons["clean"] == "waits for map of camera 1"
     assert not archive.results.exists()

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from pipelines.recorded import RecordedScan, read_scan
 from pipelines.watch import QUIET_S, Arrivals
 
 
@@ -82,6 +83,62 @@ def test_films_of_a_clock_that_is_ahead_are_quiet_once_they_stay_as_they_are(
     clock += 0.2 * QUIET_S
     assert arrivals.complete() == [folder]
     assert arrivals.complete() == []
+
+
+@pytest.fixture
+def reads(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """The folders whose scan.yaml was read, in order."""
+    read: list[Path] = []
+
+    def counted(folder: Path, archive: Path | None = None) -> RecordedScan:
+        read.append(folder)
+        return read_scan(folder, archive)
+
+    monkeypatch.setattr("pipelines.watch.read_scan", counted)
+    return read
+
+
+def test_a_document_is_read_once_until_it_changes(arriving: tuple[Path, Path], reads: list[Path]) -> None:
+    archive, scan = arriving
+    good, waiting, broken = (archive / "P0001" / name for name in ("S1", "S2", "S3"))
+    shutil.copytree(scan, good)
+    shutil.copytree(scan, waiting, ignore=shutil.ignore_patterns("cam5.avi", "frames.zarr"))
+    broken.mkdir()
+    (broken / "scan.yaml").write_text("side: [right")
+    age(archive)
+    arrivals = Arrivals((archive,))
+    assert arrivals.complete() == [good, broken]
+    for _ in range(5):
+        assert arrivals.complete() == []
+    assert reads == [good, waiting, broken]
+
+    shutil.copy(scan / "cam5.avi", waiting)
+    age(waiting)
+    for document in (good / "scan.yaml", broken / "scan.yaml"):
+        replaced = document.with_suffix(".new")  # equal in size and time, but another file
+        replaced.write_bytes(document.read_bytes())
+        status = document.stat()
+        os.utime(replaced, ns=(status.st_atime_ns, status.st_mtime_ns))
+        replaced.replace(document)
+    assert arrivals.complete() == [waiting]
+    assert reads[3:] == [good, waiting, broken]  # `age` has touched that of the second
+    assert arrivals.complete() == []
+    assert len(reads) == 6
+
+
+def test_a_document_that_was_just_written_is_read_again(arriving: tuple[Path, Path], reads: list[Path]) -> None:
+    archive, scan = arriving
+    folder = archive / "P0001/S1"
+    shutil.copytree(scan, folder)
+    document = folder / "scan.yaml"
+    document.write_text(document.read_text())
+    arrivals = Arrivals((archive,))
+    assert arrivals.complete() == arrivals.complete() == []
+    assert reads == [folder, folder]
+    age(folder)
+    assert arrivals.complete() == [folder]
+    assert arrivals.complete() == []
+    assert reads == [folder] * 3
 
 
 def test_a_broken_document_is_handed_over_to_be_refused(arriving: tuple[Path, Path]) -> None:

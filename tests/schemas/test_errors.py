@@ -23,5 +23,8 @@ def test_refusal_without_field() -> None:
 
 
 def test_a_refusal_reaches_another_process_whole() -> None:
-    error = pickle.loads(pickle.dumps(RefusedInput("scan.yaml", "no such side", field="side")))  # as pools hand it on
+    sent = RefusedInput("scan.yaml", "no such side", field="side")
+    sent.others = (RefusedInput("scan.yaml", "is missing", field="patient"),)
+    error = pickle.loads(pickle.dumps(sent))  # as pools hand it on
+    assert [str(other) for other in error.others] == ["scan.yaml: patient: is missing"]
     assert (error.source, error.field, str(error)) == ("scan.yaml", "side", "scan.yaml: side: no such side")

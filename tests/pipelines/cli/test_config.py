@@ -113,6 +113,32 @@ def test_all_mistakes_are_told_in_the_order_of_the_file(workflow: Path, capsys: 
     assert [line.split(" ")[0] for line in lines] == ["workflow.yaml:4:1:", "workflow.yaml:8:20:", "workflow.yaml:9:5:"]
 
 
+@pytest.mark.parametrize("command", [("run",), ("run", "--watch"), ("plan",), ("tune",), ("config", "show")])
+def test_every_command_tells_all_mistakes_at_once(
+    workflow: Path, capsys: pytest.CaptureFixture[str], command: tuple[str, ...]
+) -> None:
+    text = RIGHT.replace("workers: 2", "worker: 2").replace("gravity", "gravty").replace("ridge_px: 2.5", "ridge: 2.5")
+    workflow.write_text(text)
+    assert run_command([*command]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        "footscan: workflow.yaml: worker: unknown field, did you mean 'workers'? (line 4, column 1)",
+        "footscan: workflow.yaml: parameters.extraction.centre_method: input should be 'threshold-median', 'gravity', "
+        "'gaussian', 'ridge' or 'fir', found 'gravty', did you mean 'gravity'? (line 8, column 20)",
+        "footscan: workflow.yaml: parameters.extraction.ridge: unknown field, did you mean 'ridge_px'? "
+        "(line 9, column 5)",
+    ]
+
+
+def test_all_that_is_not_there_is_told_with_a_missing_archive(
+    workflow: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    workflow.write_text(RIGHT.replace("archive: archive", "archive: [archive, a, b]\ncalibration: no.json"))
+    assert run_command(["run"]) == 2
+    lines = [line.removeprefix("footscan: workflow.yaml: ") for line in capsys.readouterr().err.splitlines()]
+    assert [line.partition(":")[0] for line in lines] == ["archive.1", "archive.2", "calibration"]
+    assert lines[2].endswith("found 'no.json' (line 3, column 14)")
+
+
 @pytest.mark.usefixtures("workflow")
 def test_nothing_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command(["config", "check"]) == 0

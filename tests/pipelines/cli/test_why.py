@@ -116,7 +116,7 @@ def test_code(done: Any, why: Why, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_never_run_and_without_a_workflow(archive: Any, done: Any, why: Why, tmp_path: Path) -> None:
     found = explained(why("P0001/S1", "--workflow", archive.workflow, "--json"))
     assert len(found) == 16
-    assert (found["ingest-1"]["reason"], found["ingest-1"]["last"]) == ("cam1 is not there", None)
+    assert (found["ingest-1"]["reason"], found["ingest-1"]["last"]) == ("never run", None)
     options = ("--calibration", done.root / "calibration.json", "--out", done.root / "results")
     assert why(done.scan, *options)[1].startswith("P0001/S1: nothing would run")
     assert why(done.scan, *options[:2], "--out", tmp_path / "new")[1].splitlines()[0] == "ingest-1, ingest-5: never run"

@@ -97,6 +97,18 @@ def test_reason_of_a_result_that_is_gone(chain: Any, store: Store, run_steps: Ru
     assert told(chain(), store) == [HITS[0], ("miss", "its result is gone"), ("waits", "waits for second")]
 
 
+def test_a_first_plan_says_never_run_whatever_the_step_would_write(
+    chain: Any, store: Store, run_steps: RunSteps, tmp_path: Path
+) -> None:
+    written = tmp_path / "frames/cam3/zarr.json"
+    assert told(chain(writes=written), store)[0] == ("miss", "never run")
+    written.parent.mkdir(parents=True)
+    written.touch()
+    run_steps(*chain(writes=written))
+    written.unlink()
+    assert told(chain(writes=written, film=b"other"), store)[0] == ("miss", "cam3 is not there")
+
+
 def test_going_back_to_an_earlier_parameter_is_a_hit(chain: Any, store: Store, run_steps: RunSteps) -> None:
     run_steps(*chain(factor=2))
     run_steps(*chain(factor=3))
