@@ -26,7 +26,7 @@ def show(workflow: WorkflowFile = None, settings: Settings = None, as_json: AsJs
     from schemas.workflow import ScanParameters, Workflow
 
     path = workflow or WORKFLOW
-    document, text = read_yaml(path, Workflow), read_text(path)
+    document, text = read_yaml(path, Workflow), read_text(path, "yaml_bytes")
     given = parse_settings(settings or [])
     changed = overridden(ScanParameters, document.parameters.model_dump(mode="json"), settings or [])
     rows = []
@@ -64,7 +64,7 @@ def _mistakes(path: Path) -> Iterator[dict[str, Any]]:
     from schemas.workflow import Workflow
     from schemas.yaml_text import place_in_yaml
 
-    text = read_text(path)
+    text = read_text(path, "yaml_bytes")
     value = read_yaml_text(path, text)
     if not isinstance(value, dict):
         validate(path, Workflow, value)
