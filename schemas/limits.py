@@ -41,7 +41,7 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
         "measures": Limit(1_000, "measures of a foot", "a foot has some 30"),
         "mesh_bytes": Limit(100_000_000, "bytes of a mesh or cloud", "a foot of 200,000 triangles has 10 MB"),
         "mesh_rows": Limit(
-            4_000_000, "lines, vertices, faces or corners of faces of a mesh", "each takes up to 100 bytes and 2 us"
+            3_000_000, "lines, vertices, faces or corners of faces of a mesh", "each takes up to 100 bytes and 2 us"
         ),
         "polygon_corners": Limit(1_000, "corners of one face", "triangles that all meet in one point take their time"),
         "image_bytes": Limit(64_000_000, "bytes of an image", "a frame of 640 x 480 has some 30 kB"),

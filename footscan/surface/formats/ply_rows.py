@@ -114,6 +114,10 @@ class _Binary:
         if triangles is not None:
             return triangles
         lists = {name: PolygonList() for name, length, _ in properties if length}
+        if len(properties) == 1:
+            name, length, value = properties[0]
+            self._read_list(count, length or "", value, lists[name])
+            return {name: lists[name].polygons()}
         for _ in range(count):
             for name, length, value in properties:
                 items = int(self._values(length, 1)[0]) if length else 1
@@ -136,6 +140,22 @@ class _Binary:
             return None
         self._at += size
         return {name: rows["items"]}
+
+    def _read_list(self, count: int, length: str, value: str, polygons: PolygonList) -> None:
+        """One list a row: millions of them, so that a row must take no more than a microsecond."""
+        one, head, width = struct.Struct(self._order + CODES[length]), int(length[1]), int(value[1])
+        body, at = self._body, self._at
+        for _ in range(count):
+            if at + head > len(body):
+                raise self._end()
+            (items,) = one.unpack_from(body, at)
+            at += head
+            if items < 0 or at + items * width > len(body):
+                raise self._end()
+            values = struct.unpack_from(f"{self._order}{items}{CODES[value]}", body, at) if items else ()
+            polygons.add(values if value[0] != "f" else map(_whole, values))
+            at += items * width
+        self._at = at
 
     def _values(self, kind: str, count: int) -> tuple[float, ...]:
         size = count * int(kind[1])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.limits import refuse_beyond
+from schemas.limits import limit, refuse_beyond
 
 
 class Polygons(NamedTuple):
@@ -24,6 +24,7 @@ class PolygonList:
 
     def __init__(self) -> None:
         self._lengths, self._vertices = array("q"), array("q")
+        self._most, self._most_corners = limit("mesh_rows"), limit("polygon_corners")
 
     def add(self, vertices: Iterable[int]) -> None:
         """One more; ValueError of a number that no vertex can have."""
@@ -32,9 +33,12 @@ class PolygonList:
             self._vertices.extend(vertices)
         except OverflowError:
             raise ValueError("a face with a number too large for a vertex") from None
-        self._lengths.append(len(self._vertices) - before)
-        refuse_beyond("polygon_corners", self._lengths[-1], "mesh")
-        refuse_beyond("mesh_rows", max(len(self._lengths), len(self._vertices)), "mesh")
+        corners = len(self._vertices) - before
+        self._lengths.append(corners)
+        if corners > self._most_corners:
+            refuse_beyond("polygon_corners", corners, "mesh")
+        if len(self._vertices) > self._most:
+            refuse_beyond("mesh_rows", len(self._vertices), "mesh")
 
     def polygons(self) -> Polygons:
         """Those that were added."""
