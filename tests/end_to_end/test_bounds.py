@@ -1,4 +1,4 @@
-"""Hostile files of every kind are refused within 10 s and 1 GB, in one line that names the file and what was expected."""
+"""Hostile files of every kind are refused within 10 s and 1 GB, in one line that says what was expected."""
 
 import json
 import os
