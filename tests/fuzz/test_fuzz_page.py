@@ -29,7 +29,7 @@ ADDRESS = "http://127.0.0.1:8760"
 STATUSES = {200, 204, 400, 403, 404, 405, 409, 413, 421, 429, 502}
 SECRET = "a secret outside of the results"
 PARTS = (
-    *("P1", "S1", "foot", "pair", "results", "static", "cameras", "1.jpg", "do", "stop", "scan", "jog", "home", "connect"),
+    *("P1", "S1", "foot", "pair", "results", "static", "cameras", "1.jpg", "do", "stop", "scan", "jog", "home"),
     *("..", ".", "%2e%2e", "%2f", "..%2f..%2fsecret", "secret", "%00", "a%00b", "%ff", "%", "~", "x" * 3000, "", "*"),
     *("measures.json", "quality.json", "foot.stl", "cloud.ply", "report.html", "console.css", "link.js", "viewer.js"),
     *("99999999999999999999.jpg", "-1.jpg", "0x1.jpg", "1.jpg/", "<script>", "%0d%0aSet-Cookie:x", "\u202e", "é"),
