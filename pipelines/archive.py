@@ -342,6 +342,6 @@ def _calibration(scan: RecordedScan, job: Job, known: dict[Path, CalibrationFile
     own = None if job.calibration_wins and job.calibrations else scan.calibration
     path = own or choose_calibration(scan, job.calibrations)
     if path not in known:
-        text = read_text(path)
+        text = read_text(path, "json_bytes")
         known[path] = CalibrationFile(path, calibration_from_json(text, path), sha256(text.encode()))
     return known[path]

@@ -9,7 +9,7 @@ from footscan.frames.film import film_files
 from footscan.frames.ingest import ingest_film
 from pipelines.recorded import SCAN_FILE, read_scan, scan_folders
 from pipelines.steps.ingest_background import ingest_background
-from schemas.errors import FootscanError
+from schemas.errors import FootscanError, RefusedInput
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,13 @@ def ingest_scans(folders: Sequence[Path]) -> list[CameraIngest]:
     """Ingest the films of scan folders, and of all scans in archives; what fails costs its own camera."""
     ends: list[CameraIngest] = []
     for folder in folders:
+        found = len(ends)
         is_scan = (folder / SCAN_FILE).exists() or not folder.is_dir()
         for scan_folder in [folder] if is_scan else scan_folders(folder):
             ends += _ingest_scan(scan_folder, None if is_scan else folder)
+        if len(ends) == found:
+            problem = str(RefusedInput(folder, "holds no scan, expected folders with a scan.yaml"))
+            ends.append(CameraIngest(str(folder), None, problem=problem, exit_status=RefusedInput.exit_status))
     return ends
 
 

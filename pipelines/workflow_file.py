@@ -42,7 +42,7 @@ def read_workflow(path: Path) -> Workflow:
 def check_archives(path: Path, document: Workflow) -> None:
     """Refuse the workflow in `path` if an archive of it is not there, and tell what else is not there."""
     if not all((path.resolve().parent / archive).is_dir() for archive in document.archive):
-        raise _refusal(path, _missing_files(path, read_text(path), document))
+        raise _refusal(path, _missing_files(path, read_text(path, "yaml_bytes"), document))
 
 
 def workflow_mistakes(path: Path) -> list[PlacedMistake]:
@@ -56,7 +56,7 @@ def workflow_mistakes(path: Path) -> list[PlacedMistake]:
 
 
 def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
-    text = read_text(path)
+    text = read_text(path, "yaml_bytes")
     value = read_yaml_text(path, text)
     if not isinstance(value, dict):
         validate(path, Workflow, value)

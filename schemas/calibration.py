@@ -212,7 +212,7 @@ def _convex(corners: list[Point]) -> bool:
 
 def read_calibration(path: Path) -> Calibration:
     """The calibration file `path`, older versions migrated to the current one."""
-    return calibration_from_json(read_text(path), path)
+    return calibration_from_json(read_text(path, "json_bytes"), path)
 
 
 def calibration_from_json(text: str, source: Path | str) -> Calibration:

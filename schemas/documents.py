@@ -2,7 +2,6 @@
 
 import json
 import re
-import stat
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -10,10 +9,9 @@ from typing import Annotated, Any, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from schemas.errors import RefusedInput
+from schemas.limits import read_bounded, refuse_beyond
 from schemas.mistakes import Mistake, mistakes
 from schemas.yaml_text import parse_yaml, place_in_yaml
-
-MAX_BYTES = 8 * 2**20
 
 
 def _pseudonym(name: str) -> str:
@@ -53,17 +51,18 @@ def read_yaml(path: Path, model: type[AnyDocument]) -> AnyDocument:
     RefusedInput
         The file is missing, too large, no YAML, or breaks the model; one line names file, field and expectation.
     """
-    text = read_text(path)
+    text = read_text(path, "yaml_bytes")
     return validate(path, model, read_yaml_text(path, text), lambda mistake: _in_brackets(text, mistake))
 
 
 def read_json(path: Path, model: type[AnyDocument]) -> AnyDocument:
     """The JSON file `path` as `model`; errors as in `read_yaml`."""
-    return validate(path, model, parse_json(path, read_text(path)))
+    return validate(path, model, parse_json(path, read_text(path, "json_bytes")))
 
 
 def parse_json(source: Path | str, text: str) -> Any:
-    """`text` as JSON without NaN, infinities and names that stand twice."""
+    """`text` as JSON without NaN, infinities and names that stand twice; BeyondLimitError of too many values."""
+    refuse_beyond("json_values", text.count(","), source)
     try:
         return _encodable(json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_refuse_twice))
     except (ValueError, RecursionError) as error:
@@ -109,8 +108,8 @@ def validate(
     try:
         return model.model_validate(value)
     except ValidationError as error:
-        first = mistakes(model, error)[0]
-        field = ".".join(map(str, first.path)) or None
+        first = mistakes(model, error, most=1)[0]
+        field = ".".join(str(name)[:80] for name in first.path) or None
         raise RefusedInput(source, first.problem + (place(first) if place else ""), field=field) from None
 
 
@@ -133,15 +132,10 @@ def inside(archive: Path, document: Path, relative: str, field: str) -> Path:
     return path
 
 
-def read_text(path: Path) -> str:
-    """The content of a small UTF-8 file; RefusedInput where it is none."""
+def read_text(path: Path, bound: str) -> str:
+    """The content of a UTF-8 file; RefusedInput where it is none, or larger than the `bound` of that name allows."""
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise RefusedInput(path, "expected a file")
-        if status.st_size > MAX_BYTES:
-            raise RefusedInput(path, f"larger than {MAX_BYTES} bytes, expected a small text document")
-        return path.read_bytes().decode("utf-8")
+        return read_bounded(path, bound).decode("utf-8")
     except UnicodeDecodeError:
         raise RefusedInput(path, "expected UTF-8 text") from None
     except FileNotFoundError:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, model_validator
 
 from schemas.documents import Document
+from schemas.limits import beyond, limit
 from schemas.measures import Status
 from schemas.scan import Side
 
@@ -61,6 +62,11 @@ class Foot(Document):
         told = value.get("format", "") if isinstance(value, dict) else ""
         if not re.fullmatch(r"footscan\.measures/\d+", str(told)):
             raise ValueError(f"expected the format footscan.measures/1, found {str(told)[:80]!r}")
+        if told != "footscan.measures/1":
+            raise ValueError(f"expected the format footscan.measures/1, found {told[:80]!r}: a newer footscan wrote it")
+        measures = value.get("measures")
+        if isinstance(measures, dict) and len(measures) > limit("measures"):
+            raise ValueError(beyond("measures", len(measures)))
         return value
 
     @property

@@ -8,6 +8,9 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel, ValidationError
 
 Path = tuple[str | int, ...]
+MOST = 100
+"""Nobody reads more mistakes at once."""
+LONGEST_NAME = 80
 
 
 class Mistake(NamedTuple):
@@ -20,19 +23,18 @@ class Mistake(NamedTuple):
     """Whether the name is wrong, not the value."""
 
 
-def mistakes(model: type[BaseModel], error: ValidationError) -> list[Mistake]:
-    """What pydantic found, wrong names first: a misspelt field is missing, too, and its own name says more."""
-    found = error.errors(include_url=False)
-    wrong_names = [e for e in found if e["type"] == "extra_forbidden"]
-    others = [e for e in found if e["type"] != "extra_forbidden"]
-    return [
-        Mistake(tuple(e["loc"]), _problem(model, dict(e)), e["type"] == "extra_forbidden") for e in wrong_names + others
-    ]
+def mistakes(model: type[BaseModel], error: ValidationError, most: int = MOST) -> list[Mistake]:
+    """What pydantic found, wrong names first: a misspelt field is missing, too, and its own name says more.
+
+    No more than `most`: to find the name that was meant takes its time.
+    """
+    found = sorted(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
+    return [Mistake(tuple(e["loc"]), _problem(model, dict(e)), e["type"] == "extra_forbidden") for e in found[:most]]
 
 
 def nearest_name(model: type[BaseModel], path: Path) -> str | None:
     """The field that was meant by `path`: one of the section that it stands in, or else of any, with its section."""
-    name = str(path[-1])
+    name = str(path[-1])[:LONGEST_NAME]
     here = sorted({field for section in _sections(model, path[:-1]) for field in _fields(section)})
     if near := difflib.get_close_matches(name, here, n=1):
         return near[0]

@@ -4,13 +4,11 @@ import csv
 import io
 import math
 import re
-import stat
 from collections.abc import Iterator
 from pathlib import Path
 
 from schemas.errors import RefusedInput
-
-MAX_BYTES = 256 * 2**20
+from schemas.limits import read_bounded, refuse_beyond
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
@@ -21,15 +19,12 @@ def read_records(path: Path) -> Iterator[tuple[int, list[str]]]:
     Raises
     ------
     RefusedInput
-        The file is missing, too large, or no CSV in UTF-8.
+        The file is missing, too large (see `schemas.limits`), or no CSV in UTF-8.
     """
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise RefusedInput(path, "expected a CSV file")
-        if status.st_size > MAX_BYTES:
-            raise RefusedInput(path, f"larger than {MAX_BYTES} bytes, expected a table of points")
-        text = path.read_bytes().decode("utf-8-sig")
+        content = read_bounded(path, "table_bytes")
+        refuse_beyond("table_rows", max(content.count(b"\n"), content.count(b"\r")), path)
+        text = content.decode("utf-8-sig")
     except FileNotFoundError:
         raise RefusedInput(path, "no such file") from None
     except UnicodeDecodeError as error:

@@ -16,8 +16,14 @@ from schemas.tuning import Tuning
 
 
 def _place(named: str) -> str:
-    if not named:
+    if not named or "\0" in named:
         raise ValueError("expected a folder or a URL")
+    return named
+
+
+def _path(named: str) -> str:
+    if not named or "\0" in named:
+        raise ValueError("expected a path")
     return named
 
 
@@ -45,7 +51,8 @@ def _as_list(folders: Any) -> Any:
     return [folders] if isinstance(folders, str) else folders
 
 
-Folder = Annotated[str, Field(min_length=1)]
+AnyPath = Annotated[str, Field(min_length=1), AfterValidator(_path)]
+Folder = AnyPath
 Folders = Annotated[
     list[Folder],
     BeforeValidator(_as_list),
@@ -57,7 +64,7 @@ Folders = Annotated[
 class ChosenCalibration(Document):
     """A calibration, and for which scans it is meant."""
 
-    file: Annotated[str, Field(min_length=1)]
+    file: AnyPath
     scanner: Pseudonym | None = None
     """For scans of this scanner; of any where absent."""
     since: datetime.date | None = None
@@ -70,11 +77,11 @@ class Workflow(Document):
     format: Literal["footscan.workflow/1"]
     archive: Folders
     """Folder that holds the scans, each a folder with a scan.yaml; or several such folders."""
-    calibration: str | None = None
+    calibration: AnyPath | None = None
     """Used for scans that name none themselves."""
     calibrations: list[ChosenCalibration] = Field(default_factory=list)
     """Likewise, where they differ by scanner and date; excludes `calibration`."""
-    results: Annotated[str, Field(min_length=1)]
+    results: AnyPath
     """Folder for `<patient>/<scan>/`."""
     cache: Annotated[str, AfterValidator(_place)] | None = None
     """Folder of the content store, or its URL as fsspec has it; `.footscan` in the results where absent."""

@@ -1,6 +1,7 @@
 """YAML as the project takes it: lists and named values, whose scalars stay text; and where in the text each stands."""
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import Any
 
 import yaml
@@ -43,11 +44,7 @@ def place_in_yaml(text: str, path: Sequence[str | int], *, of_name: bool = False
     of_name : bool
         Where the value's name stands instead, as it always is of a section.
     """
-    try:
-        node: Any = yaml.compose(text, Loader=_PARSER)
-    except yaml.YAMLError:  # the one took it, or the other did, see `parse_yaml`
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
-    name = node
+    node = name = _composed(text)
     for part in path:
         if isinstance(node, yaml.MappingNode):
             found = next(((key, value) for key, value in node.value if key.value == str(part)), None)
@@ -57,6 +54,15 @@ def place_in_yaml(text: str, path: Sequence[str | int], *, of_name: bool = False
             name = node = node.value[part]
     mark = (name if of_name or isinstance(node, yaml.MappingNode) else node).start_mark
     return mark.line + 1, mark.column + 1
+
+
+@lru_cache(maxsize=2)
+def _composed(text: str) -> Any:
+    """The nodes of a `text` that parses: they are the same for each of its mistakes."""
+    try:
+        return yaml.compose(text, Loader=_PARSER)
+    except yaml.YAMLError:  # the one took it, or the other did, see `parse_yaml`
+        return yaml.compose(text, Loader=yaml.SafeLoader)
 
 
 def _document(events: _Events) -> Any:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.errors import RefusedInput
+from schemas.limits import refuse_beyond
 from schemas.tables import finite, read_records
 from schemas.units import LengthUnit
 
@@ -69,6 +70,7 @@ def read_chart(path: Path) -> dict[int, Chart]:
             problem = f"camera {row.camera} has {row.point!r} in line {first} already, expected each point once"
             raise RefusedInput(path, problem, field=f"line {line}, column point")
         rows.append(row)
+        refuse_beyond("chart_points", len(rows), path)
     if not rows:
         raise RefusedInput(path, "has a header but no control point, expected at least one row")
     return {camera: _chart(camera, unit, rows) for camera in sorted({row.camera for row in rows})}

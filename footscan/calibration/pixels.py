@@ -1,6 +1,5 @@
 """Pixel coordinates out of a CSV file."""
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +8,9 @@ from numpy.typing import NDArray
 from schemas.errors import RefusedInput
 from schemas.tables import finite, read_records
 
+LARGEST_PX = 1e6
+"""No pixel of any camera lies farther out; the powers of it that a map takes stay finite."""
+
 
 def read_pixels(path: Path) -> NDArray[np.float64]:
     """(N, 2) columns `i` and `j` of a CSV file, in px; other columns are passed over.
@@ -16,7 +18,7 @@ def read_pixels(path: Path) -> NDArray[np.float64]:
     Raises
     ------
     RefusedInput
-        The file or a column is missing, or a value is no finite number.
+        The file or a column is missing, or a value is no pixel of any camera.
     """
     records = read_records(path)
     _, header = next(records, (1, []))
@@ -30,8 +32,8 @@ def read_pixels(path: Path) -> NDArray[np.float64]:
 
 
 def _number(path: Path, line: int, name: str, cell: list[str]) -> float:
-    value = finite(cell[0]) if cell else math.nan
-    if math.isnan(value):
+    value = finite(cell[0]) if cell else LARGEST_PX + 1
+    if not abs(value) <= LARGEST_PX:
         found = cell[0][:80] if cell else ""
         raise RefusedInput(path, f"expected a number of pixels, found {found!r}", field=f"line {line}, column {name}")
     return value

@@ -13,7 +13,6 @@ points a camera each of them can be moved to fit, so what is said there is a gue
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from pathlib import Path
 from typing import Literal
 
@@ -201,17 +200,17 @@ def _border(chart: Chart, named: set[int | None], limit: float) -> Iterator[Char
 
 def _twice(chart: Chart, named: set[int | None], limit: float) -> Iterator[ChartWarning]:
     world = _millimetres(chart)
-    for one, other in combinations(range(len(world)), 2):
-        if one in named or other in named:
-            continue
-        in_mm = float(np.hypot(*(world[one] - world[other])))
-        in_px = float(np.hypot(*(chart.pixels[one] - chart.pixels[other])))
-        name, twin = chart.points[one], chart.points[other]
-        if in_mm == 0.0 and in_px > limit:
-            message = f"is where {name} is, but seen {in_px:.1f} px away, expected one pixel for one corner"
-            yield ChartWarning(chart.camera, twin, "twice", message)
-        elif in_px == 0.0 and in_mm > SAME_PLACE_MM:
-            message = f"has the pixel of {name}, {in_mm:.0f} mm away, expected another"
+    for one, name in enumerate(chart.points):
+        in_mm, in_px = (np.hypot(*(p[one] - p[one + 1 :]).T) for p in (world, chart.pixels))
+        is_twin = ((in_mm == 0.0) & (in_px > limit)) | ((in_px == 0.0) & (in_mm > SAME_PLACE_MM))
+        for k in np.flatnonzero(is_twin).tolist():
+            if one in named or one + 1 + k in named:
+                continue
+            twin = chart.points[one + 1 + k]
+            if in_mm[k] == 0.0:
+                message = f"is where {name} is, but seen {in_px[k]:.1f} px away, expected one pixel for one corner"
+            else:
+                message = f"has the pixel of {name}, {in_mm[k]:.0f} mm away, expected another"
             yield ChartWarning(chart.camera, twin, "twice", message)
 
 

@@ -8,6 +8,9 @@ from pydantic import ValidationError
 
 from schemas.errors import DamagedError, Fault, RefusedInput
 from schemas.frames import FrameManifest
+from schemas.limits import BeyondLimitError, read_bounded, refuse_beyond
+
+METADATA = "zarr.json"
 
 
 def chunk_name(frame: int) -> str:
@@ -26,11 +29,14 @@ def is_complete(array: Path) -> bool:
 def read_manifest(array: Path) -> FrameManifest:
     """What a complete array of ours holds; RefusedInput where it is another's, or its metadata are damaged."""
     try:
-        return FrameManifest.model_validate(_attributes(array)["footscan"])
+        manifest = FrameManifest.model_validate(_attributes(array)["footscan"])
     except OSError as error:
         raise RefusedInput(array, error.strerror or "cannot be read") from None
     except (*_BROKEN, ValidationError):
         raise RefusedInput(array, "expected an array of frames with its manifest", field="zarr.json") from None
+    refuse_beyond("image_pixels", manifest.height * manifest.width, array)
+    refuse_beyond("film_frames", len(manifest.frames), array)
+    return manifest
 
 
 def is_recorded(array: Path) -> bool:
@@ -47,8 +53,10 @@ def stored_bytes(array: Path, frame: int) -> bytes | None:
     What is in it is the image, and Zarr's own way takes as long as the decoding.
     """
     try:
-        return (array / chunk_name(frame)).read_bytes()
-    except OSError:
+        return read_bounded(array / chunk_name(frame), "image_bytes")
+    except BeyondLimitError:
+        raise
+    except (OSError, RefusedInput):
         return None
 
 
@@ -63,5 +71,5 @@ _BROKEN = (ValueError, KeyError, TypeError, RecursionError)
 
 
 def _attributes(array: Path) -> dict[str, Any]:
-    attributes: dict[str, Any] = json.loads((array / "zarr.json").read_bytes())["attributes"]
+    attributes: dict[str, Any] = json.loads(read_bounded(array / METADATA, "json_bytes"))["attributes"]
     return attributes

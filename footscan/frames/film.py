@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from footscan.frames.array import damage, is_complete, read_manifest, stored_bytes
-from footscan.frames.image import SUFFIXES, Rgb, decode_image, image_size, pixel_buffer
+from footscan.frames.image import SUFFIXES, Rgb, decode_image, image_size, pixel_buffer, refused_image
 from schemas.errors import Fault, RefusedInput
+from schemas.limits import read_bounded, refuse_beyond
 
 if TYPE_CHECKING:
     from av.container import InputContainer
@@ -85,7 +86,7 @@ def encoded_frames(film: Film) -> Iterator[bytes | None]:
         yield from _array_frames(film.path)
         return
     if film.kind == "images":
-        yield from (file.read_bytes() or None for file in image_files(film.path))
+        yield from (read_bounded(file, "image_bytes") or None for file in image_files(film.path))
         return
     yield from _fill_gaps(_packets(film), film.frames)
 
@@ -157,13 +158,11 @@ def _open_array(path: Path) -> Film:
 
 
 def _open_images(path: Path, files: list[Path]) -> Film:
+    refuse_beyond("film_frames", len(files), path)
     try:
-        sizes = {file: image_size(file.read_bytes()) for file in files}
+        sizes = {file: _image_size(file) for file in files}
     except OSError as error:
         raise Fault(f"{path}: cannot be read ({error.strerror or error})") from None
-    except ValueError as error:
-        broken = next(file for file in files if not _is_image(file))
-        raise RefusedInput(broken, f"expected a JPEG or PNG image ({error})") from None
     rows, columns = sizes[files[0]]
     for file, size in sizes.items():
         if size != (rows, columns):
@@ -172,12 +171,11 @@ def _open_images(path: Path, files: list[Path]) -> Film:
     return Film(path, "images", len(files), rows, columns)
 
 
-def _is_image(file: Path) -> bool:
+def _image_size(file: Path) -> tuple[int, int]:
     try:
-        image_size(file.read_bytes())
-    except ValueError:
-        return False
-    return True
+        return image_size(read_bounded(file, "image_bytes"))
+    except ValueError as error:
+        raise refused_image(file, error) from None
 
 
 def _open_avi(path: Path) -> Film:
@@ -191,10 +189,12 @@ def _open_avi(path: Path) -> Film:
         if kind is None:
             raise RefusedInput(path, f"expected Motion-JPEG or raw video, found {codec}", field="codec")
         height, width = stream.height, stream.width
+        refuse_beyond("image_pixels", height * width, path)
         numbers = [_number(packet.pts, stream) for packet in container.demux(stream) if packet.size]
     found = max(numbers, default=-1) + 1
     if not numbers:
         raise RefusedInput(path, "expected at least one frame, found none", field="frames")
+    refuse_beyond("film_frames", found, path)
     if found < fewest:
         problem = f"truncated: expected the {fewest} frames that its header declares, found {found}"
         raise RefusedInput(path, problem, field="frames")

@@ -13,14 +13,25 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from schemas.errors import RefusedInput
+from schemas.limits import BeyondLimitError, beyond, limit, read_bounded
 
 Rgb = NDArray[np.uint8]
 """(rows, columns, 3) uint8: red, green, blue."""
 
-MAX_PIXELS = 200_000_000
-Image.MAX_IMAGE_PIXELS = MAX_PIXELS  # Pillow's own guard would warn at half of it
+Image.MAX_IMAGE_PIXELS = None  # `schemas.limits` bounds them; Pillow's own guard would warn at half of its bound
 SUFFIXES = (".jpg", ".jpeg", ".png")
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+
+
+class TooManyPixelsError(ValueError):
+    """An image beyond its bound, see `schemas.limits`."""
+
+
+def refused_image(path: Path, error: ValueError) -> RefusedInput:
+    """What to raise of a file that is no image, or a too large one, as `decode_image` and `image_size` say."""
+    if isinstance(error, TooManyPixelsError):
+        return BeyondLimitError(path, str(error))
+    return RefusedInput(path, f"expected a JPEG or PNG image ({error})")
 
 
 def pixel_buffer(rows: int, columns: int) -> Rgb:
@@ -80,8 +91,10 @@ def image_size(data: bytes) -> tuple[int, int]:
         rows, columns = int.from_bytes(data[20:24], "big"), int.from_bytes(data[16:20], "big")
     else:
         raise ValueError("neither JPEG nor PNG")
-    if not 0 < rows * columns <= MAX_PIXELS:
+    if rows < 1 or columns < 1:
         raise ValueError(f"{columns} x {rows} pixels")
+    if rows * columns > limit("image_pixels"):
+        raise TooManyPixelsError(f"{columns} x {rows} pixels: {beyond('image_pixels', rows * columns)}")
     return int(rows), int(columns)
 
 
@@ -95,11 +108,11 @@ def encode_png(pixels: Rgb) -> bytes:
 def read_image(path: Path) -> Rgb:
     """The pixels of an image file; RefusedInput where it is none."""
     try:
-        return decode_image(path.read_bytes())
+        return decode_image(read_bounded(path, "image_bytes"))
     except OSError as error:
         raise RefusedInput(path, error.strerror or "cannot be read") from None
     except ValueError as error:
-        raise RefusedInput(path, f"expected a JPEG or PNG image ({error})") from None
+        raise refused_image(path, error) from None
 
 
 def _is_jpeg(data: bytes) -> bool:

@@ -3,7 +3,6 @@
 An array is written beside its place and renamed when it is whole: what has its name is complete.
 """
 
-import contextlib
 import shutil
 from collections import Counter
 from collections.abc import Mapping
@@ -14,12 +13,13 @@ import zarr
 from zarr.codecs import BloscCodec
 from zarr.errors import ContainsGroupError
 
-from footscan.frames.array import chunk_name, is_recorded
+from footscan.frames.array import METADATA, chunk_name, is_recorded
 from footscan.frames.codec import ImageCodec
 from footscan.frames.film import Film, encoded_frames, frame_digest, open_film, pixel_frames
 from footscan.frames.partial import move_into_place, partial_folder, sweep
 from schemas.errors import Fault, RefusedInput
 from schemas.frames import FrameManifest
+from schemas.limits import read_bounded
 
 FRAME_SIZE = (480, 640)
 """(rows, columns) of a recorded scan's frames."""
@@ -52,6 +52,7 @@ def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SI
         return _checked(opened)
     if is_recorded(array):
         raise RefusedInput(array, "holds frames that were recorded into it, expected scan.yaml to name it as the film")
+    _check_group(array.parent)
     partial = partial_folder(array.parent.parent, array.name)  # outside of the group: no reader of it meets a part
     try:
         array.parent.mkdir(parents=True, exist_ok=True)
@@ -113,8 +114,18 @@ class FrameWriter:
 
 def make_group(folder: Path) -> None:
     """Makes the folder of several arrays a Zarr group."""
-    with contextlib.suppress(ContainsGroupError):  # another camera's thread was first
+    try:
         zarr.open_group(str(folder), mode="a")
+    except ContainsGroupError:  # another camera's thread was first
+        return
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:  # what damaged metadata do to it
+        raise RefusedInput(folder / METADATA, f"expected a Zarr group ({error})") from None
+
+
+def _check_group(folder: Path) -> None:
+    """Refuses metadata of a group that are too large to be any, before Zarr reads them."""
+    if (folder / METADATA).exists():
+        read_bounded(folder / METADATA, "json_bytes")
 
 
 def discard(array: Path) -> None:

@@ -1,5 +1,6 @@
 """Frames out of their Zarr array, each checked against the digest under which it was stored."""
 
+import math
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -7,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import zarr
 
-from footscan.frames.array import damage, stored_bytes
+from footscan.frames.array import METADATA, chunk_name, damage, stored_bytes
 from footscan.frames.film import decode_or_none, frame_digest
 from footscan.frames.image import Rgb, pixel_buffer
 from schemas.errors import DamagedError
 from schemas.frames import FrameManifest
+from schemas.limits import read_bounded
 
 _Reader = Callable[[int], bytes | Rgb | None]
 
@@ -51,19 +53,37 @@ def _frame(array: Path, manifest: FrameManifest, number: int, read: _Reader, buf
 
 
 def _chunk_reader(array: Path, manifest: FrameManifest) -> _Reader:
-    return partial(stored_bytes, array) if manifest.encoding == "image" else _pixel_reader(array)
+    return partial(stored_bytes, array) if manifest.encoding == "image" else _pixel_reader(array, manifest)
 
 
-def _pixel_reader(array: Path) -> _Reader:
+def _pixel_reader(array: Path, manifest: FrameManifest) -> _Reader:
+    shape = (manifest.height, manifest.width, 3)
     try:
+        read_bounded(array / METADATA, "json_bytes")  # before Zarr reads them
         frames = zarr.open_array(str(array), mode="r")
     except Exception as error:  # damaged metadata can make Zarr raise anything
         raise DamagedError(f"{array}: expected a Zarr array ({error})") from None
+    if frames.shape[1:] != shape or frames.chunks != (1, *shape):
+        raise DamagedError(f"{array}: expected frames of {shape}, found {frames.shape[1:]}")
 
     def read(number: int) -> Rgb | None:
         try:
+            if not _is_chunk_of(array / chunk_name(number), math.prod(shape)):
+                return None
             return np.asarray(frames[number], np.uint8)
         except Exception:  # a damaged chunk can make its decompressor raise anything
             return None
 
     return read
+
+
+def _is_chunk_of(chunk: Path, size: int) -> bool:
+    """Whether a chunk says that it holds so many bytes: one that was forged could unpack to anything.
+
+    Blosc's header has the bytes before compression at its fifth byte; what does not compress is as long and a little
+    longer.
+    """
+    if not chunk.is_file() or chunk.stat().st_size > size + 4096:
+        return False
+    with chunk.open("rb") as file:
+        return int.from_bytes(file.read(8)[4:], "little") == size

@@ -1,16 +1,17 @@
 """Where the laser plane stood at each frame."""
 
-import math
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from schemas.errors import RefusedInput
+from schemas.limits import refuse_beyond
 from schemas.scan import Travel
 from schemas.tables import finite, read_records
 
-MAX_FRAMES = 1_000_000
+FARTHEST_MM = 1e5
+"""No travel is longer, see `schemas.scan.Travel`."""
 
 
 def travelled(travel: Travel, frames: int) -> NDArray[np.float64]:
@@ -46,8 +47,9 @@ def read_positions(path: Path) -> NDArray[np.float64]:
 def _position(path: Path, line: int, header: list[str], cells: list[str]) -> tuple[int, float]:
     row = dict(zip(header, cells, strict=False))
     number = row.get("frame", "")
-    frame = int(number) if number.isdecimal() and len(number) < 9 else MAX_FRAMES
+    frame = int(number) if number.isascii() and number.isdecimal() and len(number) < 16 else -1
     x_mm = finite(row.get("x_mm", ""))
-    if len(cells) != len(header) or frame >= MAX_FRAMES or math.isnan(x_mm):
+    if len(cells) != len(header) or frame < 0 or not abs(x_mm) <= FARTHEST_MM:
         raise RefusedInput(path, "expected a frame number from 0 and x_mm in millimetres", field=f"line {line}")
+    refuse_beyond("film_frames", frame + 1, path, field=f"line {line}")
     return frame, x_mm

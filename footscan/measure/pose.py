@@ -127,6 +127,8 @@ def _open_area(rims: Floats, up: Floats, reach: float) -> float:
         return 0.0
     height = rims @ up
     on_floor = rims[(height < height.min() + reach).all(axis=1)]
+    if not len(on_floor):
+        return 0.0
     on_floor = on_floor - on_floor.mean(axis=(0, 1))
     return max(float(np.cross(on_floor[:, 0], on_floor[:, 1]).sum(axis=0) @ up) / 2, 0.0)
 

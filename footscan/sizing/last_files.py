@@ -7,6 +7,7 @@ from typing import get_args
 
 from schemas.errors import RefusedInput
 from schemas.lasts import Last, LastMeasure, LastSide
+from schemas.limits import refuse_beyond
 from schemas.tables import finite, read_records
 
 MEASURES: tuple[LastMeasure, ...] = get_args(LastMeasure)
@@ -44,6 +45,7 @@ def read_lasts(place: Path) -> list[Last]:
                     last.place, f"last {last.name!r} stands in {lasts[key].place} already, expected once"
                 )
             lasts[key] = last
+            refuse_beyond("lasts", len(lasts), place)
     if not lasts:
         raise RefusedInput(place, "no lasts here, expected CSV files with a last a row")
     return list(lasts.values())

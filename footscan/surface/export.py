@@ -15,11 +15,13 @@ from footscan.surface.formats.threemf import threemf_of
 from footscan.surface.formats.vrml import vrml_of
 from footscan.surface.mesh import Mesh
 from schemas.errors import RefusedInput
+from schemas.limits import BeyondLimitError, read_bounded
 
 Shape = tuple[NDArray[np.float64], NDArray[np.int32]]
 """(V, 3) vertices in mm and (F, 3) faces; a cloud is a shape without faces."""
 
-MAX_BYTES = 2**30
+FARTHEST_MM = 1e7
+"""No coordinate of a mesh is larger, not even in micrometres: its powers stay finite."""
 PARSERS = {".stl": parse_stl, ".ply": parse_ply, ".obj": parse_obj}
 WRITERS: dict[str, Callable[[Mesh], bytes]] = {
     ".stl": stl_of,
@@ -52,23 +54,23 @@ def read_file(path: Path) -> Mesh:
     parser = PARSERS.get(path.suffix.lower())
     if parser is None:
         raise RefusedInput(path, f"expected a file that ends in {', '.join(PARSERS)}, found {path.suffix!r}")
-    if path.exists() and not path.is_file():
-        raise RefusedInput(path, "cannot be read (no file, but a folder or a device)")
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise RefusedInput(path, f"larger than {MAX_BYTES} bytes, expected a mesh or cloud of a foot")
-        content = path.read_bytes()
+        content = read_bounded(path, "mesh_bytes")
     except OSError as error:
         missing = isinstance(error, FileNotFoundError)
         raise RefusedInput(path, "no such file" if missing else f"cannot be read ({error.strerror})") from None
     try:
         mesh = parser(content)
+    except BeyondLimitError as error:  # a parser does not know whose bytes they are
+        raise BeyondLimitError(path, error.problem) from None
     except ValueError as error:
         raise RefusedInput(path, f"is no proper {path.suffix.lower()[1:].upper()} file: {error}") from None
     if not len(mesh.vertices):
         raise RefusedInput(path, "holds no points, expected a mesh or a cloud")
     if not np.all(np.isfinite(mesh.vertices)):
         raise RefusedInput(path, "holds coordinates that are no numbers, expected mm")
+    if np.abs(mesh.vertices).max() > FARTHEST_MM:
+        raise RefusedInput(path, f"holds coordinates beyond {FARTHEST_MM:.0f}, expected mm")
     if mesh.metadata.get("unit", "mm") != "mm":
         raise RefusedInput(path, f"is in {mesh.metadata['unit']!r}, expected mm", field="unit")
     if mesh.faces.size and not 0 <= int(mesh.faces.min()) <= int(mesh.faces.max()) < len(mesh.vertices):

@@ -25,7 +25,7 @@ def show(workflow: WorkflowFile = None, settings: Settings = None, as_json: AsJs
     from schemas.workflow import ScanParameters
 
     path = workflow or WORKFLOW
-    document, text = read_workflow(path), read_text(path)
+    document, text = read_workflow(path), read_text(path, "yaml_bytes")
     given = parse_settings(settings or [])
     changed = overridden(ScanParameters, document.parameters.model_dump(mode="json"), settings or [])
     rows = []

@@ -33,6 +33,7 @@ from pipelines.cli import (
 )
 from pipelines.cli.output import drop_unwritten, message
 from schemas.errors import Fault, FootscanError, RefusedInput, one_line
+from schemas.limits import check_limits
 
 INTERRUPTED = 130
 
@@ -88,6 +89,8 @@ def main() -> None:
 def run_command(arguments: list[str]) -> int:
     """The exit status of `footscan ARGUMENTS`; what went wrong stands on standard error, each mistake in one line."""
     try:
+        check_limits()
+        _check_arguments(arguments)
         status = int(app(arguments, standalone_mode=False, prog_name="footscan") or 0)
         if status == INTERRUPTED:  # which is what Typer makes of it
             raise KeyboardInterrupt
@@ -102,6 +105,13 @@ def run_command(arguments: list[str]) -> int:
     except EndedBySignal as end:
         message(f"footscan: {end}")
         return 128 + end.number
+
+
+def _check_arguments(arguments: list[str]) -> None:
+    """Refuses what no program can be given by a shell; a file's name cannot hold it either."""
+    for argument in arguments:
+        if "\0" in argument:
+            raise RefusedInput(one_line(argument)[:80], "holds a character of value 0, expected none")
 
 
 def _explain(error: BaseException) -> tuple[str, int]:

@@ -34,7 +34,7 @@ def sizes(
         if as_json:
             print_json(rules.model_dump(mode="json"))
         else:
-            print(read_text(table or TABLE), end="")
+            print(read_text(table or TABLE, "yaml_bytes"), end="")
         return
     if foot is None:
         raise RefusedInput("FOOT", f"is missing, expected {FEET}")

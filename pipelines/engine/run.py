@@ -21,6 +21,7 @@ from pipelines.engine.pool import OnStepEnd, Pool, StepEnd, Task
 from pipelines.engine.step import Failure, Input, Outcome, Output, SourceFile, Step, Success, Value
 from pipelines.engine.store import Row, Store
 from schemas.errors import DamagedError, Fault, Finding, RefusedInput, one_line
+from schemas.limits import BeyondLimitError
 
 log = logging.getLogger("footscan.run")
 
@@ -126,6 +127,8 @@ def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tup
     except (RefusedInput, Finding) as error:
         _check_sources(step)
         kind, problem = "finding" if isinstance(error, Finding) else "refused", str(error)
+        if isinstance(error, BeyondLimitError):  # the user may raise the limit, which is no input of the step
+            return Failure(problem, kind, step.name), None
         failure = kind, without_places(problem, step.places)
         return Failure(problem, kind, step.name), _record(step, image, None, failure, store)
     _check_sources(step)

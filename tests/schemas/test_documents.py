@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.documents import (
-    MAX_BYTES,
     Document,
     canonical_json,
     inside,
@@ -117,7 +116,11 @@ def test_broken_scan_is_refused_by_field(tmp_path: Path, old: str, new: str, exp
         (b"just words", "expected a document with named fields, found text"),
         (SCAN.encode("utf-16"), "expected UTF-8 text"),
         ("patient: Zoë".encode("latin-1"), "expected UTF-8 text"),
-        (b"#" * (MAX_BYTES + 1), f"larger than {MAX_BYTES} bytes, expected a small text document"),
+        (
+            b"#" * 256_001,
+            "256001 bytes of a YAML document are too many, expected at most 256000 "
+            "(FOOTSCAN_LIMITS=yaml_bytes=N raises it)",
+        ),
     ],
 )
 def test_what_is_no_document_is_refused(tmp_path: Path, content: bytes, expected: str) -> None:

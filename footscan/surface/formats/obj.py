@@ -1,9 +1,11 @@
 """OBJ, text. Colours stand behind the coordinates of a vertex, as most programs read them."""
 
+from array import array
+
 import numpy as np
 
-from footscan.surface.formats.polygons import fan, vertex_numbers
-from footscan.surface.formats.text import coordinates, described
+from footscan.surface.formats.polygons import PolygonList, fans
+from footscan.surface.formats.text import coordinates, described, lines_of
 from footscan.surface.mesh import Mesh
 
 
@@ -22,19 +24,20 @@ def obj_of(mesh: Mesh) -> bytes:
 
 def parse_obj(content: bytes) -> Mesh:
     """Vertices (`v`), with colours where all have them, and faces (`f`); all else in the file is passed over."""
-    rows: list[list[float]] = []
-    faces: list[list[int]] = []
-    for line in content.splitlines():
+    places, colours, faces = array("d"), array("d"), PolygonList()
+    for line in lines_of(content):
         words = line.split()
         if words[:1] == [b"v"]:
             if len(words) < 4:
                 raise ValueError(f"a vertex of {len(words) - 1} coordinates, expected three")
-            rows.append([float(word) for word in words[1:7]])
+            places.extend(map(float, words[1:4]))
+            colours.extend(map(float, words[4:7] if len(words) >= 7 else ()))
         elif words[:1] == [b"f"]:
-            corners = [int(word.split(b"/")[0]) for word in words[1:]]
-            faces += fan([corner - 1 if corner > 0 else len(rows) + corner for corner in corners])
-    vertices = np.array([row[:3] for row in rows], np.float64).reshape(-1, 3)
-    colours = None
-    if rows and all(len(row) == 6 for row in rows):
-        colours = np.rint(np.clip(np.nan_to_num([row[3:] for row in rows]), 0, 1) * 255).astype(np.uint8)
-    return Mesh(vertices, vertex_numbers(faces), colours=colours)
+            count = len(places) // 3
+            corners = (int(word.partition(b"/")[0]) for word in words[1:])
+            faces.add(corner - 1 if corner > 0 else count + corner for corner in corners)
+    vertices = np.array(places, np.float64).reshape(-1, 3)
+    levels = np.array(colours, np.float64).reshape(-1, 3)
+    is_coloured = 0 < len(levels) == len(vertices)
+    coloured = np.rint(np.clip(np.nan_to_num(levels), 0, 1) * 255).astype(np.uint8) if is_coloured else None
+    return Mesh(vertices, fans(faces.polygons()), colours=coloured)

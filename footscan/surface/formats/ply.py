@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.surface.formats.ply_rows import Rows, ply_rows
-from footscan.surface.formats.polygons import fan, vertex_numbers
+from footscan.surface.formats.polygons import Polygons, fans, vertex_numbers
 from footscan.surface.formats.text import described
 from footscan.surface.mesh import Mesh
 
@@ -84,6 +84,4 @@ def _faces(face: Rows) -> NDArray[np.int32]:
     polygons = face.get("vertex_indices", face.get("vertex_index"))
     if polygons is None:
         raise ValueError("faces without vertex_indices")
-    if isinstance(polygons, np.ndarray):
-        return vertex_numbers(polygons)
-    return vertex_numbers([triangle for polygon in polygons for triangle in fan(polygon)])
+    return fans(polygons) if isinstance(polygons, Polygons) else vertex_numbers(polygons)

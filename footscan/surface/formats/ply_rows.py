@@ -3,12 +3,18 @@
 Files come from outside: every count in one is held against the bytes that are there before anything is allocated.
 """
 
+import struct
+from array import array
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.surface.formats.polygons import PolygonList, Polygons
+from footscan.surface.formats.text import lines_of
 from footscan.surface.mesh import KNOWN_OF_A_MESH
+from schemas.limits import refuse_beyond
 
 TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -20,12 +26,15 @@ TYPES = {
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
+CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
+"""Of the module `struct`."""
+LENGTHS = [name for name, kind in TYPES.items() if kind[0] != "f"]
 BYTE_ORDER = {"binary_little_endian": "<", "binary_big_endian": ">"}
 MAX_HEADER = 2**16
 Property = tuple[str, str | None, str]
 """Name, type of the length if it is a list, type of the value; types as numpy's, without byte order."""
-Rows = dict[str, "NDArray[np.generic] | list[list[int]]"]
-"""Property -> one value a row, or one list of integers a row."""
+Rows = dict[str, "NDArray[np.generic] | Polygons"]
+"""Property -> one value a row, or one list of integers a row; of an element with lists, its lists alone."""
 
 
 class Header(NamedTuple):
@@ -64,8 +73,9 @@ def _header(content: bytes) -> Header:
             case ["format", name, "1.0"]:
                 form = name
             case ["element", name, count] if count.isdecimal() and len(count) < 12:
+                refuse_beyond("mesh_rows", int(count), "mesh")
                 elements.append((name, int(count), []))
-            case ["property", "list", length, value, name] if elements and {length, value} <= TYPES.keys():
+            case ["property", "list", length, value, name] if elements and length in LENGTHS and value in TYPES:
                 elements[-1][2].append((name, TYPES[length], TYPES[value]))
             case ["property", value, name] if elements and value in TYPES:
                 elements[-1][2].append((name, None, TYPES[value]))
@@ -103,12 +113,18 @@ class _Binary:
         triangles = self._read_triangles(count, properties)
         if triangles is not None:
             return triangles
-        rows: dict[str, list[list[int]]] = {name: [] for name, _, _ in properties}
+        lists = {name: PolygonList() for name, length, _ in properties if length}
+        if len(properties) == 1:
+            name, length, value = properties[0]
+            self._read_list(count, length or "", value, lists[name])
+            return {name: lists[name].polygons()}
         for _ in range(count):
             for name, length, value in properties:
                 items = int(self._values(length, 1)[0]) if length else 1
-                rows[name].append(self._values(value, items).astype(np.int64).tolist())
-        return dict(rows)
+                values = self._values(value, items)
+                if length:
+                    lists[name].add(map(_whole, values))
+        return {name: polygons.polygons() for name, polygons in lists.items()}
 
     def _read_triangles(self, count: int, properties: list[Property]) -> Rows | None:
         """Almost all files hold one list a face, of three vertices: those need no loop."""
@@ -125,42 +141,84 @@ class _Binary:
         self._at += size
         return {name: rows["items"]}
 
-    def _values(self, kind: str, count: int) -> NDArray[np.generic]:
-        dtype = np.dtype(self._order + kind)
-        return np.frombuffer(self._take(count * dtype.itemsize), dtype)
+    def _read_list(self, count: int, length: str, value: str, polygons: PolygonList) -> None:
+        """One list a row: millions of them, so that a row must take no more than a microsecond."""
+        one, head, width = struct.Struct(self._order + CODES[length]), int(length[1]), int(value[1])
+        body, at = self._body, self._at
+        for _ in range(count):
+            if at + head > len(body):
+                raise self._end()
+            (items,) = one.unpack_from(body, at)
+            at += head
+            if items < 0 or at + items * width > len(body):
+                raise self._end()
+            values = struct.unpack_from(f"{self._order}{items}{CODES[value]}", body, at) if items else ()
+            polygons.add(values if value[0] != "f" else map(_whole, values))
+            at += items * width
+        self._at = at
+
+    def _values(self, kind: str, count: int) -> tuple[float, ...]:
+        size = count * int(kind[1])
+        if not 0 <= size <= len(self._body) - self._at:
+            raise self._end()
+        self._at += size
+        return struct.unpack_from(f"{self._order}{count}{CODES[kind]}", self._body, self._at - size)
 
     def _take(self, size: int) -> bytes:
         if not 0 <= size <= len(self._body) - self._at:
-            raise ValueError(f"ends after {len(self._body)} bytes of data, expected more")
+            raise self._end()
         self._at += size
         return self._body[self._at - size : self._at]
+
+    def _end(self) -> ValueError:
+        return ValueError(f"ends after {len(self._body)} bytes of data, expected more")
 
 
 class _Text:
     """Reads element after element from the body of a text file, one row a line."""
 
     def __init__(self, body: bytes) -> None:
-        self._lines = body.split(b"\n")
-        self._at = 0
+        self._lines = lines_of(body)
 
     def read(self, count: int, properties: list[Property]) -> Rows:
-        lines = self._lines[self._at : self._at + count]
-        self._at += count
-        if len(lines) < count:
-            raise ValueError(f"ends after {len(lines)} lines of an element, expected {count}")
-        words = [line.split() for line in lines]
-        if not any(length for _, length, _ in properties):
-            if any(len(row) < len(properties) for row in words):
-                raise ValueError(f"a line of too few values, expected {len(properties)}")
-            return {name: np.array([float(row[k]) for row in words]) for k, (name, _, _) in enumerate(properties)}
-        rows: dict[str, list[list[int]]] = {name: [] for name, _, _ in properties}
-        for row in words:
-            at = 0
-            for name, length, _ in properties:
-                items = int(row[at]) if length and at < len(row) else 1
-                at += length is not None
-                if items < 0 or at + items > len(row):
-                    raise ValueError("a line of too few values")
-                rows[name].append([int(float(word)) for word in row[at : at + items]])
-                at += items
-        return dict(rows)
+        rows = self._rows(count)
+        if any(length for _, length, _ in properties):
+            return _lists_of(rows, properties)
+        width = len(properties)
+        values = array("d")
+        for words in rows:
+            if len(words) < width:
+                raise ValueError(f"a line of too few values, expected {width}")
+            values.extend(map(float, words[:width]))
+        table = np.array(values, np.float64).reshape(-1, max(width, 1))
+        return {name: table[:, k] for k, (name, _, _) in enumerate(properties)}
+
+    def _rows(self, count: int) -> Iterator[list[bytes]]:
+        for number in range(count):
+            line = next(self._lines, None)
+            if line is None:
+                raise ValueError(f"ends after {number} lines of an element, expected {count}")
+            yield line.split()
+
+
+def _lists_of(rows: Iterable[list[bytes]], properties: list[Property]) -> Rows:
+    lists = {name: PolygonList() for name, length, _ in properties if length}
+    for words in rows:
+        at = 0
+        for name, length, _ in properties:
+            items = int(words[at]) if length and at < len(words) else 1
+            at += length is not None
+            if items < 0 or at + items > len(words):
+                raise ValueError("a line of too few values")
+            if length:
+                lists[name].add(_whole(float(word)) for word in words[at : at + items])
+            at += items
+    return {name: polygons.polygons() for name, polygons in lists.items()}
+
+
+def _whole(value: float) -> int:
+    """The number of a vertex; ValueError where it is none."""
+    try:
+        return int(value)
+    except OverflowError:
+        raise ValueError("a list with a number that is infinite") from None

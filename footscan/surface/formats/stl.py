@@ -1,12 +1,14 @@
 """STL, binary; of text it is read too. It holds triangles alone, and 80 letters to say more."""
 
 import re
+from array import array
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from footscan.rows import distinct_rows
+from footscan.surface.formats.text import lines_of
 from footscan.surface.mesh import KNOWN_OF_A_MESH, Mesh
 
 START = 84
@@ -48,12 +50,7 @@ def parse_stl(content: bytes) -> Mesh:
         corners = np.frombuffer(content, TRIANGLE, offset=START)["corners"].reshape(-1, 3)
         metadata = _metadata(content[:80])
     elif content.lstrip()[:5].lower() == b"solid" and b"\0" not in content:
-        if not content.rstrip().splitlines()[-1].lstrip().lower().startswith(b"endsolid"):
-            raise ValueError("ends without 'endsolid', expected a whole text")
-        words = [line.split()[1:] for line in content.splitlines() if line.lstrip()[:6].lower() == b"vertex"]
-        if len(words) % 3 or any(len(word) != 3 for word in words):
-            raise ValueError("expected three vertices of three coordinates in each facet")
-        corners = np.array(words, np.float64).reshape(-1, 3)
+        corners = _corners(content)
     elif content and b"\0" not in content:
         raise ValueError("is text that does not begin with 'solid', expected STL")
     else:
@@ -61,6 +58,23 @@ def parse_stl(content: bytes) -> Mesh:
         raise ValueError(f"{len(content)} bytes, {expected or 'expected at least 84'}")
     merged = distinct_rows(corners.astype(np.float64) + 0.0)
     return Mesh(merged.rows, merged.number.reshape(-1, 3).astype(np.int32), metadata=metadata)
+
+
+def _corners(content: bytes) -> NDArray[np.float64]:
+    """(3 F, 3) the vertices of a text."""
+    numbers, last = array("d"), b""
+    for line in lines_of(content):
+        words = line.split()
+        if words and words[0].lower() == b"vertex":
+            if len(words) != 4:
+                raise ValueError("expected three vertices of three coordinates in each facet")
+            numbers.extend(map(float, words[1:]))
+        last = line if words else last
+    if not last.lstrip().lower().startswith(b"endsolid"):
+        raise ValueError("ends without 'endsolid', expected a whole text")
+    if len(numbers) % 9:
+        raise ValueError("expected three vertices of three coordinates in each facet")
+    return np.array(numbers, np.float64).reshape(-1, 3)
 
 
 def _header(metadata: Mapping[str, str]) -> str:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from footscan.frames.travel import MAX_FRAMES, read_positions, travelled
+from footscan.frames.travel import read_positions, travelled
 from schemas.errors import RefusedInput
 from schemas.scan import Travel
 
@@ -44,7 +44,7 @@ def test_uneven_travel(tmp_path: Path, text: str) -> None:
             (f"frame,x_mm\n0,1\n{row}\n", "line 3: expected a frame number from 0 and x_mm in millimetres")
             for row in (
                 "one,2", "1,two", "-1,2", "1.0,2", ",2", "1,", "1", "1,nan", "1,inf", "1,-1e999", "1,2,5", "1,2 mm",
-                f"{MAX_FRAMES},2",
+                "1,1e6", "\u0661,2", "9999999999999999,2",
             )
         ],
     ],
@@ -61,7 +61,7 @@ def test_what_is_no_csv_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "cam3.csv"
     with pytest.raises(RefusedInput, match=r"cam3\.csv: no such file$"):
         read_positions(path)
-    with pytest.raises(RefusedInput, match="expected a CSV file"):
+    with pytest.raises(RefusedInput, match="expected a file"):
         read_positions(tmp_path)
     for data in (b"frame,x_mm\n0,\xff\n", b'frame,x_mm\n0,"' + b"1" * 200_000):
         path.write_bytes(data)

@@ -148,7 +148,7 @@ def test_another_unit(tmp_path: Path) -> None:
 
 def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "foot.stl")
-    refused(tmp_path / "foot.stl", "cannot be read")
+    refused(tmp_path / "foot.stl", "expected a file")
 
 
 def test_a_cloud_is_no_mesh(tmp_path: Path) -> None:
@@ -163,7 +163,7 @@ def test_missing_and_unknown_files(tmp_path: Path) -> None:
     (tmp_path / "foot.step").write_text("x")
     refused(tmp_path / "foot.step", r"expected a file that ends in \.stl, \.ply, \.obj")
     (tmp_path / "folder.stl").mkdir()
-    refused(tmp_path / "folder.stl", "cannot be read")
+    refused(tmp_path / "folder.stl", "expected a file")
 
 
 STL = stl_bytes(VERTICES, FACES, "footscan")
@@ -194,8 +194,8 @@ PLY = b"ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty flo
         ("a.ply", b"ply\nformat binary_middle_endian 1.0\nend_header\n", "binary_middle_endian"),
         ("a.ply", PLY % 3 + b"end_header\n0 0 0\n1 1 1", "ends after 2 lines"),
         ("a.ply", PLY % 2 + b"end_header\n0 0\n1 1 1\n", "too few values"),
-        ("a.ply", PLY % 99999999999 + b"end_header\n0 0 0\n", "expected 99999999999"),
-        ("a.ply", PLY.replace(b"ascii", b"binary_little_endian") % 99999999999 + b"end_header\n0", "expected more"),
+        ("a.ply", PLY % 999999 + b"end_header\n0 0 0\n", "expected 999999"),
+        ("a.ply", PLY.replace(b"ascii", b"binary_little_endian") % 999999 + b"end_header\n0", "expected more"),
         ("a.ply", PLY.replace(b"float z", b"float w") % 0 + b"end_header\n", "vertices without z"),
         ("a.ply", PLY % 0 + b"end_header\n", "no points"),
         ("a.ply", PLY % 1 + b"property quaternion q\nend_header\n0 0 0 0\n", "unknown header line"),
