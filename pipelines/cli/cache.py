@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.output import AsJson, message, print_json, print_table
+from pipelines.cli.output import AsJson, message, print_json, print_line, print_table
 from pipelines.cli.runs import WORKFLOW, WorkflowFile
 from pipelines.cli.why import json_time, local_time, plan_of_scan
 from schemas.errors import Fault, RefusedInput, one_line
@@ -51,8 +51,8 @@ def stats(workflow: WorkflowFile = None, place: Place = None, as_json: AsJson = 
         return
     _print_shares(_place(store), contents, contents.sizes)
     if pinned:
-        print(f"pinned: {', '.join(pinned)}")
-    print(f"gc would free {_sum(contents, garbage.names)}")
+        print_line(f"pinned: {', '.join(pinned)}")
+    print_line(f"gc would free {_sum(contents, garbage.names)}")
 
 
 @cache.command("gc")
@@ -76,7 +76,7 @@ def gc(
     if not as_json:
         if garbage.names:
             _print_shares(f"{_place(store)}: what would go", contents, garbage.names)
-        print(f"to go: {_sum(contents, garbage.names)}; too young to go: {_sum(contents, garbage.young)}")
+        print_line(f"to go: {_sum(contents, garbage.names)}; too young to go: {_sum(contents, garbage.young)}")
     deleted: list[str] = []
     if delete:
         deleted, live = collect.delete(garbage, store)
@@ -90,9 +90,9 @@ def gc(
         }
         print_json({"store": _place(store), **_garbage_json(contents, garbage), **facts})
     elif delete:
-        print(f"deleted: {_sum(contents, deleted)}")
+        print_line(f"deleted: {_sum(contents, deleted)}")
     elif garbage.names:
-        print("nothing was deleted: --delete does it")
+        print_line("nothing was deleted: --delete does it")
     for one in live:
         message(f"footscan: {_told(one)}; nothing is deleted while it is")
     return 1 if delete and live else 0
@@ -116,7 +116,7 @@ def verify(
     read = audit.verify(store)
     facts: dict[str, Any] = {"store": _place(store), "files": read.files, "damaged": read.damaged}
     if not as_json:
-        print(f"{_place(store)}: {read.files} files read, {len(read.damaged)} damaged")
+        print_line(f"{_place(store)}: {read.files} files read, {len(read.damaged)} damaged")
     failed = bool(read.damaged)
     if share is not None:
         count, differences, problems = _recompute(workflow or WORKFLOW, share, seed)
@@ -126,7 +126,7 @@ def verify(
             "problems": problems,
         }
         if not as_json:
-            print(f"{count} action{'s' * (count != 1)} done again, {len(differences)} came to something else")
+            print_line(f"{count} action{'s' * (count != 1)} done again, {len(differences)} came to something else")
         for one in differences:
             message(f"footscan: {one.step}: NOT REPRODUCED: recorded {one.recorded}, now {one.found}")
         for problem in problems:
@@ -147,7 +147,7 @@ def pin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_jso
     if as_json:
         print_json({"store": _place(store), "scan": name, "steps": steps})
     else:
-        print(f"{name}: the results of {steps} steps are kept")
+        print_line(f"{name}: the results of {steps} steps are kept")
 
 
 @cache.command("unpin")
@@ -160,7 +160,7 @@ def unpin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_j
     if as_json:
         print_json({"store": _place(store), "scan": name})
     else:
-        print(f"{name}: kept no longer than other results")
+        print_line(f"{name}: kept no longer than other results")
 
 
 def open_place(place: Path | str) -> "Store":

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from pipelines.cli.output import AsJson, print_json, print_table
+from pipelines.cli.output import AsJson, print_json, print_line, print_table
 from pipelines.cli.runs import WORKFLOW, Settings, WorkflowFile
 from schemas.errors import RefusedInput
 
@@ -49,9 +49,9 @@ def check(workflow: WorkflowFile = None, as_json: AsJson = False) -> int:
     if as_json:
         print_json(found)
     for mistake in [] if as_json else found:
-        print("{file}:{line}:{column}: {field}: {problem}".format_map(mistake).replace(" : ", " "))
+        print_line("{file}:{line}:{column}: {field}: {problem}".format_map(mistake).replace(" : ", " "))
     if not found and not as_json:
-        print(f"{workflow or WORKFLOW}: nothing is wrong")
+        print_line(f"{workflow or WORKFLOW}: nothing is wrong")
     return RefusedInput.exit_status if found else 0
 
 

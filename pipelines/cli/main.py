@@ -30,6 +30,7 @@ from pipelines.cli import (
     verify,
     why,
 )
+from pipelines.cli.output import LogFormatter, message
 from schemas.errors import Fault, FootscanError, RefusedInput, one_line
 
 INTERRUPTED = 130
@@ -74,7 +75,9 @@ app.command("console")(console.console)
 
 def main() -> None:
     """Run the command line and exit with its status."""
-    logging.basicConfig(format="footscan: %(message)s", level=logging.WARNING)
+    handler = logging.StreamHandler()
+    handler.setFormatter(LogFormatter("footscan: %(message)s"))
+    logging.basicConfig(handlers=[handler], level=logging.WARNING)
     if os.environ.get("FOOTSCAN_DEBUG"):
         logging.getLogger("footscan").setLevel(logging.DEBUG)
     sys.exit(run_command(sys.argv[1:]))
@@ -90,7 +93,7 @@ def run_command(arguments: list[str]) -> int:
     except (FootscanError, typer.TyperException, typer.Abort, KeyboardInterrupt, OSError, MemoryError) as error:
         problem, status = _explain(error)
         if problem:
-            print(f"footscan: {problem}", file=sys.stderr)
+            message(f"footscan: {problem}")
         return status
 
 

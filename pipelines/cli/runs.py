@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
-from pipelines.cli.output import AsJson, message, print_json, print_table
+from pipelines.cli.output import AsJson, message, print_json, print_line, print_table
 from pipelines.cli.workers import ClusterAddress, Threads, Workers, check_workers, chosen_pool
 from schemas.errors import Fault, FootscanError, RefusedInput
 
@@ -98,7 +98,7 @@ def _run(
         if end.problem is not None:
             _tell(end.scan, end.problem)
         elif not as_json:
-            print(f"{end.scan}: {end.folder}")
+            print_line(f"{end.scan}: {end.folder}")
     return ends
 
 
@@ -157,7 +157,7 @@ def plan(
         if rows:
             print_table("", ["scan", "step", "camera", "reason"], rows)
         if planned.steps:
-            print(_summary(planned))
+            print_line(_summary(planned))
     for refused in planned.refused:
         _tell(refused.scan, str(refused.error))
     for planned_scan in planned.scans:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.cli.output import AsJson, figure, message, print_json, print_table
+from pipelines.cli.output import AsJson, figure, message, print_json, print_line, print_table
 from pipelines.cli.runs import WORKFLOW, Settings, WorkflowFile, with_settings
 from pipelines.cli.workers import ClusterAddress, Threads, Workers, check_workers, chosen_pool
 from schemas.errors import Fault, RefusedInput
@@ -77,8 +77,8 @@ def _print(tuned: "Tuned", folder: Path) -> None:
     ]
     print_table("Winner beside present", ["scans", "objective", "", "present", "winner", "gain", "spread", ""], rows)
     for line in [*sentences(result), *result.notes]:
-        print(line)
-    print(f"{len(result.trials) - 1} trials, {tuned.ran.get('extract', 0)} films extracted: {folder}")
+        print_line(line)
+    print_line(f"{len(result.trials) - 1} trials, {tuned.ran.get('extract', 0)} films extracted: {folder}")
 
 
 def _gain(gain: "Gain") -> tuple[float | None, ...]:

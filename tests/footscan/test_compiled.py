@@ -83,8 +83,14 @@ class Checkout:
         known = {**kept, "PYTHONPATH": str(self.root), "PYTHONDONTWRITEBYTECODE": "1", **environment}
         if not environment:
             known["XDG_CACHE_HOME"] = str(self.cache)
-        command = [sys.executable, "-c", script]
-        ended = subprocess.run(command, cwd=self.root / "elsewhere", env=known, capture_output=True, text=True)
+        ended = subprocess.run(
+            [sys.executable, "-c", script],
+            check=False,
+            cwd=self.root / "elsewhere",
+            env=known,
+            capture_output=True,
+            text=True,
+        )
         assert ended.returncode == 0, ended.stderr
         return ended.stdout.splitlines(), ended.stderr
 
