@@ -163,7 +163,7 @@ def unpin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_j
         print_line(f"{name}: kept no longer than other results")
 
 
-def open_place(place: Path | str) -> "Store":
+def open_place(place: Path | str, group: int | None = None) -> "Store":
     """The store at a place, read anew at every turn; RefusedInput where there is none."""
     from pipelines.engine.files import LocalFiles
     from pipelines.engine.store import open_store
@@ -172,15 +172,18 @@ def open_place(place: Path | str) -> "Store":
     store = open_store(place)
     if isinstance(store.files, LocalFiles) and not Path(store.files.root).is_dir():
         raise RefusedInput(store.files.root, "no such folder, expected the store of a run")
-    warn_if_others_can_write(store)
+    warn_if_others_can_write(store, group)
     return store
 
 
 def _store(workflow: Path | None, place: str | None) -> "Store":
     from pipelines.archive import job_of_workflow
+    from pipelines.engine.access import share
 
     if place is None:
-        return open_place(job_of_workflow(workflow or WORKFLOW, may_be_empty=True).cache)
+        job = job_of_workflow(workflow or WORKFLOW, may_be_empty=True)
+        share([job.cache] if isinstance(job.cache, Path) and job.cache.is_dir() else [], job.group)
+        return open_place(job.cache, job.group)
     if workflow is not None:
         raise RefusedInput(workflow, "a workflow and --cache exclude each other, expected one of them")
     return open_place(place)

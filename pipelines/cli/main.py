@@ -31,6 +31,7 @@ from pipelines.cli import (
     why,
 )
 from pipelines.cli.output import LogFormatter, message
+from pipelines.engine.access import keep_private
 from schemas.errors import Fault, FootscanError, RefusedInput, one_line
 
 INTERRUPTED = 130
@@ -75,6 +76,7 @@ app.command("console")(console.console)
 
 def main() -> None:
     """Run the command line and exit with its status."""
+    keep_private()
     handler = logging.StreamHandler()
     handler.setFormatter(LogFormatter("footscan: %(message)s"))
     logging.basicConfig(handlers=[handler], level=logging.WARNING)

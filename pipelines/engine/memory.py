@@ -5,6 +5,7 @@ It can be lost: then rows and blobs are read, and checked, once more.
 
 import contextlib
 import logging
+import os
 import sqlite3
 import threading
 import zlib
@@ -127,6 +128,7 @@ class Memory:
             self._forget(error)
 
     def _open(self) -> sqlite3.Connection:
+        os.close(os.open(self.file, os.O_RDWR | os.O_CREAT, 0o660))  # SQLite's own would not be for a group to write
         connection = sqlite3.connect(self.file, timeout=5, check_same_thread=False)
         try:
             connection.execute(_TABLE)
