@@ -198,7 +198,8 @@ def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None
         added.
     """
     local = job.cache if isinstance(job.cache, Path) else job.results / CACHE
-    planned = PlannedJob(job, open_store(job.cache, local / "known.sqlite"), FileDigests.load(local / "files.json"))
+    store = open_store(job.cache, local / "known.sqlite")
+    planned = PlannedJob(job, store, FileDigests.load(local / "files.json", store.secret))
     folders = {} if folders is None else folders
     for folder in job.folders:
         name = str(folder)

@@ -137,6 +137,32 @@ def verify(
     return int(failed)
 
 
+@cache.command("seal")
+def seal(
+    workflow: WorkflowFile = None,
+    place: Place = None,
+    every: Annotated[
+        bool, typer.Option("--all", help="Also what was written without the seal since: only if you wrote all of it.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Seal the rows of a store with a secret of yours, so that nobody else can make one.
+
+    The first time, what lies in the store is sealed; from then on, a row without the seal counts as missing.
+    """
+    from pipelines.engine.audit import seal_store
+    from pipelines.engine.seal import secret_file
+
+    sealing = seal_store(_store(workflow, place), every=every)
+    store = _store(workflow, place)
+    facts = {"store": _place(store), "secret": str(secret_file(store.files)), **vars(sealing)}
+    if as_json:
+        print_json(facts)
+        return
+    print_line(f"{_place(store)}: {sealing.sealed} rows sealed, {sealing.unsealed} without the seal")
+    print_line(f"secret: {facts['secret']}")
+
+
 @cache.command("pin")
 def pin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_json: AsJson = False) -> None:
     """Keep the present results of a scan, whatever is computed of it later."""
@@ -204,21 +230,21 @@ def _garbage(
         planned = plan_job(job)
         for scan in planned.scans:
             keys |= repeatable(plan_of_scan(scan, planned), store).keys()
-        delivered = _delivered(job.results)
+        delivered = _delivered(job.results, store.secret)
     elif Path(place).name == CACHE:
-        delivered = _delivered(Path(place).resolve().parent)
+        delivered = _delivered(Path(place).resolve().parent, store.secret)
     return find_garbage(
         contents, store, keys=keys, delivered=delivered, now=time.time(), older_than_s=older_than * HOUR_S
     )
 
 
-def _delivered(results: Path) -> set[str]:
+def _delivered(results: Path, secret: bytes | None) -> set[str]:
     """Digests of the files that lie in a folder of results."""
     from pipelines.archive import CACHE
     from pipelines.engine.digest import FileDigests
     from pipelines.scan import DELIVERED
 
-    digests = FileDigests.load(results / CACHE / "files.json")
+    digests = FileDigests.load(results / CACHE / "files.json", secret)
     return {digests.of(file)[0] for name in DELIVERED for file in results.glob(f"*/*/{name}") if file.is_file()}
 
 
