@@ -1,49 +1,140 @@
-"""Loops compiled to machine code, which is kept on disk.
+"""Loops compiled to machine code, which is kept on disk in one place of the user's own.
 
 numba looks for a newer version at the file of a function alone, and would go on with old machine code where a module
 changed that the function takes a constant or another compiled function from. Here the code of a room lies in a folder
 that is named for the digest of all its modules. Compiled functions therefore call none of another room.
+
+What numba keeps is a pickle: whoever can write there runs code as the user who loads it. So a folder that others own,
+or can write to, is not used.
 """
 
 import hashlib
+import logging
 import os
+import stat
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
+from numba.core.caching import FunctionCache
+
+log = logging.getLogger("footscan.compiled")
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
+
+OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def compiled(function: _Function) -> _Function:
     """The function compiled at its first call, without Python's global lock."""
-    room = Path(function.__code__.co_filename).parent
-    folder = _folder(room)
-    known = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(folder or "")
-    try:
-        made: _Function = numba.njit(cache=folder is not None, nogil=True)(function)
-    finally:
-        numba.config.CACHE_DIR = known
-    return made
+    made: Any = numba.njit(nogil=True)(function)
+    if _folder(Path(function.__code__.co_filename).parent) is not None:
+        # As `cache=True` does, but for the folder: numba's own setting for that holds for all threads and libraries.
+        made._cache = _RoomCache(function)
+    kept: _Function = made
+    return kept
+
+
+class _RoomLocator:
+    """Tells numba where the machine code of a function is kept."""
+
+    def __init__(self, function: Callable[..., object], file: str) -> None:
+        self._py_file = file  # numba's warnings name it
+        self._line = function.__code__.co_firstlineno
+        folder = _folder(Path(file).parent)
+        if folder is None:
+            raise RuntimeError(f"{file}: its machine code is kept nowhere")
+        self._folder = folder
+
+    @classmethod
+    def from_function(cls, function: Callable[..., object], file: str) -> "_RoomLocator":
+        return cls(function, file)
+
+    def ensure_cache_path(self) -> None:
+        _make(self._folder)  # a person may have deleted it meanwhile
+
+    def get_cache_path(self) -> str:
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        """The same for equal sources, whenever and wherever they were written: two checkouts share what is equal."""
+        return self._folder.name
+
+    def get_disambiguator(self) -> str:
+        return str(self._line)
+
+
+class _RoomImplementation(FunctionCache._impl_class):  # type: ignore[misc]
+    _locator_classes = (_RoomLocator,)
+
+
+class _RoomCache(FunctionCache):  # type: ignore[misc]
+    _impl_class = _RoomImplementation
 
 
 @lru_cache
 def _folder(room: Path) -> Path | None:
-    """Where the machine code of a room's functions is kept: beside them, otherwise in the user's cache, or nowhere."""
+    """Where the machine code of a room's functions is kept; None where no place is safe."""
+    place = _place()
+    if place is None:
+        return None
     digest = hashlib.sha256()
     for module in sorted(room.glob("*.py")):
         digest.update(module.read_bytes())
-    name = f"{room.name}-{digest.hexdigest()[:16]}"
-    given = numba.config.CACHE_DIR
-    places = [Path(given)] if given else [room / "__pycache__", Path.home() / ".cache" / "footscan"]
-    for place in places:
-        try:
-            (place / name).mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(place / name, os.W_OK):
-            return place / name
+    folder = place / f"{room.name}-{digest.hexdigest()[:16]}"
+    problem = _problem(folder)
+    if problem is not None:
+        _warn(problem)
+        return None
+    return folder
+
+
+@lru_cache
+def _place() -> Path | None:
+    """The folder that `NUMBA_CACHE_DIR` names, otherwise one in the user's cache; settled at its first use."""
+    if given := numba.config.CACHE_DIR:
+        return Path(given).absolute()
+    cache = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    try:
+        cache = cache if cache.is_absolute() else Path.home() / ".cache"  # a relative one is to be ignored, says XDG
+    except RuntimeError:
+        cache = Path()
+    if not cache.is_absolute():
+        _warn("this user has no home")
+        return None
+    return cache / "footscan" / "compiled"
+
+
+def _problem(folder: Path) -> str | None:
+    """Why others may have written what is loaded from a folder, which is made; None where only this user can."""
+    try:
+        _make(folder)
+        if not os.access(folder, os.W_OK):
+            return f"{folder}: cannot be written"
+        if not hasattr(os, "geteuid"):  # Windows: the user's profile is the user's own
+            return None
+        above, here = folder.parent.stat(), folder.lstat()
+    except OSError as error:
+        return f"{folder}: {error.strerror or error}"
+    if above.st_uid not in (0, os.geteuid()) or here.st_uid != os.geteuid():
+        return f"{folder}: belongs to another user"
+    if here.st_mode & OTHERS_WRITE or (above.st_mode & OTHERS_WRITE and not above.st_mode & stat.S_ISVTX):
+        return f"{folder}: other users can write to it"
     return None
+
+
+def _make(folder: Path) -> None:
+    """Make a folder that is the user's alone, and those above it likewise."""
+    if not folder.is_dir():
+        _make(folder.parent)
+        folder.mkdir(mode=0o700, exist_ok=True)
+
+
+@lru_cache
+def _warn(problem: str) -> None:
+    log.warning(
+        "%s: machine code is not kept, and compiled at every start; expected a folder of your own in NUMBA_CACHE_DIR",
+        problem,
+    )

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from pipelines.calibration_choice import CalibrationPlace, calibration_places, choose_calibration
 from pipelines.deliver import deliver
+from pipelines.engine.access import group_number, share
 from pipelines.engine.digest import FileDigests, sha256
 from pipelines.engine.files import open_files
 from pipelines.engine.lease import lease
@@ -26,6 +27,7 @@ from pipelines.workflow_file import check_archives, read_workflow
 from schemas.calibration import calibration_from_json
 from schemas.documents import read_text
 from schemas.errors import RefusedInput
+from schemas.frames import GROUP
 from schemas.measures import Measures
 from schemas.scan import Scan
 from schemas.workflow import ScanParameters
@@ -53,6 +55,8 @@ class Job:
     parameters: ScanParameters
     threads: int
     """Steps that run at once where no other pool is given."""
+    group: int | None = None
+    """Number of the group that what is written is for, as well as its owner."""
 
     def archive_of(self, folder: Path) -> Path | None:
         """The archive that a scan lies in."""
@@ -164,6 +168,7 @@ def job_of_workflow(path: Path, threads: int | None = None, *, may_be_empty: boo
         cache=_cache(path, workflow.cache) or results / CACHE,
         parameters=workflow.parameters,
         threads=threads or workflow.workers or cores(),
+        group=None if workflow.group is None else group_number(workflow.group, path),
     )
 
 
@@ -195,7 +200,8 @@ def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None
         added.
     """
     local = job.cache if isinstance(job.cache, Path) else job.results / CACHE
-    planned = PlannedJob(job, open_store(job.cache, local / "known.sqlite"), FileDigests.load(local / "files.json"))
+    store = open_store(job.cache, local / "known.sqlite")
+    planned = PlannedJob(job, store, FileDigests.load(local / "files.json", store.secret))
     folders = {} if folders is None else folders
     for folder in job.folders:
         name = str(folder)
@@ -229,7 +235,8 @@ def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator
     for name, folder, error in planned.refused:
         yield ScanEnd(name, folder, None, str(error), "refused")
     waiting = iter(planned.scans)
-    warn_if_others_can_write(planned.store)
+    share_written(planned)
+    warn_if_others_can_write(planned.store, planned.job.group)
     held = lease(planned.store) if planned.to_run else nullcontext()  # what runs nothing uses what it has looked up
     try:
         with held:
@@ -239,6 +246,13 @@ def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator
         planned.digests.save()
         if planned.store.memory is not None:
             planned.store.memory.close()
+
+
+def share_written(planned: PlannedJob) -> None:
+    """Let the group of a job, if it has one, read and write all that its run writes."""
+    job = planned.job
+    frames = [scan.scan.folder / GROUP for scan in planned.scans if scan.to_run]
+    share([job.results, *([job.cache] if isinstance(job.cache, Path) else []), *frames], job.group)
 
 
 def cores() -> int:

@@ -64,7 +64,7 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
     with timed("filming and calibration", len(plan.to_run), len(plan.steps)) as on_step_end, lease(store):
         outcomes = run_plan(plan, store, pool=Threads(1), on_step_end=on_step_end)
     digests = digests_of(filming, outcomes)
-    files = FileDigests.load(results / CACHE / "files.json")
+    files = FileDigests.load(results / CACHE / "files.json", store.secret)
     if problem := deliver(
         {"calibration.json": digests["calibrate"], "known.json": digests["film"]}, store, files, folder
     ):

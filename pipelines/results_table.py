@@ -1,6 +1,5 @@
 """All results of an archive as one table, a row a scan: for spreadsheets, for programs, and as a page for people."""
 
-import csv
 import io
 import json
 from collections.abc import Sequence
@@ -13,6 +12,7 @@ from pipelines.engine.atomic import write_atomically
 from pipelines.scan import DELIVERED
 from pipelines.version import SOFTWARE
 from schemas.quality import MeshQuality
+from schemas.tables import Cell, csv_text
 
 CSV, PARQUET = "results.csv", "results.parquet"
 
@@ -25,8 +25,6 @@ COUNTS = {"cameras", "frames_lost", "stripe_points", "cloud_points"} | {
     if {kind["type"] for kind in field.get("anyOf", [field])} <= {"integer", "null"}
 }
 """Names of columns; all others hold measures, distances and shares."""
-
-Cell = str | int | float | None
 
 
 def write_results_table(ends: Sequence[ScanEnd], folder: Path) -> None:
@@ -85,11 +83,7 @@ def _is(path: Path, content: bytes) -> bool:
 
 
 def _as_csv(columns: Sequence[str], rows: Sequence[dict[str, Cell]]) -> str:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, columns, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
+    return csv_text([columns, *([row.get(column) for column in columns] for row in rows)])
 
 
 def _as_parquet(columns: Sequence[str], rows: Sequence[dict[str, Cell]]) -> bytes:

@@ -56,4 +56,12 @@ class DamagedError(Fault):
 
 def one_line(text: str) -> str:
     """`text` without line breaks and control characters, for names that come from outside."""
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in " ".join(text.split()))
+    return printable(" ".join(text.split()))
+
+
+def printable(text: str, keep: str = "") -> str:
+    """`text` with another sign for what a terminal would obey instead of showing: control characters, escape sequences,
+    line breaks, marks that turn the direction of writing. The characters in `keep` stay."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in keep else "\N{REPLACEMENT CHARACTER}" for c in text)

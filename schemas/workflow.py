@@ -85,6 +85,8 @@ class Workflow(Document):
     """Folder for `<patient>/<scan>/`."""
     cache: Annotated[str, AfterValidator(_place)] | None = None
     """Folder of the content store, or its URL as fsspec has it; `.footscan` in the results where absent."""
+    group: Annotated[str, Field(min_length=1, max_length=64)] | None = None
+    """Group of users of this machine who share what is written; it is the owner's alone where absent."""
     workers: Annotated[int, Field(ge=1, le=256)] | None = None
     """How many steps run at once; as many as there are cores where absent."""
     parameters: Annotated[ScanParameters, BeforeValidator(_without_empty)] = ScanParameters()

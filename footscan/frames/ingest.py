@@ -16,7 +16,7 @@ from zarr.errors import ContainsGroupError
 from footscan.frames.array import METADATA, chunk_name, is_recorded
 from footscan.frames.codec import ImageCodec
 from footscan.frames.film import Film, encoded_frames, frame_digest, open_film, pixel_frames
-from footscan.frames.partial import move_into_place, partial_folder, sweep
+from footscan.frames.partial import make_partial, move_into_place, partial_folder, sweep
 from schemas.errors import Fault, RefusedInput
 from schemas.frames import FrameManifest
 from schemas.limits import read_bounded
@@ -58,8 +58,9 @@ def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SI
         array.parent.mkdir(parents=True, exist_ok=True)
         sweep(array.parent.parent)
         shutil.rmtree(partial, ignore_errors=True)
-        manifest = _write_frames(opened, partial)
-        move_into_place(partial, array)
+        make_partial(partial, array.parent)
+        manifest = _write_frames(opened, partial / array.name)
+        move_into_place(partial / array.name, array)
         make_group(array.parent)
     except OSError as error:
         raise Fault(f"{array}: cannot be written ({error.strerror or error})") from None

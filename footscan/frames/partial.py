@@ -5,6 +5,7 @@ import errno
 import os
 import shutil
 import socket
+import stat
 import threading
 from pathlib import Path
 
@@ -12,6 +13,15 @@ from pathlib import Path
 def partial_folder(folder: Path, name: str) -> Path:
     """Where what shall be called `name` is made, hidden in `folder`; one for each thread."""
     return folder / f".{name}.partial-{socket.gethostname()}-{threading.get_ident()}-{os.getpid()}"
+
+
+def make_partial(partial: Path, place: Path) -> None:
+    """Make a folder for what shall lie in the folder `place`: if that is shared with a group, so is what is made."""
+    partial.mkdir()
+    status = place.stat()
+    if status.st_mode & stat.S_ISGID:
+        os.chown(partial, -1, status.st_gid)
+        partial.chmod(stat.S_IMODE(status.st_mode))
 
 
 def move_into_place(partial: Path, place: Path) -> None:

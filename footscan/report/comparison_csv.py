@@ -1,10 +1,9 @@
 """A comparison as CSV, for a spreadsheet."""
 
-import csv
-import io
 from collections.abc import Iterator
 
 from schemas.quality import Comparison, Figures, Histogram
+from schemas.tables import Cell, csv_text
 
 FIGURES = tuple(Figures.model_fields)
 
@@ -15,17 +14,18 @@ def comparison_csv(comparison: Comparison) -> str:
     The column `table` tells them apart: `whole`, `region`, `completeness` (the other way; its first row is the whole),
     `unsigned` and `signed` (classes). Lengths are mm; what a row does not have is empty.
     """
-    out = io.StringIO(newline="")
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["table", "name", "from_mm", "to_mm", "share", *FIGURES])
-    writer.writerow(["whole", *_EMPTY[:4], *_cells(comparison)])
-    writer.writerows(["region", region.region, *_EMPTY[:3], *_cells(region)] for region in comparison.regions)
+    return csv_text(_rows(comparison))
+
+
+def _rows(comparison: Comparison) -> Iterator[list[Cell]]:
+    yield ["table", "name", "from_mm", "to_mm", "share", *FIGURES]
+    yield ["whole", *_EMPTY[:4], *_cells(comparison)]
+    yield from (["region", region.region, *_EMPTY[:3], *_cells(region)] for region in comparison.regions)
     if (found := comparison.completeness) is not None:
-        writer.writerow(["completeness", "", 0, found.within_mm, found.within_share, *_cells(found)])
-        writer.writerows(["completeness", region.region, *_EMPTY[:3], *_cells(region)] for region in found.regions)
+        yield ["completeness", "", 0, found.within_mm, found.within_share, *_cells(found)]
+        yield from (["completeness", region.region, *_EMPTY[:3], *_cells(region)] for region in found.regions)
     for histogram in comparison.histograms:
-        writer.writerows(_classes(histogram))
-    return out.getvalue()
+        yield from _classes(histogram)
 
 
 _EMPTY = [""] * len(FIGURES)
@@ -35,7 +35,7 @@ def _cells(figures: Figures) -> list[float | None]:
     return [getattr(figures, name) for name in FIGURES]
 
 
-def _classes(histogram: Histogram) -> Iterator[list[object]]:
+def _classes(histogram: Histogram) -> Iterator[list[Cell]]:
     table = "signed" if histogram.signed else "unsigned"
     edges = histogram.edges_mm
     for number, (count, share) in enumerate(zip(histogram.counts, histogram.shares, strict=True)):

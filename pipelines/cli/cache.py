@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.output import AsJson, message, print_json, print_table
+from pipelines.cli.output import AsJson, message, print_json, print_line, print_table
 from pipelines.cli.runs import WORKFLOW, WorkflowFile
 from pipelines.cli.why import json_time, local_time, plan_of_scan
 from schemas.errors import Fault, RefusedInput, one_line
@@ -51,8 +51,8 @@ def stats(workflow: WorkflowFile = None, place: Place = None, as_json: AsJson = 
         return
     _print_shares(_place(store), contents, contents.sizes)
     if pinned:
-        print(f"pinned: {', '.join(pinned)}")
-    print(f"gc would free {_sum(contents, garbage.names)}")
+        print_line(f"pinned: {', '.join(pinned)}")
+    print_line(f"gc would free {_sum(contents, garbage.names)}")
 
 
 @cache.command("gc")
@@ -76,7 +76,7 @@ def gc(
     if not as_json:
         if garbage.names:
             _print_shares(f"{_place(store)}: what would go", contents, garbage.names)
-        print(f"to go: {_sum(contents, garbage.names)}; too young to go: {_sum(contents, garbage.young)}")
+        print_line(f"to go: {_sum(contents, garbage.names)}; too young to go: {_sum(contents, garbage.young)}")
     deleted: list[str] = []
     if delete:
         deleted, live = collect.delete(garbage, store)
@@ -90,9 +90,9 @@ def gc(
         }
         print_json({"store": _place(store), **_garbage_json(contents, garbage), **facts})
     elif delete:
-        print(f"deleted: {_sum(contents, deleted)}")
+        print_line(f"deleted: {_sum(contents, deleted)}")
     elif garbage.names:
-        print("nothing was deleted: --delete does it")
+        print_line("nothing was deleted: --delete does it")
     for one in live:
         message(f"footscan: {_told(one)}; nothing is deleted while it is")
     return 1 if delete and live else 0
@@ -116,7 +116,7 @@ def verify(
     read = audit.verify(store)
     facts: dict[str, Any] = {"store": _place(store), "files": read.files, "damaged": read.damaged}
     if not as_json:
-        print(f"{_place(store)}: {read.files} files read, {len(read.damaged)} damaged")
+        print_line(f"{_place(store)}: {read.files} files read, {len(read.damaged)} damaged")
     failed = bool(read.damaged)
     if share is not None:
         count, differences, problems = _recompute(workflow or WORKFLOW, share, seed)
@@ -126,7 +126,7 @@ def verify(
             "problems": problems,
         }
         if not as_json:
-            print(f"{count} action{'s' * (count != 1)} done again, {len(differences)} came to something else")
+            print_line(f"{count} action{'s' * (count != 1)} done again, {len(differences)} came to something else")
         for one in differences:
             message(f"footscan: {one.step}: NOT REPRODUCED: recorded {one.recorded}, now {one.found}")
         for problem in problems:
@@ -135,6 +135,32 @@ def verify(
     if as_json:
         print_json(facts)
     return int(failed)
+
+
+@cache.command("seal")
+def seal(
+    workflow: WorkflowFile = None,
+    place: Place = None,
+    every: Annotated[
+        bool, typer.Option("--all", help="Also what was written without the seal since: only if you wrote all of it.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Seal the rows of a store with a secret of yours, so that nobody else can make one.
+
+    The first time, what lies in the store is sealed; from then on, a row without the seal counts as missing.
+    """
+    from pipelines.engine.audit import seal_store
+    from pipelines.engine.seal import secret_file
+
+    sealing = seal_store(_store(workflow, place), every=every)
+    store = _store(workflow, place)
+    facts = {"store": _place(store), "secret": str(secret_file(store.files)), **vars(sealing)}
+    if as_json:
+        print_json(facts)
+        return
+    print_line(f"{_place(store)}: {sealing.sealed} rows sealed, {sealing.unsealed} without the seal")
+    print_line(f"secret: {facts['secret']}")
 
 
 @cache.command("pin")
@@ -147,7 +173,7 @@ def pin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_jso
     if as_json:
         print_json({"store": _place(store), "scan": name, "steps": steps})
     else:
-        print(f"{name}: the results of {steps} steps are kept")
+        print_line(f"{name}: the results of {steps} steps are kept")
 
 
 @cache.command("unpin")
@@ -160,10 +186,10 @@ def unpin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_j
     if as_json:
         print_json({"store": _place(store), "scan": name})
     else:
-        print(f"{name}: kept no longer than other results")
+        print_line(f"{name}: kept no longer than other results")
 
 
-def open_place(place: Path | str) -> "Store":
+def open_place(place: Path | str, group: int | None = None) -> "Store":
     """The store at a place, read anew at every turn; RefusedInput where there is none."""
     from pipelines.engine.files import LocalFiles
     from pipelines.engine.store import open_store
@@ -172,15 +198,18 @@ def open_place(place: Path | str) -> "Store":
     store = open_store(place)
     if isinstance(store.files, LocalFiles) and not Path(store.files.root).is_dir():
         raise RefusedInput(store.files.root, "no such folder, expected the store of a run")
-    warn_if_others_can_write(store)
+    warn_if_others_can_write(store, group)
     return store
 
 
 def _store(workflow: Path | None, place: str | None) -> "Store":
     from pipelines.archive import job_of_workflow
+    from pipelines.engine.access import share
 
     if place is None:
-        return open_place(job_of_workflow(workflow or WORKFLOW, may_be_empty=True).cache)
+        job = job_of_workflow(workflow or WORKFLOW, may_be_empty=True)
+        share([job.cache] if isinstance(job.cache, Path) and job.cache.is_dir() else [], job.group)
+        return open_place(job.cache, job.group)
     if workflow is not None:
         raise RefusedInput(workflow, "a workflow and --cache exclude each other, expected one of them")
     return open_place(place)
@@ -201,21 +230,21 @@ def _garbage(
         planned = plan_job(job)
         for scan in planned.scans:
             keys |= repeatable(plan_of_scan(scan, planned), store).keys()
-        delivered = _delivered(job.results)
+        delivered = _delivered(job.results, store.secret)
     elif Path(place).name == CACHE:
-        delivered = _delivered(Path(place).resolve().parent)
+        delivered = _delivered(Path(place).resolve().parent, store.secret)
     return find_garbage(
         contents, store, keys=keys, delivered=delivered, now=time.time(), older_than_s=older_than * HOUR_S
     )
 
 
-def _delivered(results: Path) -> set[str]:
+def _delivered(results: Path, secret: bytes | None) -> set[str]:
     """Digests of the files that lie in a folder of results."""
     from pipelines.archive import CACHE
     from pipelines.engine.digest import FileDigests
     from pipelines.scan import DELIVERED
 
-    digests = FileDigests.load(results / CACHE / "files.json")
+    digests = FileDigests.load(results / CACHE / "files.json", secret)
     return {digests.of(file)[0] for name in DELIVERED for file in results.glob(f"*/*/{name}") if file.is_file()}
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from pipelines.cli.calibration_file import tell_calibration, write_calibration
-from pipelines.cli.output import AsJson, keep_inputs, message, print_json, print_table
+from pipelines.cli.output import AsJson, keep_inputs, message, print_json, print_line, print_table, print_text
 from schemas.errors import RefusedInput
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def models(
             ]
         )
     elif markdown:
-        print(markdown_of_models(trials), end="")
+        print_text(markdown_of_models(trials))
     else:
         print_models(trials)
 
@@ -181,4 +181,4 @@ def _print_quadratic(charts: "dict[int, Chart]", *, as_json: bool) -> None:
     units = "/".join(sorted({chart.unit for chart in charts.values()}))
     print_table(f"Quadratic of the pixel, in {units}", ["camera", "of", *names, "R^2"], rows)
     for remark in sorted({fit.remark for fit in fits.values() if fit.remark}):
-        print(remark)
+        print_line(remark)

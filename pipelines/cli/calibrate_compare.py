@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.output import AsJson, figure, message, print_json, print_table
+from pipelines.cli.output import AsJson, figure, message, print_json, print_line, print_table
 from schemas.errors import one_line
 
 if TYPE_CHECKING:
@@ -53,10 +53,10 @@ def _print(comparisons: "list[CameraComparison]", title: str) -> None:
     in_both = [found for found in comparisons if found.model_a is not None and found.model_b is not None]
     if in_both:
         print_table(title, COLUMNS, [_row(found) for found in in_both])
-        print(MEANING)
+        print_line(MEANING)
     for remark in dict.fromkeys(remark for found in comparisons for remark in found.remarks):
         cameras = [str(found.camera) for found in comparisons if remark in found.remarks]
-        print(f"Camera{'s' if len(cameras) > 1 else ''} {', '.join(cameras)}: {remark}.")
+        print_line(f"Camera{'s' if len(cameras) > 1 else ''} {', '.join(cameras)}: {remark}.")
 
 
 def _row(found: "CameraComparison") -> list[str]:

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from pipelines.cli.calibration_file import print_pairs
-from pipelines.cli.output import AsJson, figure, keep_inputs, message, print_json, print_table
+from pipelines.cli.output import AsJson, figure, keep_inputs, message, print_json, print_line, print_table
 
 
 def show(
@@ -41,15 +41,15 @@ def show(
         ]
         columns = ["camera", "model", "points", "own rms mm", "held-out rms mm", "worst mm", "condition", "region"]
         print_table("", columns, rows)
-        print(
+        print_line(
             "Condition: how much the fit magnifies errors of its data. Region: the hull of the pixels it was fitted to."
         )
         print_pairs(known.pairs)
         made = f" at {known.created:%Y-%m-%d %H:%M} UTC" if known.created else ""
         for warning in known.warnings:
-            print(f"Warning: {warning}")
-        print(f"Made by {known.software}{made} from {len(known.sources)} files:")
+            print_line(f"Warning: {warning}")
+        print_line(f"Made by {known.software}{made} from {len(known.sources)} files:")
         for source in known.sources:
-            print(f"  {source.name}  {source.sha256[:16]}")
+            print_line(f"  {source.name}  {source.sha256[:16]}")
     write_atomically(picture, calibration_figure(known))
     message(f"{picture}: residuals and coverage")

@@ -15,7 +15,7 @@ from pipelines.cli import (
     calibrate_latency,
     calibrate_show,
 )
-from pipelines.cli.output import AsJson, print_json
+from pipelines.cli.output import AsJson, print_json, print_text
 
 calibrate = typer.Typer(help="Learn each camera's map from pixels to millimetres.", no_args_is_help=True)
 calibrate.command("chart")(calibrate_chart.chart)
@@ -53,7 +53,7 @@ def map_pixels(
     if as_json:
         print_json(rows)
     elif out is None:
-        print(_csv(rows), end="")
+        print_text(_csv(rows))
 
 
 def _csv(rows: list[dict[str, Any]]) -> str:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.output import AsJson, figure, keep_inputs, message, print_json, print_table
+from pipelines.cli.output import AsJson, figure, keep_inputs, message, print_json, print_line, print_table
 from schemas.errors import Finding, RefusedInput, one_line
 
 if TYPE_CHECKING:
@@ -133,10 +133,10 @@ def _print(comparison: "Comparison", registration: "Registration | None", first:
 
     if registration is not None:
         before, after = registration.before, registration.after
-        print(f"Moved onto {one_line(second)} by")
+        print_line(f"Moved onto {one_line(second)} by")
         for line in registration.transform:
-            print("  " + " ".join(f"{value:12.6f}" for value in line))
-        print(f"Residuals, rms: {before.rms:.4f} mm before, {after.rms:.4f} mm after; {registration.verdict}")
+            print_line("  " + " ".join(f"{value:12.6f}" for value in line))
+        print_line(f"Residuals, rms: {before.rms:.4f} mm before, {after.rms:.4f} mm after; {registration.verdict}")
     rows = [[name, figure(getattr(comparison, name), ".4f")] for name in Figures.model_fields if name != "points"]
     print_table(f"{first} to {second}, mm", ["figure", "mm"], rows)
     for title, regions in (
@@ -150,4 +150,4 @@ def _print(comparison: "Comparison", registration: "Registration | None", first:
     if comparison.completeness is not None:
         found = comparison.completeness
         within = f"{100 * found.within_share:.2f} % of {one_line(second)} is within {found.within_mm:g} mm"
-        print(f"{within} of {one_line(first)}; mean {found.mean:.4f} mm, largest {found.max:.4f} mm")
+        print_line(f"{within} of {one_line(first)}; mean {found.mean:.4f} mm, largest {found.max:.4f} mm")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from pipelines.cli.output import AsJson, print_json, print_table
+from pipelines.cli.output import AsJson, print_json, print_line, print_table
 from pipelines.cli.runs import WORKFLOW, Settings, WorkflowFile
 from schemas.errors import RefusedInput
 
@@ -51,9 +51,9 @@ def check(workflow: WorkflowFile = None, as_json: AsJson = False) -> int:
     if as_json:
         print_json([{"file": str(path), **mistake._asdict()} for mistake in found])
     for line, column, field, problem in [] if as_json else found:
-        print(f"{path}:{line}:{column}: {field}: {problem}".replace(" : ", " "))
+        print_line(f"{path}:{line}:{column}: {field}: {problem}".replace(" : ", " "))
     if not found and not as_json:
-        print(f"{path}: nothing is wrong")
+        print_line(f"{path}: nothing is wrong")
     return RefusedInput.exit_status if found else 0
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pipelines.cli.output import message, print_table
+from pipelines.cli.output import message, print_line, print_table
 from pipelines.cli.results import print_measures
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def demo(
         figures = quality.truth.model_dump(include={"mean", "p50", "p95", "p99", "max"})
         rows = [[name, f"{value:.3f}"] for name, value in figures.items()]
         print_table("Distance to the true surface", ["figure", "mm"], rows)
-    print(f"Report: {result.results / 'report.html'}")
+    print_line(f"Report: {result.results / 'report.html'}")
 
 
 @contextmanager

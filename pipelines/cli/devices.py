@@ -3,7 +3,7 @@
 from typing import Any
 
 from pipelines.cli.live_options import RIG, VIRTUAL_FOLDER, RigFile, Virtual, VirtualFolder, opened_rig, plain_world
-from pipelines.cli.output import AsJson, message, print_json, print_table
+from pipelines.cli.output import AsJson, message, print_json, print_line, print_table
 
 
 def devices(
@@ -28,9 +28,11 @@ def devices(
 
 def _print(found: dict[str, Any]) -> None:
     ports = [[port["stable_name"], port["words"]] for port in found["serial_ports"]]
-    print_table("Serial ports", ["port", "adapter"], ports) if ports else print("No serial port.")
+    print_table("Serial ports", ["port", "adapter"], ports) if ports else print_line("No serial port.")
     cameras = [[one["device"], one["name"], one["bus"] or "-", one["problem"] or "ok"] for one in found["cameras"]]
-    print_table("Cameras", ["device", "name", "bus", ""], cameras) if cameras else print("No camera on this computer.")
+    print_table("Cameras", ["device", "name", "bus", ""], cameras) if cameras else print_line(
+        "No camera on this computer."
+    )
     if "rig" not in found:
         message("no rig.yaml here: nothing is expected")
         return
@@ -47,4 +49,4 @@ def _print(found: dict[str, Any]) -> None:
     ]
     print_table(f"Rig, board at {found['rig']['port']}", ["camera", "head", "device", "", "latency (ms)"], rows)
     for each in found["rig"]["passes"]:
-        print(each["reason"])
+        print_line(each["reason"])

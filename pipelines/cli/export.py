@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 FLOOR_MM = 1.0
 """A mesh whose lowest vertex is farther than this from Z = 0 does not stand there."""
+ANONYMOUS = {("side", "right"), ("side", "left"), ("side", "unknown"), ("frame", "scanner"), ("unit", "mm")}
+"""What is told of a mesh that does not tell whose it is: of the values, too, for a file may say anything."""
 SIZE_MM = (20.0, 2000.0)
 """Across a foot, a block or a sphere in mm; in metres or inches it is smaller."""
 
@@ -31,6 +33,9 @@ def export(
     ] = None,
     patient: Annotated[str | None, typer.Option(help="Pseudonym, told in the file.")] = None,
     scan: Annotated[str | None, typer.Option(help="Name of the scan, told in the file.")] = None,
+    anonymous: Annotated[
+        bool, typer.Option("--anonymous", help="Tell nothing of whose foot it is: no names, no colours of the skin.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Write a foot's mesh for another program, with fewer triangles if it wants that."""
@@ -48,8 +53,14 @@ def export(
     suffix = out.suffix.lower()
     if suffix not in WRITERS:
         raise RefusedInput(out, f"expected a name that ends in {', '.join(WRITERS)}, found {out.suffix!r}")
+    if anonymous and (patient is not None or scan is not None):
+        raise RefusedInput("--anonymous", "excludes --patient and --scan")
     keep_inputs([out], file)
     given = read_file(file)
+    if anonymous:
+        _check_name(out, file, given)
+        kept = dict(sorted(given.metadata.items() & ANONYMOUS))
+        given = replace(given, metadata=kept, colours=None)  # of a photograph: skin, scars, tattoos
     _check(given, file)
     names = {
         key: pseudonym(name, f"--{key}") for key, name in (("patient", patient), ("scan", scan)) if name is not None
@@ -81,6 +92,17 @@ def export(
         )
     else:
         _print(quality, changed, out)
+
+
+def _check_name(out: Path, file: Path, mesh: "Mesh") -> None:
+    """Refuses a name that tells whose foot it is, as far as the mesh or the folders of its results tell that."""
+    names = {mesh.metadata.get("patient", ""), mesh.metadata.get("scan", "")}
+    folder = file.resolve().parent
+    if (folder / "measures.json").exists():
+        names |= {folder.name, folder.parent.name}
+    for name in sorted(names):
+        if len(name) > 2 and name.casefold() in out.name.casefold():
+            raise RefusedInput(out, f"has {one_line(name)!r} in its name, expected another one for --anonymous")
 
 
 def _check(mesh: "Mesh", file: Path) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.cli.feet import FEET, PATIENT, AnyPatient, TableFile, is_patient, read_feet, read_latest_pair
-from pipelines.cli.output import AsJson, figure, print_json, print_table
+from pipelines.cli.output import AsJson, figure, print_json, print_line, print_table
 from schemas.errors import one_line
 
 if TYPE_CHECKING:
@@ -62,14 +62,14 @@ def _print(ranking: "Ranking", feet: str, most: int) -> None:
     measures = [name.replace("_", " ") for name in names]
     print_table(one_line(title), ["rank", "last", "foot", "score", *measures, "heel", "spring"], rows)
     out = [last for last in ranking.lasts if last.rank is None]
-    print(f"{len(fitting)} of {len(ranking.lasts)} lasts can be worn; out: {len(out)}")
+    print_line(f"{len(fitting)} of {len(ranking.lasts)} lasts can be worn; out: {len(out)}")
     for last in out[:most]:
         told = "; ".join(f"{side} {reason}" for side, fit in last.feet.items() for reason in fit.rejected)
-        print(one_line(f"{last.name}: {told}"))
+        print_line(one_line(f"{last.name}: {told}"))
     if len(out) > most:
-        print(f"and {len(out) - most} more")
+        print_line(f"and {len(out) - most} more")
     for missing in ranking.missing:
-        print(one_line(f"not compared: {missing}"))
+        print_line(one_line(f"not compared: {missing}"))
 
 
 def _heading(last: "RankedLast", side: str) -> list[str]:

@@ -31,7 +31,8 @@ from pipelines.cli import (
     verify,
     why,
 )
-from pipelines.cli.output import drop_unwritten, message
+from pipelines.cli.output import LogFormatter, drop_unwritten, message
+from pipelines.engine.access import keep_private
 from schemas.errors import Fault, FootscanError, RefusedInput, one_line
 from schemas.limits import check_limits
 
@@ -78,7 +79,10 @@ app.command("console")(console.console)
 
 def main() -> None:
     """Run the command line and exit with its status."""
-    logging.basicConfig(format="footscan: %(message)s", level=logging.WARNING)
+    keep_private()
+    handler = logging.StreamHandler()
+    handler.setFormatter(LogFormatter("footscan: %(message)s"))
+    logging.basicConfig(handlers=[handler], level=logging.WARNING)
     if os.environ.get("FOOTSCAN_DEBUG"):
         logging.getLogger("footscan").setLevel(logging.DEBUG)
     status = run_command(sys.argv[1:])

@@ -1,6 +1,11 @@
-"""What the command prints: tables for persons and JSON for programs on standard output, messages on standard error."""
+"""What the command prints: tables for persons and JSON for programs on standard output, messages on standard error.
+
+Names of folders and all else that comes from outside is shown, never obeyed by the terminal: it cannot move the cursor,
+begin a line of its own or hide what stands before it. So nothing here is printed by `print` itself.
+"""
 
 import json
+import logging
 import os
 import sys
 from collections.abc import Iterable, Sequence
@@ -10,7 +15,7 @@ from typing import Annotated, Any
 
 import typer
 
-from schemas.errors import RefusedInput
+from schemas.errors import RefusedInput, printable
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of a table.")]
 
@@ -18,7 +23,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document in
 def message(text: str) -> None:
     """A line for the person at the terminal; where that is gone, nobody can read it."""
     with suppress(OSError):
-        print(text, file=sys.stderr)
+        print(printable(text), file=sys.stderr)
 
 
 def drop_unwritten() -> None:
@@ -30,6 +35,28 @@ def drop_unwritten() -> None:
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, stream.fileno())
             os.close(nowhere)
+
+
+def print_line(text: str) -> None:
+    """A line on standard output."""
+    print(printable(text))
+
+
+def print_text(text: str) -> None:
+    """Lines on standard output, with their ends: a table in a format of its own, or a file as it is."""
+    print(printable(text, keep="\n\t"), end="")
+
+
+class LogFormatter(logging.Formatter):
+    """Log lines for the terminal."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 (a name of logging's)
+        """The line, whatever names are in it."""
+        return printable(super().formatMessage(record))
+
+    def formatException(self, ei: Any) -> str:  # noqa: N802 (as above)
+        """The lines of a traceback."""
+        return printable(super().formatException(ei), keep="\n")
 
 
 def keep_inputs(outputs: Iterable[Path | None], *inputs: Path) -> None:
@@ -58,7 +85,15 @@ def keep_inputs(outputs: Iterable[Path | None], *inputs: Path) -> None:
 
 def print_json(value: Any) -> None:
     """One JSON document on standard output."""
-    print(json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False))
+    print(json_text(value, indent=2))
+
+
+def json_text(value: Any, indent: int | None = None) -> str:
+    """A JSON document; what is not shown, such as a mark that turns the direction of writing, is escaped."""
+    text = json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False)
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text)
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -69,13 +104,13 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
 
     console = Console(width=None if sys.stdout.isatty() else 120)
     if title:
-        console.print(Text(title, style="bold"))
+        console.print(Text(printable(title), style="bold"))
     table = Table()
     for index, column in enumerate(columns):
         numbers = all(_is_number(row[index]) for row in rows)
-        table.add_column(column, justify="right" if numbers else "left")
+        table.add_column(Text(printable(column)), justify="right" if numbers else "left")
     for row in rows:
-        table.add_row(*(Text(cell) for cell in row))  # Text: names of scans are data, never markup
+        table.add_row(*(Text(printable(cell, keep="\n")) for cell in row))  # Text: names are data, never markup
     console.print(table)
 
 

@@ -18,7 +18,7 @@ from pipelines.cli.feet import (
     read_patient,
     tell_passed_over,
 )
-from pipelines.cli.output import AsJson, figure, print_json, print_table
+from pipelines.cli.output import AsJson, figure, print_json, print_line, print_table
 from pipelines.cli.sizes import print_notes, print_sizes
 from schemas.errors import RefusedInput, one_line
 
@@ -120,7 +120,7 @@ def _print_pair(found: "Pair") -> None:
     sides = ", ".join(f"{measure} by the {side} foot" for measure, side in found.decided_by.items() if side)
     print_sizes("Sizes for both" + (f": {sides}" if sides else ""), found.sizes)
     for note in found.notes:
-        print(one_line(note))
+        print_line(one_line(note))
 
 
 def _print_change(found: "Change") -> None:
@@ -143,7 +143,7 @@ def _print_change(found: "Change") -> None:
     )
     print_notes((row.measure, row.note) for row in found.rows)
     for note in found.notes:
-        print(one_line(note))
+        print_line(one_line(note))
 
 
 def _name(sighting: "Sighting") -> str:

@@ -18,6 +18,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from pipelines.cli.output import json_text
 from pipelines.engine.pool import StepEnd
 from pipelines.engine.step import Failure
 
@@ -102,7 +103,7 @@ class StepProgress:
 
     def _write(self, event: str, **facts: Any) -> None:
         if self._log is not None:
-            self._log.write(json.dumps({"event": event, "time": time.time(), **facts}, ensure_ascii=False) + "\n")
+            self._log.write(json_text({"event": event, "time": time.time(), **facts}) + "\n")
             self._log.flush()
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.output import AsJson, keep_inputs, message, print_json, print_table
+from pipelines.cli.output import AsJson, keep_inputs, message, print_json, print_line, print_table
 from schemas.errors import RefusedInput, one_line
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def _check(out: Path, age: str, *, as_json: bool) -> int:
     if as_json:
         print_json({"fresh": is_fresh, "told": said})
     else:
-        print(one_line(said))
+        print_line(one_line(said))
     return 0 if is_fresh else 1
 
 
@@ -130,8 +130,10 @@ def _show(night: "Night") -> None:
     for one in night.result.sets:
         for first in one.first:
             changes = "; ".join(one_line(change.text) for change in first.changes)
-            print(f"{one.name}: first {', '.join(first.steps)}: {first.why}" + (f" ({changes})" if changes else ""))
-    print(f"Report: {night.page}")
+            print_line(
+                f"{one.name}: first {', '.join(first.steps)}: {first.why}" + (f" ({changes})" if changes else "")
+            )
+    print_line(f"Report: {night.page}")
 
 
 def _cell(value: float | None) -> str:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pipelines.cli.output import AsJson, figure, keep_inputs, message, print_json, print_table
+from pipelines.cli.output import AsJson, figure, keep_inputs, message, print_json, print_line, print_table
 from schemas.errors import Finding, RefusedInput
 
 if TYPE_CHECKING:
@@ -92,20 +92,14 @@ def _manual_landmarks(file: Path) -> "dict[str, NDArray[np.float64]]":
 def _with_row(table: Path, file: Path, measures: "Measures") -> str:
     """The CSV `table` with a row for one foot, in place of one that it has for the same file and side; a value is empty
     where it could not be taken."""
-    import csv
-    import io
-
-    from schemas.tables import read_records
+    from schemas.tables import csv_text, plain_cell, read_records
 
     header = ["file", "side", "axis", *(f"{name}_{m.unit}" for name, m in measures.measures.items())]
-    row = [str(file), measures.side, measures.axis, *(m.value for m in measures.measures.values())]
+    row = [plain_cell(str(file)), measures.side, measures.axis, *(m.value for m in measures.measures.values())]
     there = [cells for _, cells in read_records(table)] if table.exists() else []
     if there and there[0] != header:
         raise RefusedInput(table, "has another header, expected rows of measures to add one to", field="line 1")
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerows([header, *(cells for cells in there[1:] if cells[:2] != row[:2]), row])
-    return text.getvalue()
+    return csv_text([header, *(cells for cells in there[1:] if cells[:2] != row[:2]), row])
 
 
 def print_measures(measures: "Measures", known: dict[str, float]) -> None:
@@ -123,4 +117,4 @@ def print_measures(measures: "Measures", known: dict[str, float]) -> None:
     print_table(f"Foot, side {measures.side}, axis {measures.axis}", columns, rows)
     for name, measured in measures.measures.items():
         if measured.status != "ok" and measured.note is not None:
-            print(f"{name} is {measured.status}: {measured.note}")
+            print_line(f"{name} is {measured.status}: {measured.note}")

@@ -9,8 +9,18 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
-from pipelines.cli.output import AsJson, message, print_json, print_table
-from pipelines.cli.workers import ClusterAddress, Threads, Workers, check_workers, chosen_pool
+from pipelines.cli.output import AsJson, message, print_json, print_line, print_table
+from pipelines.cli.workers import (
+    ClusterAddress,
+    Dashboard,
+    Placement,
+    Threads,
+    TlsCa,
+    TlsCert,
+    TlsKey,
+    Workers,
+    chosen_pool,
+)
 from schemas.errors import Fault, FootscanError, RefusedInput
 
 if TYPE_CHECKING:
@@ -49,6 +59,10 @@ def run(
     threads: Threads = None,
     workers: Workers = None,
     cluster: ClusterAddress = None,
+    dashboard: Dashboard = False,
+    tls_ca: TlsCa = None,
+    tls_cert: TlsCert = None,
+    tls_key: TlsKey = None,
     watch: WatchArchive = False,
     log_json: JsonLog = None,
     as_json: AsJson = False,
@@ -57,13 +71,14 @@ def run(
 
     Nothing that has been computed before is computed again.
     """
-    check_workers(threads, workers, cluster)
+    placement = Placement(threads, workers, cluster, dashboard, (tls_ca, tls_cert, tls_key))
+    placement.check()
     if watch and (scan is not None or as_json):
         raise RefusedInput("--watch", "goes with a workflow alone, not with --scan or --json")
     with ExitStack() as stack:
         log = None if log_json is None else stack.enter_context(_log(log_json))
         job = job_of(workflow, scan, calibration, out, threads, settings, may_be_empty=watch)
-        pool = stack.enter_context(chosen_pool(job.threads, workers, cluster))
+        pool = stack.enter_context(chosen_pool(job.threads, placement))
         if watch:
             return _watch(job, pool, log)
         ends = _run(job, pool, log, as_json=as_json)
@@ -98,7 +113,7 @@ def _run(
         if end.problem is not None:
             _tell(end.scan, end.problem)
         elif not as_json:
-            print(f"{end.scan}: {end.folder}")
+            print_line(f"{end.scan}: {end.folder}")
     return ends
 
 
@@ -157,7 +172,7 @@ def plan(
         if rows:
             print_table("", ["scan", "step", "camera", "reason"], rows)
         if planned.steps:
-            print(_summary(planned))
+            print_line(_summary(planned))
     for refused in planned.refused:
         _tell(refused.scan, str(refused.error))
     for planned_scan in planned.scans:

@@ -16,7 +16,7 @@ from pipelines.cli.live_options import (
     opened_rig,
     plain_world,
 )
-from pipelines.cli.output import AsJson, message, print_json
+from pipelines.cli.output import AsJson, message, print_json, print_line
 from schemas.errors import Fault, FootscanError, RefusedInput
 
 if TYPE_CHECKING:
@@ -195,10 +195,10 @@ def _print(result: "LiveResult", known: dict[str, float], as_json: bool) -> None
     if as_json:
         print_json(_json(result))
         return
-    print(f"Scan: {result.stored.place}")
+    print_line(f"Scan: {result.stored.place}")
     if measured is not None and measured.folder is not None and measured.measures is not None:
         print_measures(measured.measures, known)
-        print(f"Report: {measured.folder / 'report.html'}")
+        print_line(f"Report: {measured.folder / 'report.html'}")
 
 
 def _json(result: "LiveResult") -> dict[str, Any]:
@@ -228,7 +228,7 @@ def _print_heads(x_mm: tuple[float, float, float], as_json: bool) -> None:
     if as_json:
         print_json({"x_mm": list(x_mm)})
     else:
-        print(", ".join(f"head {head} at X = {x:.2f} mm" for head, x in enumerate(x_mm, start=1)))
+        print_line(", ".join(f"head {head} at X = {x:.2f} mm" for head, x in enumerate(x_mm, start=1)))
 
 
 def _status(kind: str | None) -> int:

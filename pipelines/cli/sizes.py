@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.cli.feet import FEET, ForPeople, TableFile, chosen, read_foot
-from pipelines.cli.output import AsJson, figure, print_json, print_table
+from pipelines.cli.output import AsJson, figure, print_json, print_line, print_table, print_text
 from schemas.errors import RefusedInput, one_line
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def sizes(
         if as_json:
             print_json(rules.model_dump(mode="json"))
         else:
-            print(read_text(table or TABLE, "yaml_bytes"), end="")
+            print_text(read_text(table or TABLE, "yaml_bytes"))
         return
     if foot is None:
         raise RefusedInput("FOOT", f"is missing, expected {FEET}")
@@ -82,7 +82,7 @@ def print_sizes(title: str, found: "Sizes") -> None:
         )
     print_notes((one.label, one.note) for one in found.sizes)
     print_notes((one.label, one.note) for one in found.widths)
-    print(f"Sizes and widths are {found.caution}.")
+    print_line(f"Sizes and widths are {found.caution}.")
 
 
 def print_notes(told: Iterable[tuple[str, str | None]]) -> None:
@@ -92,4 +92,4 @@ def print_notes(told: Iterable[tuple[str, str | None]]) -> None:
         if note:
             of.setdefault(note, []).append(label)
     for note, labels in of.items():
-        print(one_line(f"{', '.join(labels)}: {note}"))
+        print_line(one_line(f"{', '.join(labels)}: {note}"))

@@ -11,7 +11,7 @@ import typer
 
 from pipelines.cli.output import AsJson, message, print_json
 from pipelines.cli.runs import WORKFLOW
-from schemas.errors import RefusedInput
+from schemas.errors import RefusedInput, printable
 
 if TYPE_CHECKING:
     from rich.tree import Tree
@@ -118,7 +118,7 @@ def _print_tree(file: Path, digest: str, found: "Trace") -> None:
     from rich.text import Text
     from rich.tree import Tree
 
-    tree = Tree(Text(f"{file}  {digest[:12]}", style="bold"))
+    tree = Tree(Text(printable(f"{file}  {digest[:12]}"), style="bold"))
     _grow(tree, "", found.made_by, found, set())
     Console(width=None if sys.stdout.isatty() else 160).print(tree)
 
@@ -134,7 +134,7 @@ def _grow(tree: "Tree", taken_as: str, key: str, found: "Trace", shown: set[str]
         tree.add(Text(f"{label}  as above"))
         return
     shown.add(key)
-    branch = tree.add(Text("\n".join([label, *_facts(action)])))
+    branch = tree.add(Text(printable("\n".join([label, *_facts(action)]), keep="\n")))
     for taken in action.inputs:
         if taken.source != "result":
             branch.add(Text(_leaf(taken)))

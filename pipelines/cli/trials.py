@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from pipelines.cli.output import print_table
+from pipelines.cli.output import print_line, print_table
 
 if TYPE_CHECKING:
     from footscan.calibration.selection import ModelTrial
@@ -31,7 +31,7 @@ def print_trials(trials: "Sequence[ModelTrial]") -> None:
             for number, trial in enumerate(trial for trial in tried if trial.camera == camera)
         ]
         print_table("Models of each camera", ("camera", *COLUMNS), rows)
-    print(MEANING)
+    print_line(MEANING)
     _print_refused(trials)
 
 
@@ -39,7 +39,7 @@ def print_models(trials: "Sequence[ModelTrial]") -> None:
     """The errors of all models, a column a camera."""
     columns, rows = _matrix(trials, chosen="{}*")
     print_table("Own and held-out error of each camera, mm rms; *: chosen", columns, rows)
-    print(MEANING)
+    print_line(MEANING)
     _print_refused(trials)
 
 
@@ -53,7 +53,7 @@ def markdown_of_models(trials: "Sequence[ModelTrial]") -> str:
 def _print_refused(trials: "Sequence[ModelTrial]") -> None:
     judged = set(_models(trial for trial in trials if trial.status != "refused"))
     if refused := [model for model in _models(trials) if model not in judged]:
-        print(f"Too few data for: {'; '.join(refused)}.")
+        print_line(f"Too few data for: {'; '.join(refused)}.")
 
 
 def _row(model: str, trials: "Sequence[ModelTrial]") -> list[str]:

@@ -3,9 +3,19 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.cli.output import AsJson, figure, message, print_json, print_table
+from pipelines.cli.output import AsJson, figure, message, print_json, print_line, print_table
 from pipelines.cli.runs import WORKFLOW, Settings, WorkflowFile, with_settings
-from pipelines.cli.workers import ClusterAddress, Threads, Workers, check_workers, chosen_pool
+from pipelines.cli.workers import (
+    ClusterAddress,
+    Dashboard,
+    Placement,
+    Threads,
+    TlsCa,
+    TlsCert,
+    TlsKey,
+    Workers,
+    chosen_pool,
+)
 from schemas.errors import Fault, RefusedInput
 
 if TYPE_CHECKING:
@@ -19,6 +29,10 @@ def tune(
     threads: Threads = None,
     workers: Workers = None,
     cluster: ClusterAddress = None,
+    dashboard: Dashboard = False,
+    tls_ca: TlsCa = None,
+    tls_cert: TlsCert = None,
+    tls_key: TlsKey = None,
     as_json: AsJson = False,
 ) -> int:
     """Seek better parameters, as the section tune of a workflow says.
@@ -31,14 +45,15 @@ def tune(
     from pipelines.tuning.search import FOLDER, tune
     from pipelines.workflow_file import read_workflow
 
-    check_workers(threads, workers, cluster)
+    placement = Placement(threads, workers, cluster, dashboard, (tls_ca, tls_cert, tls_key))
+    placement.check()
     path = workflow or WORKFLOW
     document = read_workflow(path)
     if document.tune is None:
         raise RefusedInput(path, "is missing, expected what is sought", field="tune")
     job = with_settings(job_of_workflow(path, threads), settings)
     folder = job.results / FOLDER
-    with chosen_pool(job.threads, workers, cluster) as pool, StepProgress(0) as progress:
+    with chosen_pool(job.threads, placement) as pool, StepProgress(0) as progress:
         tuned = tune(job, document.tune, pool, progress.on_step_end, _tell_trial)
     write_files(folder, path, document, tuned.result, tuned.parameters)
     if as_json:
@@ -76,8 +91,8 @@ def _print(tuned: "Tuned", folder: Path) -> None:
     ]
     print_table("Winner beside present", ["scans", "objective", "", "present", "winner", "gain", "spread", ""], rows)
     for line in [*sentences(result), *result.notes]:
-        print(line)
-    print(f"{len(result.trials) - 1} trials, {tuned.ran.get('extract', 0)} films extracted: {folder}")
+        print_line(line)
+    print_line(f"{len(result.trials) - 1} trials, {tuned.ran.get('extract', 0)} films extracted: {folder}")
 
 
 def _gain(gain: "Gain") -> tuple[float | None, ...]:

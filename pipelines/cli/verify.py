@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.output import AsJson, figure, print_json, print_table
+from pipelines.cli.output import AsJson, figure, print_json, print_line, print_table
 from schemas.errors import Finding, RefusedInput, one_line
 
 if TYPE_CHECKING:
@@ -196,14 +196,16 @@ def _print_block(fit: "CuboidFit", compared: list[tuple[float, float | None, "Cu
     print_table("Angles", ["faces", "degrees"], [[" and ".join(a.faces), f"{a.degrees:.3f}"] for a in fit.angles])
     for found in fit.dimensions:
         if found.note:
-            print(f"{figure(found.value_mm)}: {found.note}")
+            print_line(f"{figure(found.value_mm)}: {found.note}")
     bases = {end for found in fit.dimensions for end in found.ends}
     if "floor" in bases:
-        print(f"Floor: nothing saw the bottom, so the height counts from Z = {fit.floor_mm:g} mm.")
+        print_line(f"Floor: nothing saw the bottom, so the height counts from Z = {fit.floor_mm:g} mm.")
     if "stripes" in bases:
         step = figure(fit.stripe_step_mm, "g")
-        print(f"Stripes: no point lies on that end; it stands by the last stripe on the block, one every {step} mm.")
-        print("Turned by 5 degrees, the block would show its ends.")
+        print_line(
+            f"Stripes: no point lies on that end; it stands by the last stripe on the block, one every {step} mm."
+        )
+        print_line("Turned by 5 degrees, the block would show its ends.")
 
 
 def _print_spheres(found: "list[tuple[Path, SphereFit]]", diameter: float) -> None:
@@ -228,4 +230,6 @@ def _print_spheres(found: "list[tuple[Path, SphereFit]]", diameter: float) -> No
     error = max((fit.diameter_error_mm for fit in fits), key=abs)
     deviation = max(fit.radial_sd_mm for fit in fits)
     shell = max(fit.radial_range95_mm for fit in fits)
-    print(f"Worst of {len(fits)}: error of diameter {error:+.3f}, standard deviation {deviation:.3f}, 95 % {shell:.3f}")
+    print_line(
+        f"Worst of {len(fits)}: error of diameter {error:+.3f}, standard deviation {deviation:.3f}, 95 % {shell:.3f}"
+    )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.output import AsJson, print_json, print_table
+from pipelines.cli.output import AsJson, print_json, print_line, print_table
 from pipelines.cli.runs import WORKFLOW, Settings, with_settings
 from schemas.errors import RefusedInput
 
@@ -69,7 +69,7 @@ def why(
         _show(chosen)
     else:
         newest = _newest(every)
-        print(f"{found.scan.name}: nothing would run; last result: {_short(newest.step)}, {_came_to(newest)}")
+        print_line(f"{found.scan.name}: nothing would run; last result: {_short(newest.step)}, {_came_to(newest)}")
 
 
 def plan_of_scan(found: "PlannedScan", planned: "PlannedJob") -> "Plan":
@@ -166,9 +166,9 @@ def _show(chosen: Sequence[Explanation]) -> None:
     for one in chosen:
         alike.setdefault((one.reason, one.changes), []).append(one)
     for (reason, _), steps in alike.items():
-        print(f"{', '.join(_short(one.step) for one in steps)}: {reason}")
+        print_line(f"{', '.join(_short(one.step) for one in steps)}: {reason}")
         if steps[0].last is not None:
-            print(f"  last result: {_came_to(steps[0])}" + ", and others" * (len(steps) > 1))
+            print_line(f"  last result: {_came_to(steps[0])}" + ", and others" * (len(steps) > 1))
         rows = [row for change in steps[0].changes for row in _rows(change)]
         if rows:
             print_table("", ["changed", "last time", "now"], rows)

@@ -11,6 +11,8 @@ from schemas.errors import Fault
 def write_atomically(path: Path, data: bytes) -> None:
     """Write `data` to a file beside `path`, then give it that name. Fault where the disk refuses.
 
+    File and missing folders are never for all users; the process's umask says whether they are for its group.
+
     A symbolic link stays one: what it points to is written. A device or a pipe is written into.
     """
     try:
@@ -35,9 +37,18 @@ def is_stream(path: Path) -> bool:
 def _replace(path: Path, data: bytes) -> None:
     partial = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.partial")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_bytes(data)
+        _make(path.parent)
+        with contextlib.suppress(FileNotFoundError):
+            partial.unlink()  # of a killed process that had the same number
+        with open(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o660), "wb") as file:  # noqa: PTH123
+            file.write(data)
         partial.replace(path)
     finally:
         with contextlib.suppress(OSError):
             partial.unlink()  # there after a failure or an interruption only
+
+
+def _make(folder: Path) -> None:
+    if not folder.is_dir():
+        _make(folder.parent)
+        folder.mkdir(mode=0o770, exist_ok=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
-from pipelines.engine.digest import BROKEN, sha256, unsealed
+from pipelines.engine.digest import BROKEN, sealed, sha256, unsealed
 from pipelines.engine.key import image_text, key_of
 from pipelines.engine.lease import FOLDER as LEASES
 from pipelines.engine.lease import leases
@@ -17,6 +17,7 @@ from pipelines.engine.pins import FOLDER as PINS
 from pipelines.engine.pins import read_pin
 from pipelines.engine.plan import Plan, without_places
 from pipelines.engine.run import content_of
+from pipelines.engine.seal import make_secret
 from pipelines.engine.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.store import Store, latest_name
 from pipelines.engine.trace import blob_digest, row_key
@@ -32,6 +33,15 @@ class Audit:
     files: int
     damaged: list[str]
     """How a person would name them; they are there no more."""
+
+
+@dataclass(frozen=True)
+class Sealing:
+    """What became of the rows and last actions of a store that were not sealed."""
+
+    sealed: int
+    unsealed: int
+    """Left as they were: they count as missing."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +82,22 @@ def verify(store: Store) -> Audit:
             if is_damaged:
                 damaged.append(store.files.path(name))
     return Audit(files, damaged)
+
+
+def seal_store(store: Store, *, every: bool = False) -> Sealing:
+    """Seal the sound rows and last actions of a store: all where it was not sealed before, or where `every` says so."""
+    secret = store.secret
+    if secret is None:
+        secret, every = make_secret(store.files), True
+    done = left = 0
+    for name in [name for folder in ("actions", "latest") for name, _ in store.files.sizes(folder)]:
+        data = _read(name, store)
+        if data is None or not _is_sealed(data) or _is_sealed(data, secret):
+            continue
+        if every:
+            store.files.write(name, sealed(unsealed(data), secret))
+        done, left = done + every, left + (not every)
+    return Sealing(done, left)
 
 
 def repeatable(plan: Plan, store: Store) -> dict[str, Repeatable]:
@@ -184,9 +210,9 @@ def _read(name: str, store: Store) -> bytes | None:
         return b""
 
 
-def _is_sealed(data: bytes) -> bool:
+def _is_sealed(data: bytes, secret: bytes | None = None) -> bool:
     try:
-        unsealed(data)
+        unsealed(data, secret)
     except BROKEN:
         return False
     return True

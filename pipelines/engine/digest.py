@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pipelines.engine.atomic import write_atomically
+from pipelines.engine.seal import check_seal, seal_of
 from schemas.documents import canonical_json
 from schemas.errors import Fault, RefusedInput
 
@@ -36,17 +37,23 @@ def sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def sealed(value: dict[str, Any]) -> bytes:
-    """An object as canonical JSON, with its digest as `seal`."""
+def sealed(value: dict[str, Any], secret: bytes | None = None) -> bytes:
+    """An object as canonical JSON, with its digest as `seal`; with a `secret` also with what none makes without."""
+    if secret is not None:
+        value = {**value, "owner_seal": seal_of(value, secret)}
     return canonical_json({**value, "seal": sha256(canonical_json(value).encode())}).encode()
 
 
-def unsealed(data: bytes) -> dict[str, Any]:
-    """The object that was sealed; one of the errors in `BROKEN` where it is none."""
+def unsealed(data: bytes, secret: bytes | None = None) -> dict[str, Any]:
+    """The object that was sealed; one of the errors in `BROKEN` where it is none, UnsealedError where it bears not the
+    seal of the `secret`, if any."""
     value = json.loads(data)
     seal = value.pop("seal")
     if seal != sha256(canonical_json(value).encode()):
         raise ValueError("broken seal")
+    owner_seal = value.pop("owner_seal", None)
+    if secret is not None:
+        check_seal(value, owner_seal, secret)
     return dict(value)
 
 
@@ -66,27 +73,29 @@ class FileDigests:
     """Digests of files by path, remembered in one file of the cache."""
 
     memory: Path
+    secret: bytes | None = field(default=None, repr=False)
+    """Of the store beside which it lies, if that is sealed."""
     _known: dict[str, tuple[FileState, str]] = field(default_factory=dict)
     _changed: bool = False
 
     @classmethod
-    def load(cls, memory: Path) -> "FileDigests":
+    def load(cls, memory: Path, secret: bytes | None = None) -> "FileDigests":
         """What was remembered; nothing where the file is missing or damaged."""
         try:
-            rows = unsealed(memory.read_bytes())["rows"]
-            return cls(memory, {path: (FileState(*state), str(digest)) for path, state, digest in rows})
+            rows = unsealed(memory.read_bytes(), secret)["rows"]
+            return cls(memory, secret, {path: (FileState(*state), str(digest)) for path, state, digest in rows})
         except FileNotFoundError:
-            return cls(memory)
+            return cls(memory, secret)
         except (OSError, *BROKEN):
             log.warning("%s: damaged, will be made again", memory)
-            return cls(memory)
+            return cls(memory, secret)
 
     def save(self) -> None:
         """Remember for the next run; where that cannot be, it reads the files again."""
         if self._changed:
             rows = [[path, list(state), digest] for path, (state, digest) in sorted(self._known.items())]
             try:
-                write_atomically(self.memory, sealed({"rows": rows}))
+                write_atomically(self.memory, sealed({"rows": rows}, self.secret))
             except Fault as error:
                 log.warning("%s; the next run will read all films again", error)
             self._changed = False

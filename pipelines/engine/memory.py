@@ -4,7 +4,9 @@ It can be lost: then rows and blobs are read, and checked, once more.
 """
 
 import contextlib
+import hashlib
 import logging
+import os
 import sqlite3
 import threading
 import zlib
@@ -49,6 +51,8 @@ class Memory:
     """Rows of one store, by key, in a file of this machine."""
 
     file: Path
+    secret: bytes | None = field(default=None, repr=False)
+    """Of the store, if that is sealed: otherwise a row could be made up in here."""
     _new: dict[str, Known] = field(default_factory=dict)
     _connection: sqlite3.Connection | None = None
     _lock: threading.Lock = field(default_factory=threading.Lock)
@@ -73,7 +77,7 @@ class Memory:
         if found is None:
             return None
         known, seal = Known(*found[:-1]), found[-1]
-        return known if seal == _seal(key, known) else None
+        return known if seal == _seal(key, known, self.secret) else None
 
     @contextmanager
     def reading(self) -> Iterator[None]:
@@ -97,7 +101,7 @@ class Memory:
         if not self._new:
             return
         with self._lock:
-            rows = [(key, *known, _seal(key, known)) for key, known in list(self._new.items())]
+            rows = [(key, *known, _seal(key, known, self.secret)) for key, known in list(self._new.items())]
             try:
                 self.file.parent.mkdir(parents=True, exist_ok=True)
                 self._connection = self._connection or self._open()
@@ -127,6 +131,7 @@ class Memory:
             self._forget(error)
 
     def _open(self) -> sqlite3.Connection:
+        os.close(os.open(self.file, os.O_RDWR | os.O_CREAT, 0o660))  # SQLite's own would not be for a group to write
         connection = sqlite3.connect(self.file, timeout=5, check_same_thread=False)
         try:
             connection.execute(_TABLE)
@@ -154,6 +159,9 @@ class Memory:
                 self.file.unlink()
 
 
-def _seal(key: str, known: Known) -> int:
-    """SQLite does not see that a bit has changed."""
-    return zlib.crc32(repr((key, *known)).encode())
+def _seal(key: str, known: Known, secret: bytes | None) -> int:
+    """SQLite does not see that a bit has changed, nor who has changed it."""
+    data = repr((key, *known)).encode()
+    if secret is None:
+        return zlib.crc32(data)
+    return int.from_bytes(hashlib.blake2b(data, key=secret, digest_size=8).digest(), signed=True)

@@ -15,6 +15,8 @@ from pipelines.engine.memory import Known
 from pipelines.engine.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.store import Store
 
+NO_SEAL = "its row bears no seal of the store's owner"
+
 
 class State(Enum):
     """What the cache knows of a step."""
@@ -124,6 +126,8 @@ def _reason(step: Step, image: str, store: Store) -> str:
         return "never run"
     if step.writes is not None and not step.writes.exists():
         return f"{step.writes.parent.name} is not there"
+    if store.bears_no_seal(key_of(image)):
+        return NO_SEAL
     row = store.row(latest.key)
     return "never run" if row is None else reason(changes(step, row.image, json.loads(image), store))
 

@@ -14,12 +14,14 @@ from typing import Any, Protocol
 from uuid import uuid4
 
 from pipelines.engine.step import Failure, Outcome, Step
+from pipelines.engine.tls import SCHEME, Certificates, security_of
 from schemas.errors import RefusedInput, one_line
 
 log = logging.getLogger("footscan.run")
 
 ANSWER_S = 10.0
 """How long a scheduler is waited for."""
+LOOPBACK = "127.0.0.1"
 FAILURES_ALLOWED = 1
 """A task is tried again after it has killed so many workers; another one, and it is given up."""
 
@@ -178,8 +180,11 @@ class Cluster:
 
 
 @contextmanager
-def local_cluster(workers: int) -> Iterator[Cluster]:
-    """So many processes of this machine, one step at a time in each."""
+def local_cluster(workers: int, *, dashboard: bool = False) -> Iterator[Cluster]:
+    """So many processes of this machine, one step at a time in each; they listen on its loopback alone.
+
+    `dashboard` : whether Dask's status page is served there.
+    """
     import dask
 
     _quieten()
@@ -190,9 +195,17 @@ def local_cluster(workers: int) -> Iterator[Cluster]:
         # A worker that misses its scheduler at the end of a run calls it an error.
         "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical",
     }
+    if not dashboard:  # Dask opens the ports of its pages in any case; then there is nothing behind them
+        settings |= {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
     with dask.config.set(settings):
         with _deaf_to_ctrl_c():
-            here = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=":0")
+            here = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                host=LOOPBACK,
+                dashboard_address=f"{LOOPBACK}:0",  # a name alone, or none, would be all of this machine's addresses
+                scheduler_kwargs={"dashboard": dashboard},
+            )
         with here, Client(here) as client:
             yield Cluster(client, workers)
 
@@ -216,13 +229,17 @@ def _deaf_to_ctrl_c() -> Iterator[None]:
 
 
 @contextmanager
-def joined_cluster(address: str) -> Iterator[Cluster]:
-    """The workers of a scheduler that was started elsewhere; RefusedInput where none answers."""
+def joined_cluster(address: str, certificates: Certificates | None = None) -> Iterator[Cluster]:
+    """The workers of a scheduler that was started elsewhere; RefusedInput where none answers.
+
+    `certificates` : for an address that begins with `tls://`; those of Dask's own configuration where absent.
+    """
     _quieten()
     from distributed import Client
 
+    security = security_of(certificates) if address.startswith(SCHEME) else None
     try:
-        client = Client(address, timeout=ANSWER_S)
+        client = Client(address, timeout=ANSWER_S, security=security)
     except (OSError, ValueError, TimeoutError) as error:
         problem = one_line(str(error)) or type(error).__name__
         raise RefusedInput(f"--cluster {address}", f"no Dask scheduler answers ({problem})") from None

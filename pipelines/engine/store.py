@@ -8,7 +8,7 @@ since it was checked is not read again (`memory`).
 import contextlib
 import logging
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from pipelines.engine.digest import BROKEN, sealed, sha256, unsealed
 from pipelines.engine.files import Files, open_files
 from pipelines.engine.key import PreImage, key_of
 from pipelines.engine.memory import Known, Memory
+from pipelines.engine.seal import UnsealedError, secret_of
 from schemas.errors import Fault
 
 log = logging.getLogger("footscan.store")
@@ -52,9 +53,11 @@ class Store:
 
     files: Files
     memory: Memory | None = None
+    secret: bytes | None = field(default=None, repr=False)
+    """Of the store's owner, if it is sealed."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Store, (self.files,)  # what one machine remembers does not go to another
+        return _reopened, (self.files,)  # what one machine remembers does not go to another, and secrets do not travel
 
     def put(self, data: bytes) -> str:
         """Keep `data`; returns its digest."""
@@ -108,7 +111,9 @@ class Store:
     def record(self, step_name: str, row: Row, sources: dict[str, str] | None = None) -> None:
         """Write the row of an action, and remember it as the last one of its step."""
         key = key_of(row.image)
-        self.files.write(row_name(key), sealed({"image": row.image, "digest": row.digest, "failure": row.failure}))
+        self.files.write(
+            row_name(key), sealed({"image": row.image, "digest": row.digest, "failure": row.failure}, self.secret)
+        )
         self.note_latest(step_name, key, sources or {})
         state = self.files.state(row_name(key))
         if self.memory is not None and state is not None:
@@ -117,7 +122,9 @@ class Store:
 
     def note_latest(self, step_name: str, key: str, sources: dict[str, str]) -> None:
         """Remember an action as the last one of a step."""
-        self.files.write(latest_name(step_name), sealed({"step": step_name, "key": key, "sources": sources}))
+        self.files.write(
+            latest_name(step_name), sealed({"step": step_name, "key": key, "sources": sources}, self.secret)
+        )
 
     def latest(self, step_name: str) -> Latest | None:
         """The last action of a step, whatever its key."""
@@ -151,6 +158,16 @@ class Store:
             log.warning("%s: damaged, will be made again", self.files.path(row_name(key)))
             return None
 
+    def bears_no_seal(self, key: str) -> bool:
+        """Whether there is a row of an action that the owner of a sealed store did not make."""
+        try:
+            unsealed(self.files.read(row_name(key)), self.secret)
+        except UnsealedError:
+            return True
+        except (OSError, *BROKEN):
+            pass
+        return False
+
     def _remember(self, key: str, known: Known) -> None:
         if self.memory is not None:
             self.memory.put(key, known)
@@ -158,8 +175,11 @@ class Store:
     def _read_sealed(self, name: str) -> dict[str, Any] | None:
         """The content of a small file, if its seal is right."""
         try:
-            return unsealed(self.files.read(name))
+            return unsealed(self.files.read(name), self.secret)
         except FileNotFoundError:
+            return None
+        except UnsealedError as error:
+            log.warning("%s: %s, will be made again", self.files.path(name), error)
             return None
         except (OSError, *BROKEN):
             log.warning("%s: damaged, will be made again", self.files.path(name))
@@ -168,7 +188,14 @@ class Store:
 
 def open_store(place: Path | str, memory: Path | None = None) -> Store:
     """The store at a path or URL, with what the file `memory` remembers of it."""
-    return Store(open_files(place), None if memory is None else Memory(memory))
+    files = open_files(place)
+    secret = secret_of(files)
+    return Store(files, None if memory is None else Memory(memory, secret), secret)
+
+
+def _reopened(files: Files) -> Store:
+    """The store where another process works with it."""
+    return Store(files, None, secret_of(files))
 
 
 def blob_name(digest: str) -> str:

@@ -120,7 +120,7 @@ def _calibrate(folder: Path, file: Path, scanner_seed: int) -> None:
     with lease(store):
         outcomes = run_plan(plan, store, pool=Threads(1), on_step_end=lambda _: None)
     digests = digests_of(steps, outcomes)
-    files = FileDigests.load(folder / CACHE / "files.json")
+    files = FileDigests.load(folder / CACHE / "files.json", store.secret)
     if problem := deliver({file.name: digests["calibrate"]}, store, files, folder):
         raise Fault(problem)
     if store.memory is not None:

@@ -96,7 +96,7 @@ def _virtual(
     outcomes = run_plan(make_plan(filming, store), store, pool=Threads(1), on_step_end=on_step_end)
     digests = digests_of(filming, outcomes)
     calibration = films / "calibrations" / name / "calibration.json"
-    files = FileDigests.load(out / "cache" / "files.json")
+    files = FileDigests.load(out / "cache" / "files.json", store.secret)
     if problem := deliver({calibration.name: digests["calibrate"]}, store, files, calibration.parent):
         raise Fault(problem)
     filmed = json.loads(store.get(digests["film"]) or b"{}")

@@ -1,6 +1,5 @@
 """What a search leaves in its folder: the winner as a workflow, a table of trials, and a page."""
 
-import csv
 import io
 import os
 from collections.abc import Sequence
@@ -13,11 +12,10 @@ from footscan.report.tune_page import tune_page
 from footscan.report.tune_result import Trial, TuneResult
 from pipelines.engine.atomic import write_atomically
 from schemas.documents import canonical_json
+from schemas.tables import Cell, csv_text
 from schemas.workflow import ScanParameters, Workflow
 
 BEST, CSV, PARQUET, PAGE = "best.yaml", "trials.csv", "trials.parquet", "index.html"
-
-Cell = str | int | float | None
 
 
 def write_files(
@@ -71,11 +69,7 @@ def _row(trial: Trial, result: TuneResult) -> dict[str, Cell]:
 
 
 def _as_csv(rows: Sequence[dict[str, Cell]]) -> str:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
+    return csv_text([rows[0].keys(), *([row[name] for name in rows[0]] for row in rows)])
 
 
 def _as_parquet(rows: Sequence[dict[str, Cell]]) -> bytes:

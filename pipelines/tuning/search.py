@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from footscan.report.tune_result import Gain, Goal, Trial, TuneResult
-from pipelines.archive import Job, PlannedJob, plan_job
+from pipelines.archive import Job, PlannedJob, plan_job, share_written
 from pipelines.engine.lease import lease
 from pipelines.engine.pool import OnStepEnd, Pool
 from pipelines.engine.trust import warn_if_others_can_write
@@ -60,7 +60,8 @@ def tune(job: Job, tuning: Tuning, pool: Pool, on_step_end: OnStepEnd, on_trial:
         All scans of a trial failed by a fault of the machine; the next search goes on from there.
     """
     planned = plan_job(replace(job, folders=[folder for folder in job.folders if may_be_meant(folder, job, tuning)]))
-    warn_if_others_can_write(planned.store)
+    share_written(planned)
+    warn_if_others_can_write(planned.store, planned.job.group)
     try:
         return _tune(planned, tuning, pool, on_step_end, on_trial)
     finally:

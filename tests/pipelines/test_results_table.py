@@ -84,3 +84,13 @@ def test_no_scan_is_an_empty_table(tmp_path: Path) -> None:
     write_results_table([], tmp_path)
     assert rows(tmp_path) == []
     assert parquet.read_table(tmp_path / PARQUET).num_rows == 0
+
+
+def test_a_spreadsheet_computes_nothing(ends: list[ScanEnd], tmp_path: Path) -> None:
+    """Folder and problem are text from outside; what is measured stays a number."""
+    hostile = ScanEnd("=cmd|'/C calc'!A0", ends[0].source, None, "\t-2+3", "refused")
+    write_results_table([ends[0], hostile], tmp_path)
+    good, bad = rows(tmp_path)
+    assert (bad["scan"], bad["problem"]) == ("'=cmd|'/C calc'!A0", "'\t-2+3")
+    assert all(not cell.startswith("'") for cell in good.values())
+    assert float(good["foot_length_mm"]) > 0

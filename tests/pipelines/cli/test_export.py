@@ -1,6 +1,7 @@
 import json
 import os
 import stat
+import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -174,3 +175,59 @@ def test_a_pipe_is_written_into(ply: Path, run: Run) -> None:
     finally:
         os.close(end)
     assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+NAMES = {"patient": "Pt-4711", "scan": "2026-11-20-R"}
+
+
+def everything_in(path: Path) -> bytes:
+    """What a file says, of a zip file that of its parts."""
+    if path.suffix != ".3mf":
+        return path.read_bytes()
+    with zipfile.ZipFile(path) as package:
+        return b"".join(part.filename.encode() + package.read(part) for part in package.infolist())
+
+
+@pytest.mark.parametrize("suffix", sorted(WRITERS))
+def test_an_anonymous_file_names_nobody(ply: Path, suffix: str, run: Run) -> None:
+    named = {**egg().metadata, **NAMES, "frame": "scanner"}
+    data = mesh_bytes(replace(egg(), metadata=named), ".ply").replace(
+        b"comment unit mm", b"comment unit mm\ncomment operator Smith\ncomment file /films/smith/2026-11-20/foot.ply"
+    )
+    ply.write_bytes(data)
+    out, known = ply.with_name(f"out{suffix}"), ply.with_name(f"known{suffix}")
+    status, printed, _ = run(ply, "--out", known, "--json")
+    assert (status, json.loads(printed)["metadata"]["patient"]) == (0, NAMES["patient"])
+    assert NAMES["patient"].encode() in everything_in(known)
+    status, printed, _ = run(ply, "--out", out, "--anonymous", "--json")
+    told = {"side": "left", "frame": "scanner", "unit": "mm", "software": SOFTWARE}
+    assert (status, json.loads(printed)["metadata"]) == (0, told)
+    for word in (*NAMES.values(), "smith", "/films", str(ply.parent)):
+        assert word.lower().encode() not in everything_in(out).lower()
+    assert b"left" in everything_in(out)
+    if suffix in (".ply", ".obj"):
+        found = read_file(out)
+        assert (found.colours, read_file(known).colours is None) == (None, False)
+        np.testing.assert_allclose(found.vertices, egg().vertices, atol=1e-4)
+    assert all(word not in everything_in(out) for word in (b"COLOR_0", b"m:color", b"Color {", b"uchar red"))
+
+
+def test_the_name_of_an_anonymous_file(ply: Path, run: Run) -> None:
+    ply.write_bytes(mesh_bytes(replace(egg(), metadata=NAMES), ".ply"))
+    refused(run(ply, "--out", ply.with_name("foot-of-pt-4711.stl"), "--anonymous"), "has 'Pt-4711' in its name")
+    refused(run(ply, "--out", ply.with_name("out.stl"), "--anonymous", "--patient", "P1"), "excludes --patient")
+    ply.write_bytes(mesh_bytes(replace(egg(), metadata={"side": "Smith", "frame": "of Smith"}), ".ply"))
+    out = ply.with_name("out.stl")
+    assert json.loads(run(ply, "--out", out, "--anonymous", "--json")[1])["metadata"] == {
+        "unit": "mm",
+        "software": SOFTWARE,
+    }
+    results = ply.parent / "results/P0042/visit-R"
+    results.mkdir(parents=True)
+    (results / "measures.json").touch()
+    (results / "foot.ply").write_bytes(mesh_bytes(egg(), ".ply"))
+    refused(
+        run(results / "foot.ply", "--out", ply.with_name("visit-R.stl"), "--anonymous"), "has 'visit-R' in its name"
+    )
+    assert run(results / "foot.ply", "--out", ply.with_name("foot.stl"), "--anonymous")[0] == 0
+    assert run(results / "foot.ply", "--out", ply.with_name("visit-R.stl"))[0] == 0

@@ -79,7 +79,7 @@ def test_processes_try_what_threads_would(workflow: Path, capsys: pytest.Capture
     assert run_command(["tune", str(workflow), "--workers", "1", "--json"]) == 0
     out, err = capsys.readouterr()
     by_workers = json.loads(out)
-    assert "dashboard: http://" in err
+    assert "dashboard" not in err
     assert by_workers["ran"]["clean"] > 0
     assert run_command(["tune", str(workflow), "--json"]) == 0
     by_threads = json.loads(capsys.readouterr().out)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from pipelines.engine import trust
 from pipelines.engine.store import Store, open_store
 from pipelines.engine.trust import warn_if_others_can_write
 
@@ -21,6 +22,8 @@ def made(store: Store, mode: int, folder: str = "") -> Path:
     for part in (Path(store.files.path("")), path):
         part.mkdir(parents=True, exist_ok=True)
         part.chmod(0o755)
+    if folder:
+        path.parent.chmod(0o755)
     path.chmod(mode)
     return path
 
@@ -35,13 +38,25 @@ def test_a_store_of_ones_own_is_trusted(store: Store, told: pytest.LogCaptureFix
 
 
 @pytest.mark.parametrize("mode", [0o775, 0o757, 0o777, 0o1777])
-@pytest.mark.parametrize("folder", ["", "actions"])
+@pytest.mark.parametrize("folder", ["", "actions", "blobs/ab", "actions/00", "pins/P0001"])
 def test_others_can_write(store: Store, told: pytest.LogCaptureFixture, mode: int, folder: str) -> None:
     path = made(store, mode, folder)
     warn_if_others_can_write(store)
     warn_if_others_can_write(store)
     expected = "other users can write to it, and so exchange results; expected 'chmod -R go-w'"
     assert told.messages == [f"{path}: {expected}"]
+
+
+def test_the_group_of_a_workflow_is_no_other(store: Store, told: pytest.LogCaptureFixture) -> None:
+    path = made(store, 0o2770, "blobs/ab")
+    warn_if_others_can_write(store, path.stat().st_gid)
+    assert told.messages == []
+    warn_if_others_can_write(store, path.stat().st_gid + 1)
+    assert len(told.messages) == 1
+    path.chmod(0o2777)
+    trust._warn.cache_clear()
+    warn_if_others_can_write(store, path.stat().st_gid)
+    assert len(told.messages) == 2
 
 
 def test_another_owner(store: Store, told: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
