@@ -20,6 +20,7 @@ from pipelines.engine.run import run_plan
 from pipelines.engine.step import Failure, Outcome, Step, Success
 from pipelines.engine.store import Store, open_store
 from pipelines.engine.trust import warn_if_others_can_write
+from pipelines.forget.notes import cut_off
 from pipelines.recorded import RecordedScan, read_scan, scan_folders
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
 from schemas.calibration import calibration_from_json
@@ -228,6 +229,8 @@ def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator
         yield ScanEnd(name, folder, None, str(error), "refused")
     waiting = iter(planned.scans)
     warn_if_others_can_write(planned.store)
+    for name in cut_off(planned.store):
+        log.warning("%s: its erasure was cut off; 'footscan forget' of it finishes that", name)
     held = lease(planned.store) if planned.to_run else nullcontext()  # what runs nothing uses what it has looked up
     try:
         with held:
