@@ -21,6 +21,7 @@ from pipelines.engine.run import run_plan
 from pipelines.engine.step import Failure, Outcome, Step, Success
 from pipelines.engine.store import Store, open_store
 from pipelines.engine.trust import warn_if_others_can_write
+from pipelines.forget.notes import cut_off
 from pipelines.recorded import RecordedScan, read_scan, scan_folders
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
 from pipelines.workflow_file import check_archives, read_workflow
@@ -237,6 +238,8 @@ def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator
     waiting = iter(planned.scans)
     share_written(planned)
     warn_if_others_can_write(planned.store, planned.job.group)
+    for name in cut_off(planned.store):
+        log.warning("%s: its erasure was cut off; 'footscan forget' of it finishes that", name)
     held = lease(planned.store) if planned.to_run else nullcontext()  # what runs nothing uses what it has looked up
     try:
         with held:

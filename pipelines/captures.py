@@ -5,6 +5,7 @@ from pathlib import Path
 
 from footscan.frames.film import film_files, open_film
 from footscan.frames.ingest import FRAME_SIZE
+from pipelines.film_paths import film_inside
 from pipelines.recorded import recorded_folder
 from schemas.documents import inside, read_yaml
 from schemas.errors import RefusedInput
@@ -41,7 +42,7 @@ class RecordedCapture:
 
     def film(self, camera: CaptureCamera) -> Path:
         """The film of a camera."""
-        return inside(self.folder, self.file, camera.file, f"file of camera {camera.id}")
+        return film_inside(self.folder, self.file, camera.file, f"file of camera {camera.id}")
 
 
 def read_capture(folder: Path) -> RecordedCapture:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from pipelines.film_paths import film_inside
 from schemas.documents import inside, read_yaml
 from schemas.errors import RefusedInput
 from schemas.frames import GROUP
@@ -23,6 +24,8 @@ class RecordedScan:
     document: Scan
     _found: dict[str, Path] = field(default_factory=dict, compare=False, repr=False)
     """Where the paths in scan.yaml lead: each is followed once."""
+    _films: dict[str, Path] = field(default_factory=dict, compare=False, repr=False)
+    """Likewise, of films and arrays of frames."""
 
     @property
     def name(self) -> str:
@@ -36,19 +39,24 @@ class RecordedScan:
 
     def film(self, camera: CameraFilm) -> Path:
         """The film of a camera, which may be missing."""
-        return self._inside(camera.file, f"file of camera {camera.id}")
+        return self._film(camera.file, f"file of camera {camera.id}")
+
+    def arrays(self) -> Path:
+        """The Zarr group of all cameras' frames, which may not be there yet."""
+        return self._film(GROUP, "frames")
 
     def array(self, camera: CameraFilm) -> Path:
         """The Zarr array of a camera's frames, which may not be there yet."""
-        return self.folder / GROUP / f"cam{camera.id}"
+        return self._film(f"{GROUP}/cam{camera.id}", f"frames of camera {camera.id}")
 
     def background(self, camera: CameraFilm) -> Path | None:
         """The film of a camera with the laser off, which may be missing."""
-        return self._optional(camera.background, f"background of camera {camera.id}")
+        named = camera.background
+        return None if named is None else self._film(named, f"background of camera {camera.id}")
 
     def background_array(self, camera: CameraFilm) -> Path:
         """The Zarr array of a camera's laser-off frames, which may not be there yet."""
-        return self.folder / GROUP / f"cam{camera.id}-background"
+        return self._film(f"{GROUP}/cam{camera.id}-background", f"background frames of camera {camera.id}")
 
     def positions(self, camera: CameraFilm) -> Path | None:
         """The file with the positions of a camera's frames."""
@@ -67,6 +75,12 @@ class RecordedScan:
     def _optional(self, named: str | None, field: str) -> Path | None:
         return None if named is None else self._inside(named, field)
 
+    def _film(self, named: str, field: str) -> Path:
+        """As `_inside`; what lies in a folder of frames is looked at, too."""
+        if named not in self._films:
+            self._films[named] = film_inside(self.archive, self.file, named, field)
+        return self._films[named]
+
     def _inside(self, named: str, field: str) -> Path:
         if named not in self._found:
             self._found[named] = inside(self.archive, self.file, named, field)
@@ -83,9 +97,12 @@ def read_scan(folder: Path, archive: Path | None = None) -> RecordedScan:
     """
     folder = recorded_folder(folder, SCAN_FILE, "a recorded scan")
     scan = RecordedScan(folder, (archive or folder.parent.parent).resolve(), read_yaml(folder / SCAN_FILE, Scan))
+    scan.arrays()
     for camera in scan.document.cameras:
         scan.film(camera)  # refused here, before any work, where they leave the archive
-        scan.background(camera)
+        scan.array(camera)
+        if scan.background(camera) is not None:
+            scan.background_array(camera)
         scan.positions(camera)
     return scan
 

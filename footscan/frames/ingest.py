@@ -3,6 +3,8 @@
 An array is written beside its place and renamed when it is whole: what has its name is complete.
 """
 
+import os
+import re
 import shutil
 from collections import Counter
 from collections.abc import Mapping
@@ -45,7 +47,8 @@ def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SI
     RefusedInput
         The film is missing, truncated, or not of this size; or `array` holds another camera's recorded frames.
     Fault
-        The array cannot be written, and nothing that looks whole is left; or a recorded frame is damaged.
+        The array cannot be written, and nothing that looks whole is left; or a recorded frame is damaged; or something
+        lies at the array's place that footscan did not write.
     """
     opened = open_film(film, size)
     if film.resolve() == array.resolve():
@@ -53,10 +56,13 @@ def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SI
     if is_recorded(array):
         raise RefusedInput(array, "holds frames that were recorded into it, expected scan.yaml to name it as the film")
     _check_group(array.parent)
+    _expect_own(array)
     partial = partial_folder(array.parent.parent, array.name)  # outside of the group: no reader of it meets a part
     try:
         array.parent.mkdir(parents=True, exist_ok=True)
         sweep(array.parent.parent)
+        if partial.is_symlink():  # which `rmtree` leaves alone, and Zarr would write through
+            partial.unlink()
         shutil.rmtree(partial, ignore_errors=True)
         make_partial(partial, array.parent)
         manifest = _write_frames(opened, partial / array.name)
@@ -132,6 +138,26 @@ def _check_group(folder: Path) -> None:
 def discard(array: Path) -> None:
     """Take back the completeness of an array that was found damaged."""
     (array / "zarr.json").unlink(missing_ok=True)
+
+
+def _expect_own(array: Path) -> None:
+    """Fault where something lies in an array's place that is none of ours: it would be removed with the array.
+
+    No RefusedInput: that would be remembered of the film, which is not at fault.
+    """
+    if not os.path.lexists(array):
+        return
+    expected = "expected nothing but an array of frames there; move it elsewhere"
+    if array.is_symlink() or not array.is_dir():
+        raise Fault(f"{array}: was not written by footscan, {expected}")
+    with os.scandir(array) as entries:
+        foreign = [one.name for one in entries if not (_IS_OURS(one.name) and (one.is_symlink() or one.is_file()))]
+    if foreign:
+        raise Fault(f"{array}: holds {min(foreign)}, which footscan did not write; {expected}")
+
+
+_IS_OURS = re.compile(r"zarr\.json|\d+\.0\.0\.0|\d+\.renumbered|[\w.]+\.[0-9a-f]{32}\.partial").fullmatch
+"""Names of a frame, of Zarr's document, and of what is left of either by a process that was killed."""
 
 
 def _checked(recorded: Film) -> FrameManifest:

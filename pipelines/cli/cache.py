@@ -1,7 +1,8 @@
 """`footscan cache`: what lies in the store, what of it can go, and whether it is sound."""
 
+import socket
 import time
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,6 +27,9 @@ HOUR_S = 3600.0
 Place = Annotated[str | None, typer.Option("--cache", help="The store: a folder or a URL, without a workflow.")]
 OfWorkflow = Annotated[Path | None, typer.Option("--workflow", help="The workflow; workflow.yaml where absent.")]
 ScanName = Annotated[str, typer.Argument(help="A scan: its folder, or patient/scan.")]
+TakeOver = Annotated[
+    bool, typer.Option("--take-over", help="Remove the leases of runs elsewhere, or with a wrong clock, that are gone.")
+]
 OlderThan = Annotated[float, typer.Option(min=0, help="Hours below which nothing goes.")]
 
 
@@ -37,7 +41,7 @@ def stats(workflow: WorkflowFile = None, place: Place = None, as_json: AsJson = 
 
     store = _store(workflow, place)
     contents = read_contents(store)
-    garbage = _garbage(contents, store, workflow, place, 24.0)
+    garbage, _ = _garbage(contents, store, workflow, place, 24.0)
     pinned = list(read_pins(store))
     if as_json:
         print_json(
@@ -61,9 +65,10 @@ def gc(
     place: Place = None,
     delete: Annotated[bool, typer.Option("--delete", help="Delete it; otherwise it is only listed.")] = False,
     older_than: OlderThan = 24.0,
+    take_over: TakeOver = False,
     as_json: AsJson = False,
 ) -> int:
-    """List, and with --delete delete, what no step's last action and no pin reaches.
+    """List, and with --delete delete, what no step's last action and no pin reaches, or a vanished scan's alone.
 
     Nothing is deleted while a run is under way.
     """
@@ -71,9 +76,12 @@ def gc(
     from pipelines.engine.lease import live_leases
 
     store = _store(workflow, place)
+    taken_over = take_over_leases(store) if take_over else []
     contents = collect.read_contents(store)
-    garbage = _garbage(contents, store, workflow, place, older_than)
+    garbage, vanished = _garbage(contents, store, workflow, place, older_than)
     if not as_json:
+        if vanished:
+            print_line(f"gone from the archive: {', '.join(vanished)}")
         if garbage.names:
             _print_shares(f"{_place(store)}: what would go", contents, garbage.names)
         print_line(f"to go: {_sum(contents, garbage.names)}; too young to go: {_sum(contents, garbage.young)}")
@@ -86,7 +94,9 @@ def gc(
         facts = {
             "deleted": len(deleted),
             "deleted_bytes": _bytes(contents, deleted),
+            "vanished": vanished,
             "runs": [_run_json(one) for one in live],
+            "taken_over": [_run_json(one) for one in taken_over],
         }
         print_json({"store": _place(store), **_garbage_json(contents, garbage), **facts})
     elif delete:
@@ -94,7 +104,7 @@ def gc(
     elif garbage.names:
         print_line("nothing was deleted: --delete does it")
     for one in live:
-        message(f"footscan: {_told(one)}; nothing is deleted while it is")
+        message(f"footscan: {told_lease(one)}; nothing is deleted while it is")
     return 1 if delete and live else 0
 
 
@@ -217,35 +227,40 @@ def _store(workflow: Path | None, place: str | None) -> "Store":
 
 def _garbage(
     contents: "Contents", store: "Store", workflow: Path | None, place: str | None, older_than: float
-) -> "Garbage":
-    """What of a store can go; of a workflow, its present results and all that they came from stay."""
+) -> "tuple[Garbage, list[str]]":
+    """What of a store can go, and the scans that are no more; a workflow's present results, and what they came from,
+    stay."""
     from pipelines.archive import CACHE, job_of_workflow, plan_job
     from pipelines.engine.audit import repeatable
     from pipelines.engine.collect import find_garbage
+    from pipelines.vanished import vanished_scans
 
     keys: set[str] = set()
     delivered: set[str] = set()
+    vanished: list[str] = []
     if place is None:
         job = job_of_workflow(workflow or WORKFLOW, may_be_empty=True)
         planned = plan_job(job)
         for scan in planned.scans:
             keys |= repeatable(plan_of_scan(scan, planned), store).keys()
-        delivered = _delivered(job.results, store.secret)
+        vanished = vanished_scans(contents.actions, {scan.scan.name for scan in planned.scans}, job.archives)
+        delivered = _delivered(job.results, store.secret, vanished)
     elif Path(place).name == CACHE:
         delivered = _delivered(Path(place).resolve().parent, store.secret)
-    return find_garbage(
-        contents, store, keys=keys, delivered=delivered, now=time.time(), older_than_s=older_than * HOUR_S
-    )
+    times = {"now": time.time(), "older_than_s": older_than * HOUR_S}
+    found = find_garbage(contents, store, keys=keys, delivered=delivered, vanished=vanished, **times)
+    return found, vanished
 
 
-def _delivered(results: Path, secret: bytes | None) -> set[str]:
-    """Digests of the files that lie in a folder of results."""
+def _delivered(results: Path, secret: bytes | None, without: Collection[str] = ()) -> set[str]:
+    """Digests of the files that lie in a folder of results, but for those of some scans."""
     from pipelines.archive import CACHE
     from pipelines.engine.digest import FileDigests
     from pipelines.scan import DELIVERED
 
     digests = FileDigests.load(results / CACHE / "files.json", secret)
-    return {digests.of(file)[0] for name in DELIVERED for file in results.glob(f"*/*/{name}") if file.is_file()}
+    files = (file for name in DELIVERED for file in results.glob(f"*/*/{name}") if file.is_file())
+    return {digests.of(file)[0] for file in files if "/".join(file.parts[-3:-1]) not in without}
 
 
 def _place(store: "Store") -> str:
@@ -347,11 +362,35 @@ def _garbage_json(contents: "Contents", garbage: "Garbage") -> dict[str, Any]:
 
 
 def _run_json(one: "Lease") -> dict[str, Any]:
+    from pipelines.engine.lease import is_ahead
+
     started, heartbeat = json_time(one.started), json_time(one.heartbeat)
-    return {"host": one.host, "process": one.process, "started": started, "heartbeat": heartbeat}
+    times = {"started": started, "heartbeat": heartbeat, "ahead": is_ahead(one)}
+    return {"host": one.host, "process": one.process, **times}
 
 
-def _told(one: "Lease") -> str:
+def take_over_leases(store: "Store") -> "list[Lease]":
+    """Take over all leases but those of this machine's own runs, and say which they were."""
+    from pipelines.engine.lease import take_over
+
+    taken = take_over(store)
+    for one in taken:
+        message(f"footscan: taken over: {one.name} of {_holder(one)}")
+    return taken
+
+
+def told_lease(one: "Lease") -> str:
+    """Who holds a lease, since when, and what to do where it is no run's."""
+    from pipelines.engine.lease import is_ahead
+
     if one.host is None:
         return f"{one.name}: damaged, so a run may be under way ('footscan cache verify' removes it)"
-    return f"process {one.process} on {one.host} is running since {local_time(one.started)}"
+    if is_ahead(one):
+        when = f"is dated in the future, {local_time(one.heartbeat)}: the clock there is wrong, or the one here"
+        return f"{_holder(one)} {when} (if no run is under way there, --take-over removes {one.name})"
+    hint = "" if one.host == socket.gethostname() else " (if that host is gone, --take-over)"
+    return f"{_holder(one)} is running since {local_time(one.started)}{hint}"
+
+
+def _holder(one: "Lease") -> str:
+    return "an unknown process" if one.host is None else one_line(f"process {one.process} on {one.host}")

@@ -19,6 +19,7 @@ from pipelines.cli import (
     export,
     extract,
     films,
+    forget,
     lasts,
     pairs,
     regress,
@@ -61,6 +62,7 @@ app.command("tune")(tune.tune)
 app.command("why")(why.why)
 app.command("trace")(trace.trace)
 app.add_typer(cache.cache, name="cache")
+app.command("forget")(forget.forget)
 app.command("regress")(regress.regress)
 app.command("measure")(results.measure)
 app.command("sizes")(sizes.sizes)

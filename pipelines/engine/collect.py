@@ -8,7 +8,7 @@ from pipelines.engine.explain import code_of, inputs_of, kind_of
 from pipelines.engine.lease import FOLDER as LEASES
 from pipelines.engine.lease import Lease, live_leases
 from pipelines.engine.pins import read_pins
-from pipelines.engine.store import Store, blob_name, row_name
+from pipelines.engine.store import Store, blob_name, latest_name, row_name
 from pipelines.engine.trace import Actions, blob_digest, read_actions, row_key
 
 FOLDERS = ("actions", "blobs", "latest", "pins", LEASES)
@@ -88,6 +88,7 @@ def find_garbage(
     *,
     keys: Iterable[str] = (),
     delivered: Iterable[str] = (),
+    vanished: Iterable[str] = (),
     now: float,
     older_than_s: float,
 ) -> Garbage:
@@ -99,6 +100,8 @@ def find_garbage(
         Of other actions that are in use: who went back to earlier parameters uses those of earlier runs.
     delivered : iterable of str
         Digests of the files that lie in the results.
+    vanished : iterable of str
+        Scans (`patient/scan`) that are no more: what their steps did last goes, unless it is pinned.
     now : float
         s since 1970.
     older_than_s : float
@@ -109,10 +112,15 @@ def find_garbage(
     DamagedError
         A pin is damaged: what it keeps is not known.
     """
-    rows, blobs = _reached(contents.actions, set(keys), set(delivered), store)
+    gone = set(vanished)
+    left = [one for one in contents.actions.latest if one.step.rpartition("/")[0] in gone]
+    roots = {*keys, *(one.key for one in contents.actions.latest if one not in left)}
+    roots |= {key for pin in read_pins(store).values() for key in pin.values()}
+    rows, blobs = reached(contents.actions, roots, set(delivered), store)
     kept = {row_name(key) for key in rows} | {blob_name(digest) for digest in blobs}
+    left_names = {latest_name(one.step) for one in left}
     live = {one.name for one in live_leases(store)}
-    unused = [name for name in contents.sizes if _is_garbage(name, kept, live)]
+    unused = [name for name in contents.sizes if name in left_names or _is_garbage(name, kept, live)]
     garbage = Garbage()
     for name in sorted(unused, key=lambda name: (row_key(name) is None, name)):
         written = store.files.written(name)
@@ -148,11 +156,9 @@ def _is_garbage(name: str, kept: set[str], live: set[str]) -> bool:
     return (row_key(name) is not None or blob_digest(name) is not None) and name not in kept
 
 
-def _reached(actions: Actions, keys: set[str], delivered: set[str], store: Store) -> tuple[set[str], set[str]]:
-    """Keys of the rows and digests of the blobs that are reached, back to where all came from."""
-    waiting = keys | {latest.key for latest in actions.latest}
-    for pin in read_pins(store).values():
-        waiting |= set(pin.values())
+def reached(actions: Actions, keys: set[str], delivered: set[str], store: Store) -> tuple[set[str], set[str]]:
+    """Keys of the rows and digests of the blobs that these actions and files came from, they themselves included."""
+    waiting = set(keys)
     rows: set[str] = set()
     while True:
         rows |= waiting & actions.rows.keys()

@@ -5,6 +5,7 @@ import json
 import logging
 import os
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -99,6 +100,14 @@ class FileDigests:
             except Fault as error:
                 log.warning("%s; the next run will read all films again", error)
             self._changed = False
+
+    def forget(self, is_theirs: Callable[[str, str], bool]) -> None:
+        """Remember no file whose path and digest are somebody's; Fault where that cannot be written."""
+        rows = [[path, list(state), digest] for path, (state, digest) in sorted(self._known.items())]
+        left = [row for row in rows if not is_theirs(str(row[0]), str(row[2]))]
+        if len(left) < len(rows):
+            write_atomically(self.memory, sealed({"rows": left}))
+            self._known = {path: known for path, known in self._known.items() if not is_theirs(path, known[1])}
 
     def of(self, path: Path) -> tuple[str, FileState]:
         """Digest and state of a file; RefusedInput where it cannot be read."""

@@ -24,6 +24,8 @@ FOLDER = "runs"
 HEARTBEAT_S = 60.0
 STALE_S = 600.0
 """Without a heartbeat for so long, a run is taken for dead."""
+LATEST = 253_402_214_400.0
+"""s since 1970: the last day of the year 9999, beyond which no calendar of Python goes."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,8 @@ class Lease:
 
 
 @contextmanager
-def lease(store: Store) -> Iterator[None]:
-    """Holds a lease while a run lasts. A store that cannot be written to gets none, and that is said."""
+def lease(store: Store) -> Iterator[str]:
+    """Holds a lease while a run lasts; gives its name. A store that cannot be written to gets none; that is said."""
     host = re.sub(r"[^A-Za-z0-9.]", "-", socket.gethostname())[:64] or "host"
     name = f"{FOLDER}/{host}-{os.getpid()}-{secrets.token_hex(4)}.json"
     started = time.time()
@@ -65,7 +67,7 @@ def lease(store: Store) -> Iterator[None]:
     thread = threading.Thread(target=beat, name="lease", daemon=True)
     thread.start()
     try:
-        yield
+        yield name
     finally:
         ended.set()
         thread.join()
@@ -88,6 +90,27 @@ def live_leases(store: Store) -> list[Lease]:
     now = time.time()
     beating = (one for one in leases(store) if one.heartbeat is None or now - one.heartbeat < STALE_S)
     return [one for one in beating if not _is_gone(one)]
+
+
+def is_ahead(one: Lease) -> bool:
+    """Whether a lease was renewed in the future: by the clock of its host, or by this one's, which then is wrong."""
+    return one.heartbeat is not None and one.heartbeat - time.time() > STALE_S
+
+
+def take_over(store: Store) -> list[Lease]:
+    """Remove the leases that block a store, but for those of processes seen to run on this machine; returns them.
+
+    A run that is alive after all writes its lease again with the next heartbeat.
+    """
+    taken = [one for one in live_leases(store) if not _is_here(one)]
+    for one in taken:
+        store.files.remove(one.name)
+    return taken
+
+
+def _is_here(one: Lease) -> bool:
+    """Whether the process of a lease was looked for where it ran, and found."""
+    return one.process is not None and one.system is not None and one.system == _system() and not _is_gone(one)
 
 
 def _is_gone(one: Lease) -> bool:
@@ -145,6 +168,8 @@ def _read(name: str, data: bytes) -> Lease:
                 "heartbeat": float(heartbeat),
                 **more,
             }:
+                if not all(0.0 <= one < LATEST for one in (started, heartbeat)):
+                    raise ValueError("no time")
                 system, birth = (str(more[fact]) if more.get(fact) else None for fact in ("system", "birth"))
                 return Lease(name, host, process, started, heartbeat, system, birth)
     except (ValueError, RecursionError):

@@ -10,7 +10,7 @@ import os
 import sqlite3
 import threading
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -112,6 +112,22 @@ class Memory:
                     self._new.pop(key, None)
             except _ERRORS as error:
                 self._forget(error)
+
+    def keep_only(self, keys: Collection[str]) -> None:
+        """Forget all actions but these, so that nothing of them stays in the file; OSError where it cannot."""
+        self.close()
+        self._new.clear()
+        if not self.file.exists():
+            return
+        try:
+            with contextlib.closing(sqlite3.connect(self.file, timeout=5)) as connection:
+                connection.execute("PRAGMA secure_delete = ON")
+                known = {key for (key,) in connection.execute("SELECT key FROM known")}
+                with connection:
+                    connection.executemany("DELETE FROM known WHERE key = ?", [(key,) for key in known - set(keys)])
+                connection.execute("VACUUM")
+        except _ERRORS:  # damaged or locked: it can be done without
+            self.file.unlink()
 
     def close(self) -> None:
         """Write down what is new, and let go of the file."""

@@ -2,6 +2,8 @@
 
 import json
 import logging
+import shutil
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,7 @@ import pytest
 from pipelines.cli.main import run_command
 from pipelines.engine.lease import lease
 from pipelines.engine.store import open_store
+from pipelines.engine.trace import read_actions
 
 Command = Callable[..., tuple[int, str, list[str]]]
 
@@ -91,6 +94,54 @@ def test_gc_waits_for_runs(done: Any, cache: Command) -> None:
         assert run["process"] > 0
     assert cache("gc", done.workflow, "--older-than", 0, "--delete")[0] == 0
     assert size(done) < before
+
+
+def test_a_lease_from_the_future_is_said_and_taken_over(done: Any, cache: Command) -> None:
+    done.set_parameters(OTHER)
+    done.run()
+    ahead = time.time() + 365 * 86400.0
+    (place(done) / "runs").mkdir(exist_ok=True)
+    (place(done) / "runs/attic-7-ab.json").write_text(
+        json.dumps({"host": "attic", "process": 7, "started": ahead, "heartbeat": ahead})
+    )
+    status, _, told = cache("gc", done.workflow, "--older-than", 0, "--delete")
+    assert status == 1
+    assert "process 7 on attic is dated in the future" in told[0]
+    assert "--take-over" in told[0]
+    [run] = as_json(cache("gc", done.workflow, "--json"))["runs"]
+    assert (run["host"], run["ahead"]) == ("attic", True)
+    found = as_json(cache("gc", done.workflow, "--older-than", 0, "--delete", "--take-over", "--json"))
+    assert [run["host"] for run in found["taken_over"]] == ["attic"]
+    assert found["deleted"] > 0
+    assert not (place(done) / "runs/attic-7-ab.json").exists()
+
+
+def test_gc_frees_what_only_a_vanished_scan_needed(done: Any, cache: Command) -> None:
+    before = size(done)
+    other = done.root / "archive/P0002/S1"
+    shutil.copytree(done.scan, other)
+    document = (other / "scan.yaml").read_text().replace("P0001", "P0002")
+    (other / "scan.yaml").write_text(document.replace("step_mm: 10.0", "step_mm: 9.0"))
+    done.run()
+    assert size(done) > before
+    assert as_json(cache("gc", done.workflow, "--older-than", 0, "--json"))["files"] == 0
+    shutil.rmtree(other)
+    freed = as_json(cache("gc", done.workflow, "--older-than", 0, "--delete", "--json"))
+    assert freed["vanished"] == ["P0002/S1"]
+    assert freed["deleted"] > 0
+    steps = {latest.step for latest in read_actions(open_store(place(done))).latest}
+    assert {step.rpartition("/")[0] for step in steps} == {"P0001/S1"}
+    assert abs(size(done) - before) < 4096  # the table of digests' own size apart
+    assert done.run()[1] == set()
+
+
+def test_an_archive_that_is_not_mounted_has_lost_no_scan(done: Any, cache: Command) -> None:
+    before = size(done)
+    done.run()
+    (done.root / "archive").rename(done.root / "unmounted")
+    (done.root / "archive").mkdir()
+    found = as_json(cache("gc", done.workflow, "--older-than", 0, "--delete", "--json"))
+    assert (found["vanished"], found["deleted"], size(done)) == ([], 0, before)
 
 
 def test_going_back_keeps_what_lies_in_the_results(done: Any, cache: Command) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from pipelines.engine import lease as lease_module
-from pipelines.engine.lease import STALE_S, lease, leases, live_leases
+from pipelines.engine.lease import STALE_S, is_ahead, lease, leases, live_leases, take_over
 from pipelines.engine.store import Store
 from schemas.documents import canonical_json
 
@@ -98,3 +98,39 @@ def test_a_store_that_cannot_be_written_to_does_not_keep_a_run_from_trying(
     with caplog.at_level(logging.WARNING), lease(store):
         pass
     assert "cannot be written" in caplog.text
+
+
+def test_a_lease_from_the_future_can_be_taken_over(store: Store) -> None:
+    write(store, -86400.0)
+    [one] = live_leases(store)
+    assert is_ahead(one)
+    assert take_over(store) == [one]
+    assert leases(store) == []
+
+
+def test_a_lease_of_another_host_can_be_taken_over_but_none_of_a_process_that_is_seen_here(store: Store) -> None:
+    if not Path("/proc/sys/kernel/random/boot_id").exists():
+        pytest.skip("only Linux tells")
+    write(store, 5.0)
+    [other] = live_leases(store)
+    assert not is_ahead(other)
+    with lease(store) as name:
+        assert take_over(store) == [other]
+        assert [one.name for one in live_leases(store)] == [name]
+
+
+def test_a_run_whose_lease_was_taken_over_announces_itself_again(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lease_module, "HEARTBEAT_S", 0.02)
+    with lease(store) as name:
+        store.files.remove(name)
+        give_up = time.monotonic() + 10
+        while not live_leases(store):
+            assert time.monotonic() < give_up, "not written again"
+            time.sleep(0.01)
+
+
+@pytest.mark.parametrize("time_s", ["Infinity", "NaN", "1e300", "-1.0"])
+def test_a_lease_of_no_time_is_damaged(store: Store, time_s: str) -> None:
+    store.files.write("runs/h-7-ab.json", f'{{"host":"h","process":7,"started":1.0,"heartbeat":{time_s}}}'.encode())
+    [one] = live_leases(store)
+    assert one.host is None

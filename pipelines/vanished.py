@@ -1,0 +1,35 @@
+"""Scans that a store still knows, and that are gone from the archive."""
+
+import os
+from collections.abc import Collection
+from pathlib import Path
+
+from pipelines.engine.trace import Actions
+
+
+def vanished_scans(actions: Actions, present: Collection[str], archives: Collection[Path]) -> list[str]:
+    """The scans (`patient/scan`) whose films and scan.yaml lay in one of these archives, and are no more.
+
+    A scan is judged by where its films lay when its steps ran last. What lay elsewhere may be another workflow's, and
+    an archive that is missing or empty may be a disk that is not mounted: of neither anything is said.
+
+    Parameters
+    ----------
+    present : collection of str
+        Scans that the archives hold.
+    archives : collection of Path
+    """
+    roots = [archive.resolve() for archive in archives if archive.is_dir() and list(archive.iterdir())]
+    films: dict[str, list[Path]] = {}
+    for latest in actions.latest:
+        scan = latest.step.rpartition("/")[0]
+        places = (latest.sources.get(name) for name in ("film", "background", "travel", "positions"))
+        films.setdefault(scan, []).extend(Path(place) for place in places if isinstance(place, str))
+    return sorted(
+        scan
+        for scan, places in films.items()
+        if scan not in present
+        and places
+        and all(any(place.is_relative_to(root) for root in roots) for place in places)
+        and not any(os.path.lexists(place) or os.path.lexists(place.parent / "scan.yaml") for place in places)
+    )
