@@ -1,7 +1,7 @@
 """Erasing a patient, or a scan, from archives, results and store, and proving it."""
 
 import shutil
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +14,7 @@ from pipelines.engine.store import Store, open_store
 from pipelines.forget.notes import FOLDER, note_name
 from pipelines.forget.proof import find_remains
 from pipelines.forget.shares import Shares, find_shares
-from pipelines.forget.subject import Belongings, Subject, files_below, find_belongings
+from pipelines.forget.subject import Belongings, Subject, find_belongings
 from pipelines.forget.tables import erase_from_text, rewrite_tables, texts_that_name
 from pipelines.scan import DELIVERED
 from schemas.documents import canonical_json, parse_json
@@ -67,10 +67,10 @@ def find_erasure(subject: Subject, job: Job) -> Erasure:
     shares = find_shares(subject, store, delivered)
     was_cut_off = store.files.state(note_name(subject.name)) is not None
     if was_cut_off:
-        known = parse_json(
-            store.files.path(note_name(subject.name)), store.files.read(note_name(subject.name)).decode()
-        )
-        belongings.digests |= set(map(str, known))
+        name = note_name(subject.name)
+        known = parse_json(store.files.path(name), store.files.read(name).decode())
+        belongings.digests |= set(known["digests"])
+        belongings.sizes |= set(known["sizes"])
     texts = texts_that_name(subject, [job.results, *([local] if local.is_dir() else [])])
     return Erasure(subject, job, store, belongings, shares, texts, was_cut_off)
 
@@ -89,10 +89,8 @@ def erase(found: Erasure) -> list[Lease]:
         return live
     with lease(found.store) as own:
         folders = found.belongings.folders
-        sizes = {file.stat().st_size for one in folders for file in files_below(one) if file.is_file()}
-        found.store.files.write(
-            note_name(found.subject.name), canonical_json(sorted(found.belongings.digests)).encode()
-        )
+        known = {"digests": sorted(found.belongings.digests), "sizes": sorted(found.belongings.sizes)}
+        found.store.files.write(note_name(found.subject.name), canonical_json(known).encode())
         for place in folders:
             _remove(place)
         _remove_empty_parents(found)
@@ -103,7 +101,7 @@ def erase(found: Erasure) -> list[Lease]:
         if live := _erase_from_store(found, own):
             return live
         _clear_folders(found, "pins")
-        found.remains = _remains(found, sizes)
+        found.remains = _remains(found)
         if not found.remains:
             found.store.files.remove(note_name(found.subject.name))
             _clear_folders(found, FOLDER)
@@ -129,10 +127,10 @@ def _erase_from_store(found: Erasure, own: str) -> list[Lease]:
     return []
 
 
-def _remains(found: Erasure, sizes: Collection[int]) -> list[str]:
+def _remains(found: Erasure) -> list[str]:
     folders = [*found.job.archives, found.job.results]
     digests = found.belongings.digests | found.shares.digests
-    places = find_remains(found.subject, digests, folders, found.store, sizes, found.shares.digests)
+    places = find_remains(found.subject, digests, folders, found.store, found.belongings.sizes, found.shares.digests)
     return [place for place in places if f"/{FOLDER}/" not in place]
 
 

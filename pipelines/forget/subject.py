@@ -57,6 +57,8 @@ class Belongings:
     """Folders, and films that lie outside of them."""
     digests: set[str] = field(default_factory=set)
     """Of the films and all other files in them, by which copies are found."""
+    sizes: set[int] = field(default_factory=set)
+    """Of these files, in bytes: no other can be a copy."""
     out_of_reach: list[str] = field(default_factory=list)
 
 
@@ -138,3 +140,4 @@ def _look_into(folder: Path, found: Belongings) -> None:
             found.out_of_reach.append(f"{file} is a link to {os.readlink(file)}: only the link is erased")  # noqa: PTH115
         elif not (GROUP in file.parts and CHUNK(file.name)) and (digest := digest_of(file)) and file.stat().st_size:
             found.digests.add(digest)
+            found.sizes.add(file.stat().st_size)
