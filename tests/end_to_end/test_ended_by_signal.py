@@ -124,4 +124,4 @@ def test_a_command_that_is_killed_or_halted_ends_with_its_motion(scanner: Scanne
     process.send_signal(number)
     time.sleep(14.0)  # 400 mm take 11 s
     scanner.assert_dark_and_standing(signalled + 13.0)
-    assert 50.0 < scanner.board.position_at(time.monotonic())[0] < 402.0
+    assert 50.0 < scanner.board.position_at(time.monotonic())[0] < 410.1  # as far as heads reach
