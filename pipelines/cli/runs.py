@@ -146,6 +146,8 @@ def _watch(job: "Job", pool: "Pool", log: TextIO | None) -> int:
 
 @contextmanager
 def _log(path: Path) -> Iterator[TextIO]:
+    if path.is_dir():
+        raise RefusedInput(path, "is a folder, expected the name of a file to write")
     try:
         with path.open("a", encoding="utf-8") as log:
             yield log

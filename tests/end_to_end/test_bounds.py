@@ -182,6 +182,10 @@ def test_a_folder_without_scans_is_refused_by_ingest(bounded: BoundedCommand, tm
     refuse(bounded, ["ingest", "empty"], tmp_path, "empty: holds no scan, expected folders with a scan.yaml")
 
 
+def test_a_log_that_is_a_folder_is_refused(bounded: BoundedCommand, archive: Path) -> None:
+    refuse(bounded, ["run", "--log-json", "archive"], archive, "archive: is a folder, expected the name of a file")
+
+
 def test_positions_of_blank_lines_are_refused(bounded: BoundedCommand, archive: Path) -> None:
     scan = archive / "archive/P0001/S1"
     document = scan / "scan.yaml"
