@@ -48,7 +48,8 @@ def _remains(subject: Subject, digests: Collection[str], folder: Path, sizes: Co
         if file.is_symlink() or not file.is_file() or CHUNK(file.name):
             continue
         size = file.stat().st_size
-        is_copy = size in sizes and not _is_anothers(file, folder) and digest_of(file) in digests
+        is_shared = file.name in digests or _is_anothers(file, folder)  # a blob is judged in the store, as one of it
+        is_copy = size in sizes and not is_shared and digest_of(file) in digests
         if is_copy or (size <= LARGE_BYTES and subject.pattern.search(file.read_bytes())):
             yield file
 

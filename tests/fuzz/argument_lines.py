@@ -7,8 +7,8 @@ import typer.main
 
 from pipelines.cli.main import app
 
-LIVE = {"console", "scan", "home", "jog", "devices", "demo", "simulate", "regress", "tune", "capture", "latency"}
-"""They move heads, serve pages, or compute for minutes: they have fuzzers of their own, or none."""
+LIVE = {"run", "console", "scan", "home", "jog", "devices", "demo", "simulate", "regress", "tune", "capture", "latency"}
+"""They move heads, serve pages, or compute for minutes, as `run` does where `plan` takes the same options."""
 NEVER = {"--watch", "--cluster", "--workers", "--install-completion", "--show-completion"}
 FILES = (
     *("solid.stl", "solid.ply", "solid.obj", "chart.csv", "lasts.csv", "pixels.csv", "left.json", "right.json"),
