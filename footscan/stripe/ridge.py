@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
-from footscan.portable import gaussian_kernel
 from footscan.stripe.limits import Limits
 from footscan.stripe.redness import SATURATED, SIGNAL_SCALE, SUMMED
 
@@ -43,7 +42,9 @@ I, J, NORMAL_I, NORMAL_J, SHARPNESS = range(5)  # noqa: E741 (the name of the ax
 @lru_cache
 def gaussian(sigma: float) -> NDArray[np.float32]:
     """The `TAPS` weights of a Gaussian, `sigma` in px, at most half of `RADIUS`."""
-    return gaussian_kernel(sigma, RADIUS).astype(np.float32)
+    # By the C library: NumPy's exp differs in its last digits from processor to processor.
+    weights = np.array([math.exp(-0.5 * (k / sigma) ** 2) for k in range(-RADIUS, RADIUS + 1)])
+    return np.asarray(weights / weights.sum(), np.float32)
 
 
 @compiled

@@ -6,12 +6,12 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from footscan.portable import cos_sin, product
 from footscan.virtual.foot_form import pternion, toe_tips
 from footscan.virtual.foot_measures import known_landmarks, known_measures
 from footscan.virtual.foot_mesh import mesh_field
 from footscan.virtual.foot_shape import FootShape, sample_pair, sample_shape
 from footscan.virtual.foot_solve import solved_field
+from footscan.virtual.portable import cos_sin, product
 
 __all__ = ["Foot", "FootShape", "Side", "make_foot", "placed", "sample_pair", "sample_shape"]
 

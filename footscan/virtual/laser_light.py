@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
-from footscan.portable import cos_sin, dot, exp
 from footscan.virtual.glass import directions_from_below, exits_above, reflectance
+from footscan.virtual.portable import cos_sin, dot, exp
 from footscan.virtual.scanner import FAN_DEGREES, HEIGHT, WIDTH, Laser
 from footscan.virtual.scene import Hits, Scene
 from footscan.virtual.texture import Texture

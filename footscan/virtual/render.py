@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
-from footscan.portable import gaussian_blur, gaussian_kernel
 from footscan.virtual.laser_light import stripe_picture
+from footscan.virtual.portable import gaussian_blur, gaussian_kernel
 from footscan.virtual.room import COARSE, LEVELS, Backdrop, backdrop, coarse_rays, lit_object
 from footscan.virtual.scanner import HEIGHT, WIDTH, VirtualScanner
 from footscan.virtual.scene import Scene, Surface

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.portable import cos_sin, dot, exp, gaussian_blur
+from footscan.virtual.portable import cos_sin, dot, exp, gaussian_blur
 from footscan.virtual.scanner import HEIGHT, WIDTH, Camera
 from footscan.virtual.scene import Scene
 from footscan.virtual.texture import Texture

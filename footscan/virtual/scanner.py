@@ -12,9 +12,9 @@ from math import cos, radians, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.portable import product
 from footscan.virtual.glass import THICKNESS_MM, directions_from_below, exits_above
 from footscan.virtual.lens import Lens
+from footscan.virtual.portable import product
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
-from footscan.portable import cos_sin
+from footscan.virtual.portable import cos_sin
 from footscan.virtual.ray_tree import any_hits, first_hits, ray_tree
 
 Floats = NDArray[np.float64]

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.portable import cos_sin, product
+from footscan.virtual.portable import cos_sin, product
 
 Floats = NDArray[np.float64]
 

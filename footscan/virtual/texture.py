@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
-from footscan.portable import gaussian_blur
+from footscan.virtual.portable import gaussian_blur
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]

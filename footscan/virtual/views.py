@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.portable import dot
 from footscan.virtual.glass import exits_above, reflectance
+from footscan.virtual.portable import dot
 from footscan.virtual.scanner import HEIGHT, WIDTH, Camera
 
 Floats = NDArray[np.float64]

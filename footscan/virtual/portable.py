@@ -1,8 +1,8 @@
 """Arithmetic that gives the same bytes on every x86-64 processor.
 
 NumPy's `exp`, `sin` and `power` take other instructions, hence other last digits, where a processor has AVX-512; BLAS,
-behind `@`, takes the kernels of each processor. Films, captures and stripes are made without them: by single
-operations of IEEE 754 in a fixed order. numba contracts no multiplication and addition unless `fastmath` is asked for.
+behind `@`, takes the kernels of each processor. Films and captures are made without them: by single operations of
+IEEE 754 in a fixed order. numba contracts no multiplication and addition unless `fastmath` is asked for.
 """
 
 import math

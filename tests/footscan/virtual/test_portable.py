@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from footscan.portable import cos_sin, dot, exp, gaussian_blur, gaussian_kernel, product
+from footscan.virtual.portable import cos_sin, dot, exp, gaussian_blur, gaussian_kernel, product
 
 
 def test_exp_is_good_to_two_units_in_the_last_place() -> None:
