@@ -69,6 +69,7 @@ class LiveScanner:
         self._heads: Heads | None = None
         self._deck = CameraDeck(sources_of(rig))
         self._stopped = threading.Event()
+        self._working = threading.Event()
         self._stopping = threading.Lock()
 
     def __enter__(self) -> Self:
@@ -153,7 +154,10 @@ class LiveScanner:
         Where nothing moves or shines, nothing happens.
         """
         self._stopped.set()
-        self._end_motion()
+        if self._working.is_set():
+            self._stop_heads()  # also where the board has not told yet of motion that has just begun
+        else:
+            self._end_motion()
 
     @contextmanager
     def waiting_for(self, words: str) -> Iterator[Callable[[int, int], None]]:
@@ -273,8 +277,12 @@ class LiveScanner:
     def _at_work(self, first: Activity, words: str = "") -> Iterator[None]:
         with self._board.at_work(first, words):
             self._stopped.clear()  # a stop is of what was under way when it was pressed
-            with self._held_to_stops():
-                yield
+            self._working.set()
+            try:
+                with self._held_to_stops():
+                    yield
+            finally:
+                self._working.clear()
 
     @contextmanager
     def _held_to_stops(self) -> Iterator[None]:
@@ -312,6 +320,12 @@ class LiveScanner:
         with self._stopping:
             heads = self._heads
             if heads is not None and heads.state.name in UNDER_WAY:
+                heads.stop()
+
+    def _stop_heads(self) -> None:
+        with self._stopping:
+            heads = self._heads
+            if heads is not None and heads.state.name not in {"lost", "closed"}:
                 heads.stop()
 
     def _connect_board(self) -> None:
