@@ -12,6 +12,7 @@ import typer
 from footscan.capture.way_out import EndedBySignal
 from pipelines.cli.live_options import VIRTUAL_FOLDER, RigFile, Virtual, VirtualFolder, opened_rig, plain_world
 from pipelines.cli.output import message
+from schemas.errors import RefusedInput
 
 if TYPE_CHECKING:
     from pipelines.console.scanner import Scanner
@@ -31,6 +32,13 @@ def console(
     host: Annotated[
         str, typer.Option(help="Address to listen on. Other than loopback, the page is opened with a token.")
     ] = LOOPBACK,
+    token: Annotated[
+        bool | None,
+        typer.Option(
+            help="Open the page with a token, which other accounts of this computer do not have. Default: only where "
+            "the address is not loopback; there it cannot be switched off."
+        ),
+    ] = None,
     virtual: Virtual = False,
     virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
     grid_mm: Annotated[
@@ -42,7 +50,9 @@ def console(
     from pipelines.console.guard import is_loopback
     from pipelines.console.server import listen, server_of
 
-    token = None if is_loopback(host) else secrets.token_urlsafe(32)
+    if token is False and not is_loopback(host):
+        raise RefusedInput("--no-token", "leaves the scanner open to the network, expected it with loopback alone")
+    secret = secrets.token_urlsafe(32) if token or not is_loopback(host) else None
     with (
         listen(host, port) as socket,
         _opened(rig, out, results, calibration, virtual_folder, grid_mm if virtual else None) as scanner,
@@ -53,9 +63,9 @@ def console(
             message("footscan: anyone who can read the network's traffic can read the token: use a network of your own")
         if host in EVERYWHERE:
             shown = "ADDRESS-OF-THIS-COMPUTER"
-        print(f"http://{shown}:{socket.getsockname()[1]}/{f'?token={token}' if token else ''}", flush=True)
+        print(f"http://{shown}:{socket.getsockname()[1]}/{f'?token={secret}' if secret else ''}", flush=True)
         one.connect()
-        server = server_of(one, host, token)
+        server = server_of(one, host, secret)
         server.run(sockets=[socket])
     if server.ended_by not in ASKED_TO_END:
         raise EndedBySignal(server.ended_by)

@@ -1,5 +1,6 @@
 """Stop of a console, a process of its own with a virtual board, while others hold its connections."""
 
+import re
 import resource
 import socket
 import sys
@@ -140,6 +141,23 @@ def test_an_order_of_another_site_stops_nothing(scanner: Scanner) -> None:
     assert stop(port, origin="http://evil.example").startswith(b"HTTP/1.1 403")
     assert scanner.board.laser_at(scanner.board.clock()) > 0.0
     assert stop(port).startswith(b"HTTP/1.1 204")
+
+
+def test_a_token_is_asked_for_on_loopback_too(scanner: Scanner) -> None:
+    process = scanner.start("console", more=("--token",))
+    assert process.stdout is not None
+    found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)\n", str(process.stdout.readline()))
+    assert found is not None
+    port, token = int(found[1]), found[2]
+    assert stop(port).startswith(b"HTTP/1.1 401")
+    with socket.create_connection(("127.0.0.1", port), LONG_SECONDS) as connection:
+        connection.sendall(get("/"))
+        assert connection.recv(4096).startswith(b"HTTP/1.1 401")
+    with socket.create_connection(("127.0.0.1", port), LONG_SECONDS) as connection:
+        connection.sendall(get(f"/?token={token}"))
+        answer = connection.recv(4096)
+    assert answer.startswith(b"HTTP/1.1 303")
+    assert b"set-cookie: footscan_console=" + token.encode() in answer
 
 
 def stop(port: int, origin: str | None = None) -> bytes:

@@ -44,10 +44,10 @@ class Scanner:
         self.board, self.folder = board, folder
         self.running: list[subprocess.Popen[str]] = []
 
-    def start(self, name: str, **options: Any) -> "subprocess.Popen[str]":
-        """A command in a process of its own, as a shell in a terminal starts it."""
+    def start(self, name: str, more: tuple[str, ...] = (), **options: Any) -> "subprocess.Popen[str]":
+        """A command in a process of its own, with `more` options, as a shell in a terminal starts it."""
         pipe = subprocess.PIPE
-        line = ["/usr/bin/env", "--default-signal=HUP,INT,QUIT", FOOTSCAN, *COMMANDS[name]]
+        line = ["/usr/bin/env", "--default-signal=HUP,INT,QUIT", FOOTSCAN, *COMMANDS[name], *more]
         options = {"stdout": pipe, "stderr": pipe, "stdin": subprocess.DEVNULL} | options
         self.running.append(subprocess.Popen(line, cwd=self.folder, text=True, **options))
         return self.running[-1]

@@ -83,6 +83,30 @@ def test_another_site_sees_no_pictures_but_may_link_here(web: TestClient) -> Non
     assert web.get("/", headers={"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"}).status_code == 200
 
 
+@pytest.mark.parametrize("path", ["/events?page=cccccccccccccccc", "/cameras/1.jpg", "/results/P1/S1/foot.stl"])
+def test_another_site_links_to_pages_alone(web: TestClient, console: Console, path: str) -> None:
+    link = {
+        "sec-fetch-site": "cross-site",
+        "sec-fetch-mode": "navigate",
+        "referer": "http://evil.example/x",
+        "accept": "text/html",
+    }
+    assert web.get(path, headers=link).status_code == 403
+    assert not console.seen_by("c" * 16)["in_charge"]
+
+
+def test_a_link_to_the_events_is_refused_whatever_the_browser_tells(web: TestClient, console: Console) -> None:
+    """Browsers say where a request is from on loopback and with TLS only."""
+    assert web.get("/events?page=cccccccccccccccc", headers={"accept": "text/html,*/*"}).status_code == 403
+    assert not console.seen_by("c" * 16)["in_charge"]
+
+
+def test_who_is_in_charge_hears_of_another_site(web: TestClient, until: Any) -> None:
+    web.post("/do/stop", json={}, headers={"origin": "http://evil.example"})
+    seen = until(lambda seen: seen["warning"] is not None)
+    assert seen["warning"] == "http://evil.example asked this scanner for /do/stop and was refused"
+
+
 def test_large_requests_are_refused_unread(web: TestClient, scanner: StandIn) -> None:
     assert web.post("/do/scan", content=b"{" + b" " * 5000 + b"}").status_code == 413
     assert web.post("/do/scan", content=(b"x" for _ in range(3))).status_code == 413, "a body of untold length"
@@ -288,3 +312,37 @@ def test_a_port_in_use_is_refused_in_one_line() -> None:
             RefusedInput, match=rf"^127\.0\.0\.1:{port}: cannot be listened on \(Address already in use\)"
         ):
             listen("127.0.0.1", port)
+
+
+SWAPPED = {
+    "a folder": lambda file: file.mkdir(),
+    "a named pipe": os.mkfifo,
+    "a link that leads out": lambda file: file.symlink_to("/etc/hostname"),
+    "nothing": Path.exists,
+    "an empty file": lambda file: file.touch(),
+    "other bytes": lambda file: file.write_bytes(b"\xff\x00{" * 50),
+    "half a file": lambda file: file.write_text('{"format": "footscan.measures/1", "unit"'),
+    "another document": lambda file: file.write_text(
+        '{"format": "footscan.measures/1", "measures": {"foot_length": 1e999}}'
+    ),
+    "deep nesting": lambda file: file.write_text("[" * 100_000),
+    "a sparse file of 6 GB": lambda file: (file.touch(), os.truncate(file, 6 * 2**30)),
+}
+
+
+@pytest.mark.parametrize("swapped", SWAPPED)
+@pytest.mark.parametrize("name", ["measures.json", "quality.json", "foot.stl", "foot.ply"])
+def test_results_that_are_swapped_are_told_in_a_line(
+    web: TestClient, results: Path, foot: str, swapped: str, name: str
+) -> None:
+    assert web.get(f"/foot/{foot}").status_code == 200
+    file = results / foot / name
+    file.unlink(missing_ok=True)
+    SWAPPED[swapped](file)
+    for path in (f"/foot/{foot}", f"/results/{foot}/{name}", "/pair/P1/S1/S1"):
+        answer = web.get(path)
+        assert answer.status_code in {200, 404}, (path, answer.text[:300])
+        assert "Traceback" not in answer.text
+        if answer.status_code == 404:
+            assert answer.text.startswith("footscan: ")
+            assert answer.text.count("\n") == 1
