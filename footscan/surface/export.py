@@ -20,7 +20,7 @@ from schemas.limits import BeyondLimitError, read_bounded
 Shape = tuple[NDArray[np.float64], NDArray[np.int32]]
 """(V, 3) vertices in mm and (F, 3) faces; a cloud is a shape without faces."""
 
-FARTHEST_MM = 1e7
+FARTHEST_MM = 1e9
 """No coordinate of a mesh is larger, not even in micrometres: its powers stay finite."""
 PARSERS = {".stl": parse_stl, ".ply": parse_ply, ".obj": parse_obj}
 WRITERS: dict[str, Callable[[Mesh], bytes]] = {

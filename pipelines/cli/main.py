@@ -38,6 +38,8 @@ from schemas.errors import Fault, FootscanError, RefusedInput, one_line
 from schemas.limits import check_limits
 
 INTERRUPTED = 130
+MOST_OTHERS = 19
+"""Mistakes that are told after the first one: what a terminal shows at once."""
 
 app = typer.Typer(
     name="footscan",
@@ -105,8 +107,11 @@ def run_command(arguments: list[str]) -> int:
         problem, status = _explain(error)
         if problem:
             message(f"footscan: {problem}")
-        for other in error.others if isinstance(error, RefusedInput) else ():
+        others = error.others if isinstance(error, RefusedInput) else ()
+        for other in others[:MOST_OTHERS]:
             message(f"footscan: {other}")
+        if others[MOST_OTHERS:]:
+            message(f"footscan: and {len(others) - MOST_OTHERS} more mistakes")
         return status
     except EndedBySignal as end:
         message(f"footscan: {end}")

@@ -40,8 +40,8 @@ def _replace(path: Path, data: bytes) -> None:
         _make(path.parent)
         with contextlib.suppress(FileNotFoundError):
             partial.unlink()  # of a killed process that had the same number
-        with open(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o660), "wb") as file:  # noqa: PTH123
-            file.write(data)
+        os.close(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o660))
+        partial.write_bytes(data)
         partial.replace(path)
     finally:
         with contextlib.suppress(OSError):

@@ -20,6 +20,7 @@ from footscan.capture.recording import ScanRecording
 from footscan.capture.usb_bus import Pass
 from pipelines.live.devices import heads_of, passes_of, sources_of, timing_of
 from pipelines.live.light import ScanLight, fix_light, measured_light
+from pipelines.live.looking_on import looking_on
 from pipelines.live.measuring import Measured, measure_scan
 from pipelines.live.state import Activity, OnState, ScannerState, StateBoard, with_board
 from pipelines.live.storing import FilmedScan, ScanName, ScanStory, store_scan
@@ -30,6 +31,7 @@ FRAME_BYTES = 40_000
 """Of a picture, before any has come."""
 WATCH_SECONDS = 0.1
 UNDER_WAY = ("moving", "jogging", "homing", "held", "door")
+ANSWERING = (*UNDER_WAY, "ready", "not homed", "alarm", "restarting")
 """States of the board that a stop ends."""
 STOPPED = "stopped; nothing of this scan is kept"
 
@@ -154,10 +156,8 @@ class LiveScanner:
         Where nothing moves or shines, nothing happens.
         """
         self._stopped.set()
-        if self._working.is_set():
-            self._stop_heads()  # also where the board has not told yet of motion that has just begun
-        else:
-            self._end_motion()
+        # At work, heads are stopped also where the board has not told yet of motion that has just begun.
+        self._stop_heads(ANSWERING if self._working.is_set() else UNDER_WAY)
 
     @contextmanager
     def waiting_for(self, words: str) -> Iterator[Callable[[int, int], None]]:
@@ -287,21 +287,14 @@ class LiveScanner:
     @contextmanager
     def _held_to_stops(self) -> Iterator[None]:
         """Ends motion that began just after a stop was pressed, before the board had told of it."""
-        ended = threading.Event()
 
-        def watch() -> None:
-            while not ended.wait(WATCH_SECONDS):
-                if self._stopped.is_set():
-                    with suppress(Fault):  # the state tells it
-                        self._end_motion()
+        def look() -> None:
+            if self._stopped.is_set():
+                with suppress(Fault):  # the state tells it
+                    self._stop_heads(UNDER_WAY)
 
-        thread = threading.Thread(target=watch, name="watch for a stop", daemon=True)
-        thread.start()
-        try:
+        with looking_on(look, WATCH_SECONDS, "watch for a stop"):
             yield
-        finally:
-            ended.set()
-            thread.join()
 
     @contextmanager
     def _stop_said(self) -> Iterator[None]:
@@ -316,16 +309,10 @@ class LiveScanner:
         if self._stopped.is_set():
             raise Fault(STOPPED)
 
-    def _end_motion(self) -> None:
+    def _stop_heads(self, states: tuple[str, ...]) -> None:
         with self._stopping:
             heads = self._heads
-            if heads is not None and heads.state.name in UNDER_WAY:
-                heads.stop()
-
-    def _stop_heads(self) -> None:
-        with self._stopping:
-            heads = self._heads
-            if heads is not None and heads.state.name not in {"lost", "closed"}:
+            if heads is not None and heads.state.name in states:
                 heads.stop()
 
     def _connect_board(self) -> None:
@@ -387,28 +374,21 @@ class LiveScanner:
 
     @contextmanager
     def _watched(self, plan: PassPlan, recording: ScanRecording) -> Iterator[None]:
-        """Tells how far the heads are, and ends the pass where the disk fails, or it is told to stop."""
-        ended = threading.Event()
+        """Tells how far the heads are, and ends the pass where the disk fails."""
         heads = self.heads
 
-        def watch() -> None:
-            while not ended.wait(WATCH_SECONDS):
-                try:
-                    recording.check()
-                    self._refuse_stopped()
-                except Fault:
-                    with suppress(Fault):  # the state tells it
-                        self._end_motion()
-                for latest in heads.log.between(time.monotonic() - 1.0, math.inf)[-1:]:
-                    self._board.progress((latest.x_mm[0] - plan.start_mm) / (plan.end_mm - plan.start_mm))
+        def look() -> None:
+            try:
+                recording.check()
+            except Fault:
+                with suppress(Fault):  # the state tells it
+                    self._stop_heads(UNDER_WAY)
+            for latest in heads.log.between(time.monotonic() - 1.0, math.inf)[-1:]:
+                self._board.progress((latest.x_mm[0] - plan.start_mm) / (plan.end_mm - plan.start_mm))
 
-        thread = threading.Thread(target=watch, name="watch over the pass", daemon=True)
-        thread.start()
         try:
-            yield
+            with looking_on(look, WATCH_SECONDS, "watch over the pass"):
+                yield
         except FootscanError:
             recording.check()  # the disk's failure, which ended the pass, says more
             raise
-        finally:
-            ended.set()
-            thread.join()

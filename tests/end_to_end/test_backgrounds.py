@@ -51,7 +51,7 @@ def test_scan_with_a_background(footscan: Footscan, mistake: Mistake, bench: Pat
     plan = json.loads(footscan("plan", bench / "workflow.yaml", "--json").stdout)
     assert plan["steps"] == STEPS_OF_THE_SCAN + 3  # and its colours, and those of the surface
     reasons = {(miss["step"], miss["camera"]): miss["reason"] for miss in plan["misses"]}
-    assert reasons["background", CAMERA] == "never run"
+    assert reasons["background", CAMERA] == "cam1-background is not there"
     assert reasons["extract", CAMERA] == "waits for background of camera 1"
     assert {camera for step, camera in reasons if camera is not None} == {CAMERA}
     done = footscan("run", bench / "workflow.yaml", "--json")

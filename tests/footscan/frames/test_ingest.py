@@ -178,7 +178,7 @@ def test_killed_ingest_leaves_nothing_and_the_next_sweeps_up(
     )
     process = subprocess.Popen([sys.executable, "-c", code])
     deadline = time.monotonic() + 60
-    while not list(scan.glob(".cam1.partial-*/2.0.0.0")):
+    while not list(scan.glob(".cam1.partial-*/*/2.0.0.0")):
         assert process.poll() is None, "it was to be killed in the middle"
         assert time.monotonic() < deadline
         time.sleep(0.002)

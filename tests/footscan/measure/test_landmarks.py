@@ -41,7 +41,7 @@ def known_on(foot: Foot) -> dict[str, np.ndarray]:
 def test_landmarks_are_where_the_foot_was_built_with_them(number: int) -> None:
     foot = known_foot(number)
     found = found_on(foot, number)
-    assert set(found) == set(LANDMARKS)
+    assert set(found) == set(LANDMARKS) - {"navicular", "fifth_metatarsal_tuberosity"}, "its sides are even"
     known = known_on(foot)
     off = {name: found[name].point - point for name, point in known.items()}
     assert off["pternion"][:2] == pytest.approx([0, 0], abs=0.02)

@@ -144,7 +144,7 @@ def test_wrong_files_are_refused_in_one_line(ply: Path, run: Run) -> None:
     )
     refused(run(ply, "--out", "/dev/stdout"), "expected a name that ends in")
     refused(run(ply.with_name("none.stl"), "--out", out), "no such file")
-    refused(run(folder, "--out", out), "cannot be read")
+    refused(run(folder, "--out", out), "expected a file")
     refused(run(ply.with_name("a\nb\x1b.stl"), "--out", out), "no such file")
     refused(run(ply, "--out", out, "--patient", "../P1"), "--patient")
     refused(run(ply, "--out", out, "--triangles", 0), "--triangles")
