@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from schemas.errors import Fault, FootscanError
 
 GONE_SECONDS = 0.5
-"""A page that is not heard of for so long is gone: closed, frozen, or cut off. Its script speaks every 0.15 s."""
+"""A page that is not heard of for so long is gone: closed, cut off, or it hangs. Its script speaks every 0.15 s."""
 LOOKS_SECONDS = 0.05
 
 
