@@ -41,8 +41,8 @@ BUDGETS = {"events": 24, "orders": 16, "pages": 48}
 HandOver = Callable[[socket.socket, bytes, Callable[[], None], float | None], None]
 """Gives the server a connection with what has come on it, and what to call when it ends; it ends after so many
 seconds at the latest, where a number is given."""
-Stop = Callable[[dict[str, Any]], tuple[int, bytes]]
-"""Stops the scanner, where the request (an ASGI scope) may: the status and body of the answer."""
+Answer = tuple[int, bytes]
+"""Status and body."""
 
 
 @dataclass
@@ -56,8 +56,15 @@ class _Waiting:
 class Gate:
     """Listens in a thread of its own until it is closed."""
 
-    def __init__(self, listening: socket.socket, hand_over: HandOver, stop: Stop) -> None:
-        self._listening, self._hand_over, self._stop = listening, hand_over, stop
+    def __init__(
+        self,
+        listening: socket.socket,
+        hand_over: HandOver,
+        refusal: Callable[[dict[str, Any]], Answer | None],
+        stop: Callable[[], Answer],
+    ) -> None:
+        """`refusal` is the answer to a request (an ASGI scope) that must not come in."""
+        self._listening, self._hand_over, self._refusal, self._stop = listening, hand_over, refusal, stop
         self._most_waiting = min(MOST_WAITING, max(_descriptors() - KEPT_DESCRIPTORS, 16))
         self._waiting: dict[socket.socket, _Waiting] = {}
         self._free = {kind: threading.BoundedSemaphore(most) for kind, most in BUDGETS.items()}
@@ -166,10 +173,11 @@ class Gate:
             connection.close()
             return
         if one.request.method == b"POST" and _path(one.request) == STOP:
-            if self._free_stops.acquire(blocking=False):
-                threading.Thread(
-                    target=self._stop_now, args=(connection, one.request), name="console: stop", daemon=True
-                ).start()
+            refused = self._refusal(_scope(one.request))
+            if refused is not None:
+                _respond(connection, *refused)
+            elif self._free_stops.acquire(blocking=False):
+                threading.Thread(target=self._stop_now, args=(connection,), name="console: stop", daemon=True).start()
             else:  # so many are being carried out
                 _respond(connection, 503, b"footscan: Stop is being carried out\n")
             return
@@ -184,10 +192,9 @@ class Gate:
             free.release()
             connection.close()
 
-    def _stop_now(self, connection: socket.socket, request: h11.Request) -> None:
+    def _stop_now(self, connection: socket.socket) -> None:
         try:
-            status, body = self._stop(_scope(request))
-            _respond(connection, status, body)
+            _respond(connection, *self._stop())
         finally:
             self._free_stops.release()
 

@@ -28,7 +28,7 @@ from footscan.report.style import STYLE
 from footscan.report.viewer_script import SCRIPT
 from pipelines.console.console import Console
 from pipelines.console.foot_page import foot_page
-from pipelines.console.gate import LARGEST_HEAD, Gate, Stop, hand_over_to
+from pipelines.console.gate import LARGEST_HEAD, Answer, Gate, hand_over_to
 from pipelines.console.guard import LARGEST_BODY, PAGE, PAGE_HEADER, Guard, Rules
 from pipelines.console.live_picture import LivePictures
 from pipelines.console.pair_page import pair_page
@@ -76,10 +76,9 @@ class ConsoleServer(uvicorn.Server):
     The heads stop at once, see `signals_end_the_program`; they do not wait for what is done here.
     """
 
-    def __init__(self, config: uvicorn.Config, ends: Callable[[], None], stop: Stop) -> None:
+    def __init__(self, config: uvicorn.Config, console: Console, rules: Rules) -> None:
         super().__init__(config)
-        self._ends = ends
-        self._stop = stop
+        self._console, self._rules = console, rules
         self._gate: Gate | None = None
         self.ended_by: int | None = None
         """The signal that ended it."""
@@ -88,7 +87,8 @@ class ConsoleServer(uvicorn.Server):
         """As uvicorn has it, but the one of `sockets` is watched by the gate."""
         await super().startup([])
         [listening] = sockets or []
-        self._gate = Gate(listening, hand_over_to(asyncio.get_running_loop(), self._protocol), self._stop)
+        hand_over = hand_over_to(asyncio.get_running_loop(), self._protocol)
+        self._gate = Gate(listening, hand_over, partial(_refused, self._rules), partial(_stopped, self._console))
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """As uvicorn has it."""
@@ -119,7 +119,7 @@ class ConsoleServer(uvicorn.Server):
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """As uvicorn has it."""
         self.ended_by = self.ended_by or sig
-        self._ends()
+        self._console.end()
         super().handle_exit(sig, frame)
 
 
@@ -156,7 +156,7 @@ def server_of(console: Console, host: str, token: str | None) -> ConsoleServer:
         h11_max_incomplete_event_size=LARGEST_HEAD,
         headers=[("connection", "close")],  # each request comes in by the gate
     )
-    return ConsoleServer(config, console.end, partial(_stopped, console, rules))
+    return ConsoleServer(config, console, rules)
 
 
 def application(console: Console, host: str, token: str | None) -> Starlette:
@@ -281,14 +281,13 @@ class _Pages:
             console.leave(page)
 
 
-def _stopped(console: Console, rules: Rules, scope: dict[str, Any]) -> tuple[int, bytes]:
-    """Stops, where the request may: the status and body of the answer.
-
-    The answer does not wait for a board that takes long to confirm; where it never does, the state tells so.
-    """
+def _refused(rules: Rules, scope: dict[str, Any]) -> Answer | None:
     refusal = rules.answer(scope)
-    if refusal is not None:
-        return refusal.status_code, bytes(refusal.body)
+    return None if refusal is None else (refusal.status_code, bytes(refusal.body))
+
+
+def _stopped(console: Console) -> Answer:
+    """Stops; the answer does not wait for a board that takes long to confirm, and where it never does, the state tells."""
     problems: list[FootscanError] = []
 
     def stop() -> None:

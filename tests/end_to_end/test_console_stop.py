@@ -143,6 +143,31 @@ def test_an_order_of_another_site_stops_nothing(scanner: Scanner) -> None:
     assert stop(port).startswith(b"HTTP/1.1 204")
 
 
+def test_refused_stops_are_in_nobody_s_way(scanner: Scanner) -> None:
+    process = scanner.started("console")
+    port = port_of(process.pid)
+    refused: list[bytes] = []
+    ended = threading.Event()
+
+    def flood() -> None:
+        while not ended.is_set():
+            refused.append(stop(port, origin="http://evil.example"))
+
+    threads = [threading.Thread(target=flood) for _ in range(30)]
+    for thread in threads:
+        thread.start()
+    time.sleep(0.3)
+    pressed = time.monotonic()
+    answer = stop(port)
+    ended.set()
+    for thread in threads:
+        thread.join()
+    assert answer.startswith(b"HTTP/1.1 204")
+    assert all(one.startswith(b"HTTP/1.1 403") for one in refused if one)
+    time.sleep(0.8)
+    scanner.assert_dark_and_standing(pressed + WITHIN_SECONDS)
+
+
 def test_a_token_is_asked_for_on_loopback_too(scanner: Scanner) -> None:
     process = scanner.start("console", more=("--token",))
     assert process.stdout is not None
