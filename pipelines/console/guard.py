@@ -85,7 +85,7 @@ class Rules:
         if len(hosts) != 1 or not self._is_ours(hosts[0]):
             return _refused(421, "this server is asked by its own address only")
         if scope["method"] in {"GET", "HEAD"}:
-            return None if self._may_look(scope["path"], headers) else self._of_another_site(scope, headers)
+            return None if self._may_look(scope["path"], hosts[0], headers) else self._of_another_site(scope, headers)
         if scope["method"] != "POST":
             return _refused(405, "expected GET or POST")
         from_own_page = (
@@ -100,14 +100,16 @@ class Rules:
             return _refused(413, f"expected a body of a told length, up to {LARGEST_BODY} bytes")
         return None
 
-    def _may_look(self, path: str, headers: Headers) -> bool:
+    def _may_look(self, path: str, host: str, headers: Headers) -> bool:
         """Whether a page may be read: another site may link to pages, and have nothing else."""
         if path == "/events" and "text/event-stream" not in headers.get("accept", ""):
             return False  # a link, which would make whoever follows it look on, perhaps in charge
+        is_page = path == "/" or path.startswith(LINKED)
+        if not is_page and headers.get("origin", f"http://{host}") != f"http://{host}":
+            return False  # all that browsers tell a server that is on another computer
         if headers.get("sec-fetch-site") not in {"cross-site", "same-site"}:
             return True
-        is_link = headers.get("sec-fetch-mode") == "navigate"
-        return is_link and (path == "/" or path.startswith(LINKED))
+        return is_page and headers.get("sec-fetch-mode") == "navigate"
 
     def _of_another_site(self, scope: Scope, headers: Headers) -> Response:
         by = headers.get("origin") or headers.get("referer") or "a page that does not say where it is from"
