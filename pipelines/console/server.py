@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, BinaryIO, Literal, TypeVar
 
 import uvicorn
 from pydantic import Field, ValidationError
@@ -22,6 +22,7 @@ from starlette.middleware import Middleware
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
+from starlette.types import Receive, Scope, Send
 
 from footscan.capture.way_out import ending_signals
 from footscan.report.style import STYLE
@@ -32,7 +33,7 @@ from pipelines.console.gate import LARGEST_HEAD, Gate, Stop, hand_over_to
 from pipelines.console.guard import LARGEST_BODY, PAGE, PAGE_HEADER, Guard, Rules
 from pipelines.console.live_picture import LivePictures
 from pipelines.console.pair_page import pair_page
-from pipelines.console.results import KINDS, read_result
+from pipelines.console.results import KINDS, open_result, shown, version_of
 from pipelines.console.scanner import Side
 from pipelines.console.sitting_page import sitting_page
 from schemas.documents import Document, Pseudonym
@@ -47,6 +48,9 @@ ALIVE_SECONDS = 10.0
 CONFIRM_SECONDS = 0.15
 """How long the answer to Stop waits for the board."""
 PAGES_KEPT = 4
+PAGE_OF = ("measures.json", "quality.json", "foot.ply")
+"""What the page of a foot is made of."""
+PART_BYTES = 256 * 1024
 WORKERS = 2
 """Threads that make pages and read results."""
 REPORT_POLICY = (
@@ -203,7 +207,7 @@ class _Pages:
         self._pictures = LivePictures()
         self._foot = lru_cache(PAGES_KEPT)(self._foot_page)
 
-    def _foot_page(self, patient: str, scan: str, _version: int) -> str:
+    def _foot_page(self, patient: str, scan: str, _version: tuple[int, ...]) -> str:
         return foot_page(self._console.archive, self._console.results, patient, scan)
 
     async def _worked(self, make: Callable[[], _Made]) -> _Made:
@@ -217,22 +221,34 @@ class _Pages:
         patient, scan = request.path_params["patient"], request.path_params["scan"]
 
         def made() -> str:
-            version = hash(read_result(self._console.results, patient, scan, "measures.json"))
-            return self._foot(patient, scan, version)
+            results = self._console.results
+            version = version_of(results, patient, scan, *PAGE_OF)
+            return shown(results / patient / scan, lambda: self._foot(patient, scan, version))
 
         return HTMLResponse(await self._worked(made))
 
     async def pair(self, request: Request) -> Response:
-        names = (request.path_params[name] for name in ("patient", "left", "right"))
-        return HTMLResponse(await self._worked(partial(pair_page, self._console.results, *names)))
+        patient, left, right = (request.path_params[name] for name in ("patient", "left", "right"))
+        results = self._console.results
+        page = partial(pair_page, results, patient, left, right)
+        return HTMLResponse(await self._worked(partial(shown, results / patient, page)))
 
     async def result(self, request: Request) -> Response:
         patient, scan, name = (request.path_params[part] for part in ("patient", "scan", "name"))
-        content = await self._worked(partial(read_result, self._console.results, patient, scan, name))
+        file = await self._worked(partial(open_result, self._console.results, patient, scan, name))
         if name.endswith(".html"):
-            return Response(content, media_type=KINDS[".html"], headers={"content-security-policy": REPORT_POLICY})
+            return _Given(self._parts(file), file, KINDS[".html"], {"content-security-policy": REPORT_POLICY})
         headers = {"content-disposition": f'attachment; filename="{patient}-{scan}-{name}"'}
-        return Response(content, media_type=KINDS[Path(name).suffix], headers=headers)
+        return _Given(self._parts(file), file, KINDS[Path(name).suffix], headers)
+
+    async def _parts(self, file: BinaryIO) -> AsyncIterator[bytes]:
+        """A file bit by bit, up to the size that it has at first."""
+        left = os.fstat(file.fileno()).st_size
+        while left and (part := await self._worked(partial(file.read, min(left, PART_BYTES)))):
+            left -= len(part)
+            yield part
+        if left:
+            raise OSError("the file has become shorter while it was given out")
 
     async def picture(self, request: Request) -> Response:
         camera = request.path_params["camera"]
@@ -279,6 +295,20 @@ class _Pages:
         finally:
             unhear()
             console.leave(page)
+
+
+class _Given(StreamingResponse):
+    """A file that is given out, and closed whoever goes away meanwhile."""
+
+    def __init__(self, parts: AsyncIterator[bytes], file: BinaryIO, kind: str, headers: dict[str, str]) -> None:
+        length = {"content-length": str(os.fstat(file.fileno()).st_size)}
+        super().__init__(parts, media_type=kind, headers=headers | length)
+        self._file = file
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """As ASGI has it."""
+        with self._file:
+            await super().__call__(scope, receive, send)
 
 
 def _stopped(console: Console, rules: Rules, scope: dict[str, Any]) -> tuple[int, bytes]:
