@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any, BinaryIO, Literal, TypeVar
+from typing import Annotated, BinaryIO, Literal, TypeVar
 
 import uvicorn
 from pydantic import Field, ValidationError
@@ -36,6 +36,7 @@ from pipelines.console.pair_page import pair_page
 from pipelines.console.results import KINDS, open_result, shown, version_of
 from pipelines.console.scanner import Side
 from pipelines.console.sitting_page import sitting_page
+from pipelines.console.stopping import stop_asked
 from schemas.documents import Document, Pseudonym
 from schemas.errors import Fault, FootscanError, RefusedInput
 
@@ -45,12 +46,12 @@ STATIC = Path(__file__).with_name("static")
 SCRIPTS = ("link.js", "sitting.js", "foot.js")
 ALIVE_SECONDS = 10.0
 """After so long without a change a page is told that the server is there."""
-CONFIRM_SECONDS = 0.15
-"""How long the answer to Stop waits for the board."""
 PAGES_KEPT = 4
 PAGE_OF = ("measures.json", "quality.json", "foot.ply")
 """What the page of a foot is made of."""
 PART_BYTES = 256 * 1024
+BACKLOG = 4096
+"""Connections that may wait to be taken: of one more the system drops the first packet, which comes again after 1 s."""
 WORKERS = 2
 """Threads that make pages and read results."""
 REPORT_POLICY = (
@@ -89,10 +90,11 @@ class ConsoleServer(uvicorn.Server):
         """The signal that ended it."""
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """As uvicorn has it, but the one of `sockets` is watched by the gate."""
+        """As uvicorn has it, but `sockets` are watched by the gate: that of the pages, and that of Stop alone."""
         await super().startup([])
-        [listening] = sockets or []
-        self._gate = Gate(listening, hand_over_to(asyncio.get_running_loop(), self._protocol), self._stop)
+        listening, *aside = sockets or []
+        hand_over = hand_over_to(asyncio.get_running_loop(), self._protocol)
+        self._gate = Gate(listening, hand_over, self._stop, aside[0] if aside else None)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """As uvicorn has it."""
@@ -137,18 +139,19 @@ def listen(host: str, port: int) -> socket.socket:
     """
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        return socket.create_server((host, port), family=family)
+        return socket.create_server((host, port), family=family, backlog=BACKLOG)
     except OSError as error:
         why = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror
         problem = f"cannot be listened on ({why}), expected another --port or --host"
         raise RefusedInput(f"{host}:{port}", problem) from None
 
 
-def server_of(console: Console, host: str, token: str | None) -> ConsoleServer:
-    """What serves the console; `run` it with the socket of `listen`, or have `serve` awaited."""
-    rules = Rules(host, token, console.warn)
+def server_of(console: Console, host: str, token: str | None, ports: tuple[int, int] | None = None) -> ConsoleServer:
+    """What serves the console; `run` it with the sockets of `listen`: one for pages, and if `ports` are given (see
+    `Rules`) one for Stop alone."""
+    rules = Rules(host, token, console.warn, ports)
     config = uvicorn.Config(
-        _application(console, rules),
+        _application(console, rules, None if ports is None else ports[1]),
         log_level="critical",
         access_log=False,
         server_header=False,
@@ -160,16 +163,16 @@ def server_of(console: Console, host: str, token: str | None) -> ConsoleServer:
         h11_max_incomplete_event_size=LARGEST_HEAD,
         headers=[("connection", "close")],  # each request comes in by the gate
     )
-    return ConsoleServer(config, console.end, partial(_stopped, console, rules))
+    return ConsoleServer(config, console.end, partial(stop_asked, console, rules))
 
 
 def application(console: Console, host: str, token: str | None) -> Starlette:
     """The application behind its guard; `host` and `token` as `Rules` has them."""
-    return _application(console, Rules(host, token, console.warn))
+    return _application(console, Rules(host, token, console.warn), None)
 
 
-def _application(console: Console, rules: Rules) -> Starlette:
-    pages = _Pages(console)
+def _application(console: Console, rules: Rules, stop_port: int | None) -> Starlette:
+    pages = _Pages(console, stop_port)
     actions = {
         "connect": lambda page, _: console.connect(page),
         "home": lambda page, _: console.home(page),
@@ -201,8 +204,8 @@ def _application(console: Console, rules: Rules) -> Starlette:
 class _Pages:
     """What is answered to GET."""
 
-    def __init__(self, console: Console) -> None:
-        self._console = console
+    def __init__(self, console: Console, stop_port: int | None) -> None:
+        self._console, self._stop_port = console, stop_port
         self._workers = ThreadPoolExecutor(WORKERS, thread_name_prefix="console: pages")
         self._pictures = LivePictures()
         self._foot = lru_cache(PAGES_KEPT)(self._foot_page)
@@ -285,7 +288,7 @@ class _Pages:
             before = None
             while not console.closing.is_set():
                 changed.clear()
-                state = json.dumps(console.seen_by(page), allow_nan=False)
+                state = json.dumps(console.seen_by(page) | {"stop_port": self._stop_port}, allow_nan=False)
                 yield ": here\n\n" if state == before else f"data: {state}\n\n"
                 before = state
                 try:
@@ -309,33 +312,6 @@ class _Given(StreamingResponse):
         """As ASGI has it."""
         with self._file:
             await super().__call__(scope, receive, send)
-
-
-def _stopped(console: Console, rules: Rules, scope: dict[str, Any]) -> tuple[int, bytes]:
-    """Stops, where the request may: the status and body of the answer.
-
-    The answer does not wait for a board that takes long to confirm; where it never does, the state tells so.
-    """
-    refusal = rules.answer(scope)
-    if refusal is not None:
-        return refusal.status_code, bytes(refusal.body)
-    problems: list[FootscanError] = []
-
-    def stop() -> None:
-        try:
-            console.stop()
-        except FootscanError as error:
-            problems.append(error)
-            console.warn(f"Stop: {error}")
-
-    stopping = threading.Thread(target=stop, name="console: stop the board", daemon=True)
-    stopping.start()
-    stopping.join(CONFIRM_SECONDS)
-    if problems:
-        return (409 if isinstance(problems[0], RefusedInput) else 502), json.dumps(
-            {"problem": str(problems[0])}
-        ).encode()
-    return 204, b""
 
 
 async def _do(act: Callable[[str, bytes], None], request: Request) -> Response:
