@@ -55,6 +55,7 @@ def console(
     secret = secrets.token_urlsafe(32) if token or not is_loopback(host) else None
     with (
         listen(host, port) as socket,
+        listen(host, 0) as aside,
         _opened(rig, out, results, calibration, virtual_folder, grid_mm if virtual else None) as scanner,
         Console(scanner, out, results) as one,
     ):
@@ -63,10 +64,11 @@ def console(
             message("footscan: anyone who can read the network's traffic can read the token: use a network of your own")
         if host in EVERYWHERE:
             shown = "ADDRESS-OF-THIS-COMPUTER"
-        print(f"http://{shown}:{socket.getsockname()[1]}/{f'?token={secret}' if secret else ''}", flush=True)
+        ports = socket.getsockname()[1], aside.getsockname()[1]
+        print(f"http://{shown}:{ports[0]}/{f'?token={secret}' if secret else ''}", flush=True)
         one.connect()
-        server = server_of(one, host, secret)
-        server.run(sockets=[socket])
+        server = server_of(one, host, secret, ports)
+        server.run(sockets=[socket, aside])
     if server.ended_by not in ASKED_TO_END:
         raise EndedBySignal(server.ended_by)
     message("the lasers are off, the console has ended")

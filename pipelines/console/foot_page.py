@@ -12,12 +12,13 @@ from footscan.report.measure_drawings import landmark_place, measure_drawings
 from footscan.report.quality_lights import Level, Light, quality_lights, worst
 from footscan.report.surface_views import upright
 from footscan.report.viewer import Colouring, Drawing, viewer
-from footscan.surface.export import PARSERS
+from footscan.surface.export import FARTHEST_MM, PARSERS
 from footscan.surface.mesh import Mesh
 from pipelines.console.advice import advice
 from pipelines.console.results import read_measures, read_quality, read_recording, read_result
 from pipelines.console.shell import shell
 from schemas.errors import RefusedInput
+from schemas.limits import BeyondLimitError
 from schemas.measures import Measure, Measures
 from schemas.quality import Quality
 
@@ -65,10 +66,20 @@ def foot_page(archive: Path, results: Path, patient: str, scan: str) -> str:
 
 
 def _mesh(results: Path, patient: str, scan: str) -> Mesh:
+    source = results / patient / scan / "foot.ply"
     try:
-        return PARSERS[".ply"](read_result(results, patient, scan, "foot.ply"))
+        mesh = PARSERS[".ply"](read_result(results, patient, scan, "foot.ply"))
+    except BeyondLimitError as error:  # a parser does not know whose bytes they are
+        raise BeyondLimitError(source, error.problem) from None
     except ValueError as error:
-        raise RefusedInput(results / patient / scan / "foot.ply", f"is no proper PLY file: {error}") from None
+        raise RefusedInput(source, f"is no proper PLY file: {error}") from None
+    if not len(mesh.vertices) or not len(mesh.faces):
+        raise RefusedInput(source, "expected a surface, found no faces")
+    if not np.abs(mesh.vertices).max() <= FARTHEST_MM:
+        raise RefusedInput(source, f"expected coordinates in mm, up to {FARTHEST_MM:.0f}")
+    if not 0 <= int(mesh.faces.min()) <= int(mesh.faces.max()) < len(mesh.vertices):
+        raise RefusedInput(source, f"has faces of vertices that are not there, expected below {len(mesh.vertices)}")
+    return mesh
 
 
 def _verdict(level: Level, lights: Sequence[Light], lines: Sequence[str]) -> str:

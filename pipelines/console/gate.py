@@ -41,38 +41,41 @@ BUDGETS = {"events": 24, "orders": 16, "pages": 48}
 HandOver = Callable[[socket.socket, bytes, Callable[[], None], float | None], None]
 """Gives the server a connection with what has come on it, and what to call when it ends; it ends after so many
 seconds at the latest, where a number is given."""
-Answer = tuple[int, bytes]
-"""Status and body."""
+Headers = list[tuple[bytes, bytes]]
+Stop = Callable[[dict[str, Any], bool], tuple[int, bytes, Headers]]
+"""Stops the scanner, where the request (an ASGI scope) may; it has come by the socket of Stop alone, or not. Returns
+status, body and further headers of the answer."""
 
 
 @dataclass
 class _Waiting:
     until: float
+    is_aside: bool
     parser: h11.Connection = field(default_factory=lambda: h11.Connection(h11.SERVER, LARGEST_HEAD))
     came: bytes = b""
     request: h11.Request | None = None
 
 
 class Gate:
-    """Listens in a thread of its own until it is closed."""
+    """Listens in a thread of its own until it is closed.
+
+    A second socket, if given, is for Stop alone: a browser has six connections for a port, all of which may be taken.
+    """
 
     def __init__(
-        self,
-        listening: socket.socket,
-        hand_over: HandOver,
-        refusal: Callable[[dict[str, Any]], Answer | None],
-        stop: Callable[[], Answer],
+        self, listening: socket.socket, hand_over: HandOver, stop: Stop, aside: socket.socket | None = None
     ) -> None:
-        """`refusal` is the answer to a request (an ASGI scope) that must not come in."""
-        self._listening, self._hand_over, self._refusal, self._stop = listening, hand_over, refusal, stop
+        self._hand_over, self._stop = hand_over, stop
+        self._doors = {listening: False} if aside is None else {listening: False, aside: True}
         self._most_waiting = min(MOST_WAITING, max(_descriptors() - KEPT_DESCRIPTORS, 16))
         self._waiting: dict[socket.socket, _Waiting] = {}
         self._free = {kind: threading.BoundedSemaphore(most) for kind, most in BUDGETS.items()}
         self._free_stops = threading.BoundedSemaphore(MOST_STOPS)
         self._selector = selectors.DefaultSelector()
         self._wake, self._woken = socket.socketpair()
-        listening.setblocking(False)
-        self._selector.register(listening, selectors.EVENT_READ)
+        for door in self._doors:
+            door.setblocking(False)
+            self._selector.register(door, selectors.EVENT_READ)
         self._selector.register(self._woken, selectors.EVENT_READ)
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="console: gate", daemon=True)
@@ -88,10 +91,8 @@ class Gate:
         try:
             while not self._closing.is_set():
                 for key, _ in self._selector.select(self._patience()):
-                    if key.fileobj is self._listening:
-                        self._accept()
-                    elif isinstance(key.fileobj, socket.socket) and key.fileobj in self._waiting:
-                        self._read(key.fileobj)
+                    if isinstance(key.fileobj, socket.socket):
+                        self._look_at(key.fileobj)
                 now = time.monotonic()
                 for late in [connection for connection, one in self._waiting.items() if one.until <= now]:
                     self._answer(late, 408, b"footscan: the request did not come whole\n")
@@ -102,14 +103,25 @@ class Gate:
             self._wake.close()
             self._woken.close()
 
+    def _look_at(self, ready: socket.socket) -> None:
+        try:
+            if ready in self._doors:
+                self._accept(ready)
+            elif ready in self._waiting:
+                self._read(ready)
+        except Exception:  # whatever one of them does, the next one may be a Stop
+            log.exception("a connection was dropped")
+            if ready in self._waiting:
+                self._forget(ready).close()
+
     def _patience(self) -> float | None:
         first = next(iter(self._waiting.values()), None)
         return None if first is None else max(first.until - time.monotonic(), 0.0)
 
-    def _accept(self) -> None:
+    def _accept(self, door: socket.socket) -> None:
         for _ in range(MOST_WAITING):
             try:
-                connection, _ = self._listening.accept()
+                connection, _ = door.accept()
             except BlockingIOError:
                 return
             except OSError as error:  # no descriptor is left, or who called has gone
@@ -123,7 +135,7 @@ class Gate:
                 self._make_room()
             connection.setblocking(False)
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._waiting[connection] = _Waiting(time.monotonic() + REQUEST_SECONDS)
+            self._waiting[connection] = _Waiting(time.monotonic() + REQUEST_SECONDS, self._doors[door])
             self._selector.register(connection, selectors.EVENT_READ)
             self._read(connection)  # a browser sends its request at once
 
@@ -173,13 +185,18 @@ class Gate:
             connection.close()
             return
         if one.request.method == b"POST" and _path(one.request) == STOP:
-            refused = self._refusal(_scope(one.request))
-            if refused is not None:
-                _respond(connection, *refused)
-            elif self._free_stops.acquire(blocking=False):
-                threading.Thread(target=self._stop_now, args=(connection,), name="console: stop", daemon=True).start()
+            if self._free_stops.acquire(blocking=False):
+                threading.Thread(
+                    target=self._stop_now,
+                    args=(connection, one.request, one.is_aside),
+                    name="console: stop",
+                    daemon=True,
+                ).start()
             else:  # so many are being carried out
                 _respond(connection, 503, b"footscan: Stop is being carried out\n")
+            return
+        if one.is_aside:
+            _respond(connection, 404, b"footscan: here is Stop alone\n")
             return
         kind = _kind(one.request)
         free = self._free[kind]
@@ -192,9 +209,9 @@ class Gate:
             free.release()
             connection.close()
 
-    def _stop_now(self, connection: socket.socket) -> None:
+    def _stop_now(self, connection: socket.socket, request: h11.Request, is_aside: bool) -> None:
         try:
-            _respond(connection, *self._stop())
+            _respond(connection, *self._stop(_scope(request), is_aside))
         finally:
             self._free_stops.release()
 
@@ -262,10 +279,10 @@ def _scope(request: h11.Request) -> dict[str, Any]:
     return {"type": "http", "method": method, "path": path.decode("latin-1"), "query_string": query, "headers": headers}
 
 
-def _respond(connection: socket.socket, status: int, body: bytes) -> None:
+def _respond(connection: socket.socket, status: int, body: bytes, further: Headers | None = None) -> None:
     """Answers a small request and closes; whoever does not take the answer is not waited for."""
     kind = b"application/json" if body.startswith(b"{") else b"text/plain; charset=utf-8"
-    headers = [(name.encode(), value.encode()) for name, value in HEADERS.items()]
+    headers = [(name.encode(), value.encode()) for name, value in HEADERS.items()] + (further or [])
     headers += [(b"connection", b"close"), (b"content-length", str(len(body)).encode()), (b"content-type", kind)]
     if status == 204:
         headers = [(name, value) for name, value in headers if not name.startswith(b"content-")]

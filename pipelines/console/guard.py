@@ -52,7 +52,7 @@ class Guard:
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                for name, value in {**HEADERS, "content-security-policy": POLICY}.items():
+                for name, value in {**HEADERS, "content-security-policy": self._rules.policy(scope)}.items():
                     headers.setdefault(name, value)
             await send(message)
 
@@ -67,16 +67,48 @@ class Rules:
     host : the address that is listened on
     token : what a browser must bring along; None where none is asked for
     foreign : is told, in words, of each request that another site's page has made
+    ports : of the pages, and of Stop alone; None where it has none of its own
     """
 
-    def __init__(self, host: str, token: str | None, foreign: Callable[[str], None]) -> None:
+    def __init__(
+        self, host: str, token: str | None, foreign: Callable[[str], None], ports: tuple[int, int] | None = None
+    ) -> None:
         self._host = host
         self._token = token
         self._foreign = foreign
+        self._ports = ports
 
     def answer(self, scope: Scope) -> Response | None:
         """What a request is answered that does not come in; None of one that does."""
         return self._refusal(scope) or self._entrance(scope)
+
+    def answer_aside(self, scope: Scope) -> Response | None:
+        """As `answer`, of a Stop on the port of its own: that is another origin than the page's, and of the same site.
+
+        It has no header of the page's own, for which a browser would ask beforehand whether it may.
+        """
+        headers = Headers(scope=scope)
+        hosts = headers.getlist("host")
+        if len(hosts) != 1 or not self._is_ours(hosts[0]):
+            return _refused(421, "this server is asked by its own address only")
+        if (
+            headers.get("origin") != self.page_origin(hosts[0])
+            or headers.get("sec-fetch-site", "same-site") != "same-site"
+        ):
+            return self._of_another_site(scope, headers)
+        return _length_refused(headers) or self._entrance(scope)
+
+    def page_origin(self, host: str) -> str:
+        """Of the pages, for who has asked the port of Stop by the name `host`."""
+        port = self._ports[0] if self._ports else 80
+        return f"http://{_name(host)}" + ("" if port == 80 else f":{port}")
+
+    def policy(self, scope: Scope) -> str:
+        """What a page may load, and whom it may ask: this server, and the port of Stop."""
+        host = Headers(scope=scope).get("host", "")
+        if self._ports is None or not self._is_ours(host) or "[" in host:  # of IPv6 a policy knows nothing
+            return POLICY
+        return POLICY.replace("connect-src 'self'", f"connect-src 'self' http://{_name(host)}:{self._ports[1]}")
 
     def _refusal(self, scope: Scope) -> Response | None:
         """What a request is answered that must not come in; None for all others."""
@@ -85,7 +117,7 @@ class Rules:
         if len(hosts) != 1 or not self._is_ours(hosts[0]):
             return _refused(421, "this server is asked by its own address only")
         if scope["method"] in {"GET", "HEAD"}:
-            return None if self._may_look(scope["path"], headers) else self._of_another_site(scope, headers)
+            return None if self._may_look(scope["path"], hosts[0], headers) else self._of_another_site(scope, headers)
         if scope["method"] != "POST":
             return _refused(405, "expected GET or POST")
         from_own_page = (
@@ -95,19 +127,18 @@ class Rules:
         )
         if not from_own_page:
             return self._of_another_site(scope, headers)
-        length = headers.get("content-length", "")
-        if not length.isascii() or not length.isdigit() or int(length[:9]) > LARGEST_BODY:
-            return _refused(413, f"expected a body of a told length, up to {LARGEST_BODY} bytes")
-        return None
+        return _length_refused(headers)
 
-    def _may_look(self, path: str, headers: Headers) -> bool:
+    def _may_look(self, path: str, host: str, headers: Headers) -> bool:
         """Whether a page may be read: another site may link to pages, and have nothing else."""
         if path == "/events" and "text/event-stream" not in headers.get("accept", ""):
             return False  # a link, which would make whoever follows it look on, perhaps in charge
+        is_page = path == "/" or path.startswith(LINKED)
+        if not is_page and headers.get("origin", f"http://{host}") != f"http://{host}":
+            return False  # all that browsers tell a server that is on another computer
         if headers.get("sec-fetch-site") not in {"cross-site", "same-site"}:
             return True
-        is_link = headers.get("sec-fetch-mode") == "navigate"
-        return is_link and (path == "/" or path.startswith(LINKED))
+        return is_page and headers.get("sec-fetch-mode") == "navigate"
 
     def _of_another_site(self, scope: Scope, headers: Headers) -> Response:
         by = headers.get("origin") or headers.get("referer") or "a page that does not say where it is from"
@@ -133,7 +164,7 @@ class Rules:
 
     def _is_ours(self, host: str) -> bool:
         """Whether a browser that asks for `host` cannot have been led here by a name of somebody else's."""
-        name = re.sub(r":\d{1,5}$", "", host).lower()
+        name = _name(host)
         if name in LOOPBACK_NAMES or name == self._host.lower():
             return True
         return self._token is not None and _is_address(name.removeprefix("[").removesuffix("]"))
@@ -142,6 +173,18 @@ class Rules:
 def is_loopback(host: str) -> bool:
     """Whether only programs of this computer reach `host`."""
     return host == "localhost" or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
+
+
+def _name(host: str) -> str:
+    """Without the port."""
+    return re.sub(r":\d{1,5}$", "", host).lower()
+
+
+def _length_refused(headers: Headers) -> Response | None:
+    length = headers.get("content-length", "")
+    if length.isascii() and length.isdigit() and int(length[:9]) <= LARGEST_BODY:
+        return None
+    return _refused(413, f"expected a body of a told length, up to {LARGEST_BODY} bytes")
 
 
 def _is_address(name: str) -> bool:

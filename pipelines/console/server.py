@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, BinaryIO, Literal, TypeVar
 
 import uvicorn
 from pydantic import Field, ValidationError
@@ -22,19 +22,21 @@ from starlette.middleware import Middleware
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
+from starlette.types import Receive, Scope, Send
 
 from footscan.capture.way_out import ending_signals
 from footscan.report.style import STYLE
 from footscan.report.viewer_script import SCRIPT
 from pipelines.console.console import Console
 from pipelines.console.foot_page import foot_page
-from pipelines.console.gate import LARGEST_HEAD, Answer, Gate, hand_over_to
+from pipelines.console.gate import LARGEST_HEAD, Gate, Stop, hand_over_to
 from pipelines.console.guard import LARGEST_BODY, PAGE, PAGE_HEADER, Guard, Rules
 from pipelines.console.live_picture import LivePictures
 from pipelines.console.pair_page import pair_page
-from pipelines.console.results import KINDS, read_result
+from pipelines.console.results import KINDS, open_result, shown, version_of
 from pipelines.console.scanner import Side
 from pipelines.console.sitting_page import sitting_page
+from pipelines.console.stopping import stop_asked
 from schemas.documents import Document, Pseudonym
 from schemas.errors import Fault, FootscanError, RefusedInput
 
@@ -44,9 +46,12 @@ STATIC = Path(__file__).with_name("static")
 SCRIPTS = ("link.js", "sitting.js", "foot.js")
 ALIVE_SECONDS = 10.0
 """After so long without a change a page is told that the server is there."""
-CONFIRM_SECONDS = 0.15
-"""How long the answer to Stop waits for the board."""
 PAGES_KEPT = 4
+PAGE_OF = ("measures.json", "quality.json", "foot.ply")
+"""What the page of a foot is made of."""
+PART_BYTES = 256 * 1024
+BACKLOG = 4096
+"""Connections that may wait to be taken: of one more the system drops the first packet, which comes again after 1 s."""
 WORKERS = 2
 """Threads that make pages and read results."""
 REPORT_POLICY = (
@@ -76,19 +81,20 @@ class ConsoleServer(uvicorn.Server):
     The heads stop at once, see `signals_end_the_program`; they do not wait for what is done here.
     """
 
-    def __init__(self, config: uvicorn.Config, console: Console, rules: Rules) -> None:
+    def __init__(self, config: uvicorn.Config, ends: Callable[[], None], stop: Stop) -> None:
         super().__init__(config)
-        self._console, self._rules = console, rules
+        self._ends = ends
+        self._stop = stop
         self._gate: Gate | None = None
         self.ended_by: int | None = None
         """The signal that ended it."""
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """As uvicorn has it, but the one of `sockets` is watched by the gate."""
+        """As uvicorn has it, but `sockets` are watched by the gate: that of the pages, and that of Stop alone."""
         await super().startup([])
-        [listening] = sockets or []
+        listening, *aside = sockets or []
         hand_over = hand_over_to(asyncio.get_running_loop(), self._protocol)
-        self._gate = Gate(listening, hand_over, partial(_refused, self._rules), partial(_stopped, self._console))
+        self._gate = Gate(listening, hand_over, self._stop, aside[0] if aside else None)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """As uvicorn has it."""
@@ -119,7 +125,7 @@ class ConsoleServer(uvicorn.Server):
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """As uvicorn has it."""
         self.ended_by = self.ended_by or sig
-        self._console.end()
+        self._ends()
         super().handle_exit(sig, frame)
 
 
@@ -133,18 +139,19 @@ def listen(host: str, port: int) -> socket.socket:
     """
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        return socket.create_server((host, port), family=family)
+        return socket.create_server((host, port), family=family, backlog=BACKLOG)
     except OSError as error:
         why = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror
         problem = f"cannot be listened on ({why}), expected another --port or --host"
         raise RefusedInput(f"{host}:{port}", problem) from None
 
 
-def server_of(console: Console, host: str, token: str | None) -> ConsoleServer:
-    """What serves the console; `run` it with the socket of `listen`, or have `serve` awaited."""
-    rules = Rules(host, token, console.warn)
+def server_of(console: Console, host: str, token: str | None, ports: tuple[int, int] | None = None) -> ConsoleServer:
+    """What serves the console; `run` it with the sockets of `listen`: one for pages, and if `ports` are given (see
+    `Rules`) one for Stop alone."""
+    rules = Rules(host, token, console.warn, ports)
     config = uvicorn.Config(
-        _application(console, rules),
+        _application(console, rules, None if ports is None else ports[1]),
         log_level="critical",
         access_log=False,
         server_header=False,
@@ -156,16 +163,16 @@ def server_of(console: Console, host: str, token: str | None) -> ConsoleServer:
         h11_max_incomplete_event_size=LARGEST_HEAD,
         headers=[("connection", "close")],  # each request comes in by the gate
     )
-    return ConsoleServer(config, console, rules)
+    return ConsoleServer(config, console.end, partial(stop_asked, console, rules))
 
 
 def application(console: Console, host: str, token: str | None) -> Starlette:
     """The application behind its guard; `host` and `token` as `Rules` has them."""
-    return _application(console, Rules(host, token, console.warn))
+    return _application(console, Rules(host, token, console.warn), None)
 
 
-def _application(console: Console, rules: Rules) -> Starlette:
-    pages = _Pages(console)
+def _application(console: Console, rules: Rules, stop_port: int | None) -> Starlette:
+    pages = _Pages(console, stop_port)
     actions = {
         "connect": lambda page, _: console.connect(page),
         "home": lambda page, _: console.home(page),
@@ -197,13 +204,13 @@ def _application(console: Console, rules: Rules) -> Starlette:
 class _Pages:
     """What is answered to GET."""
 
-    def __init__(self, console: Console) -> None:
-        self._console = console
+    def __init__(self, console: Console, stop_port: int | None) -> None:
+        self._console, self._stop_port = console, stop_port
         self._workers = ThreadPoolExecutor(WORKERS, thread_name_prefix="console: pages")
         self._pictures = LivePictures()
         self._foot = lru_cache(PAGES_KEPT)(self._foot_page)
 
-    def _foot_page(self, patient: str, scan: str, _version: int) -> str:
+    def _foot_page(self, patient: str, scan: str, _version: tuple[int, ...]) -> str:
         return foot_page(self._console.archive, self._console.results, patient, scan)
 
     async def _worked(self, make: Callable[[], _Made]) -> _Made:
@@ -217,22 +224,34 @@ class _Pages:
         patient, scan = request.path_params["patient"], request.path_params["scan"]
 
         def made() -> str:
-            version = hash(read_result(self._console.results, patient, scan, "measures.json"))
-            return self._foot(patient, scan, version)
+            results = self._console.results
+            version = version_of(results, patient, scan, *PAGE_OF)
+            return shown(results / patient / scan, lambda: self._foot(patient, scan, version))
 
         return HTMLResponse(await self._worked(made))
 
     async def pair(self, request: Request) -> Response:
-        names = (request.path_params[name] for name in ("patient", "left", "right"))
-        return HTMLResponse(await self._worked(partial(pair_page, self._console.results, *names)))
+        patient, left, right = (request.path_params[name] for name in ("patient", "left", "right"))
+        results = self._console.results
+        page = partial(pair_page, results, patient, left, right)
+        return HTMLResponse(await self._worked(partial(shown, results / patient, page)))
 
     async def result(self, request: Request) -> Response:
         patient, scan, name = (request.path_params[part] for part in ("patient", "scan", "name"))
-        content = await self._worked(partial(read_result, self._console.results, patient, scan, name))
+        file = await self._worked(partial(open_result, self._console.results, patient, scan, name))
         if name.endswith(".html"):
-            return Response(content, media_type=KINDS[".html"], headers={"content-security-policy": REPORT_POLICY})
+            return _Given(self._parts(file), file, KINDS[".html"], {"content-security-policy": REPORT_POLICY})
         headers = {"content-disposition": f'attachment; filename="{patient}-{scan}-{name}"'}
-        return Response(content, media_type=KINDS[Path(name).suffix], headers=headers)
+        return _Given(self._parts(file), file, KINDS[Path(name).suffix], headers)
+
+    async def _parts(self, file: BinaryIO) -> AsyncIterator[bytes]:
+        """A file bit by bit, up to the size that it has at first."""
+        left = os.fstat(file.fileno()).st_size
+        while left and (part := await self._worked(partial(file.read, min(left, PART_BYTES)))):
+            left -= len(part)
+            yield part
+        if left:
+            raise OSError("the file has become shorter while it was given out")
 
     async def picture(self, request: Request) -> Response:
         camera = request.path_params["camera"]
@@ -269,7 +288,7 @@ class _Pages:
             before = None
             while not console.closing.is_set():
                 changed.clear()
-                state = json.dumps(console.seen_by(page), allow_nan=False)
+                state = json.dumps(console.seen_by(page) | {"stop_port": self._stop_port}, allow_nan=False)
                 yield ": here\n\n" if state == before else f"data: {state}\n\n"
                 before = state
                 try:
@@ -281,30 +300,18 @@ class _Pages:
             console.leave(page)
 
 
-def _refused(rules: Rules, scope: dict[str, Any]) -> Answer | None:
-    refusal = rules.answer(scope)
-    return None if refusal is None else (refusal.status_code, bytes(refusal.body))
+class _Given(StreamingResponse):
+    """A file that is given out, and closed whoever goes away meanwhile."""
 
+    def __init__(self, parts: AsyncIterator[bytes], file: BinaryIO, kind: str, headers: dict[str, str]) -> None:
+        length = {"content-length": str(os.fstat(file.fileno()).st_size)}
+        super().__init__(parts, media_type=kind, headers=headers | length)
+        self._file = file
 
-def _stopped(console: Console) -> Answer:
-    """Stops; the answer does not wait for a board that takes long to confirm, and where it never does, the state tells."""
-    problems: list[FootscanError] = []
-
-    def stop() -> None:
-        try:
-            console.stop()
-        except FootscanError as error:
-            problems.append(error)
-            console.warn(f"Stop: {error}")
-
-    stopping = threading.Thread(target=stop, name="console: stop the board", daemon=True)
-    stopping.start()
-    stopping.join(CONFIRM_SECONDS)
-    if problems:
-        return (409 if isinstance(problems[0], RefusedInput) else 502), json.dumps(
-            {"problem": str(problems[0])}
-        ).encode()
-    return 204, b""
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """As ASGI has it."""
+        with self._file:
+            await super().__call__(scope, receive, send)
 
 
 async def _do(act: Callable[[str, bytes], None], request: Request) -> Response:

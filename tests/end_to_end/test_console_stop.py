@@ -69,7 +69,7 @@ def test_stop_is_behind_nothing(scanner: Scanner, held: str) -> None:
     deliver_made_up(folder, "right")
     (folder / "foot.ply").write_bytes(bytes(20_000_000))
     process = scanner.started("console")
-    port = port_of(process.pid)
+    port = port_of(scanner.address)
     count, begun = HELD[held]
     with ExitStack() as stack:
         for k in range(count):
@@ -93,7 +93,7 @@ def test_stop_waits_for_nothing_that_the_heads_do(scanner: Scanner, stage: str) 
     process = scanner.start("console")
     assert process.stdout is not None
     address = str(process.stdout.readline()).strip()
-    port = int(address.rstrip("/").rsplit(":", maxsplit=1)[1])
+    port = port_of(address)
     order(address, "connect", when_idle=True)
     if stage == "homing":
         order(address, "home", when_idle=True)
@@ -109,8 +109,8 @@ def test_stop_waits_for_nothing_that_the_heads_do(scanner: Scanner, stage: str) 
 
 
 def test_many_stops_at_once_are_all_answered(scanner: Scanner) -> None:
-    process = scanner.started("console")
-    port = port_of(process.pid)
+    scanner.started("console")
+    port = port_of(scanner.address)
     answers: list[bytes] = []
     threads = [threading.Thread(target=lambda: answers.append(stop(port))) for _ in range(40)]
     pressed = time.monotonic()
@@ -127,7 +127,7 @@ def test_many_stops_at_once_are_all_answered(scanner: Scanner) -> None:
 def test_what_does_not_come_whole_is_let_go(scanner: Scanner) -> None:
     process = scanner.start("console")
     assert process.stdout is not None
-    port = int(str(process.stdout.readline()).strip().rstrip("/").rsplit(":", maxsplit=1)[1])
+    port = port_of(str(process.stdout.readline()).strip())
     with socket.create_connection(("127.0.0.1", port), LONG_SECONDS) as connection:
         connection.sendall(b"GET / HTTP/1.1\r\n")
         begun = time.monotonic()
@@ -136,8 +136,8 @@ def test_what_does_not_come_whole_is_let_go(scanner: Scanner) -> None:
 
 
 def test_an_order_of_another_site_stops_nothing(scanner: Scanner) -> None:
-    process = scanner.started("console")
-    port = port_of(process.pid)
+    scanner.started("console")
+    port = port_of(scanner.address)
     assert stop(port, origin="http://evil.example").startswith(b"HTTP/1.1 403")
     assert scanner.board.laser_at(scanner.board.clock()) > 0.0
     assert stop(port).startswith(b"HTTP/1.1 204")
@@ -192,22 +192,6 @@ def stop(port: int, origin: str | None = None) -> bytes:
         return connection.recv(4096)
 
 
-def port_of(pid: int) -> int:
-    """The port that a process listens on."""
-    inodes = {
-        link.split("[")[1].rstrip("]")
-        for file in Path(f"/proc/{pid}/fd").iterdir()
-        if (link := _link(file)).startswith("socket:[")
-    }
-    for line in Path("/proc/net/tcp").read_text().splitlines()[1:]:
-        fields = line.split()
-        if fields[3] == "0A" and fields[9] in inodes:
-            return int(fields[1].split(":")[1], 16)
-    raise AssertionError("no port is listened on")
-
-
-def _link(file: Path) -> str:
-    try:
-        return str(file.readlink())
-    except OSError:
-        return ""
+def port_of(address: str) -> int:
+    """The port in an address that a console prints."""
+    return int(address.rstrip("/").rsplit(":", maxsplit=1)[1])

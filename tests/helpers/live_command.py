@@ -43,6 +43,8 @@ class Scanner:
     def __init__(self, board: Board, folder: Path) -> None:
         self.board, self.folder = board, folder
         self.running: list[subprocess.Popen[str]] = []
+        self.address = ""
+        """Of the console that was started last."""
 
     def start(self, name: str, more: tuple[str, ...] = (), **options: Any) -> "subprocess.Popen[str]":
         """A command in a process of its own, with `more` options, as a shell in a terminal starts it."""
@@ -56,9 +58,9 @@ class Scanner:
         """A command in the midst of what it does."""
         process = self.start(name)
         if name == "console":
-            address = str(process.stdout.readline()).strip() if process.stdout else ""
-            order(address, "connect", when_idle=True)
-            order(address, "scan", b'{"patient": "P1", "side": "right"}', when_idle=True)
+            self.address = str(process.stdout.readline()).strip() if process.stdout else ""
+            order(self.address, "connect", when_idle=True)
+            order(self.address, "scan", b'{"patient": "P1", "side": "right"}', when_idle=True)
         self.wait_until_busy(name, process)
         return process
 

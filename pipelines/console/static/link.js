@@ -4,7 +4,8 @@ const footscan = (() => {
   const NAMES = {disconnected: "Not connected", idle: "Ready", homing: "Homing", filming: "Filming", storing: "Storing",
     reconstructing: "Reconstructing", done: "Done", failed: "Failed", "door open": "Door open", alarm: "Alarm"};
   const LEVELS = {disconnected: "bad", idle: "ok", done: "ok", failed: "bad", alarm: "bad", "door open": "warning"};
-  const PRESENT_MS = 150;
+  const PRESENT_MS = 150, STOP_SOON_MS = 60, STOP_LATE_MS = 1000;
+  const SWITCH = "The server does not answer. Where light is to end at once, use the scanner’s own switch.";
   const listeners = [];
   let latest = null;
 
@@ -58,7 +59,7 @@ const footscan = (() => {
         headers: {"X-Footscan-Page": page, "Content-Type": "application/json"}});
       if (!answer.ok) problem = await problemOf(answer);
     } catch {
-      problem = "The server does not answer. Where light is to end at once, use the scanner’s own switch.";
+      problem = SWITCH;
     }
     if (name === "jog" && problem) stayPresent(false);
     told(problem || "");
@@ -103,10 +104,28 @@ const footscan = (() => {
     element("count").textContent = "";
   }
 
-  function stop() {
+  // A browser has six connections for each port of a server, and other tabs and downloads may have taken them all: Stop
+  // goes to a port of its own first, and the usual way, too, where that is not answered soon.
+  async function stopAside() {
+    if (!latest || !latest.stop_port) return false;
+    const answer = await fetch(`http://${location.hostname}:${latest.stop_port}/do/stop`,
+      {method: "POST", body: "{}", credentials: "include", priority: "high"});
+    if (!answer.ok) throw new Error(await problemOf(answer));
+    return true;
+  }
+
+  async function stop() {
     element("stop").classList.add("pressed");
     setTimeout(() => element("stop").classList.remove("pressed"), 600);
-    return act("stop");
+    const aside = stopAside().catch(() => false);
+    const soon = await Promise.race([aside, new Promise(done => setTimeout(done, STOP_SOON_MS, false))]);
+    if (soon) return null;
+    const late = setTimeout(told, STOP_LATE_MS, SWITCH);
+    const usual = act("stop");
+    const done = await Promise.race([usual.then(problem => !problem), aside.then(is => is || usual.then(one => !one))]);
+    clearTimeout(late);
+    if (done) told("");
+    return done ? null : usual;
   }
 
   function follow() {

@@ -1,0 +1,54 @@
+"""Stop, as a request asks for it: in a thread of its own, and answered soon whatever the board does."""
+
+import json
+import threading
+from typing import Any
+
+from pipelines.console.console import Console
+from pipelines.console.gate import Headers
+from pipelines.console.guard import Rules
+from schemas.errors import FootscanError, RefusedInput
+
+CONFIRM_SECONDS = 0.15
+"""How long the answer waits for the board."""
+
+
+def stop_asked(console: Console, rules: Rules, scope: dict[str, Any], is_aside: bool) -> tuple[int, bytes, Headers]:
+    """Stops, where the request may: status, body and further headers of the answer.
+
+    The answer does not wait for a board that takes long to confirm; where it never does, the state tells so.
+
+    Parameters
+    ----------
+    scope : the request's, as ASGI has it
+    is_aside : whether it has come on the port of Stop alone, whose answers a page reads only if they say that it may
+    """
+    refusal = rules.answer_aside(scope) if is_aside else rules.answer(scope)
+    if refusal is not None:
+        return refusal.status_code, bytes(refusal.body), []
+    further: Headers = []
+    if is_aside:
+        origin = next(value for name, value in scope["headers"] if name == b"origin")
+        further = [(b"access-control-allow-origin", origin), (b"access-control-allow-credentials", b"true")]
+    problem = _stop(console)
+    if problem is None:
+        return 204, b"", further
+    status = 409 if isinstance(problem, RefusedInput) else 502
+    return status, json.dumps({"problem": str(problem)}).encode(), further
+
+
+def _stop(console: Console) -> FootscanError | None:
+    """What is wrong, as far as it is known soon."""
+    problems: list[FootscanError] = []
+
+    def stop() -> None:
+        try:
+            console.stop()
+        except FootscanError as error:
+            problems.append(error)
+            console.warn(f"Stop: {error}")
+
+    stopping = threading.Thread(target=stop, name="console: stop the board", daemon=True)
+    stopping.start()
+    stopping.join(CONFIRM_SECONDS)
+    return problems[0] if problems else None
