@@ -35,7 +35,7 @@ MOST_WAITING = 256
 KEPT_DESCRIPTORS = 256
 """For board, cameras, films, answers and Stop: they are never lent to connections that wait."""
 MOST_STOPS = 16
-BUDGETS = {"events": 24, "orders": 16, "pages": 48}
+BUDGETS = {"events": 24, "orders": 16, "pages": 48, "results": 8}
 """Requests of each kind that the server has at a time; one more is answered 503."""
 
 HandOver = Callable[[socket.socket, bytes, Callable[[], None], float | None], None]
@@ -259,7 +259,8 @@ def hand_over_to(loop: asyncio.AbstractEventLoop, protocol_of: Callable[[], asyn
 def _kind(request: h11.Request) -> str:
     if request.method == b"POST":
         return "orders"
-    return "events" if _path(request) == b"/events" else "pages"
+    path = _path(request)
+    return "events" if path == b"/events" else "results" if path.startswith(b"/results/") else "pages"
 
 
 def _path(request: h11.Request) -> bytes:

@@ -144,8 +144,8 @@ def test_an_order_of_another_site_stops_nothing(scanner: Scanner) -> None:
 
 
 def test_refused_stops_are_in_nobody_s_way(scanner: Scanner) -> None:
-    process = scanner.started("console")
-    port = port_of(process.pid)
+    scanner.started("console")
+    port = port_of(scanner.address)
     refused: list[bytes] = []
     ended = threading.Event()
 
