@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 OUT_OF_REACH = (
     "copies elsewhere: exports, reports that were sent, backups, snapshots, other stores, other machines",
     "equal films and results that belong to another scan as well",
-    "documents of your own, such as suites and notes, and nights of a regression whose sets are the patient's",
+    "documents of your own, such as notes; suites and logs that are not named with --suite and --log",
     "blocks that the disk has freed but not overwritten",
 )
 
@@ -26,6 +26,8 @@ def forget(
     patient: Annotated[str, typer.Argument(help="Whom to forget: the pseudonym.")],
     scan: Annotated[str | None, typer.Option("--scan", help="One scan of theirs alone.")] = None,
     workflow: Annotated[Path | None, typer.Option(help="The workflow; workflow.yaml where absent.")] = None,
+    suite: Annotated[list[Path] | None, typer.Option(help="A suite that runs scans of theirs; repeatable.")] = None,
+    log: Annotated[list[Path] | None, typer.Option(help="A log that lies elsewhere; repeatable.")] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be erased, and erase nothing.")] = False,
     take_over: TakeOver = False,
@@ -38,9 +40,11 @@ def forget(
     from pipelines.archive import job_of_workflow
     from pipelines.forget.forget import erase, find_erasure
     from pipelines.forget.subject import Subject
+    from pipelines.regression.night import read_suite
 
     subject = Subject(patient, scan)
-    found = find_erasure(subject, job_of_workflow(workflow or WORKFLOW, may_be_empty=True))
+    job = job_of_workflow(workflow or WORKFLOW, may_be_empty=True)
+    found = find_erasure(subject, job, [read_suite(one) for one in suite or ()], log or ())
     if found.is_empty:
         raise RefusedInput(
             subject.name, "is not known in archive, results or store, expected a patient or a scan there"
@@ -83,6 +87,8 @@ def _print_found(found: "Erasure") -> None:
         message(f"footscan: the erasure of {found.subject.name} was cut off, and goes on")
     for place in (*found.belongings.folders, *found.texts):
         print_line(str(place))
+    for nights in found.nights:
+        print_line(f"{nights.regression.out}: nights of {', '.join(nights.sets)}, and the store of all nights")
     store = found.store.files.path("").rstrip("/")
     print_line(f"{store}: {len(found.shares.names)} files; of {len(found.scans)} scans")
 
@@ -93,6 +99,7 @@ def _as_json(found: "Erasure", *, is_done: bool, dry_run: bool) -> dict[str, Any
         "scans": found.scans,
         "folders": [str(place) for place in found.belongings.folders],
         "documents": [str(place) for place in found.texts],
+        "nights": {str(one.regression.path): one.sets for one in found.nights},
         "store": found.store.files.path("").rstrip("/"),
         "store_files": len(found.shares.names),
         "dry_run": dry_run,

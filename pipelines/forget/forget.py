@@ -1,7 +1,7 @@
 """Erasing a patient, or a scan, from archives, results and store, and proving it."""
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,11 +11,13 @@ from pipelines.engine.digest import FileDigests
 from pipelines.engine.files import LocalFiles
 from pipelines.engine.lease import Lease, lease, live_leases
 from pipelines.engine.store import Store, open_store
+from pipelines.forget.nights import Nights, erase_nights, find_nights
 from pipelines.forget.notes import FOLDER, note_name
 from pipelines.forget.proof import find_remains
 from pipelines.forget.shares import Shares, find_shares
 from pipelines.forget.subject import Belongings, Subject, find_belongings
 from pipelines.forget.tables import erase_from_text, rewrite_tables, texts_that_name
+from pipelines.regression.night import Regression
 from pipelines.scan import DELIVERED
 from schemas.documents import canonical_json, parse_json
 from schemas.errors import Fault
@@ -34,6 +36,7 @@ class Erasure:
     belongings: Belongings
     shares: Shares
     texts: list[Path]
+    nights: list[Nights]
     was_cut_off: bool
     remains: list[str] = field(default_factory=list)
     """Where something was found after all."""
@@ -41,7 +44,7 @@ class Erasure:
     @property
     def is_empty(self) -> bool:
         """Whether nothing of the subject is known."""
-        named = self.belongings.folders or self.belongings.scans or self.shares.scans or self.texts
+        named = self.belongings.folders or self.belongings.scans or self.shares.scans or self.texts or self.nights
         return not (named or self.was_cut_off)
 
     @property
@@ -50,13 +53,22 @@ class Erasure:
         return sorted(self.belongings.scans | self.shares.scans)
 
 
-def find_erasure(subject: Subject, job: Job) -> Erasure:
+def find_erasure(
+    subject: Subject, job: Job, suites: Collection[Regression] = (), logs: Collection[Path] = ()
+) -> Erasure:
     """All that would be erased; nothing is changed.
+
+    Parameters
+    ----------
+    suites : collection of Regression
+        Suites that may run scans of the subject.
+    logs : collection of Path
+        Logs that lie neither beside the results nor beside the store.
 
     Raises
     ------
     RefusedInput
-        A folder of this name is a link.
+        A folder of this name is a link, or a log is not there.
     """
     local = job.cache if isinstance(job.cache, Path) else job.results / CACHE
     store = open_store(job.cache, local / "known.sqlite")
@@ -71,8 +83,9 @@ def find_erasure(subject: Subject, job: Job) -> Erasure:
         known = parse_json(store.files.path(name), store.files.read(name).decode())
         belongings.digests |= set(known["digests"])
         belongings.sizes |= set(known["sizes"])
-    texts = texts_that_name(subject, [job.results, *([local] if local.is_dir() else [])])
-    return Erasure(subject, job, store, belongings, shares, texts, was_cut_off)
+    texts = texts_that_name(subject, [job.results, *([local] if local.is_dir() else [])], logs)
+    nights = find_nights(subject, suites, belongings.folders)
+    return Erasure(subject, job, store, belongings, shares, texts, nights, was_cut_off)
 
 
 def erase(found: Erasure) -> list[Lease]:
@@ -98,6 +111,8 @@ def erase(found: Erasure) -> list[Lease]:
         for text in found.texts:
             if text.exists():
                 erase_from_text(found.subject, text)
+        for nights in found.nights:
+            erase_nights(nights)
         if live := _erase_from_store(found, own):
             return live
         _clear_folders(found, "pins")
@@ -128,10 +143,11 @@ def _erase_from_store(found: Erasure, own: str) -> list[Lease]:
 
 
 def _remains(found: Erasure) -> list[str]:
-    folders = [*found.job.archives, found.job.results]
+    folders = [*found.job.archives, found.job.results, *(one.regression.out for one in found.nights)]
     digests = found.belongings.digests | found.shares.digests
     places = find_remains(found.subject, digests, folders, found.store, found.belongings.sizes, found.shares.digests)
-    return [place for place in places if f"/{FOLDER}/" not in place]
+    suites = [f"{one.regression.path}: sets {', '.join(one.sets)}" for one in found.nights]
+    return [*(place for place in places if f"/{FOLDER}/" not in place), *suites]
 
 
 def _remove(place: Path) -> None:

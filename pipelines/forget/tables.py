@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Collection
 from pathlib import Path
 
 from pipelines.archive import ScanEnd
@@ -11,7 +12,7 @@ from pipelines.forget.subject import Subject
 from pipelines.recorded import read_scan, scan_folders
 from pipelines.results_table import CSV, PARQUET, write_results_table
 from pipelines.scan import DELIVERED
-from schemas.errors import FootscanError
+from schemas.errors import FootscanError, RefusedInput
 from schemas.scan import Scan
 
 TUNE = "tune"
@@ -30,11 +31,17 @@ def rewrite_tables(subject: Subject, archives: tuple[Path, ...], results: Path) 
     return [str(results / name) for name in there]
 
 
-def texts_that_name(subject: Subject, folders: list[Path]) -> list[Path]:
-    """Logs beside results and store, the files of tuning and nights, and documents of ours, that bear the name."""
+def texts_that_name(subject: Subject, folders: list[Path], logs: Collection[Path]) -> list[Path]:
+    """Logs beside results and store and elsewhere, files of tuning, and documents of ours, that bear the name.
+
+    RefusedInput where a log elsewhere is no file.
+    """
+    for log in logs:
+        if not _is_file(log):
+            raise RefusedInput(log, "is not there, expected a log")
     files = {file for folder in folders for form in LOGS for file in folder.glob(form)}
     files |= {file for folder in folders for file in (folder / TUNE).glob("*")}
-    return [file for file in sorted(files) if _is_file(file) and subject.pattern.search(file.read_bytes())]
+    return [file for file in sorted(files | set(logs)) if _is_file(file) and subject.pattern.search(file.read_bytes())]
 
 
 def erase_from_text(subject: Subject, file: Path) -> None:

@@ -68,6 +68,24 @@ def write_baseline(
     return baseline
 
 
+def forget_sets(path: Path, out: Path, names: set[str]) -> None:
+    """Take sets out of the baseline, of the steps beside it, and of those of the last good night.
+
+    Errors as in `write_baseline`.
+    """
+    baseline = read_baseline(path)
+    if baseline is not None and names & set(baseline.sets):
+        left = {name: of for name, of in baseline.sets.items() if name not in names}
+        write_atomically(path, _baseline_text(baseline.model_copy(update={"sets": left})).encode())
+    for file, head, steps in (
+        (steps_file(path), STEPS_HEAD, read_steps(path).sets),
+        (out / GOOD, GOOD_HEAD, read_good_steps(out)),
+    ):
+        if names & set(steps):
+            left_steps = {name: of for name, of in steps.items() if name not in names}
+            write_atomically(file, _steps_text(head, left_steps).encode())
+
+
 def steps_file(path: Path) -> Path:
     """The file of the steps beside that of the figures: `baseline.steps.yaml`."""
     return path.with_suffix(f".steps{path.suffix}")
@@ -83,7 +101,7 @@ def _baseline_text(baseline: Baseline) -> str:
             f"    by: {_quoted(one.by)}",
             f"    software: {_quoted(one.software)}",
         ]
-    lines.append("sets:")
+    lines.append("sets:" if baseline.sets else "sets: {}")
     for name, figures in baseline.sets.items():
         lines.append(f"  {name}:" + (" {}" if not figures else ""))
         lines += [f"    {figure}: {'null' if value is None else _plain(value)}" for figure, value in figures.items()]
@@ -91,7 +109,7 @@ def _baseline_text(baseline: Baseline) -> str:
 
 
 def _steps_text(head: str, sets: Mapping[str, Sequence[AcceptedStep]]) -> str:
-    lines = [f"format: {AcceptedSteps.model_fields['format'].default}", "sets:"]
+    lines = [f"format: {AcceptedSteps.model_fields['format'].default}", "sets:" if sets else "sets: {}"]
     for name, steps in sorted(sets.items()):
         lines.append(f"  {name}:" + (" []" if not steps else ""))
         lines += [f"    - {{step: {s.step}, key: {_quoted(s.key)}, result: {_quoted(s.result)}}}" for s in steps]

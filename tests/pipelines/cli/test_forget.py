@@ -91,6 +91,37 @@ def test_a_dry_run_changes_nothing(two: Any, footscan: Command) -> None:
     assert all_bytes(two.root) == before
 
 
+SUITE = """
+format: footscan.suite/1
+timed_passes: 0
+sets:
+  first: {scan: archive/P0001/S1, calibration: calibration.json}
+  second: {scan: archive/P0002/S1, calibration: calibration.json}
+"""
+
+
+def test_nights_over_their_scans_and_logs_elsewhere(two: Any, footscan: Command) -> None:
+    suite, log = two.root / "suite.yaml", two.root / "elsewhere.log"
+    suite.write_text(SUITE)
+    log.write_text("P0001/S1: done\nP0002/S1: done\n")
+    status, _, said = footscan("regress", suite, "--accept", "first night")
+    assert status == 0, said
+    files = ("baseline.yaml", "baseline.steps.yaml", "nights/history.jsonl", "nights/good.steps.yaml")
+    assert all("second" in (two.root / name).read_text() for name in files)
+    more = ("--suite", suite, "--log", log)
+    status, out, said = footscan("forget", "P0002", "--workflow", two.workflow, "--yes", *more)
+    assert status == 1, out
+    assert "suite.yaml: sets second: still bears P0002" in said
+    assert log.read_text() == "P0001/S1: done\n"
+    assert not any("second" in (two.root / name).read_text() for name in files)
+    assert all("first" in (two.root / name).read_text() for name in files)
+    suite.write_text("".join(line for line in SUITE.splitlines(keepends=True) if "second" not in line))
+    status, _, said = footscan("forget", "P0002", "--workflow", two.workflow, "--yes", *more)
+    assert status == 0, said
+    assert traces(two.root, "P0002") == []
+    assert footscan("regress", suite)[0] == 0
+
+
 def test_one_scan_alone(two: Any, footscan: Command) -> None:
     second = two.root / "archive/P0002/S2"
     shutil.copytree(two.root / "archive/P0002/S1", second)
