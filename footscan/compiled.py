@@ -1,8 +1,8 @@
 """Loops compiled to machine code, which is kept on disk in one place of the user's own.
 
 numba looks for a newer version at the file of a function alone, and would go on with old machine code where a module
-changed that the function takes a constant or another compiled function from. Here the code of a room lies in a folder
-that is named for the digest of all its modules. Compiled functions therefore call none of another room.
+changed that the function takes a constant or another compiled function from. Here the code of a module lies in a folder
+that is named for the digest of the module and of all modules of its package that it reaches by import.
 
 What numba keeps is a pickle: whoever can write there runs code as the user who loads it. So a folder that others own,
 or can write to, is not used.
@@ -11,6 +11,7 @@ or can write to, is not used.
 import hashlib
 import logging
 import os
+import re
 import stat
 from collections.abc import Callable
 from functools import lru_cache
@@ -24,32 +25,37 @@ log = logging.getLogger("footscan.compiled")
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
+IMPORT = re.compile(
+    r"^[ \t]*(?:from[ \t]+(?P<origin>[\w.]+)[ \t]+import[ \t]+(?P<names>\([^)]*\)|[^\n]*)"
+    r"|import[ \t]+(?P<module>[\w.]+))",
+    re.MULTILINE,
+)
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def compiled(function: _Function) -> _Function:
     """The function compiled at its first call, without Python's global lock."""
     made: Any = numba.njit(nogil=True)(function)
-    if _folder(Path(function.__code__.co_filename).parent) is not None:
+    if _folder(function.__module__, Path(function.__code__.co_filename)) is not None:
         # As `cache=True` does, but for the folder: numba's own setting for that holds for all threads and libraries.
-        made._cache = _RoomCache(function)
+        made._cache = _ModuleCache(function)
     kept: _Function = made
     return kept
 
 
-class _RoomLocator:
+class _ModuleLocator:
     """Tells numba where the machine code of a function is kept."""
 
     def __init__(self, function: Callable[..., object], file: str) -> None:
         self._py_file = file  # numba's warnings name it
         self._line = function.__code__.co_firstlineno
-        folder = _folder(Path(file).parent)
+        folder = _folder(function.__module__, Path(file))
         if folder is None:
             raise RuntimeError(f"{file}: its machine code is kept nowhere")
         self._folder = folder
 
     @classmethod
-    def from_function(cls, function: Callable[..., object], file: str) -> "_RoomLocator":
+    def from_function(cls, function: Callable[..., object], file: str) -> "_ModuleLocator":
         return cls(function, file)
 
     def ensure_cache_path(self) -> None:
@@ -66,29 +72,59 @@ class _RoomLocator:
         return str(self._line)
 
 
-class _RoomImplementation(FunctionCache._impl_class):  # type: ignore[misc]
-    _locator_classes = (_RoomLocator,)
+class _ModuleImplementation(FunctionCache._impl_class):  # type: ignore[misc]
+    _locator_classes = (_ModuleLocator,)
 
 
-class _RoomCache(FunctionCache):  # type: ignore[misc]
-    _impl_class = _RoomImplementation
+class _ModuleCache(FunctionCache):  # type: ignore[misc]
+    _impl_class = _ModuleImplementation
 
 
 @lru_cache
-def _folder(room: Path) -> Path | None:
-    """Where the machine code of a room's functions is kept; None where no place is safe."""
+def _folder(module: str, file: Path) -> Path | None:
+    """Where the machine code of a module's functions is kept; None where no place is safe."""
     place = _place()
     if place is None:
         return None
-    digest = hashlib.sha256()
-    for module in sorted(room.glob("*.py")):
-        digest.update(module.read_bytes())
-    folder = place / f"{room.name}-{digest.hexdigest()[:16]}"
+    folder = place / f"{module}-{_digest_of_closure(module, file)[:16]}"
     problem = _problem(folder)
     if problem is not None:
         _warn(problem)
         return None
     return folder
+
+
+def _digest_of_closure(module: str, file: Path) -> str:
+    """SHA-256 over the sources of a module and of what it reaches by import in its own package."""
+    root = file.parents[module.count(".")]
+    waiting, found = [module], {}
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found[name], imported = _source(root, name)
+            waiting += imported
+    return hashlib.sha256("".join(f"{name} {found[name]}\n" for name in sorted(found)).encode()).hexdigest()
+
+
+@lru_cache
+def _source(root: Path, module: str) -> tuple[str, tuple[str, ...]]:
+    """The digest of a module's source, and the names of its own package in its import statements.
+
+    A statement in a text counts as well: one module too many in a closure costs a compilation, one too few a wrong
+    result. A package and a name that is not a module have no source.
+    """
+    place = root.joinpath(*module.split("."))
+    try:
+        source = place.with_suffix(".py").read_bytes()
+    except OSError:
+        return "", ()
+    package = module.partition(".")[0]
+    names: set[str] = set()
+    for match in IMPORT.finditer(source.decode()):
+        origin = match["origin"] or match["module"]
+        if origin.partition(".")[0] == package:
+            names |= {origin, *(f"{origin}.{name}" for name in re.findall(r"\w+", match["names"] or ""))}
+    return hashlib.sha256(source).hexdigest(), tuple(sorted(names))
 
 
 @lru_cache

@@ -48,7 +48,7 @@ for thread in threads: thread.join()
 for name, module in sorted(sys.modules.items()):
     for value in list(vars(module).values()) if name.startswith("footscan.") else []:
         if isinstance(value, Dispatcher) and value.py_func.__module__ == name:
-            print(name.split(".")[1], value.stats.cache_path)
+            print(name, value.stats.cache_path)
 print("config", numba.config.CACHE_DIR)
 """
 
@@ -135,6 +135,20 @@ def test_equal_checkouts_share_it_and_others_do_not(checkout: Checkout, tmp_path
     assert checkout.run() == (["6 1"], "")
 
 
+def test_machine_code_calls_that_of_another_folder_and_follows_its_changes(checkout: Checkout) -> None:
+    other = checkout.root / "room/other"
+    other.mkdir()
+    (other / "__init__.py").touch()
+    called = "from footscan.compiled import compiled\n\n@compiled\ndef doubled(value):\n    return 2 * value\n"
+    (other / "called.py").write_text(called)
+    loops = LOOPS.replace("FACTOR * value", "FACTOR * doubled(value)")
+    (checkout.root / "room/loops.py").write_text("from room.other.called import (\n    doubled,\n)\n" + loops)
+    assert checkout.run() == (["12 0"], "")
+    assert checkout.run() == (["12 1"], "")
+    (other / "called.py").write_text(called.replace("2 *", "3 *"))
+    assert checkout.run() == (["18 0"], "")
+
+
 @pytest.mark.parametrize("level", ["compiled", "room"])
 def test_what_others_can_write_is_not_loaded(checkout: Checkout, tmp_path: Path, level: str) -> None:
     place = tmp_path / "given"
@@ -171,13 +185,13 @@ def test_without_a_place_it_is_done_without(checkout: Checkout, tmp_path: Path) 
 
 
 def test_many_threads_import_at_once(checkout: Checkout) -> None:
-    """Of real rooms: each one's functions are kept in the folder of that room, and no setting of numba's is touched."""
+    """Of real rooms: functions are kept in the folder of their module, and no setting of numba's is touched."""
     printed, said = checkout.run(SIDE_BY_SIDE)
     *functions, setting = (line.split(" ", 1) for line in printed)
     assert (setting, said) == (["config", ""], "")
     assert len(functions) > 60
-    for room, folder in functions:
+    for module, folder in functions:
         assert Path(folder).parent == checkout.cache / "footscan/compiled"
-        assert Path(folder).name.startswith(f"{room}-")
+        assert Path(folder).name.startswith(f"{module}-")
     assert list((checkout.root / "elsewhere").iterdir()) == []
     shutil.rmtree(checkout.cache)
