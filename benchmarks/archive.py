@@ -18,8 +18,8 @@ import numpy as np
 
 from benchmarks.compare import interleave, print_ratios, python, ratio_text, spread
 from footscan.frames.film import encoded_frames, open_film
-from footscan.virtual.film import write_film
-from pipelines.recorded import read_scan
+from footscan.virtual.filming.film import write_film
+from pipelines.recordings.scans import read_scan
 
 DEFAULT = Path("demo/archive/P0001/demo-R")
 EVERY = 5
@@ -33,7 +33,7 @@ PLANNING = """
 import sys, time
 start = time.perf_counter()
 from pathlib import Path
-from pipelines.archive import job_of_workflow, plan_job
+from pipelines.archive.job import job_of_workflow, plan_job
 imported = time.perf_counter()
 planned = plan_job(job_of_workflow(Path(sys.argv[1])))
 print(imported - start, time.perf_counter() - imported, planned.steps, planned.to_run)

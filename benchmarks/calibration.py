@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from footscan.calibration.chart import Chart, read_chart
-from footscan.calibration.from_chart import calibrate_chart
-from footscan.calibration.maps import is_supported, to_world
-from footscan.virtual.capture import record_capture
-from footscan.virtual.reference import standard_reference
-from footscan.virtual.scanner import VOLUME_MM, Camera, standard_scanner
+from footscan.calibration.chart.chart import Chart, read_chart
+from footscan.calibration.chart.from_chart import calibrate_chart
+from footscan.calibration.models.maps import is_supported, to_world
+from footscan.virtual.filming.capture import record_capture
+from footscan.virtual.optics.scanner import VOLUME_MM, Camera, standard_scanner
+from footscan.virtual.stage.reference import standard_reference
 from pipelines.calibrate import CaptureCalibration, calibrate_capture
-from pipelines.captures import read_capture
+from pipelines.recordings.captures import read_capture
 from schemas.calibration import Calibration, CameraCalibration, Source
 from schemas.parameters.calibration import CalibrationParameters, CaptureCalibrationParameters
 from schemas.parameters.simulation import SimulationSettings

@@ -21,9 +21,7 @@ from benchmarks.cramer_rao import ROOMS, centre_bound
 from benchmarks.extraction import plain_stripe
 from footscan.frames.image import Rgb, decode_image
 from footscan.stripe.film import extract_film
-from footscan.virtual.reference import standard_reference
-from footscan.virtual.scene import SKIN
-from footscan.virtual.stripe_frames import (
+from footscan.virtual.filming.stripe_frames import (
     Clutter,
     Curve,
     StripeFilm,
@@ -34,6 +32,8 @@ from footscan.virtual.stripe_frames import (
     sinusoid,
     straight_line,
 )
+from footscan.virtual.optics.scene import SKIN
+from footscan.virtual.stage.reference import standard_reference
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.parameters.simulation import SimulationSettings
 

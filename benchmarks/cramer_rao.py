@@ -31,10 +31,10 @@ from scipy.ndimage import gaussian_filter
 from scipy.stats import norm
 
 from footscan.frames.image import decode_image
-from footscan.virtual.render import LASER_COLOUR
-from footscan.virtual.room import LEVELS
-from footscan.virtual.scene import SKIN
-from footscan.virtual.sensor import FULL_WELL_ELECTRONS, READ_NOISE, compress, photograph
+from footscan.virtual.filming.render import LASER_COLOUR
+from footscan.virtual.optics.scene import SKIN
+from footscan.virtual.optics.sensor import FULL_WELL_ELECTRONS, READ_NOISE, compress, photograph
+from footscan.virtual.room.room import LEVELS
 from schemas.parameters.simulation import SimulationSettings
 
 Floats = NDArray[np.float64]

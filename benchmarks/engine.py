@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.compare import python, ratio_text, spread
-from pipelines.engine import code
-from pipelines.engine.digest import sha256
-from pipelines.engine.key import image_text, key_of
+from pipelines.engine.actions import code
+from pipelines.engine.actions.key import image_text, key_of
+from pipelines.engine.actions.step import Failure, Input, Output, SourceFile, Step, Success, Value
+from pipelines.engine.files.digest import sha256
 from pipelines.engine.plan import make_plan
 from pipelines.engine.run import execute
-from pipelines.engine.step import Failure, Input, Output, SourceFile, Step, Success, Value
-from pipelines.engine.store import open_store
-from schemas.workflow import ScanParameters
+from pipelines.engine.store.store import open_store
+from schemas.parameters.scan import ScanParameters
 
 ROUNDS = 5
 SCANS, FEWER_SCANS = 500, 50

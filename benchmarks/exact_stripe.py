@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from benchmarks.extraction import DEFAULT, Packets, extract, extract_plainly, load
-from footscan.surface.export import read_mesh
-from footscan.virtual.renderers import Shot
-from footscan.virtual.scanner import standard_scanner
-from footscan.virtual.scene import SKIN, Mesh
-from footscan.virtual.stripe_truth import write_stripe_truth
-from pipelines.recorded import read_scan
+from footscan.mesh.formats.files import read_mesh
+from footscan.virtual.filming.renderers import Shot
+from footscan.virtual.filming.stripe_truth import write_stripe_truth
+from footscan.virtual.optics.scanner import standard_scanner
+from footscan.virtual.optics.scene import SKIN, Mesh
+from pipelines.recordings.scans import read_scan
 from schemas.parameters.simulation import SimulationSettings
 from schemas.scan import Travel
 

@@ -27,7 +27,7 @@ from footscan.frames.image import Rgb, pixel_buffer
 from footscan.frames.ingest import ingest_film
 from footscan.frames.reader import read_frames
 from footscan.stripe.film import extract_film
-from pipelines.recorded import RecordedScan, read_scan
+from pipelines.recordings.scans import RecordedScan, read_scan
 from schemas.frames import FrameManifest
 from schemas.parameters.extraction import ExtractionParameters
 

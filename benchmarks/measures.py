@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.compare import interleave, print_ratios, python
 from footscan.measure.measures import measure_foot
+from footscan.mesh.mesh import Mesh
 from footscan.surface.decimate import decimate
-from footscan.surface.mesh import Mesh
-from footscan.virtual.foot import make_foot
-from footscan.virtual.foot_shape import sample_pair
-from schemas.errors import RefusedInput
+from footscan.virtual.foot.foot import make_foot
+from footscan.virtual.foot.shape import sample_pair
+from schemas.base.errors import RefusedInput
 
 FEET = 200
 SHIFT_MM = 500.0

@@ -21,21 +21,21 @@ from numpy.typing import NDArray
 from benchmarks.compare import interleave, print_ratios, python, spread
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.frames.reader import read_frames
+from footscan.mesh.formats.files import Shape, read_mesh
+from footscan.mesh.sampling import sample_surface
 from footscan.surface.ball_pivoting import mesh_cloud
 from footscan.surface.closed_surface import close_surface
-from footscan.surface.export import Shape, read_mesh
 from footscan.surface.quality import mesh_quality
-from footscan.surface.sampling import sample_surface
 from footscan.verify.compare import SAMPLES
 from footscan.verify.distances import distances_to_mesh
-from pipelines.archive import draw_steps, job_of_scan, plan_job
+from pipelines.archive.job import draw_steps, job_of_scan, plan_job
 from pipelines.arrays import unpack
+from pipelines.engine.actions.step import Output, Step, Success
 from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.run import run_plan
-from pipelines.engine.step import Output, Step, Success
-from pipelines.engine.store import Store
-from pipelines.recorded import RecordedScan, read_scan
+from pipelines.engine.store.store import Store
+from pipelines.recordings.scans import RecordedScan, read_scan
 from schemas.frames import FrameManifest
 from schemas.parameters.surface import SurfaceParameters
 

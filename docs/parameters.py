@@ -16,8 +16,8 @@ from typing import Any
 from pydantic import BaseModel
 
 from schemas.parameters.calibration import CalibrationParameters
+from schemas.parameters.scan import ScanParameters
 from schemas.parameters.simulation import SimulationSettings
-from schemas.workflow import ScanParameters
 
 DOCS = Path(__file__).resolve().parent
 MARKED = re.compile(r"(<!-- parameters: (\S+) -->\n).*?(<!-- end of parameters -->)", re.DOTALL)

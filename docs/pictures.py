@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from footscan.frames.film import open_film, pixel_frames
-from footscan.report.calibration_figure import calibration_figure
+from footscan.mesh.formats.files import read_mesh
+from footscan.report.calibration.figure import calibration_figure
 from footscan.report.colours import distance_colours
 from footscan.report.deviation import draw_colour_bar, write
 from footscan.report.render import render_mesh
 from footscan.stripe.film import extract_film
 from footscan.stripe.points import StripePoints
-from footscan.surface.export import read_mesh
 from footscan.verify.distances import signed_distances
-from footscan.virtual.scanner import FAN_DEGREES, VOLUME_MM, standard_scanner
-from pipelines.recorded import read_scan
+from footscan.virtual.optics.scanner import FAN_DEGREES, VOLUME_MM, standard_scanner
+from pipelines.recordings.scans import read_scan
 from schemas.calibration import read_calibration
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.scan import Travel

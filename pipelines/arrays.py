@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.errors import DamagedError
+from schemas.base.errors import DamagedError
 
 Array = NDArray[np.generic]
 

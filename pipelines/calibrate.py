@@ -8,9 +8,8 @@ import dask
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.drift import Drift, drift_of
-from footscan.calibration.found_corners import FoundCorner
-from footscan.calibration.from_capture import (
+from footscan.calibration.capture.found_corners import FoundCorner
+from footscan.calibration.capture.from_capture import (
     CalibratedView,
     CameraView,
     Recognised,
@@ -19,22 +18,23 @@ from footscan.calibration.from_capture import (
     object_poses,
     recognise_view,
 )
-from footscan.calibration.reference import Edges, doubts_about, edges_of
-from footscan.calibration.refused_capture import (
+from footscan.calibration.capture.reference import Edges, doubts_about, edges_of
+from footscan.calibration.capture.refused_capture import (
     RefusedCapture,
     check_placements,
     refuse_contradictions,
     refuse_unrecognised,
 )
-from footscan.calibration.selection import ModelTrial
+from footscan.calibration.checks.drift import Drift, drift_of
+from footscan.calibration.models.selection import ModelTrial
 from footscan.frames.film import film_files, open_film, pixel_frames
-from footscan.report.capture_figure import capture_figure
+from footscan.report.calibration.capture_figure import capture_figure
 from footscan.stripe.extract import extract_stripe
-from pipelines.captures import RecordedCapture
-from pipelines.engine.digest import sha256
+from pipelines.engine.files.digest import sha256
+from pipelines.recordings.captures import RecordedCapture
 from pipelines.version import SOFTWARE
+from schemas.base.errors import RefusedInput
 from schemas.calibration import Calibration, Source
-from schemas.errors import RefusedInput
 from schemas.mounting import CaptureCamera, mounting_of
 from schemas.parameters.calibration import CaptureCalibrationParameters
 

@@ -7,22 +7,22 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.archive import CACHE, Job, cores, plan_job, run_job
-from pipelines.calibration_choice import CalibrationPlace
-from pipelines.deliver import deliver
-from pipelines.engine.digest import FileDigests
-from pipelines.engine.lease import lease
+from pipelines.archive.job import CACHE, Job, plan_job, run_job
+from pipelines.engine.actions.step import Step
+from pipelines.engine.deliver import deliver
+from pipelines.engine.files.file_digests import FileDigests
 from pipelines.engine.plan import make_plan
-from pipelines.engine.pool import OnStepEnd, Threads
+from pipelines.engine.pool import OnStepEnd, Threads, cores
 from pipelines.engine.run import run_plan
-from pipelines.engine.step import Step
-from pipelines.engine.store import open_store
-from pipelines.filming import calibration_steps, digests_of
-from pipelines.recorded import SCAN_FILE, scan_folders
+from pipelines.engine.store.lease import lease
+from pipelines.engine.store.store import open_store
+from pipelines.recordings.calibration_choice import CalibrationPlace
+from pipelines.recordings.scans import SCAN_FILE, scan_folders
 from pipelines.scan import STEPS
-from schemas.errors import Fault
+from pipelines.simulate import calibration_steps, digests_of
+from schemas.base.errors import Fault
 from schemas.parameters.demo import FilmedFoot
-from schemas.workflow import ScanParameters
+from schemas.parameters.scan import ScanParameters
 
 Watch = Callable[[str, int, int], AbstractContextManager[OnStepEnd]]
 """Called with the name of a part, how many steps are to run and how many it has; gives what shall hear of them."""

@@ -9,15 +9,16 @@ from pathlib import Path
 
 from footscan.frames.film import film_files
 from footscan.frames.travel import read_positions
-from pipelines.engine.digest import FileDigests, sha256
-from pipelines.engine.key import parameters_text
-from pipelines.engine.step import Input, Output, SourceFile, Step, Value
-from pipelines.recorded import RecordedScan
+from pipelines.engine.actions.key import parameters_text
+from pipelines.engine.actions.step import Input, Output, SourceFile, Step, Value
+from pipelines.engine.files.digest import sha256
+from pipelines.engine.files.file_digests import FileDigests
+from pipelines.recordings.scans import RecordedScan
+from schemas.base.documents import Document, canonical_json
 from schemas.calibration import Calibration, Source
-from schemas.documents import Document, canonical_json
 from schemas.parameters.foot import FootParameters
+from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm
-from schemas.workflow import ScanParameters
 
 STEPS = "pipelines.steps"
 """Where the modules of the steps lie; they are imported when they run, for a plan needs none of their libraries."""

@@ -6,13 +6,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.surface.export import read_mesh
-from footscan.virtual.block import make_block
-from footscan.virtual.foot import make_foot
-from footscan.virtual.standing import stand_on_glass
-from schemas.errors import RefusedInput
+from footscan.mesh.formats.files import read_mesh
+from footscan.virtual.foot.foot import make_foot
+from footscan.virtual.stage.block import make_block
+from footscan.virtual.stage.standing import stand_on_glass
+from schemas.base.documents import Side
+from schemas.base.errors import RefusedInput
 from schemas.parameters.simulation import SimulationSettings
-from schemas.scan import Side
 
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]

@@ -13,10 +13,10 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AwareDatetime, Field, model_validator
 
+from schemas.base.documents import Document, parse_json, read_text, validate
+from schemas.base.errors import RefusedInput
+from schemas.base.units import Point
 from schemas.calibration_history import CalibrationV1, CalibrationV2, migrate_v1, migrate_v2
-from schemas.documents import Document, parse_json, read_text, validate
-from schemas.errors import RefusedInput
-from schemas.units import Point
 
 VERSION = 3
 _FAMILY = "footscan.calibration/"

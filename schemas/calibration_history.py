@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.documents import Document, validate
-from schemas.units import MILLIMETRES, LengthUnit, Point
+from schemas.base.documents import Document, validate
+from schemas.base.units import MILLIMETRES, LengthUnit, Point
 
 Six = Annotated[list[float], Field(min_length=6, max_length=6)]
 

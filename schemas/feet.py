@@ -6,10 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
-from schemas.documents import Document
-from schemas.limits import beyond, limit
+from schemas.base.documents import Document, Side
+from schemas.base.limits import beyond, limit
 from schemas.measures import Status
-from schemas.scan import Side
 
 AS_TOLD = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 """Measures that a person or another version wrote down are as good as ours: what is not needed is passed over."""

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from schemas.documents import Document
+from schemas.base.documents import Document
 
 Camera = Annotated[int, Field(ge=1)]
 Count = Annotated[int, Field(ge=0)]

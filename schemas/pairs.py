@@ -2,8 +2,7 @@
 
 from datetime import date
 
-from schemas.documents import Document
-from schemas.scan import Side
+from schemas.base.documents import Document, Side
 from schemas.sizes import Sizes
 
 

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from schemas.base.documents import Document
 from schemas.calibration import Source
-from schemas.documents import Document
 from schemas.fusion import FusionReport
 
 Count = Annotated[int, Field(ge=0)]

@@ -4,9 +4,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, AwareDatetime, BeforeValidator, Field, model_validator
 
-from schemas.documents import Document, Pseudonym
+from schemas.base.documents import Document, Pseudonym
+from schemas.parameters.scan import ScanParameters
 from schemas.parameters.virtual_scan import VirtualScan
-from schemas.workflow import ScanParameters
 
 Name = Annotated[str, Field(min_length=1)]
 FigureName = Annotated[str, Field(pattern=r"^[a-z0-9_.-]{1,80}$")]

@@ -7,9 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.documents import Document, Pseudonym, RelativePath
-
-Side = Literal["right", "left", "unknown"]
+from schemas.base.documents import Document, Pseudonym, RelativePath, Side
 
 
 class Travel(Document):

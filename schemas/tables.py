@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from schemas.errors import RefusedInput
-from schemas.limits import read_bounded, refuse_beyond
+from schemas.base.errors import RefusedInput
+from schemas.base.limits import read_bounded, refuse_beyond
 
 Cell = str | int | float | None
 
@@ -24,7 +24,7 @@ def read_records(path: Path) -> Iterator[tuple[int, list[str]]]:
     Raises
     ------
     RefusedInput
-        The file is missing, too large (see `schemas.limits`), or no CSV in UTF-8.
+        The file is missing, too large (see `schemas.base.limits`), or no CSV in UTF-8.
     """
     try:
         content = read_bounded(path, "table_bytes")

@@ -17,7 +17,8 @@ from pydantic import (
     model_validator,
 )
 
-from schemas.documents import Document
+from schemas.base.documents import Document
+from schemas.parameters.scan import ScanParameters
 
 Objective = Literal["accuracy", "accuracy_p99", "repeatability", "completeness", "disagreement", "false_points", "time"]
 Sampler = Literal["grid", "random", "tpe", "nsga2"]
@@ -144,8 +145,6 @@ def is_whole(name: str) -> bool:
 @cache
 def _fields() -> dict[str, tuple[Any, TypeAdapter[Any]]]:
     """Type, and what checks a value, of each parameter by `section.name`."""
-    from schemas.workflow import ScanParameters  # which stands beside what holds a Tuning
-
     found: dict[str, tuple[Any, TypeAdapter[Any]]] = {}
     for section, model in ScanParameters.model_fields.items():
         assert isinstance(model.annotation, type)

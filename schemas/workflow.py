@@ -5,13 +5,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
-from schemas.documents import Document, Pseudonym
-from schemas.parameters.extraction import ExtractionParameters
-from schemas.parameters.fusion import FusionParameters
-from schemas.parameters.mapping import MappingParameters
-from schemas.parameters.normals import NormalParameters
-from schemas.parameters.outliers import OutlierParameters
-from schemas.parameters.surface import SurfaceParameters
+from schemas.base.documents import Document, Pseudonym
+from schemas.parameters.scan import ScanParameters
 from schemas.tuning import Tuning
 
 
@@ -34,17 +29,6 @@ def _without_empty(sections: Any) -> Any:
     if not isinstance(sections, dict):
         return sections
     return {name: section for name, section in sections.items() if section is not None}
-
-
-class ScanParameters(Document):
-    """What the steps of a scan can be told, a model a step."""
-
-    extraction: ExtractionParameters = ExtractionParameters()
-    mapping: MappingParameters = MappingParameters()
-    fusion: FusionParameters = FusionParameters()
-    outliers: OutlierParameters = OutlierParameters()
-    normals: NormalParameters = NormalParameters()
-    surface: SurfaceParameters = SurfaceParameters()
 
 
 def _as_list(folders: Any) -> Any:

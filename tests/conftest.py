@@ -13,7 +13,7 @@ import simplejpeg
 from hypothesis import settings
 from numpy.typing import NDArray
 
-from footscan.virtual.film import write_film
+from footscan.virtual.filming.film import write_film
 from schemas.calibration import Calibration, CameraCalibration, HomographyMap, Source
 
 sys.path.insert(0, str(Path(__file__).parent / "helpers"))  # this folder itself would hide the packages

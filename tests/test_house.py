@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -13,6 +14,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("pipelines", "footscan", "schemas")
 LONGEST_MODULE = 400
+MOST_MODULES = 17
+KINDS = {"pipelines/steps", "schemas"}
+"""Folders in which each module is one of a kind: a step, a document."""
 
 ORCHESTRATION = {"dask", "distributed", "typer", "click", "rich"}
 CONTRACTS_MAY_USE = sys.stdlib_module_names | {"pydantic", "yaml", "schemas"}
@@ -32,6 +36,14 @@ def test_modules_are_short() -> None:
     assert long_modules(ROOT) == []
 
 
+def test_no_circle_of_modules_or_of_rooms() -> None:
+    assert circles(ROOT) == []
+
+
+def test_folders_are_small() -> None:
+    assert large_folders(ROOT) == []
+
+
 def test_every_package_folder_says_what_it_is() -> None:
     assert silent_folders(ROOT) == []
 
@@ -49,17 +61,17 @@ def test_no_file_in_git_tells_of_one_machine() -> None:
         ("schemas/scan.py", "from pipelines.engine import plan"),
         ("schemas/scan.py", "import numpy as np"),
         ("schemas/parameters/fusion.py", "from footscan import cloud"),
-        ("footscan/stripe/extract.py", "from pipelines.engine.key import key"),
+        ("footscan/stripe/extract.py", "from pipelines.engine.actions.key import key"),
         ("footscan/stripe/extract.py", "import dask.array"),
         ("footscan/stripe/extract.py", "from typer import Typer"),
         ("footscan/stripe/extract.py", "def late():\n    import rich.progress"),
         ("footscan/stripe/extract.py", "import importlib\nimportlib.import_module('click')"),
         ("footscan/stripe/extract.py", "__import__('pipelines.scan')"),
         ("footscan/stripe/extract.py", "from . import profile"),
-        ("footscan/stripe/extract.py", "from footscan.virtual.lens import Lens"),
+        ("footscan/stripe/extract.py", "from footscan.virtual.optics.lens import Lens"),
         ("footscan/verify/compare.py", "from footscan import virtual"),
-        ("footscan/virtual/lens.py", "from footscan.calibration.fit import fit"),
-        ("footscan/virtual/lens.py", "from footscan import frames"),
+        ("footscan/virtual/optics/lens.py", "from footscan.calibration.models.fit import fit"),
+        ("footscan/virtual/optics/lens.py", "from footscan import frames"),
     ],
 )
 def test_a_forbidden_import_is_seen(tmp_path: Path, module: str, statement: str) -> None:
@@ -72,7 +84,7 @@ def test_imports_with_the_stream_are_free(tmp_path: Path) -> None:
     build(
         tmp_path,
         {
-            "schemas/scan.py": "import json\nimport yaml\nfrom pydantic import Field\nfrom schemas.errors import Fault",
+            "schemas/scan.py": "import json\nimport yaml\nfrom pydantic import Field\nfrom schemas.frames import GROUP",
             "footscan/stripe/extract.py": "import numpy\nfrom footscan.frames.reader import read\nimport schemas.scan",
             "footscan/virtual/lens.py": "from footscan.virtual.glass import bend\nfrom schemas.scan import Scan",
             "pipelines/scan.py": "import dask\nfrom footscan.virtual.lens import Lens\nimport footscan.stripe.extract",
@@ -103,6 +115,32 @@ def test_a_silent_folder_is_seen(tmp_path: Path) -> None:
         "footscan/stripe: no __init__.py",
         "schemas/__init__.py: not a docstring alone",
     ]
+
+
+def test_a_circle_is_seen(tmp_path: Path) -> None:
+    build(
+        tmp_path,
+        {
+            "footscan/stripe/a.py": "from footscan.mesh.grid import cells",
+            "footscan/mesh/grid.py": "import numpy",
+            "footscan/mesh/other.py": "def late():\n    from footscan.stripe import b",
+            "footscan/stripe/b.py": "",
+            "pipelines/one.py": "if TYPE_CHECKING:\n    from pipelines.two import Two",
+            "pipelines/two.py": "from pipelines.one import One",
+        },
+    )
+    assert circles(tmp_path) == [
+        "footscan.mesh -> footscan.stripe -> footscan.mesh",
+        "pipelines.one -> pipelines.two -> pipelines.one",
+    ]
+
+
+def test_a_large_folder_is_seen(tmp_path: Path) -> None:
+    names = ("__init__", *"abcdefghijklmnopqr")
+    build(tmp_path, {f"footscan/{room}/{name}.py": "" for room in ("one", "two") for name in names})
+    build(tmp_path, {"footscan/three/board_a.py": "", "footscan/three/board_b.py": "", "footscan/three/board_c.py": ""})
+    (tmp_path / "footscan/two/r.py").unlink()
+    assert large_folders(tmp_path) == ["footscan/one: 18 modules", "footscan/three: 3 modules board_*"]
 
 
 @pytest.mark.parametrize(
@@ -188,6 +226,64 @@ def long_modules(root: Path) -> list[str]:
     modules = modules_of(root, (*PACKAGES, "tests", "benchmarks"))
     lengths = {module: len(module.read_bytes().splitlines()) for module in modules}
     return [f"{module.relative_to(root)}: {lines} lines" for module, lines in lengths.items() if lines > LONGEST_MODULE]
+
+
+def circles(root: Path) -> list[str]:
+    """Circles of imports, late ones and those for types alone included, of modules and of the rooms that they lie in.
+
+    A room is a folder; a module that lies loose in a package is a room of its own.
+    """
+    names = {".".join(path.relative_to(root).with_suffix("").parts): path for path in modules_of(root, PACKAGES)}
+    of_modules: dict[str, set[str]] = {name: set() for name in names}
+    of_rooms: dict[str, set[str]] = {}
+    for name, path in names.items():
+        for _, imported in imports_of(path):
+            target = imported if imported in names else imported.rpartition(".")[0]
+            if target in names and target != name:
+                of_modules[name].add(target)
+                one, other = room_of(name), room_of(target)
+                of_rooms.setdefault(one, set()).update({other} - {one})
+    return [*first_circles(of_rooms), *([] if first_circles(of_rooms) else first_circles(of_modules))]
+
+
+def room_of(module: str) -> str:
+    folder = module.rpartition(".")[0]
+    return folder if "." in folder else module
+
+
+def first_circles(arrows: dict[str, set[str]]) -> list[str]:
+    """A shortest circle through the first name of each knot of names that reach each other."""
+    found, seen = [], set()
+    for start in sorted(arrows):
+        paths = [[start]]
+        visited: set[str] = set()
+        while paths and start not in seen:
+            path = paths.pop(0)
+            for target in sorted(arrows.get(path[-1], ())):
+                if target == start:
+                    found.append(" -> ".join([*path, start]))
+                    seen |= set(path)
+                    paths.clear()
+                    break
+                if target not in visited:
+                    visited.add(target)
+                    paths.append([*path, target])
+    return found
+
+
+def large_folders(root: Path) -> list[str]:
+    """Folders of more modules than one sees at a glance, and prefixes that should be a folder."""
+    complaints = []
+    modules = [path for path in modules_of(root, PACKAGES) if path.name != "__init__.py"]
+    for folder in sorted({path.parent for path in modules}):
+        here = [path.stem for path in modules if path.parent == folder]
+        name = folder.relative_to(root).as_posix()
+        if name not in KINDS and len(here) > MOST_MODULES:
+            complaints.append(f"{name}: {len(here)} modules")
+        prefixes = Counter(stem.partition("_")[0] for stem in here if "_" in stem)
+        if name not in KINDS:
+            complaints += [f"{name}: {n} modules {prefix}_*" for prefix, n in prefixes.items() if n > 2]
+    return complaints
 
 
 def silent_folders(root: Path) -> list[str]:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.engine.code import code_identity
+from pipelines.engine.actions.code import code_identity
 
 ROOT = Path(__file__).resolve().parents[1]
 STEPS = ("simulate_scan", "simulate_capture", "ingest", "ingest_background", "extract")
@@ -34,7 +34,7 @@ DISPATCHED = {
 }  # fmt: skip
 """NumPy's functions that take other instructions on other processors, with other last digits."""
 
-ONLY_FOR_OTHERS = {"footscan.surface.mesh", "footscan.surface.formats.threemf"}
+ONLY_FOR_OTHERS = {"footscan.mesh.mesh", "footscan.mesh.formats.threemf"}
 """Modules that are reached by import, for meshes that are read from files; the angles and colours of meshes, which they
 compute so, go into no film."""
 
@@ -42,7 +42,9 @@ compute so, go into no film."""
 def test_films_captures_and_stripes_use_what_is_the_same_everywhere() -> None:
     modules = sorted({module for step in STEPS for module in code_identity(f"pipelines.steps.{step}").modules})
     footscan = [module for module in modules if module.startswith("footscan.") and module not in ONLY_FOR_OTHERS]
-    assert {"footscan.virtual.laser_light", "footscan.stripe.ridge", "footscan.virtual.foot_form"} <= set(footscan)
+    assert {"footscan.virtual.optics.laser_light", "footscan.stripe.ridge", "footscan.virtual.foot.form"} <= set(
+        footscan
+    )
     complaints = []
     for module in footscan:
         path = ROOT.joinpath(*module.split(".")).with_suffix(".py")
@@ -129,11 +131,11 @@ FILM_AND_EXTRACT = """
 import hashlib
 import numpy as np, simplejpeg
 from footscan.stripe.extract import extract_stripe
-from footscan.virtual.capture import prism
-from footscan.virtual.foot import make_foot
-from footscan.virtual.reference import standard_reference
-from footscan.virtual.renderers import Shot, Studio
-from footscan.virtual.scene import MATT_GREY, SKIN, Mesh
+from footscan.virtual.filming.capture import prism
+from footscan.virtual.foot.foot import make_foot
+from footscan.virtual.stage.reference import standard_reference
+from footscan.virtual.filming.renderers import Shot, Studio
+from footscan.virtual.optics.scene import MATT_GREY, SKIN, Mesh
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.parameters.simulation import SimulationSettings
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.capture.frame_clock import FrameTimes
+from footscan.capture.board.heads import Travel
+from footscan.capture.board.position_log import PositionLog
+from footscan.capture.cameras.frame_clock import FrameTimes
 from footscan.capture.frame_positions import STANDING_MM, FramePositions, Timed, frame_positions
 from footscan.capture.head_motion import HeadMotion, HeadReports, smooth_motion
-from footscan.capture.heads import Travel
 from footscan.capture.passes import FilmTally
-from footscan.capture.position_log import PositionLog
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

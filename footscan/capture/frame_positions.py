@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.capture.head_motion import HeadMotion
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

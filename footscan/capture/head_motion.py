@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -16,7 +16,7 @@ import numpy as np
 
 from footscan.frames.image import Rgb
 from footscan.stripe.extract import extract_stripe
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 from schemas.parameters.extraction import ExtractionParameters
 
 Look = Callable[[float, Mapping[int, float]], Mapping[int, Sequence[Rgb]]]

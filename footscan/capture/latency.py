@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from footscan.capture.head_motion import HeadMotion
 from footscan.capture.pass_agreement import Agreement, Prior, Seen, agree
 from footscan.stripe.points import StripePoints
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 
 Floats = NDArray[np.float64]
 

@@ -6,11 +6,11 @@ from collections import defaultdict
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
-from footscan.capture.camera_deck import CameraDeck
-from footscan.capture.camera_stream import CapturedFrame
-from footscan.capture.frame_clock import FrameTimes
-from footscan.capture.heads import Heads, Travel
-from schemas.errors import Fault
+from footscan.capture.board.heads import Heads, Travel
+from footscan.capture.cameras.deck import CameraDeck
+from footscan.capture.cameras.frame_clock import FrameTimes
+from footscan.capture.cameras.stream import CapturedFrame
+from schemas.base.errors import Fault
 
 DARK_SECONDS = 0.4
 """How long heads stand in the dark before and after: several frames of a slow camera."""

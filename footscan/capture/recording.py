@@ -19,7 +19,7 @@ import yaml
 
 from footscan.frames.ingest import FRAME_SIZE, FrameWriter, make_group
 from footscan.frames.partial import partial_folder, sweep
-from schemas.errors import Fault, RefusedInput
+from schemas.base.errors import Fault, RefusedInput
 from schemas.frames import GROUP, FrameManifest
 from schemas.scan import Scan
 

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from footscan.cloud.points import PLANE_MM, coordinates, stripe_step
-from footscan.cloud.voxels import EMPTY, MOST_CELLS, voxelise
 from footscan.compiled import compiled
+from footscan.mesh.voxels import EMPTY, MOST_CELLS, voxelise
 
 CELL_MM = 1.0
 """What is static stays within cells of this size and those around them."""

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.maps import is_supported, to_world
+from footscan.calibration.models.maps import is_supported, to_world
 from footscan.cloud.points import make_points
 from footscan.cloud.uncertainty import predicted_deviations, standard_deviations
 from footscan.stripe.points import StripePoints
+from schemas.base.errors import RefusedInput
 from schemas.calibration import CameraCalibration
-from schemas.errors import RefusedInput
 from schemas.parameters.mapping import MappingParameters
 
 Mask = NDArray[np.bool_]

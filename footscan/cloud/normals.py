@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from footscan.cloud.planes import SUMS, add_point, plane_normal
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.cloud.views import View
-from footscan.cloud.voxels import EMPTY, voxelise
 from footscan.compiled import compiled
-from schemas.errors import Finding
+from footscan.mesh.voxels import EMPTY, voxelise
+from schemas.base.errors import Finding
 from schemas.parameters.normals import NormalParameters
 
 Floats = NDArray[np.float64]

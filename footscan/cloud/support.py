@@ -9,8 +9,8 @@ from footscan.cloud.points import coordinates, stripe_step
 from footscan.cloud.segments import segments_of
 from footscan.cloud.views import View
 from footscan.cloud.visibility import CONFIRMED, DENIED, ask_others, cameras_near, sight_of
-from footscan.cloud.voxels import EMPTY, Voxels, voxelise
 from footscan.compiled import compiled
+from footscan.mesh.voxels import EMPTY, Voxels, voxelise
 from schemas.parameters.outliers import OutlierParameters
 
 Ints = NDArray[np.int32]

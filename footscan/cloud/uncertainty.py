@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.maps import model_of, prediction_covariance
+from footscan.calibration.models.maps import model_of, prediction_covariance
 from footscan.stripe.points import StripePoints
 from schemas.calibration import CameraCalibration
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from footscan.calibration.maps import IMAGE_PX, to_world
-from footscan.calibration.pose import camera_centres
+from footscan.calibration.models.maps import IMAGE_PX, to_world
+from footscan.calibration.models.pose import camera_centres
 from schemas.calibration import CameraCalibration
 
 Floats = NDArray[np.float64]

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from footscan.cloud.planes import SUMS, add_point, plane_normal
 from footscan.cloud.views import View
-from footscan.cloud.voxels import EMPTY, Voxels
 from footscan.compiled import compiled
+from footscan.mesh.voxels import EMPTY, Voxels
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

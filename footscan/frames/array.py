@@ -6,9 +6,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from schemas.errors import DamagedError, Fault, RefusedInput
+from schemas.base.errors import DamagedError, Fault, RefusedInput
+from schemas.base.limits import BeyondLimitError, read_bounded, refuse_beyond
 from schemas.frames import FrameManifest
-from schemas.limits import BeyondLimitError, read_bounded, refuse_beyond
 
 METADATA = "zarr.json"
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from footscan.frames.array import damage, is_complete, read_manifest, stored_bytes
 from footscan.frames.image import SUFFIXES, Rgb, decode_image, image_size, pixel_buffer, refused_image
-from schemas.errors import Fault, RefusedInput
-from schemas.limits import read_bounded, refuse_beyond
+from schemas.base.errors import Fault, RefusedInput
+from schemas.base.limits import read_bounded, refuse_beyond
 
 if TYPE_CHECKING:
     from av.container import InputContainer

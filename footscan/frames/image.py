@@ -12,19 +12,19 @@ import simplejpeg
 from numpy.typing import NDArray
 from PIL import Image
 
-from schemas.errors import RefusedInput
-from schemas.limits import BeyondLimitError, beyond, limit, read_bounded
+from schemas.base.errors import RefusedInput
+from schemas.base.limits import BeyondLimitError, beyond, limit, read_bounded
 
 Rgb = NDArray[np.uint8]
 """(rows, columns, 3) uint8: red, green, blue."""
 
-Image.MAX_IMAGE_PIXELS = None  # `schemas.limits` bounds them; Pillow's own guard would warn at half of its bound
+Image.MAX_IMAGE_PIXELS = None  # `schemas.base.limits` bounds them; Pillow's own guard would warn at half of its bound
 SUFFIXES = (".jpg", ".jpeg", ".png")
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 class TooManyPixelsError(ValueError):
-    """An image beyond its bound, see `schemas.limits`."""
+    """An image beyond its bound, see `schemas.base.limits`."""
 
 
 def refused_image(path: Path, error: ValueError) -> RefusedInput:

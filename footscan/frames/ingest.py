@@ -17,11 +17,11 @@ from zarr.errors import ContainsGroupError
 
 from footscan.frames.array import METADATA, chunk_name, is_recorded
 from footscan.frames.codec import ImageCodec
-from footscan.frames.film import Film, encoded_frames, frame_digest, open_film, pixel_frames
+from footscan.frames.film import Film, encoded_frames, frame_digest, open_background, open_film, pixel_frames
 from footscan.frames.partial import make_partial, move_into_place, partial_folder, sweep
-from schemas.errors import Fault, RefusedInput
+from schemas.base.errors import Fault, RefusedInput
+from schemas.base.limits import read_bounded
 from schemas.frames import FrameManifest
-from schemas.limits import read_bounded
 
 FRAME_SIZE = (480, 640)
 """(rows, columns) of a recorded scan's frames."""
@@ -117,6 +117,18 @@ class FrameWriter:
         manifest = FrameManifest(encoding="image", height=size[0], width=size[1], frames=digests)
         _describe(_create_array(self._folder, "image", (frames, *size)), manifest, film)
         return manifest
+
+
+def ingest_background(background: Path, array: Path, frames: int) -> FrameManifest:
+    """`ingest_film` for the background of a film of so many `frames`.
+
+    Raises
+    ------
+    RefusedInput
+        As in `ingest_film` and `open_background`.
+    """
+    open_background(background, FRAME_SIZE, frames)
+    return ingest_film(background, array)
 
 
 def make_group(folder: Path) -> None:

@@ -11,9 +11,9 @@ import zarr
 from footscan.frames.array import METADATA, chunk_name, damage, stored_bytes
 from footscan.frames.film import decode_or_none, frame_digest
 from footscan.frames.image import Rgb, pixel_buffer
-from schemas.errors import DamagedError
+from schemas.base.errors import DamagedError
+from schemas.base.limits import read_bounded
 from schemas.frames import FrameManifest
-from schemas.limits import read_bounded
 
 _Reader = Callable[[int], bytes | Rgb | None]
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.errors import RefusedInput
-from schemas.limits import refuse_beyond
+from schemas.base.errors import RefusedInput
+from schemas.base.limits import refuse_beyond
 from schemas.scan import Travel
 from schemas.tables import finite, read_records
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.landmarks_extreme import Summit
-from footscan.measure.landmarks_sides import (
+from footscan.measure.landmarks.extreme import Summit
+from footscan.measure.landmarks.sides import (
     HEEL_MM,
     HEEL_SIDE,
     foremost,
@@ -15,9 +15,9 @@ from footscan.measure.landmarks_sides import (
     outermost,
     pternion,
 )
-from footscan.measure.landmarks_toes import tip_near, toe_tips
-from footscan.measure.place import apply, low_height, turn_about_z
-from schemas.errors import Finding
+from footscan.measure.landmarks.toes import tip_near, toe_tips
+from footscan.mesh.rigid_transform import apply, low_height, turn_about_z
+from schemas.base.errors import Finding
 from schemas.measures import Axis
 
 Floats = NDArray[np.float64]

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
+from footscan.measure.foot_landmarks import Landmark
 from footscan.measure.frame import FootFrame
-from footscan.measure.landmark_errors import saddle_gradient, summit_gradient
-from footscan.measure.landmarks import Landmark
-from footscan.measure.landmarks_dorsal import CORNER_MM
-from footscan.measure.landmarks_sides import FULL_SIZE_MM
+from footscan.measure.landmarks.dorsal import CORNER_MM
+from footscan.measure.landmarks.errors import saddle_gradient, summit_gradient
+from footscan.measure.landmarks.sides import FULL_SIZE_MM
 from footscan.measure.outline import Outline, Plane, smooth_outline
 from footscan.measure.quantity import NotThere, Quantity
 from footscan.measure.roughness import roughness
-from footscan.measure.sections import Cuttable, Loop, cut, cuttable
-from footscan.surface.topology import vertex_normals
+from footscan.mesh.sections import Cuttable, Loop, cut, cuttable
+from footscan.mesh.topology import vertex_normals
 
 Floats = NDArray[np.float64]
 _Taken = TypeVar("_Taken")

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.measure.axis import along_axis
-from footscan.measure.dense_points import dense_points
-from footscan.measure.landmarks_toes import FOREFOOT, STRIP_MM
-from footscan.measure.place import apply, low_height
+from footscan.measure.landmarks.dense_points import dense_points
+from footscan.measure.landmarks.toes import FOREFOOT, STRIP_MM
 from footscan.measure.pose import Pose, find_pose
-from footscan.surface.topology import keep_large_components, used_vertices
-from schemas.errors import Finding
+from footscan.mesh.rigid_transform import apply, low_height
+from footscan.mesh.topology import keep_large_components, used_vertices
+from schemas.base.documents import Side
+from schemas.base.errors import Finding
 from schemas.measures import Axis
-from schemas.scan import Side
 
 Floor = Literal["glass", "sole", "resting"]
 Floats = NDArray[np.float64]

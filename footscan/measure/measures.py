@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from footscan.measure import girths, linear, plantar, solid
+from footscan.measure.foot_landmarks import Landmark, find_landmarks
 from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame import FootFrame, foot_frame
-from footscan.measure.landmarks import Landmark, find_landmarks
-from footscan.measure.place import apply
 from footscan.measure.quantity import NotThere, Quantity
+from footscan.mesh.rigid_transform import apply
 from footscan.rows import distinct_rows
+from schemas.base.documents import Side
 from schemas.measures import Axis, Measure, MeasuredLandmark, Measures, Place, Status, Unit
-from schemas.scan import Side
 
 Floats = NDArray[np.float64]
 

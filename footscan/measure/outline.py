@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.fft import fft, fftfreq, ifft, next_fast_len
 
 from footscan.compiled import compiled
-from footscan.measure.sections import Loop
+from footscan.mesh.sections import Loop
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

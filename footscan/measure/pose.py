@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from footscan.compiled import compiled
-from footscan.measure.sections import face_neighbours
-from footscan.surface.topology import vertex_normals_and_areas
-from schemas.errors import Finding
+from footscan.mesh.sections import face_neighbours
+from footscan.mesh.topology import vertex_normals_and_areas
+from schemas.base.errors import Finding
 
 Floats = NDArray[np.float64]
 

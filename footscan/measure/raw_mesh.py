@@ -9,11 +9,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
 from footscan.measure.frame import CONVEX
-from footscan.measure.place import apply
 from footscan.measure.pose import find_pose, volume
+from footscan.mesh.rigid_transform import apply
+from footscan.mesh.topology import directed_edges, face_components, used_vertices
 from footscan.rows import distinct_rows
-from footscan.surface.topology import directed_edges, face_components, used_vertices
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 
 Floats = NDArray[np.float64]
 Faces = NDArray[np.int32]

@@ -9,7 +9,7 @@ from footscan.compiled import compiled
 from footscan.measure.foot_surface import CLOSED_GAP_MM, FootSurface
 from footscan.measure.girths import EXCESS_POWER
 from footscan.measure.quantity import NotThere, Quantity, combined
-from footscan.measure.sections import Cuttable
+from footscan.mesh.sections import Cuttable
 
 Floats = NDArray[np.float64]
 

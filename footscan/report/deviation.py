@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from footscan.mesh.formats.files import Shape
 from footscan.report.colours import colour_limit, distance_colours
 from footscan.report.render import png_bytes
 from footscan.report.surface_views import PIXELS_PER_MM, render_view, upright, views_of
-from footscan.surface.export import Shape
 from footscan.verify.distances import Distances
 from footscan.verify.regions import FootRegions
-from schemas.errors import RefusedInput
-from schemas.scan import Side
+from schemas.base.documents import Side
+from schemas.base.errors import RefusedInput
 
 SEEN_MM = (1.0, 2000.0)
 """How large a thing may be that is drawn three pixels a mm."""

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from footscan.compiled import compiled
-from footscan.surface.topology import vertex_normals
+from footscan.mesh.topology import vertex_normals
 
 _SAMPLES = 2  # a pixel is the mean of 2 x 2 samples: smooth outlines
 _LIGHT = np.array([-0.35, 0.5, 0.79]) / np.linalg.norm([-0.35, 0.5, 0.79])

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.mesh.topology import vertex_normals
 from footscan.report.markup import data_uri, number, text
 from footscan.report.render import png_bytes, render_mesh
-from footscan.surface.topology import vertex_normals
-from schemas.scan import Side
+from schemas.base.documents import Side
 
 PIXELS_PER_MM = 3.0
 _MARGIN_MM = 8.0

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.mesh.mesh import Mesh, used
 from footscan.report.markup import text
 from footscan.surface.collapse import collapse_edges
 from footscan.surface.decimate import outermost
-from footscan.surface.mesh import Mesh, used
 
 _MOST_TRIANGLES = 12_000
 """They have no more than 36,000 corners, so 16 bits number them; some 150 kB on the page."""

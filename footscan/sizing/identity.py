@@ -1,6 +1,6 @@
 """Whose feet they are: what may stand side by side, and what is a mix-up."""
 
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
 from schemas.pairs import Sighting
 

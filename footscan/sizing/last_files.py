@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import get_args
 
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
+from schemas.base.limits import refuse_beyond
 from schemas.lasts import Last, LastMeasure, LastSide
-from schemas.limits import refuse_beyond
 from schemas.tables import finite, read_records
 
 MEASURES: tuple[LastMeasure, ...] = get_args(LastMeasure)

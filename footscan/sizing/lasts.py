@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from footscan.sizing.readings import Known, known
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
 from schemas.lasts import Allowance, Deviation, Last, LastFit, LastMeasure, LastRules, LastSide, RankedLast, Ranking
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from datetime import date
 
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
 
 

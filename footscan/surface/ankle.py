@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.mesh.topology import largest_component, used_vertices
 from footscan.surface.holes import rims
 from footscan.surface.patch import patch_over
-from footscan.surface.topology import largest_component, used_vertices
 
 Floats = NDArray[np.float64]
 Faces = NDArray[np.int32]

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from footscan.cloud.cells import cell_means, group_by_cell
+from footscan.mesh.cells import cell_means, group_by_cell
+from footscan.mesh.topology import drop_tangles, keep_large_components, used_vertices
 from footscan.surface.holes import close_holes
 from footscan.surface.projection import project
-from footscan.surface.topology import drop_tangles, keep_large_components, used_vertices
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 from schemas.parameters.surface import SurfaceParameters
 
 REPAIRS = (0.0, 0.0)

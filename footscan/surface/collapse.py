@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
-from footscan.surface.topology import directed_edges, edge_counts
+from footscan.mesh.topology import directed_edges, edge_counts
 
 TOWARDS_EVEN = 1e-7
 """Weight of a vertex's own place against the planes of its triangles: where the surface is flat, it decides."""

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.mesh.mesh import Mesh
 from footscan.surface.collapse import collapse_edges
-from footscan.surface.mesh import Mesh
 
 SLAB_MM = 5.0
 """Of each such length of the foot the outermost vertices stay: heel, toes, ball, instep and sole are among them."""

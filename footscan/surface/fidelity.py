@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from footscan.measure.sections import cut, cuttable
+from footscan.mesh.mesh import Mesh
+from footscan.mesh.sampling import sample_surface
+from footscan.mesh.sections import cut, cuttable
 from footscan.surface.decimate import footprint_axes
-from footscan.surface.mesh import Mesh
-from footscan.surface.sampling import sample_surface
 
 STATIONS = (0.25, 0.50, 0.62, 0.75)
 """Shares of the length, from the heel, where girths are compared: behind the ankle's front, instep, waist, ball."""

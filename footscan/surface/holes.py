@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import distance_matrix
 
+from footscan.mesh.topology import directed_edges
 from footscan.surface.patch import fair, patch_over
-from footscan.surface.topology import directed_edges
 
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int32]

@@ -14,9 +14,9 @@ from scipy import fft, ndimage
 from skimage.measure import marching_cubes
 
 from footscan.compiled import compiled
-from footscan.surface.buckets import sort_into_cubes
-from footscan.surface.topology import largest_component, used_vertices
-from schemas.errors import Finding
+from footscan.mesh.buckets import sort_into_cubes
+from footscan.mesh.topology import largest_component, used_vertices
+from schemas.base.errors import Finding
 
 MARGIN_BLURS = 8.0
 """Room around the points, where the function falls to that of the outside."""

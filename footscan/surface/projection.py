@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
-from footscan.surface.buckets import sort_into_cubes
+from footscan.mesh.buckets import sort_into_cubes
 
 STEEPEST = 0.35
 """Sine of the angle between surface and stripe planes below which neighbouring stripes count as no farther apart: what

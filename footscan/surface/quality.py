@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.mesh.topology import edge_counts, face_components
 from footscan.surface.ankle import faces_on_cut
 from footscan.surface.holes import perimeter, rims
-from footscan.surface.topology import edge_counts, face_components
 from schemas.quality import MeshQuality
 
 Floats = NDArray[np.float64]

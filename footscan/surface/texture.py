@@ -12,9 +12,9 @@ from scipy.sparse.linalg import splu
 from footscan.cloud.colour import CLIPPED_WEIGHT, as_level, camera_gains, is_clipped
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.compiled import compiled
+from footscan.mesh.buckets import Buckets, sort_into_cubes
+from footscan.mesh.topology import directed_edges
 from footscan.surface.ankle import faces_on_cut
-from footscan.surface.buckets import Buckets, sort_into_cubes
-from footscan.surface.topology import directed_edges
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

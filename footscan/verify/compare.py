@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.place import apply
-from footscan.surface.export import Shape
-from footscan.surface.mesh import Mesh
-from footscan.surface.sampling import sample_surface, surface_area
+from footscan.mesh.formats.files import Shape
+from footscan.mesh.mesh import Mesh
+from footscan.mesh.rigid_transform import apply
+from footscan.mesh.sampling import sample_surface, surface_area
 from footscan.verify.distances import Distances, SearchedMesh, check_places, distances_to_cloud, distances_to_mesh
 from footscan.verify.histogram import histogram
 from footscan.verify.regions import REGIONS, FootRegions, foot_regions
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 from schemas.quality import Comparison, Completeness, Figures, RegionFigures
 
 SAMPLES = 200_000

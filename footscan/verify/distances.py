@@ -6,9 +6,9 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.surface.export import Shape
+from footscan.mesh.formats.files import Shape
 from footscan.verify.pseudonormals import Sides, sides
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 
 BLOCK = 100_000
 """Points a query; it bounds the memory."""

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from footscan.surface.export import Shape
-from footscan.surface.topology import directed_edges, edge_counts
+from footscan.mesh.formats.files import Shape
+from footscan.mesh.topology import directed_edges, edge_counts
 
 Floats = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.mesh.formats.files import Shape
+from footscan.mesh.topology import face_components
 from footscan.rows import distinct_rows
-from footscan.surface.export import Shape
-from footscan.surface.topology import face_components
 
 SOLID_SHARE = 0.02
 """Volume over area^1.5 from which a mesh is a body with an inside; a ball has 0.094, a foot 0.05, a sheet 0."""

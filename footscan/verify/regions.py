@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.measure.frame import foot_frame
-from footscan.measure.place import apply
-from footscan.surface.export import Shape
-from footscan.surface.sampling import surface_area
+from footscan.mesh.formats.files import Shape
+from footscan.mesh.rigid_transform import apply
+from footscan.mesh.sampling import surface_area
 from footscan.verify.distances import by_blocks
-from schemas.errors import Finding
-from schemas.scan import Side
+from schemas.base.documents import Side
+from schemas.base.errors import Finding
 
 TOES = 0.80
 """The longest toe begins about here; its ball, at 0.56 to 0.80 of the length, is behind."""

@@ -7,15 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from footscan.cloud.cells import group_by_cell
-from footscan.surface.export import Shape
-from footscan.surface.sampling import sample_surface, surface_area
+from footscan.mesh.cells import group_by_cell
+from footscan.mesh.formats.files import Shape
+from footscan.mesh.sampling import sample_surface, surface_area
 from footscan.verify.ambiguity import evidence, patches_of, stiffness
 from footscan.verify.coarse import candidates, distinct, sketch, start_poses
 from footscan.verify.icp import SETTLED_MM, Poses, capped_squares, fit_of, settle
 from footscan.verify.nearest import CloudSurface, Floats, MeshSurface, Surface
-from schemas.documents import Document
-from schemas.errors import Finding
+from schemas.base.documents import Document
+from schemas.base.errors import Finding
 from schemas.parameters.registration import RegistrationParameters
 
 DEFAULTS = RegistrationParameters()

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.output import AsJson, figure, keep_inputs, message, print_json, print_line, print_table
-from schemas.errors import Finding, RefusedInput, one_line
+from pipelines.cli.terminal.output import AsJson, figure, keep_inputs, message, print_json, print_line, print_table
+from schemas.base.errors import Finding, RefusedInput, one_line
 
 if TYPE_CHECKING:
-    from footscan.surface.export import Shape
-    from footscan.surface.mesh import Mesh
+    from footscan.mesh.formats.files import Shape
+    from footscan.mesh.mesh import Mesh
     from footscan.verify.register import Registration
     from schemas.quality import Comparison
 
@@ -38,10 +38,10 @@ def compare(
     as_json: AsJson = False,
 ) -> None:
     """Distances of one surface to another, in millimetres; both in one frame, or brought there by --register."""
-    from footscan.report.comparison_csv import comparison_csv
-    from footscan.surface.export import read_file
+    from footscan.mesh.formats.files import read_file
+    from footscan.report.comparison.table import comparison_csv
     from footscan.verify import compare as verify
-    from pipelines.engine.atomic import write_atomically
+    from pipelines.engine.files.atomic import write_atomically
 
     keep_inputs([csv_file, coloured, report], result, reference)
     if coloured is not None and coloured.suffix.lower() != ".ply":
@@ -110,11 +110,11 @@ def _show(
     report: Path | None,
 ) -> None:
     """Writes what is looked at."""
-    from footscan.report.comparison_page import comparison_page
+    from footscan.report.comparison.page import comparison_page
     from footscan.report.deviation import deviation_of, deviation_pictures, deviation_ply
     from footscan.verify.compare import cloud_normals, vertex_distances
     from footscan.verify.regions import foot_regions
-    from pipelines.engine.atomic import write_atomically
+    from pipelines.engine.files.atomic import write_atomically
 
     first, second = _shape(a), _shape(b)
     distances = vertex_distances(first, second, normals_a=cloud_normals(a), normals_b=cloud_normals(b))

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pipelines.cli.output import message, print_line, print_table
-from pipelines.cli.results import print_measures
+from pipelines.cli.foot.measure import print_measures
+from pipelines.cli.terminal.output import message, print_line, print_table
 
 if TYPE_CHECKING:
     from pipelines.engine.pool import OnStepEnd
@@ -43,7 +43,7 @@ def demo(
 
 @contextmanager
 def _watch(part: str, to_run: int, steps: int) -> "Iterator[OnStepEnd]":
-    from pipelines.cli.progress import StepProgress
+    from pipelines.cli.terminal.progress import StepProgress
 
     message(f"{part}: {to_run} of {steps} steps to run")
     with StepProgress(to_run) as progress:

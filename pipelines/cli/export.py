@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pipelines.cli.output import AsJson, figure, keep_inputs, message, print_json, print_table
-from schemas.errors import RefusedInput, one_line
+from pipelines.cli.terminal.output import AsJson, figure, keep_inputs, message, print_json, print_table
+from schemas.base.errors import RefusedInput, one_line
 
 if TYPE_CHECKING:
+    from footscan.mesh.mesh import Mesh
     from footscan.surface.fidelity import Fidelity
-    from footscan.surface.mesh import Mesh
     from schemas.quality import MeshQuality
 
 FLOOR_MM = 1.0
@@ -41,14 +41,14 @@ def export(
     """Write a foot's mesh for another program, with fewer triangles if it wants that."""
     from dataclasses import replace
 
+    from footscan.mesh.formats.files import WRITERS, mesh_bytes, read_file
+    from footscan.mesh.mesh import on_floor, outward, used, with_normals
     from footscan.surface.decimate import decimate
-    from footscan.surface.export import WRITERS, mesh_bytes, read_file
     from footscan.surface.fidelity import fidelity
-    from footscan.surface.mesh import on_floor, outward, used, with_normals
     from footscan.surface.quality import mesh_quality
-    from pipelines.engine.atomic import write_atomically
+    from pipelines.engine.files.atomic import write_atomically
     from pipelines.version import SOFTWARE
-    from schemas.documents import pseudonym
+    from schemas.base.documents import pseudonym
 
     suffix = out.suffix.lower()
     if suffix not in WRITERS:

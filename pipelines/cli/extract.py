@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.output import AsJson, keep_inputs, message, print_json
-from schemas.errors import RefusedInput
+from pipelines.cli.terminal.output import AsJson, keep_inputs, message, print_json
+from schemas.base.errors import RefusedInput
 
 if TYPE_CHECKING:
     from footscan.frames.film import Film
@@ -57,8 +57,8 @@ def extract(
     """Find the laser stripe: one sub-pixel point a row of frame,i,j,width,peak,score."""
     from footscan.frames.film import film_files, open_film, pixel_frames
     from footscan.stripe.film import extract_film, points_csv
-    from pipelines.engine.atomic import write_atomically
-    from schemas.overrides import overridden
+    from pipelines.engine.files.atomic import write_atomically
+    from schemas.base.overrides import overridden
     from schemas.parameters.extraction import ExtractionParameters
 
     parameters = overridden(ExtractionParameters, {}, settings or [])
@@ -106,7 +106,7 @@ def _backgrounds(path: Path, film: "Film") -> "Iterable[Rgb | None]":
 
 def _check_outputs(out: Path | None, overlay: Path | None, sources: Sequence[Path]) -> None:
     """Refuses what cannot be written, or would replace the other output, or be a frame to the next run."""
-    from pipelines.engine.atomic import is_stream
+    from pipelines.engine.files.atomic import is_stream
 
     if out is not None and not is_stream(out):
         if out.suffix.lower() not in {".csv", ""}:
@@ -154,7 +154,7 @@ class _Seen:
 
 def _drawn(film: "Film", points: "StripePoints", lost: list[int], about: str) -> bytes:
     from footscan.frames.film import pixel_frames
-    from footscan.report.stripe_figure import film_figure, frame_figure
+    from footscan.report.scan.stripe_figure import film_figure, frame_figure
 
     frames = pixel_frames(film)
     if film.frames == 1 and (frame := next(frames)) is not None:

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pipelines.cli.output import AsJson, message, print_json, print_table
-from schemas.errors import Fault, RefusedInput
+from pipelines.cli.terminal.output import AsJson, message, print_json, print_table
+from schemas.base.errors import Fault, RefusedInput
 
 if TYPE_CHECKING:
     from schemas.parameters.simulation import SimulationSettings
@@ -42,11 +42,11 @@ def simulate_scan(
     laser_off: Annotated[bool, typer.Option("--laser-off", help="Also film with the laser off: backgrounds.")] = False,
 ) -> None:
     """Film a mesh that stands on the glass, in the middle of the travel."""
-    from footscan.virtual.record import record_scan
-    from footscan.virtual.standing import BLOCK_TURN_DEG
-    from pipelines.cli.progress import frame_progress
+    from footscan.virtual.filming.record import record_scan
+    from footscan.virtual.stage.standing import BLOCK_TURN_DEG
+    from pipelines.cli.terminal.progress import frame_progress
     from pipelines.virtual_objects import stand_in_the_middle, virtual_object
-    from schemas.documents import pseudonym
+    from schemas.base.documents import pseudonym
 
     if [mesh is not None, foot is not None, block].count(True) != 1:
         raise RefusedInput("simulate scan", "expected one of MESH, --foot and --block")
@@ -82,9 +82,9 @@ def simulate_capture(
     scanner_seed: ScannerSeed = 1,
 ) -> None:
     """Film the reference object in its placements, and write the chart of its corners as a person would click them."""
-    from footscan.virtual.capture import record_capture
-    from footscan.virtual.reference import read_reference, standard_reference
-    from pipelines.cli.progress import frame_progress
+    from footscan.virtual.filming.capture import record_capture
+    from footscan.virtual.stage.reference import read_reference, standard_reference
+    from pipelines.cli.terminal.progress import frame_progress
 
     _check_empty(out)
     filmed = standard_reference() if reference is None else read_reference(reference)
@@ -108,7 +108,7 @@ def ingest(
     as_json: AsJson = False,
 ) -> int:
     """Films to Zarr: one array a camera in frames.zarr beside the films, the camera's JPEG bytes as they are."""
-    from pipelines.ingest import ingest_scans
+    from pipelines.archive.ingest import ingest_scans
 
     ends = ingest_scans(folders)
     if as_json:

@@ -7,35 +7,16 @@ import sys
 
 import typer
 
-from footscan.capture.way_out import EndedBySignal
-from pipelines.cli import (
-    cache,
-    calibration,
-    compare,
-    config,
-    console,
-    demo,
-    devices,
-    export,
-    extract,
-    films,
-    forget,
-    lasts,
-    pairs,
-    regress,
-    results,
-    runs,
-    scan_live,
-    sizes,
-    trace,
-    tune,
-    verify,
-    why,
-)
-from pipelines.cli.output import LogFormatter, drop_unwritten, message
-from pipelines.engine.access import keep_private
-from schemas.errors import Fault, FootscanError, RefusedInput, one_line
-from schemas.limits import check_limits
+from footscan.capture.board.termination import EndedBySignal
+from pipelines.cli import compare, demo, export, extract, films, regress, tune, verify
+from pipelines.cli.archive import cache, config, forget, run, trace, why
+from pipelines.cli.calibrate import app as calibration
+from pipelines.cli.foot import lasts, measure, pairs, sizes
+from pipelines.cli.live import console, devices, scan
+from pipelines.cli.terminal.output import LogFormatter, drop_unwritten, message
+from pipelines.engine.files.access import keep_private
+from schemas.base.errors import Fault, FootscanError, RefusedInput, one_line
+from schemas.base.limits import check_limits
 
 INTERRUPTED = 130
 MOST_OTHERS = 19
@@ -57,8 +38,8 @@ app.command("ingest")(films.ingest)
 app.command("extract")(extract.extract)
 app.add_typer(calibration.calibrate, name="calibrate")
 app.command("map")(calibration.map_pixels)
-app.command("run")(runs.run)
-app.command("plan")(runs.plan)
+app.command("run")(run.run)
+app.command("plan")(run.plan)
 app.add_typer(config.config, name="config")
 app.command("tune")(tune.tune)
 app.command("why")(why.why)
@@ -66,7 +47,7 @@ app.command("trace")(trace.trace)
 app.add_typer(cache.cache, name="cache")
 app.command("forget")(forget.forget)
 app.command("regress")(regress.regress)
-app.command("measure")(results.measure)
+app.command("measure")(measure.measure)
 app.command("sizes")(sizes.sizes)
 app.command("pair")(pairs.pair)
 app.command("change")(pairs.change)
@@ -75,9 +56,9 @@ app.command("compare")(compare.compare)
 app.command("export")(export.export)
 app.add_typer(verify.verify, name="verify")
 app.command("devices")(devices.devices)
-app.command("home")(scan_live.home)
-app.command("jog")(scan_live.jog)
-app.command("scan")(scan_live.scan)
+app.command("home")(scan.home)
+app.command("jog")(scan.jog)
+app.command("scan")(scan.scan)
 app.command("console")(console.console)
 
 

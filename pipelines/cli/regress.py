@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.output import AsJson, keep_inputs, message, print_json, print_line, print_table
-from schemas.errors import RefusedInput, one_line
+from pipelines.cli.terminal.output import AsJson, keep_inputs, message, print_json, print_line, print_table
+from schemas.base.errors import RefusedInput, one_line
 
 if TYPE_CHECKING:
-    from footscan.report.regress_result import JudgedFigure, JudgedSet
     from pipelines.engine.pool import OnStepEnd
     from pipelines.regression.night import Night
+    from pipelines.regression.report.result import JudgedFigure, JudgedSet
     from schemas.regression import Acceptance
 
 SUITE = Path("regression/suite.yaml")
@@ -56,8 +56,8 @@ def regress(
     with _progress() as on_step_end:
         night = run_night(regression, on_step_end, _tell, acceptance)
     if junit is not None:
-        from pipelines.engine.atomic import write_atomically
-        from pipelines.regression.junit import junit_xml
+        from pipelines.engine.files.atomic import write_atomically
+        from pipelines.regression.report.junit import junit_xml
 
         write_atomically(junit, junit_xml(night.result))
     if as_json:
@@ -80,7 +80,7 @@ def _check(out: Path, age: str, *, as_json: bool) -> int:
 
 def _acceptance(reason: str, accepted_by: str | None) -> "Acceptance":
     from pipelines.version import SOFTWARE
-    from schemas.documents import validate
+    from schemas.base.documents import validate
     from schemas.regression import Acceptance
 
     if not reason.strip():
@@ -103,7 +103,7 @@ def _login() -> str:
 
 @contextmanager
 def _progress() -> "Iterator[OnStepEnd]":
-    from pipelines.cli.progress import StepProgress
+    from pipelines.cli.terminal.progress import StepProgress
 
     with StepProgress(0) as progress:
         yield progress.on_step_end
@@ -111,7 +111,7 @@ def _progress() -> "Iterator[OnStepEnd]":
 
 def _tell(one: "JudgedSet") -> None:
     """A line for each set as it ends."""
-    from footscan.report.regress_result import VERDICTS
+    from pipelines.regression.report.result import VERDICTS
 
     counts = ", ".join(f"{one.count(verdict)} {verdict}" for verdict in VERDICTS if one.count(verdict))
     message(f"{one.name}: {counts or 'no figures'}" + (f"; {one_line(one.problem)}" if one.problem else ""))

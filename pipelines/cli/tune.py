@@ -3,9 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.cli.output import AsJson, figure, message, print_json, print_line, print_table
-from pipelines.cli.runs import WORKFLOW, Settings, WorkflowFile, with_settings
-from pipelines.cli.workers import (
+from pipelines.cli.archive.run import WORKFLOW, Settings, WorkflowFile, with_settings
+from pipelines.cli.archive.workers import (
     ClusterAddress,
     Dashboard,
     Placement,
@@ -16,10 +15,11 @@ from pipelines.cli.workers import (
     Workers,
     chosen_pool,
 )
-from schemas.errors import Fault, RefusedInput
+from pipelines.cli.terminal.output import AsJson, figure, message, print_json, print_line, print_table
+from schemas.base.errors import Fault, RefusedInput
 
 if TYPE_CHECKING:
-    from footscan.report.tune_result import Gain, Trial
+    from pipelines.tuning.report.result import Gain, Trial
     from pipelines.tuning.search import Tuned
 
 
@@ -39,11 +39,11 @@ def tune(
 
     What has been computed before is not computed again; a search that was interrupted goes on where it was.
     """
-    from pipelines.archive import job_of_workflow
-    from pipelines.cli.progress import StepProgress
+    from pipelines.archive.job import job_of_workflow
+    from pipelines.archive.workflow_file import read_workflow
+    from pipelines.cli.terminal.progress import StepProgress
     from pipelines.tuning.files import write_files
     from pipelines.tuning.search import FOLDER, tune
-    from pipelines.workflow_file import read_workflow
 
     placement = Placement(threads, workers, cluster, dashboard, (tls_ca, tls_cert, tls_key))
     placement.check()
@@ -78,7 +78,7 @@ def _tell_trial(trial: "Trial") -> None:
 
 
 def _print(tuned: "Tuned", folder: Path) -> None:
-    from footscan.report.tune_page import sentences
+    from pipelines.tuning.report.page import sentences
 
     result = tuned.result
     present = result.trials[0].point

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.output import AsJson, figure, print_json, print_line, print_table
-from schemas.errors import Finding, RefusedInput, one_line
+from pipelines.cli.terminal.output import AsJson, figure, print_json, print_line, print_table
+from schemas.base.errors import Finding, RefusedInput, one_line
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from footscan.verify.stripe_ends import Sights
+    from footscan.verify.shapes.stripe_ends import Sights
     from schemas.fits import CuboidDimension, CuboidFit, SphereFit
 
 THESIS_NOMINAL = (150.0, 100.0, 50.0)
@@ -40,7 +40,7 @@ def block(
     as_json: AsJson = False,
 ) -> None:
     """Fit the faces of a cuboid: dimensions, angles and flatness, beside the thesis's Table 6-1."""
-    from footscan.verify.cuboid import fit_cuboid
+    from footscan.verify.shapes.cuboid import fit_cuboid
     from schemas.fits import CuboidParameters
 
     true = _dimensions(nominal)
@@ -71,7 +71,7 @@ def sphere(
     as_json: AsJson = False,
 ) -> None:
     """Fit spheres of one known diameter, in several places of the volume, as ISO 20685-2 tests scanners."""
-    from footscan.verify.sphere import find_spheres
+    from footscan.verify.shapes.sphere import find_spheres
 
     found: list[tuple[Path, SphereFit]] = []
     for file in files:
@@ -108,8 +108,8 @@ def _cloud_of(scan: Path) -> Path:
 
 def _points(file: Path) -> "NDArray[np.float64]":
     """The points of a cloud, or points spread over a mesh."""
-    from footscan.surface.export import read_shape
-    from footscan.surface.sampling import sample_surface
+    from footscan.mesh.formats.files import read_shape
+    from footscan.mesh.sampling import sample_surface
 
     vertices, faces = read_shape(file)
     return sample_surface(vertices, faces, SAMPLES) if len(faces) else vertices
@@ -117,14 +117,14 @@ def _points(file: Path) -> "NDArray[np.float64]":
 
 def _sights_of(cloud: Path) -> "Sights | None":
     """What each camera saw before the fusion, as the store above a cloud has it; None where that is not there."""
-    from footscan.calibration.pose import camera_centres
+    from footscan.calibration.models.pose import camera_centres
     from footscan.cloud.points import coordinates
-    from footscan.verify.stripe_ends import Sights
-    from pipelines.archive import CACHE
+    from footscan.verify.shapes.stripe_ends import Sights
+    from pipelines.archive.job import CACHE
     from pipelines.arrays import unpack
-    from pipelines.cli.cache import open_place
-    from pipelines.engine.digest import sha256
+    from pipelines.cli.archive.cache import open_place
     from pipelines.engine.explain import inputs_of
+    from pipelines.engine.files.digest import sha256
     from schemas.calibration import Calibration
 
     folder = cloud.resolve().parent

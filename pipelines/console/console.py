@@ -7,13 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
-from pipelines.console.charge import Charge
 from pipelines.console.guidance import guidance
+from pipelines.console.operator_lock import Charge
 from pipelines.console.presence import Presence
 from pipelines.console.scanner import Scanner, Side
 from pipelines.console.sitting import ScannedFoot, Sitting, judged
-from schemas.documents import pseudonym
-from schemas.errors import FootscanError, RefusedInput
+from schemas.base.documents import pseudonym
+from schemas.base.errors import FootscanError, RefusedInput
 
 log = logging.getLogger("footscan.console")
 

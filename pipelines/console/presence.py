@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-from schemas.errors import Fault, FootscanError
+from schemas.base.errors import Fault, FootscanError
 
 GONE_SECONDS = 0.5
 """A page that is not heard of for so long is gone: closed, cut off, or it hangs. Its script speaks every 0.15 s."""

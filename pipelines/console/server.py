@@ -24,21 +24,21 @@ from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route
 from starlette.types import Receive, Scope, Send
 
-from footscan.capture.way_out import ending_signals
+from footscan.capture.board.termination import ending_signals
 from footscan.report.style import STYLE
 from footscan.report.viewer_script import SCRIPT
 from pipelines.console.console import Console
-from pipelines.console.foot_page import foot_page
 from pipelines.console.gate import LARGEST_HEAD, Gate, Stop, hand_over_to
 from pipelines.console.guard import LARGEST_BODY, PAGE, PAGE_HEADER, Guard, Rules
-from pipelines.console.live_picture import LivePictures
-from pipelines.console.pair_page import pair_page
-from pipelines.console.results import KINDS, open_result, shown, version_of
+from pipelines.console.pages.foot import foot_page
+from pipelines.console.pages.live_picture import LivePictures
+from pipelines.console.pages.pair import pair_page
+from pipelines.console.pages.results import KINDS, open_result, shown, version_of
+from pipelines.console.pages.sitting import sitting_page
 from pipelines.console.scanner import Side
-from pipelines.console.sitting_page import sitting_page
 from pipelines.console.stopping import stop_asked
-from schemas.documents import Document, Pseudonym
-from schemas.errors import Fault, FootscanError, RefusedInput
+from schemas.base.documents import Document, Pseudonym
+from schemas.base.errors import Fault, FootscanError, RefusedInput
 
 _Made = TypeVar("_Made")
 

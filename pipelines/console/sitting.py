@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from footscan.report.quality_lights import Level, quality_lights, worst
-from pipelines.console.results import read_measures, read_quality
+from pipelines.console.pages.results import read_measures, read_quality
 from pipelines.console.scanner import Scanned
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Any
 from pipelines.console.console import Console
 from pipelines.console.gate import Headers
 from pipelines.console.guard import Rules
-from schemas.errors import FootscanError, RefusedInput
+from schemas.base.errors import FootscanError, RefusedInput
 
 CONFIRM_SECONDS = 0.15
 """How long the answer waits for the board."""

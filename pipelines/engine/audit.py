@@ -9,19 +9,20 @@ from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
-from pipelines.engine.digest import BROKEN, sealed, sha256, unsealed
-from pipelines.engine.key import image_text, key_of
-from pipelines.engine.lease import FOLDER as LEASES
-from pipelines.engine.lease import leases
-from pipelines.engine.pins import FOLDER as PINS
-from pipelines.engine.pins import read_pin
+from pipelines.engine.actions.key import image_text, key_of
+from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
+from pipelines.engine.files.digest import sha256
+from pipelines.engine.files.seal import BROKEN, sealed, unsealed
+from pipelines.engine.files.secret import make_secret
 from pipelines.engine.plan import Plan, without_places
 from pipelines.engine.run import content_of
-from pipelines.engine.seal import make_secret
-from pipelines.engine.step import Failure, Outcome, Output, Step, Success
-from pipelines.engine.store import Store, latest_name
+from pipelines.engine.store.lease import FOLDER as LEASES
+from pipelines.engine.store.lease import leases
+from pipelines.engine.store.pins import FOLDER as PINS
+from pipelines.engine.store.pins import read_pin
+from pipelines.engine.store.store import Store, latest_name
 from pipelines.engine.trace import blob_digest, row_key
-from schemas.errors import DamagedError, Finding, RefusedInput
+from schemas.base.errors import DamagedError, Finding, RefusedInput
 
 log = logging.getLogger("footscan.store")
 

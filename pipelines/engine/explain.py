@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pipelines.engine.code import CodeIdentity, code_identity
-from pipelines.engine.key import PreImage
-from pipelines.engine.step import Output, Step, Value
-from pipelines.engine.store import Store, plain_hex
+from pipelines.engine.actions.code import CodeIdentity, code_identity
+from pipelines.engine.actions.key import PreImage
+from pipelines.engine.actions.step import Output, Step, Value
+from pipelines.engine.store.store import Store, plain_hex
 
 GONE = "its result is gone"
 BETWEEN = ("...", "...")

@@ -9,11 +9,11 @@ from enum import Enum
 from pathlib import Path
 from typing import NamedTuple
 
+from pipelines.engine.actions.key import image_text, key_of
+from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.explain import changes, reason
-from pipelines.engine.key import image_text, key_of
-from pipelines.engine.memory import Known
-from pipelines.engine.step import Failure, Outcome, Output, Step, Success
-from pipelines.engine.store import Store
+from pipelines.engine.store.store import Store
+from pipelines.engine.store.verified_index import Known
 
 NO_SEAL = "its row bears no seal of the store's owner"
 

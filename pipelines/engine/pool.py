@@ -4,6 +4,7 @@ Tasks hand over digests, never arrays; a worker reads and writes the store itsel
 """
 
 import logging
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -13,9 +14,9 @@ from multiprocessing import resource_tracker
 from typing import Any, Protocol
 from uuid import uuid4
 
-from pipelines.engine.step import Failure, Outcome, Step
+from pipelines.engine.actions.step import Failure, Outcome, Step
 from pipelines.engine.tls import SCHEME, Certificates, security_of
-from schemas.errors import RefusedInput, one_line
+from schemas.base.errors import RefusedInput, one_line
 
 log = logging.getLogger("footscan.run")
 
@@ -273,3 +274,8 @@ def _with(task: Task, outcomes: Mapping[str, Outcome]) -> Task:
     known = {name: outcomes[name] for name in task.waits_for if name in outcomes}
     waits_for = tuple(name for name in task.waits_for if name not in known)
     return replace(task, before={**task.before, **known}, waits_for=waits_for)
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

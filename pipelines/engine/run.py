@@ -12,16 +12,16 @@ from contextlib import contextmanager
 from functools import partial
 from weakref import WeakValueDictionary
 
-from pipelines.engine.code import CodeIdentity, code_identity
-from pipelines.engine.digest import file_state
-from pipelines.engine.files import Files
-from pipelines.engine.key import image_text, key_of
+from pipelines.engine.actions.code import CodeIdentity, code_identity
+from pipelines.engine.actions.key import image_text, key_of
+from pipelines.engine.actions.step import Failure, Input, Outcome, Output, SourceFile, Step, Success, Value
+from pipelines.engine.files.digest import file_state
+from pipelines.engine.files.places import Files
 from pipelines.engine.plan import Plan, cached_outcome, without_places
 from pipelines.engine.pool import OnStepEnd, Pool, StepEnd, Task
-from pipelines.engine.step import Failure, Input, Outcome, Output, SourceFile, Step, Success, Value
-from pipelines.engine.store import Row, Store
-from schemas.errors import DamagedError, Fault, Finding, RefusedInput, one_line
-from schemas.limits import BeyondLimitError
+from pipelines.engine.store.store import Row, Store
+from schemas.base.errors import DamagedError, Fault, Finding, RefusedInput, one_line
+from schemas.base.limits import BeyondLimitError
 
 log = logging.getLogger("footscan.run")
 

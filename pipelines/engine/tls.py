@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from schemas.errors import RefusedInput, one_line
+from schemas.base.errors import RefusedInput, one_line
 
 SCHEME = "tls://"
 

@@ -6,9 +6,9 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from pipelines.engine.explain import code_of, inputs_of, kind_of
-from pipelines.engine.store import Latest, Row, Store
-from schemas.documents import parse_json
-from schemas.errors import RefusedInput
+from pipelines.engine.store.store import Latest, Row, Store
+from schemas.base.documents import parse_json
+from schemas.base.errors import RefusedInput
 
 
 @dataclass(frozen=True)

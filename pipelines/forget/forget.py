@@ -6,21 +6,21 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.archive import CACHE, Job
-from pipelines.engine.digest import FileDigests
-from pipelines.engine.files import LocalFiles
-from pipelines.engine.lease import Lease, lease, live_leases
-from pipelines.engine.store import Store, open_store
+from pipelines.archive.job import CACHE, Job
+from pipelines.engine.files.file_digests import FileDigests
+from pipelines.engine.files.places import LocalFiles
+from pipelines.engine.store.erasure_notes import FOLDER, note_name
+from pipelines.engine.store.lease import Lease, lease, live_leases
+from pipelines.engine.store.store import Store, open_store
 from pipelines.forget.nights import Nights, erase_nights, find_nights
-from pipelines.forget.notes import FOLDER, note_name
 from pipelines.forget.proof import find_remains
 from pipelines.forget.shares import Shares, find_shares
 from pipelines.forget.subject import Belongings, Subject, find_belongings
 from pipelines.forget.tables import erase_from_text, rewrite_tables, texts_that_name
 from pipelines.regression.night import Regression
 from pipelines.scan import DELIVERED
-from schemas.documents import canonical_json, parse_json
-from schemas.errors import Fault
+from schemas.base.documents import canonical_json, parse_json
+from schemas.base.errors import Fault
 
 CHECK_EVERY = 50
 """Files that are erased between two looks for runs that have begun meanwhile."""

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipelines.engine.atomic import write_atomically
+from pipelines.engine.files.atomic import write_atomically
 from pipelines.forget.subject import Subject
 from pipelines.regression.baseline import forget_sets
 from pipelines.regression.history import FILE, alone

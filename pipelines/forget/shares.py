@@ -3,11 +3,11 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from pipelines.engine.collect import reached
 from pipelines.engine.explain import code_of, inputs_of
-from pipelines.engine.pins import FOLDER as PINS
-from pipelines.engine.pins import read_pins
-from pipelines.engine.store import Store, blob_name, latest_name, row_name
+from pipelines.engine.garbage_collection import reached
+from pipelines.engine.store.pins import FOLDER as PINS
+from pipelines.engine.store.pins import read_pins
+from pipelines.engine.store.store import Store, blob_name, latest_name, row_name
 from pipelines.engine.trace import Actions, blob_digest, read_actions, row_key
 from pipelines.forget.subject import Subject
 

@@ -7,9 +7,9 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.recorded import read_scan, scan_folders
-from schemas.documents import pseudonym
-from schemas.errors import FootscanError, RefusedInput
+from pipelines.recordings.scans import read_scan, scan_folders
+from schemas.base.documents import pseudonym
+from schemas.base.errors import FootscanError, RefusedInput
 from schemas.frames import GROUP
 
 CHUNK = re.compile(r"\d+\.0\.0\.0").fullmatch

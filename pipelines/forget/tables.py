@@ -5,14 +5,14 @@ import json
 from collections.abc import Collection
 from pathlib import Path
 
-from pipelines.archive import ScanEnd
-from pipelines.archive_page import FILES, PAGE
-from pipelines.engine.atomic import write_atomically
+from pipelines.archive.job import ScanEnd
+from pipelines.archive.page import FILES, PAGE
+from pipelines.archive.table import CSV, PARQUET, write_results_table
+from pipelines.engine.files.atomic import write_atomically
 from pipelines.forget.subject import Subject
-from pipelines.recorded import read_scan, scan_folders
-from pipelines.results_table import CSV, PARQUET, write_results_table
+from pipelines.recordings.scans import read_scan, scan_folders
 from pipelines.scan import DELIVERED
-from schemas.errors import FootscanError, RefusedInput
+from schemas.base.errors import FootscanError, RefusedInput
 from schemas.scan import Scan
 
 TUNE = "tune"

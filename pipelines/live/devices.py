@@ -6,14 +6,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from footscan.capture.camera_devices import CameraDevice, list_cameras
-from footscan.capture.camera_source import CameraSource
+from footscan.capture.board.heads import Head
+from footscan.capture.cameras.devices import CameraDevice, list_cameras
+from footscan.capture.cameras.source import CameraSource
+from footscan.capture.cameras.usb_bus import Pass, UsbCamera, plan_passes
+from footscan.capture.cameras.usb_topology import usb_place
 from footscan.capture.film_frames import CameraTiming
 from footscan.capture.frame_positions import Timed
-from footscan.capture.heads import Head
-from footscan.capture.usb_bus import Pass, UsbCamera, plan_passes
-from footscan.capture.usb_topology import usb_place
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 from schemas.rig import Rig, RigCamera
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from footscan.capture.film_frames import is_on_time, motion_of_head
-from footscan.capture.grbl_settings import BoardSettings
+from footscan.capture.grbl.settings import BoardSettings
 from footscan.capture.latency import Latency, estimate_latency
 from footscan.capture.latency import Pass as LatencyPass
 from footscan.capture.passes import FilmedPass, PassPlan, film_name
@@ -21,7 +21,7 @@ from footscan.stripe.film import extract_film
 from pipelines.live.devices import passes_of
 from pipelines.live.light import ScanLight
 from pipelines.live.scanner import LiveScanner
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 from schemas.frames import GROUP
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.rig import Rig, RigLatency

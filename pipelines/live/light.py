@@ -6,13 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from footscan.capture.camera_deck import CameraDeck
-from footscan.capture.camera_stream import CapturedFrame
-from footscan.capture.heads import Heads
+from footscan.capture.board.heads import Heads
+from footscan.capture.cameras.deck import CameraDeck
+from footscan.capture.cameras.stream import CapturedFrame
+from footscan.capture.cameras.video_controls import ControlValues, FixedControl, controls_of
 from footscan.capture.laser_light import LightLimits, choose_light
-from footscan.capture.video_controls import ControlValues, FixedControl, controls_of
 from footscan.frames.image import Rgb, decode_image
-from schemas.errors import Fault
+from schemas.base.errors import Fault
 from schemas.rig import Rig
 
 MAINS: dict[int, Literal[0, 50, 60]] = {0: 0, 50: 50, 60: 60}

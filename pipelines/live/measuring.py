@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipelines.archive import job_of_scan, plan_job, run_job
+from pipelines.archive.job import job_of_scan, plan_job, run_job
 from pipelines.engine.pool import StepEnd, Threads
-from schemas.errors import Fault
+from schemas.base.errors import Fault
 from schemas.measures import Measures
 
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import yaml
 
-from pipelines.engine.atomic import write_atomically
-from schemas.documents import read_yaml
+from pipelines.engine.files.atomic import write_atomically
+from schemas.base.documents import read_yaml
 from schemas.rig import Rig
 
 

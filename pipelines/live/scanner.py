@@ -11,20 +11,21 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from footscan.capture.camera_deck import CameraDeck
-from footscan.capture.camera_stream import CapturedFrame
-from footscan.capture.heads import HEADS, SLACK_MM, Heads
+from footscan.capture.board.heads import HEADS, SLACK_MM, Heads
+from footscan.capture.board.position_log import Triple
+from footscan.capture.cameras.deck import CameraDeck
+from footscan.capture.cameras.stream import CapturedFrame
+from footscan.capture.cameras.usb_bus import Pass
 from footscan.capture.passes import FilmedPass, PassPlan, film_name, film_pass
-from footscan.capture.position_log import Triple
 from footscan.capture.recording import ScanRecording
-from footscan.capture.usb_bus import Pass
 from pipelines.live.devices import heads_of, passes_of, sources_of, timing_of
 from pipelines.live.light import ScanLight, fix_light, measured_light
-from pipelines.live.looking_on import looking_on
 from pipelines.live.measuring import Measured, measure_scan
+from pipelines.live.observer import looking_on
+from pipelines.live.recording_document import ScanStory
 from pipelines.live.state import Activity, OnState, ScannerState, StateBoard, with_board
-from pipelines.live.storing import FilmedScan, ScanName, ScanStory, store_scan
-from schemas.errors import Fault, FootscanError, RefusedInput
+from pipelines.live.storing import FilmedScan, ScanName, store_scan
+from schemas.base.errors import Fault, FootscanError, RefusedInput
 from schemas.rig import Rig
 
 FRAME_BYTES = 40_000

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from footscan.capture.board_state import BoardState
-from schemas.errors import FootscanError, RefusedInput
+from footscan.capture.board.state import BoardState
+from schemas.base.errors import FootscanError, RefusedInput
 
 log = logging.getLogger("footscan.live")
 

@@ -1,13 +1,12 @@
 """What was filmed, into the archive: films with their places, scan.yaml, and how it all came about."""
 
 import datetime
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from footscan.capture.board.heads import Heads
 from footscan.capture.film_frames import (
-    CameraTiming,
     FilmFrames,
     motion_of_head,
     nearest_frames,
@@ -15,16 +14,10 @@ from footscan.capture.film_frames import (
     standing_frame,
 )
 from footscan.capture.frame_positions import write_positions
-from footscan.capture.heads import Heads
-from footscan.capture.passes import FilmedPass, PassPlan, film_name
-from footscan.capture.position_log import Triple
+from footscan.capture.passes import FilmedPass, film_name
 from footscan.capture.recording import ScanRecording
-from footscan.capture.usb_bus import Pass
-from footscan.capture.video_controls import FixedControl
-from pipelines.live.devices import timing_of
-from pipelines.live.light import ScanLight
-from pipelines.live.told import recording_document
-from schemas.errors import Finding, FootscanError, RefusedInput
+from pipelines.live.recording_document import ScanStory, recording_document
+from schemas.base.errors import Finding, FootscanError, RefusedInput
 from schemas.frames import GROUP
 from schemas.rig import Rig, RigCamera
 from schemas.scan import Scan
@@ -52,26 +45,6 @@ class FilmedScan:
     """Of each camera that is in it."""
     left_out: dict[int, str] = field(default_factory=dict)
     """Cameras that are not, and why."""
-
-
-@dataclass
-class ScanStory:
-    """How a scan came about, for recording.json."""
-
-    started: datetime.datetime
-    light: ScanLight
-    passes: Sequence[Pass]
-    plan: PassPlan
-    filmed: list[FilmedPass] = field(default_factory=list)
-    """As `passes`."""
-    fixed: dict[int, list[FixedControl]] = field(default_factory=dict)
-    """What each camera made of its settings."""
-    lost_steps_mm: Triple | None = None
-    """How far heads 1, 2, 3 were off after the last travel, by their home switches."""
-
-    def timing(self, camera: RigCamera) -> CameraTiming:
-        """What is known of the times of a camera in the light of the scan."""
-        return timing_of(camera, self.light.exposure_ms.get(camera.id))
 
 
 def store_scan(

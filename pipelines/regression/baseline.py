@@ -7,10 +7,10 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from pipelines.engine.atomic import write_atomically
-from pipelines.regression.figures import rounded
-from schemas.documents import read_yaml
-from schemas.errors import RefusedInput
+from pipelines.engine.files.atomic import write_atomically
+from pipelines.regression.figures.of_scan import rounded
+from schemas.base.documents import read_yaml
+from schemas.base.errors import RefusedInput
 from schemas.regression import Acceptance, AcceptedStep, AcceptedSteps, Baseline
 
 HEAD = (

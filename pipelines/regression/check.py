@@ -4,11 +4,11 @@ import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from footscan.report.regress_page import with_notice
-from pipelines.engine.atomic import write_atomically
+from pipelines.engine.files.atomic import write_atomically
 from pipelines.regression.history import read_history
 from pipelines.regression.night import PAGE
-from schemas.errors import RefusedInput
+from pipelines.regression.report.page import with_notice
+from schemas.base.errors import RefusedInput
 
 _UNITS = {"m": timedelta(minutes=1), "h": timedelta(hours=1), "d": timedelta(days=1)}
 

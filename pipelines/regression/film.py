@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.virtual.foot import make_foot
-from footscan.virtual.record import record_scan
-from pipelines.engine.digest import sha256
+from footscan.virtual.filming.record import record_scan
+from footscan.virtual.foot.foot import make_foot
+from pipelines.engine.files.digest import sha256
 from pipelines.virtual_objects import stand_in_the_middle
 from schemas.parameters.virtual_scan import VirtualScan
 

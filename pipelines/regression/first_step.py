@@ -8,12 +8,12 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from footscan.report.regress_result import Change, FirstStep, JudgedFigure
+from pipelines.engine.actions.key import image_text, key_of
+from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.audit import input_digests
 from pipelines.engine.explain import changes, side_by_side
-from pipelines.engine.key import image_text, key_of
-from pipelines.engine.step import Failure, Outcome, Output, Step, Success
-from pipelines.engine.store import Store
+from pipelines.engine.store.store import Store
+from pipelines.regression.report.result import Change, FirstStep, JudgedFigure
 from schemas.regression import AcceptedStep
 
 FILMED_FROM = {"ingest": "film", "background": "film"}

@@ -7,11 +7,9 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Literal
 
-from footscan.report.regress_page import regress_page
-from footscan.report.regress_result import Accepted, JudgedSet, NightResult, Verdict
-from pipelines.engine.atomic import write_atomically
-from pipelines.engine.lease import lease
+from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.pool import OnStepEnd
+from pipelines.engine.store.lease import lease
 from pipelines.regression.baseline import (
     read_baseline,
     read_good_steps,
@@ -19,17 +17,19 @@ from pipelines.regression.baseline import (
     write_baseline,
     write_good_steps,
 )
-from pipelines.regression.costs import cost_figures, keeps_most
+from pipelines.regression.figures.costs import cost_figures, keeps_most
+from pipelines.regression.figures.timed import take_times
+from pipelines.regression.figures.verdict import judge_figures
 from pipelines.regression.first_step import KnownSteps, costly_steps, first_steps
 from pipelines.regression.history import History, alone, append, gaps, night_name, read_history
 from pipelines.regression.pictures import difference_pictures
+from pipelines.regression.report.page import regress_page
+from pipelines.regression.report.result import Accepted, JudgedSet, NightResult, Verdict
 from pipelines.regression.run_set import SetRun, run_set
 from pipelines.regression.sets import parameters_of, prepare, store_of
-from pipelines.regression.timed import take_times
-from pipelines.regression.verdict import judge_figures
 from pipelines.version import SOFTWARE
-from schemas.documents import read_yaml
-from schemas.errors import Fault, FootscanError, RefusedInput
+from schemas.base.documents import read_yaml
+from schemas.base.errors import Fault, FootscanError, RefusedInput
 from schemas.regression import Acceptance, AcceptedStep, Baseline, NightBegun, NightEnded, Suite
 
 PAGE = "index.html"

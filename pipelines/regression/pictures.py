@@ -5,14 +5,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from footscan.mesh.formats.files import Shape
 from footscan.report.deviation import deviation_of, deviation_pictures
-from footscan.surface.export import Shape
 from footscan.verify.compare import vertex_distances
 from footscan.verify.regions import foot_regions
-from pipelines.engine.store import Store
-from pipelines.regression.delivered import shape_of
+from pipelines.engine.store.store import Store
+from pipelines.regression.figures.delivered import shape_of
 from pipelines.regression.first_step import KnownSteps
-from schemas.errors import FootscanError
+from schemas.base.errors import FootscanError
 
 LAST_GOOD = "that of the last good night"
 SHAPES = ("surface", "orient")

@@ -3,18 +3,18 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from pipelines.archive import Job, PlannedJob, ScanEnd, draw_steps, plan_job, run_job
+from pipelines.archive.job import Job, PlannedJob, ScanEnd, draw_steps, plan_job, run_job
+from pipelines.engine.actions.step import Outcome, Step, Success
 from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import OnStepEnd, Threads
-from pipelines.engine.step import Outcome, Step, Success
-from pipelines.engine.store import Store
-from pipelines.recorded import read_scan
-from pipelines.regression.costs import cost_figures, unsteady
-from pipelines.regression.delivered import MADE_OF, delivered_figures
-from pipelines.regression.figures import result_figures
+from pipelines.engine.store.store import Store
+from pipelines.recordings.scans import read_scan
+from pipelines.regression.figures.costs import cost_figures, unsteady
+from pipelines.regression.figures.delivered import MADE_OF, delivered_figures
+from pipelines.regression.figures.of_scan import result_figures
+from pipelines.regression.figures.timed import Pass, take_times
 from pipelines.regression.first_step import PresentStep, present_steps
 from pipelines.regression.sets import PreparedSet
-from pipelines.regression.timed import Pass, take_times
 
 
 @dataclass(frozen=True)

@@ -6,24 +6,25 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pipelines.archive import Job, cores
-from pipelines.calibration_choice import CalibrationPlace
-from pipelines.deliver import deliver
-from pipelines.engine.digest import FileDigests, sha256
+from pipelines.archive.job import Job
+from pipelines.engine.actions.step import Outcome, Step
+from pipelines.engine.deliver import deliver
+from pipelines.engine.files.digest import sha256
+from pipelines.engine.files.file_digests import FileDigests
 from pipelines.engine.plan import make_plan
-from pipelines.engine.pool import OnStepEnd, Threads
+from pipelines.engine.pool import OnStepEnd, Threads, cores
 from pipelines.engine.run import run_plan
-from pipelines.engine.step import Outcome, Step
-from pipelines.engine.store import Store, open_store
-from pipelines.filming import calibration_steps, digests_of
-from pipelines.recorded import SCAN_FILE
+from pipelines.engine.store.store import Store, open_store
+from pipelines.recordings.calibration_choice import CalibrationPlace
+from pipelines.recordings.scans import SCAN_FILE
 from pipelines.regression.film import PATIENT
-from schemas.documents import canonical_json, validate
-from schemas.errors import Fault, RefusedInput
+from pipelines.simulate import calibration_steps, digests_of
+from schemas.base.documents import canonical_json, validate
+from schemas.base.errors import Fault, RefusedInput
+from schemas.parameters.scan import ScanParameters
 from schemas.parameters.simulation import SimulationSettings
 from schemas.parameters.virtual_scan import VirtualScan
 from schemas.regression import Suite
-from schemas.workflow import ScanParameters
 
 OF_A_RECORDING = SimulationSettings().model_dump(include={"seed", "start_mm", "step_mm", "frames", "ambient"})
 """What differs from recording to recording: a scanner is calibrated once, in ordinary light."""

@@ -4,11 +4,11 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from pipelines.archive import cores
 from pipelines.calibrate import calibrate_capture
-from pipelines.captures import CAPTURE_FILE, read_capture
-from pipelines.engine.digest import sha256
-from schemas.errors import DamagedError
+from pipelines.engine.files.digest import sha256
+from pipelines.engine.pool import cores
+from pipelines.recordings.captures import CAPTURE_FILE, read_capture
+from schemas.base.errors import DamagedError
 from schemas.parameters.calibration import CaptureCalibrationParameters
 
 

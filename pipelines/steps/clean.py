@@ -9,8 +9,8 @@ import numpy as np
 from footscan.cloud.outliers import remove_outliers
 from footscan.cloud.views import views_of
 from pipelines.arrays import pack, unpack
+from schemas.base.errors import Finding
 from schemas.calibration import Calibration
-from schemas.errors import Finding
 from schemas.parameters.outliers import OutlierParameters
 
 

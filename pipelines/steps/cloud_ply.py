@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from footscan.cloud.points import coordinates
-from footscan.surface.formats.ply import ply_of
-from footscan.surface.mesh import Mesh
+from footscan.mesh.formats.ply import ply_of
+from footscan.mesh.mesh import Mesh
 from pipelines.arrays import unpack
 
 

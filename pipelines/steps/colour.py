@@ -8,7 +8,7 @@ from footscan.frames.image import Rgb
 from footscan.frames.ingest import discard
 from footscan.frames.reader import read_frame
 from pipelines.arrays import pack, unpack
-from schemas.errors import DamagedError
+from schemas.base.errors import DamagedError
 from schemas.frames import FrameManifest
 
 

@@ -11,7 +11,7 @@ from footscan.frames.ingest import discard
 from footscan.frames.reader import read_frames
 from footscan.stripe.film import extract_film
 from pipelines.arrays import pack
-from schemas.errors import DamagedError
+from schemas.base.errors import DamagedError
 from schemas.frames import FrameManifest
 from schemas.parameters.extraction import ExtractionParameters
 

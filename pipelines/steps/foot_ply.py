@@ -4,8 +4,8 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from footscan.surface.formats.ply import ply_of
-from footscan.surface.mesh import Mesh
+from footscan.mesh.formats.ply import ply_of
+from footscan.mesh.mesh import Mesh
 from pipelines.arrays import unpack
 from schemas.parameters.foot import FootParameters
 

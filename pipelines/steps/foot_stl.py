@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from footscan.surface.formats.stl import stl_bytes
+from footscan.mesh.formats.stl import stl_bytes
 from pipelines.arrays import unpack
 from schemas.parameters.foot import FootParameters
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.cloud.fusion import fuse
+from footscan.cloud.fusion.fuse import fuse
 from pipelines.arrays import pack, unpack
 from schemas.parameters.fusion import FusionParameters
 

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from footscan.frames.film import open_background
-from footscan.frames.ingest import FRAME_SIZE, ingest_film
-from schemas.documents import canonical_json
+from footscan.frames.ingest import ingest_background
+from schemas.base.documents import canonical_json
 from schemas.frames import FrameManifest
 
 
@@ -15,15 +14,3 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     film = FrameManifest.model_validate_json(inputs["manifest"])
     manifest = ingest_background(places["background"], places["array"], len(film.frames))
     return canonical_json(manifest.model_dump(mode="json")).encode()
-
-
-def ingest_background(background: Path, array: Path, frames: int) -> FrameManifest:
-    """`ingest_film` for the background of a film of so many `frames`.
-
-    Raises
-    ------
-    RefusedInput
-        As in `ingest_film` and `open_background`.
-    """
-    open_background(background, FRAME_SIZE, frames)
-    return ingest_film(background, array)

@@ -9,8 +9,8 @@ import numpy as np
 from footscan.cloud.mapping import map_stripe
 from footscan.frames.travel import travelled
 from pipelines.arrays import pack, unpack
+from schemas.base.errors import RefusedInput
 from schemas.calibration import CameraCalibration
-from schemas.errors import RefusedInput
 from schemas.frames import FrameManifest
 from schemas.parameters.mapping import MappingParameters
 from schemas.scan import Travel

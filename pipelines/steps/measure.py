@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from footscan.measure.measures import measure_foot
 from pipelines.arrays import unpack
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 from schemas.measures import Measures
 from schemas.parameters.foot import FootParameters
 

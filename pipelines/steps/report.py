@@ -9,11 +9,11 @@ import numpy as np
 from footscan.frames.ingest import discard
 from footscan.frames.reader import read_frame
 from footscan.report.sample_frames import FrameSample
-from footscan.report.scan_page import scan_page
+from footscan.report.scan.page import scan_page
 from footscan.stripe.points import StripePoints
 from pipelines.arrays import unpack
+from schemas.base.errors import DamagedError
 from schemas.calibration import Calibration
-from schemas.errors import DamagedError
 from schemas.frames import FrameManifest
 from schemas.measures import Measures
 from schemas.parameters.foot import FootParameters

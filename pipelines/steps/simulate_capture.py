@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from footscan.virtual.capture import record_capture
-from footscan.virtual.reference import standard_reference
-from pipelines.engine.digest import sha256
-from schemas.documents import canonical_json
+from footscan.virtual.filming.capture import record_capture
+from footscan.virtual.stage.reference import standard_reference
+from pipelines.engine.files.digest import sha256
+from schemas.base.documents import canonical_json
 from schemas.parameters.simulation import SimulationSettings
 
 PLACEMENTS = 5

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.virtual.foot import make_foot
-from footscan.virtual.record import record_scan
+from footscan.virtual.filming.record import record_scan
+from footscan.virtual.foot.foot import make_foot
 from pipelines.virtual_objects import stand_in_the_middle
 from schemas.parameters.demo import FilmedFoot
 

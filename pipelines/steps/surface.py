@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from footscan.cloud.points import coordinates, stripe_step
+from footscan.mesh.topology import vertex_normals
 from footscan.surface.ball_pivoting import mesh_cloud, nearest_points
 from footscan.surface.closed_surface import close_surface
-from footscan.surface.topology import vertex_normals
 from pipelines.arrays import pack, unpack
 from schemas.parameters.surface import SurfaceParameters
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from footscan.mesh.formats.files import read_mesh
 from footscan.surface.ankle import faces_on_cut
-from footscan.surface.export import read_mesh
 from footscan.verify.compare import compare
 from footscan.verify.distances import SearchedMesh
 from pipelines.arrays import pack, unpack

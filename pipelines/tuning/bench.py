@@ -3,19 +3,19 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from pipelines.archive import WINDOW, PlannedJob, draw_steps
+from pipelines.archive.job import WINDOW, PlannedJob, draw_steps
+from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import OnStepEnd, Pool, StepEnd
 from pipelines.engine.run import run_plan
-from pipelines.engine.step import Failure, Outcome, Output, Step, Success
-from pipelines.recorded import RecordedScan
+from pipelines.recordings.scans import RecordedScan
 from pipelines.scan import source_files
 from pipelines.tuning.clock import Clock
 from pipelines.tuning.objectives import Judged, figures_of, lengths_of
-from schemas.errors import Fault, RefusedInput
+from schemas.base.errors import Fault, RefusedInput
 from schemas.measures import Measures
+from schemas.parameters.scan import ScanParameters
 from schemas.quality import Quality
-from schemas.workflow import ScanParameters
 
 OWN = "tune/"
 """Before the names of the steps: what a trial runs does not become the last that was run of a scan."""

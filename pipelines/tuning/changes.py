@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from footscan.cloud.outliers import KEPT
 from footscan.frames.reader import read_frame
-from footscan.report.stripe_change import change_by_frame
-from footscan.report.tune_result import FrameChange
 from footscan.stripe.points import STRIPE_DTYPE, StripePoints
 from pipelines.arrays import unpack
-from pipelines.recorded import RecordedScan
+from pipelines.recordings.scans import RecordedScan
 from pipelines.tuning.bench import Bench
-from schemas.errors import DamagedError
+from pipelines.tuning.report.result import FrameChange
+from pipelines.tuning.report.stripe_change import change_by_frame
+from schemas.base.errors import DamagedError
 from schemas.frames import FrameManifest
-from schemas.workflow import ScanParameters
+from schemas.parameters.scan import ScanParameters
 
 SCANS, FRAMES = 3, 8
 """How many scans are looked through, and how many frames are shown."""

@@ -7,11 +7,11 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from pipelines.engine.key import image_text, key_of
+from pipelines.engine.actions.key import image_text, key_of
+from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.pool import StepEnd
 from pipelines.engine.run import content_of
-from pipelines.engine.step import Failure, Outcome, Output, Step, Success
-from pipelines.engine.store import Store
+from pipelines.engine.store.store import Store
 
 
 @dataclass

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from pipelines.archive import Job
-from pipelines.engine.digest import sha256
-from pipelines.recorded import RecordedScan, read_scan
-from schemas.errors import RefusedInput
+from pipelines.archive.job import Job
+from pipelines.engine.files.digest import sha256
+from pipelines.recordings.scans import RecordedScan, read_scan
+from schemas.base.errors import RefusedInput
 from schemas.tuning import Tuning
 
 

@@ -8,12 +8,13 @@ from typing import Any
 
 import yaml
 
-from footscan.report.tune_page import tune_page
-from footscan.report.tune_result import Trial, TuneResult
-from pipelines.engine.atomic import write_atomically
-from schemas.documents import canonical_json
+from pipelines.engine.files.atomic import write_atomically
+from pipelines.tuning.report.page import tune_page
+from pipelines.tuning.report.result import Trial, TuneResult
+from schemas.base.documents import canonical_json
+from schemas.parameters.scan import ScanParameters
 from schemas.tables import Cell, csv_text
-from schemas.workflow import ScanParameters, Workflow
+from schemas.workflow import Workflow
 
 BEST, CSV, PARQUET, PAGE = "best.yaml", "trials.csv", "trials.parquet", "index.html"
 

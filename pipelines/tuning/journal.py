@@ -7,10 +7,10 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from pipelines.engine.atomic import write_atomically
-from pipelines.engine.digest import sha256
-from schemas.documents import canonical_json
-from schemas.errors import Fault
+from pipelines.engine.files.atomic import write_atomically
+from pipelines.engine.files.digest import sha256
+from schemas.base.documents import canonical_json
+from schemas.base.errors import Fault
 from schemas.tuning import TriedPoint, TuneJournal, Tuning
 
 

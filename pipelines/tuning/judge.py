@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from footscan.cloud.points import coordinates
-from footscan.surface.export import read_mesh
-from footscan.surface.sampling import sample_surface
+from footscan.mesh.formats.files import read_mesh
+from footscan.mesh.sampling import sample_surface
 from footscan.verify.compare import SAMPLES, WITHIN_MM
 from footscan.verify.distances import distances_to_mesh
 from pipelines.arrays import unpack
-from schemas.documents import canonical_json
+from schemas.base.documents import canonical_json
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from math import sqrt
 from statistics import fmean, variance
 
-from footscan.report.tune_result import Goal
-from pipelines.recorded import RecordedScan
-from schemas.errors import RefusedInput
+from pipelines.recordings.scans import RecordedScan
+from pipelines.tuning.report.result import Goal
+from schemas.base.errors import RefusedInput
 from schemas.measures import Measures
 from schemas.quality import Quality
 from schemas.tuning import Objective

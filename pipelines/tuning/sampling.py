@@ -8,9 +8,9 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
-from pipelines.engine.digest import sha256
+from pipelines.engine.files.digest import sha256
 from pipelines.tuning.space import Point, grid, grid_values, plain
-from schemas.documents import canonical_json
+from schemas.base.documents import canonical_json
 from schemas.tuning import SearchRange, Tuning, is_whole
 
 if TYPE_CHECKING:

@@ -3,25 +3,25 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from footscan.report.tune_result import Gain, Goal, Trial, TuneResult
-from pipelines.archive import Job, PlannedJob, plan_job, share_written
-from pipelines.engine.lease import lease
+from pipelines.archive.job import Job, PlannedJob, plan_job, share_written
 from pipelines.engine.pool import OnStepEnd, Pool
-from pipelines.engine.trust import warn_if_others_can_write
-from pipelines.recorded import RecordedScan
+from pipelines.engine.store.lease import lease
+from pipelines.engine.store.permissions import warn_if_others_can_write
+from pipelines.recordings.scans import RecordedScan
 from pipelines.tuning.bench import Bench
 from pipelines.tuning.changes import frame_changes
 from pipelines.tuning.clock import Clock
 from pipelines.tuning.data import may_be_meant, split
-from pipelines.tuning.front import best_compromise, on_front
 from pipelines.tuning.journal import Journal
 from pipelines.tuning.objectives import FLOORS, Judged, goals_of, mean_of, values_of
+from pipelines.tuning.pareto_front import best_compromise, on_front
+from pipelines.tuning.report.result import Gain, Goal, Trial, TuneResult
 from pipelines.tuning.sampling import proposals_of
 from pipelines.tuning.space import Point, present_point, with_point
-from schemas.documents import canonical_json
-from schemas.errors import RefusedInput
+from schemas.base.documents import canonical_json
+from schemas.base.errors import RefusedInput
+from schemas.parameters.scan import ScanParameters
 from schemas.tuning import TriedPoint, Tuning
-from schemas.workflow import ScanParameters
 
 FOLDER = "tune"
 """In the folder of the results."""

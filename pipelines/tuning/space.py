@@ -5,11 +5,11 @@ from collections.abc import Iterator, Mapping
 from itertools import product
 from typing import Any
 
-from schemas.documents import canonical_json
-from schemas.errors import RefusedInput
-from schemas.overrides import overridden
+from schemas.base.documents import canonical_json
+from schemas.base.errors import RefusedInput
+from schemas.base.overrides import overridden
+from schemas.parameters.scan import ScanParameters
 from schemas.tuning import SearchRange, Tuning, is_whole
-from schemas.workflow import ScanParameters
 
 Point = dict[str, Any]
 """A value of each parameter that is sought, by `section.name`."""

@@ -1,7 +1,6 @@
 """What is known of a foot before it is measured."""
 
-from schemas.documents import Document
-from schemas.scan import Side
+from schemas.base.documents import Document, Side
 
 
 class FootParameters(Document):

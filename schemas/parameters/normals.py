@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from schemas.documents import Document
+from schemas.base.documents import Document
 
 
 class NormalParameters(Document):

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from schemas.documents import Document
+from schemas.base.documents import Document
 
 
 class RegistrationParameters(Document):

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from schemas.documents import Document
+from schemas.base.documents import Document
 
 Radius = Annotated[float, Field(gt=0, le=50)]
 

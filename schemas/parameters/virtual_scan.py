@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from schemas.documents import Document
+from schemas.base.documents import Document
 from schemas.parameters.simulation import SimulationSettings
 
 

@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 from scipy.stats import norm
 
 from footscan.frames.image import decode_image
-from footscan.virtual.sensor import compress, photograph
+from footscan.virtual.optics.sensor import compress, photograph
 from schemas.parameters.simulation import SimulationSettings
 
 Floats = NDArray[np.float64]

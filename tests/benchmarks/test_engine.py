@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.engine.step import Output
+from pipelines.engine.actions.step import Output
 
 
 @pytest.fixture(scope="module")

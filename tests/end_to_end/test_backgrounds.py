@@ -7,10 +7,10 @@ from subprocess import CompletedProcess
 
 import pytest
 
-from footscan.surface.export import read_mesh
-from footscan.virtual.film import write_film
-from footscan.virtual.renderers import Shot, shoot
-from footscan.virtual.scene import SKIN, Mesh
+from footscan.mesh.formats.files import read_mesh
+from footscan.virtual.filming.film import write_film
+from footscan.virtual.filming.renderers import Shot, shoot
+from footscan.virtual.optics.scene import SKIN, Mesh
 from schemas.parameters.simulation import SimulationSettings
 
 Footscan = Callable[..., CompletedProcess[str]]

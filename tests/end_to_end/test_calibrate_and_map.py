@@ -12,7 +12,7 @@ import pytest
 from schemas.calibration import read_calibration
 
 Footscan = Callable[..., CompletedProcess[str]]
-DATA = Path(__file__).parents[1] / "footscan" / "calibration" / "data"
+DATA = Path(__file__).parents[1] / "footscan" / "calibration" / "chart" / "data"
 CHART = DATA / "calibration_charts.csv"
 
 

@@ -11,10 +11,10 @@ import pytest
 import yaml
 from PIL import Image
 
-from footscan.calibration.chart import read_chart
-from footscan.calibration.maps import is_supported, to_world
+from footscan.calibration.chart.chart import read_chart
+from footscan.calibration.models.maps import is_supported, to_world
 from footscan.frames.film import open_film, pixel_frames
-from footscan.virtual.scanner import standard_scanner
+from footscan.virtual.optics.scanner import standard_scanner
 from schemas.calibration import read_calibration
 
 Footscan = Callable[..., CompletedProcess[str]]

@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from PIL import Image
 
-from footscan.virtual.foot import make_foot
+from footscan.virtual.foot.foot import make_foot
 
 Footscan = Callable[..., CompletedProcess[str]]
 TURN = np.deg2rad(100)

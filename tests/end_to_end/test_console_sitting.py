@@ -22,8 +22,8 @@ from chromium import Opened, needs_chromium
 from playwright.sync_api import expect
 from waiting import wait_until
 
-from footscan.virtual.foot import make_foot
-from pipelines.console.results import read_measures
+from footscan.virtual.foot.foot import make_foot
+from pipelines.console.pages.results import read_measures
 
 FOLDER = os.environ.get("FOOTSCAN_SITTING")
 pytestmark = [

@@ -12,7 +12,7 @@ import open3d as o3d
 import pytest
 import trimesh
 
-from footscan.virtual.foot import make_foot
+from footscan.virtual.foot.foot import make_foot
 
 Footscan = Callable[..., CompletedProcess[str]]
 STEP_MM = 4.0

@@ -11,14 +11,14 @@ import trimesh
 
 from footscan.cloud.outliers import KEPT
 from footscan.cloud.points import POINT_DTYPE, make_points
+from footscan.mesh.formats.ply import ply_of
+from footscan.mesh.mesh import Mesh
 from footscan.stripe.points import STRIPE_DTYPE
-from footscan.surface.formats.ply import ply_of
-from footscan.surface.mesh import Mesh
 from footscan.surface.quality import mesh_quality
 from pipelines.arrays import pack, unpack
 from pipelines.steps import fuse, measure, orient, quality, report, surface, verify
+from schemas.base.errors import Finding
 from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
-from schemas.errors import Finding
 from schemas.frames import FrameManifest
 from schemas.parameters.foot import FootParameters
 from schemas.parameters.fusion import FusionParameters

@@ -13,15 +13,15 @@ import trimesh
 from chromium import Opened as OpenedPage
 from chromium import needs_chromium
 
-from footscan.report.comparison_page import comparison_page
+from footscan.report.comparison.page import comparison_page
 from footscan.report.deviation import Deviation
-from footscan.report.regress_page import regress_page
-from footscan.report.regress_result import Accepted, JudgedFigure, JudgedSet, NightResult
-from footscan.report.tune_page import tune_page
-from footscan.report.tune_result import Gain, Goal, Trial, TuneResult
-from pipelines.archive import ScanEnd
-from pipelines.archive_page import FILES, PAGE, write_archive_page
+from pipelines.archive.job import ScanEnd
+from pipelines.archive.page import FILES, PAGE, write_archive_page
 from pipelines.cli.main import run_command
+from pipelines.regression.report.page import regress_page
+from pipelines.regression.report.result import Accepted, JudgedFigure, JudgedSet, NightResult
+from pipelines.tuning.report.page import tune_page
+from pipelines.tuning.report.result import Gain, Goal, Trial, TuneResult
 from schemas.quality import Comparison
 
 pytestmark = needs_chromium
@@ -271,7 +271,7 @@ def archive(measured: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page of four scans of two patients, one of which was refused."""
     folder = tmp_path_factory.mktemp("archive")
     shutil.copytree(measured / "results/P0001/small", folder / "P1/R")
-    from pipelines.recorded import read_scan
+    from pipelines.recordings.scans import read_scan
 
     scan = read_scan(measured / "archive/P0001/small").document
     ends = [

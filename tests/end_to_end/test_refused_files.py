@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from footscan.virtual.foot import make_foot
+from footscan.virtual.foot.foot import make_foot
 
 Footscan = Callable[..., CompletedProcess[str]]
 Mistake = Callable[[CompletedProcess[str]], str]

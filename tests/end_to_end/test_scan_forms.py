@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from footscan.virtual.film import write_film
+from footscan.virtual.filming.film import write_film
 
 Footscan = Callable[..., CompletedProcess[str]]
 Mistake = Callable[[CompletedProcess[str]], str]

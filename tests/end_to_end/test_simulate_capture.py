@@ -7,8 +7,8 @@ from subprocess import CompletedProcess
 import numpy as np
 import pytest
 
-from footscan.virtual.reference import standard_reference
-from pipelines.captures import read_capture
+from footscan.virtual.stage.reference import standard_reference
+from pipelines.recordings.captures import read_capture
 
 Footscan = Callable[..., CompletedProcess[str]]
 Mistake = Callable[[CompletedProcess[str]], str]

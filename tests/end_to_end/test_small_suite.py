@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from footscan.measure.measures import measure_foot
-from footscan.surface.export import read_mesh
+from footscan.mesh.formats.files import read_mesh
 
 ROOT = Path(__file__).parents[2]
 DRAWS = 6

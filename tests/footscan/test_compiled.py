@@ -32,9 +32,10 @@ SIDE_BY_SIDE = """
 import importlib, sys, threading
 sys.setswitchinterval(1e-6)
 ROOMS = {
-    "footscan.stripe.centre", "footscan.stripe.ridge", "footscan.cloud.voxels", "footscan.cloud.normals",
+    "footscan.stripe.centre", "footscan.stripe.ridge", "footscan.mesh.voxels", "footscan.cloud.normals",
     "footscan.measure.hull", "footscan.measure.outline", "footscan.surface.indicator", "footscan.surface.texture",
-    "footscan.virtual.scene", "footscan.virtual.texture", "footscan.calibration.fit", "footscan.report.render",
+    "footscan.virtual.optics.scene", "footscan.virtual.optics.texture", "footscan.calibration.models.fit",
+    "footscan.report.render",
 }
 import numba, scipy.spatial, scipy.ndimage, scipy.optimize, scipy.sparse.linalg, PIL.Image
 from numba.core.dispatcher import Dispatcher

@@ -14,7 +14,7 @@ from damage_text import damage_text
 from PIL import Image
 
 from footscan.frames.film import open_film, pixel_frames
-from schemas.errors import FootscanError
+from schemas.base.errors import FootscanError
 
 Document = dict[str, Any]
 DocumentDamage = Callable[[Random, Document], str]

@@ -15,13 +15,13 @@ import dask
 import made_up_steps
 from made_up_steps import Doing
 
-from pipelines.engine.code import code_identity
-from pipelines.engine.digest import FileDigests
+from pipelines.engine.actions.code import code_identity
+from pipelines.engine.actions.step import Failure, Output, SourceFile, Step, Value
+from pipelines.engine.files.file_digests import FileDigests
 from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.run import run_plan
-from pipelines.engine.step import Failure, Output, SourceFile, Step, Value
-from pipelines.engine.store import Store, open_store
+from pipelines.engine.store.store import Store, open_store
 
 ROWS = 4
 SIZES = (20, 3_000, 70_000, 900_000)

@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import BaseModel
 
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 
 
 class Doing(BaseModel):

@@ -8,8 +8,8 @@ from random import Random
 
 from scanner_bench import CAMERAS, RATE, Bench
 
-from footscan.virtual.board_line import Direction, Harm
-from footscan.virtual.stream_faults import FaultKind, StreamFault
+from footscan.virtual.board.line import Direction, Harm
+from footscan.virtual.filming.stream_faults import FaultKind, StreamFault
 
 HARMS: tuple[Harm, ...] = ("lose", "double", "garbage", "delay")
 BYTES: dict[Direction, int] = {"to board": 60, "to host": 400}

@@ -24,7 +24,7 @@ from made_up_graph import (
     times_run,
 )
 
-from pipelines.engine import digest
+from pipelines.engine.files import digest
 
 ASKED = os.environ.get("FOOTSCAN_FUZZ")
 FIRST = int(os.environ.get("FOOTSCAN_FUZZ_FIRST", "0"))

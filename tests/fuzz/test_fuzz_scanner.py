@@ -23,9 +23,9 @@ from scanner_bench import SETTINGS, Bench, HostWatch, open_bench
 from scanner_troubles import Coming, Trouble, lift, random_trouble
 from waiting import LONG_SECONDS, wait_until
 
-from footscan.capture.heads import Heads
+from footscan.capture.board.heads import Heads
 from pipelines.live.scanner import STOPPED, LiveResult
-from schemas.errors import Fault, Finding, FootscanError
+from schemas.base.errors import Fault, Finding, FootscanError
 
 CASES = int(os.environ.get("FOOTSCAN_FUZZ", "6"))
 FIRST = int(os.environ.get("FOOTSCAN_FUZZ_FIRST", "0"))

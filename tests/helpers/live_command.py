@@ -13,8 +13,8 @@ import numpy as np
 import simplejpeg
 from waiting import LONG_SECONDS, wait_until
 
-from footscan.virtual.board import Board
-from footscan.virtual.streams import VirtualStreams, free_running
+from footscan.virtual.board.board import Board
+from footscan.virtual.filming.streams import VirtualStreams, free_running
 
 FOOTSCAN = str(Path(sys.executable).with_name("footscan"))
 WITHIN_SECONDS = 0.3

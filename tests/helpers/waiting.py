@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-from schemas.errors import Fault
+from schemas.base.errors import Fault
 
 LONG_SECONDS = 60.0
 """Longer than anything takes on a machine that has other work to do."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.archive import Job, ScanEnd, job_of_workflow, plan_job, run_job
+from pipelines.archive.job import Job, ScanEnd, job_of_workflow, plan_job, run_job
 from pipelines.engine.pool import StepEnd, Threads
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from pipelines.cli.main import run_command
-from pipelines.recorded import read_scan
-from schemas.errors import RefusedInput
+from pipelines.recordings.scans import read_scan
+from schemas.base.errors import RefusedInput
 
 LEAVES = "leaves the archive, expected a path inside it"
 

@@ -10,7 +10,7 @@ import pytest
 
 from footscan.cloud.points import POINT_DTYPE
 from pipelines.arrays import pack, unpack
-from schemas.errors import DamagedError
+from schemas.base.errors import DamagedError
 
 
 def test_arrays_come_back() -> None:

@@ -14,20 +14,20 @@ from numpy.typing import NDArray
 from footscan.frames.film import open_film, pixel_frames
 from footscan.frames.image import encode_png
 from footscan.frames.ingest import chunk_name, ingest_film
-from footscan.surface.export import read_file
-from footscan.virtual.film import write_film
+from footscan.mesh.formats.files import read_file
+from footscan.virtual.filming.film import write_film
+from pipelines.archive.ingest import ingest_scans
 from pipelines.arrays import unpack
-from pipelines.engine.digest import FileDigests
-from pipelines.ingest import ingest_scans
-from pipelines.recorded import read_scan
+from pipelines.engine.files.file_digests import FileDigests
+from pipelines.recordings.scans import read_scan
 from pipelines.scan import CalibrationFile, scan_steps
 from pipelines.steps import extract
 from pipelines.steps.ingest_background import ingest_background
+from schemas.base.errors import Fault, RefusedInput
 from schemas.calibration import Calibration
-from schemas.errors import Fault, RefusedInput
 from schemas.frames import FrameManifest
 from schemas.parameters.extraction import ExtractionParameters
-from schemas.workflow import ScanParameters
+from schemas.parameters.scan import ScanParameters
 
 Image = NDArray[np.uint8]
 FRAMES = 20

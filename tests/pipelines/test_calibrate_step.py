@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.engine.digest import sha256
+from pipelines.engine.files.digest import sha256
 from pipelines.steps import calibrate_capture
-from schemas.errors import DamagedError
+from schemas.base.errors import DamagedError
 from schemas.parameters.calibration import CaptureCalibrationParameters
 
 

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from footscan.calibration.maps import to_world
-from pipelines.archive import job_of_workflow, plan_job, run_job
-from pipelines.calibration_choice import CalibrationPlace
+from footscan.calibration.models.maps import to_world
+from pipelines.archive.job import job_of_workflow, plan_job, run_job
 from pipelines.cli.main import run_command
 from pipelines.engine.pool import Threads
+from pipelines.recordings.calibration_choice import CalibrationPlace
+from schemas.base.overrides import overridden
 from schemas.calibration import Calibration
 from schemas.measures import Measures
-from schemas.overrides import overridden
 from schemas.parameters.calibration import CalibrationParameters
-from schemas.workflow import ScanParameters
+from schemas.parameters.scan import ScanParameters
 
 Choice = tuple[str, object]
 """A parameter as `--set` names it, and one of its values."""

@@ -9,10 +9,10 @@ import simplejpeg
 from footscan.cloud.colour import linear_light
 from footscan.frames.ingest import chunk_name, ingest_film
 from footscan.stripe.points import STRIPE_DTYPE
-from footscan.virtual.film import write_film
+from footscan.virtual.filming.film import write_film
 from pipelines.arrays import pack, unpack
 from pipelines.steps import colour
-from schemas.errors import DamagedError
+from schemas.base.errors import DamagedError
 from schemas.frames import FrameManifest
 
 LEVELS = (60, 120, 180)

@@ -1,7 +1,8 @@
 from pathlib import Path
 
-from schemas.documents import read_yaml
-from schemas.workflow import ScanParameters, Workflow
+from schemas.base.documents import read_yaml
+from schemas.parameters.scan import ScanParameters
+from schemas.workflow import Workflow
 
 WORKFLOW = Path(__file__).parents[2] / "workflow.yaml"
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from footscan.cloud.points import coordinates, make_points
+from footscan.mesh.topology import vertex_normals
 from footscan.surface.quality import mesh_quality
-from footscan.surface.topology import vertex_normals
-from footscan.virtual.foot import make_foot
+from footscan.virtual.foot.foot import make_foot
 from pipelines.arrays import pack, unpack
 from pipelines.steps import measure, surface
 from schemas.measures import Measure, Measures

@@ -9,13 +9,13 @@ from typing import Any
 import pytest
 
 from footscan.frames.ingest import chunk_name
-from pipelines.engine.digest import FileDigests
-from pipelines.engine.step import Output
-from pipelines.recorded import read_scan
+from pipelines.engine.actions.step import Output
+from pipelines.engine.files.file_digests import FileDigests
+from pipelines.recordings.scans import read_scan
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps, source_files
+from schemas.base.errors import RefusedInput
 from schemas.calibration import Calibration
-from schemas.errors import RefusedInput
-from schemas.workflow import ScanParameters
+from schemas.parameters.scan import ScanParameters
 
 FROM_CLEAN = {"clean", "fuse", "orient", "surface", "measure", "quality", "cloud.ply", "foot.stl", "foot.ply", "report"}
 CAMERAS = {f"{kind}-{camera}" for kind in ("ingest", "extract", "map") for camera in (1, 5)}

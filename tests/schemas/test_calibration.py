@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from footscan.calibration.maps import is_supported, prediction_covariance, to_world
+from footscan.calibration.models.maps import is_supported, prediction_covariance, to_world
+from schemas.base.errors import RefusedInput
 from schemas.calibration import Calibration, calibration_from_json, read_calibration
-from schemas.errors import RefusedInput
 
 FROZEN = Path(__file__).parent / "frozen"
 FILES = sorted(FROZEN.glob("calibration-*.json"))

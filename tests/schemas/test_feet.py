@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from schemas.documents import read_json
-from schemas.errors import RefusedInput
+from schemas.base.documents import read_json
+from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
 from schemas.measures import Measure, Measures
 

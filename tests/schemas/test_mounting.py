@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from schemas.documents import read_yaml
-from schemas.errors import RefusedInput
+from schemas.base.documents import read_yaml
+from schemas.base.errors import RefusedInput
 from schemas.mounting import CaptureCamera, Mounting, mounting_of
 from schemas.reference import Capture
 

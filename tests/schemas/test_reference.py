@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.documents import read_yaml, validate
-from schemas.errors import RefusedInput
+from schemas.base.documents import read_yaml, validate
+from schemas.base.errors import RefusedInput
 from schemas.reference import ReferenceObject
 
 Corners = list[list[float]]

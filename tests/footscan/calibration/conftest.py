@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from footscan.calibration.homography import HomographyModel
+from footscan.calibration.models.homography import HomographyModel
 
 Floats = NDArray[np.float64]
 IMAGE_CENTRE = np.array([319.5, 239.5])

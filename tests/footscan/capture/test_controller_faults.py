@@ -19,10 +19,10 @@ from random import Random
 import pytest
 from waiting import wait_until
 
-from footscan.capture.grbl_settings import BoardSettings
-from footscan.capture.heads import Heads
-from footscan.virtual.board import Board
-from schemas.errors import FootscanError
+from footscan.capture.board.heads import Heads
+from footscan.capture.grbl.settings import BoardSettings
+from footscan.virtual.board.board import Board
+from schemas.base.errors import FootscanError
 
 CASES = int(os.environ.get("FOOTSCAN_FUZZ", "25"))
 FIRST = int(os.environ.get("FOOTSCAN_FUZZ_FIRST", "0"))
@@ -52,7 +52,7 @@ Fault = Callable[[Random, Board], str]
 def cases() -> Iterator[dict[int, "Future[None]"]]:
     """All cases, several at a time: most of their time is waiting."""
     with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(AT_A_TIME) as pool:
-        patch.setattr("footscan.virtual.board_firmware.ALARM_SECONDS", 0.05)
+        patch.setattr("footscan.virtual.board.firmware.ALARM_SECONDS", 0.05)
         yield {number: pool.submit(try_case, number) for number in range(FIRST, FIRST + CASES)}
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from footscan.capture.board.heads import Travel
+from footscan.capture.board.position_log import HeadPosition, PositionLog
+from footscan.capture.cameras.frame_clock import number_frames
 from footscan.capture.film_frames import CameraTiming, FilmFrames, motion_of_head, place_frames
-from footscan.capture.frame_clock import number_frames
 from footscan.capture.frame_positions import Timed
-from footscan.capture.heads import Travel
 from footscan.capture.passes import FilmTally
-from footscan.capture.position_log import HeadPosition, PositionLog
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from footscan.capture.frame_positions import FramePositions, Timed, frame_positions, write_positions
 from footscan.capture.head_motion import HeadMotion, HeadReports, smooth_motion
 from footscan.frames.travel import read_positions
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

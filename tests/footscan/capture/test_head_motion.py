@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from footscan.capture.head_motion import HeadReports, smooth_motion
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 
 Floats = NDArray[np.float64]
 

@@ -10,13 +10,13 @@ import simplejpeg
 from numpy.typing import NDArray
 
 from footscan.capture.laser_light import LightLimits, StripeSeen, choose_light, stripe_seen
-from footscan.virtual.reference_stage import block_subject
-from footscan.virtual.render import CameraRenderer
-from footscan.virtual.scanner import standard_scanner
-from footscan.virtual.scene import SKIN, Scene
-from footscan.virtual.sensor import compress, photograph
-from footscan.virtual.texture import random_texture
-from schemas.errors import Finding
+from footscan.virtual.filming.render import CameraRenderer
+from footscan.virtual.optics.scanner import standard_scanner
+from footscan.virtual.optics.scene import SKIN, Scene
+from footscan.virtual.optics.sensor import compress, photograph
+from footscan.virtual.optics.texture import random_texture
+from footscan.virtual.stage.reference_stage import block_subject
+from schemas.base.errors import Finding
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.parameters.simulation import SimulationSettings
 

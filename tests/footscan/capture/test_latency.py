@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from footscan.capture.head_motion import HeadReports, smooth_motion
 from footscan.capture.latency import Latency, Pass, estimate_latency
 from footscan.stripe.points import STRIPE_DTYPE, StripePoints
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 
 Floats = NDArray[np.float64]
 

@@ -14,19 +14,19 @@ import pytest
 import simplejpeg
 
 from footscan.capture import frame_positions
-from footscan.capture.camera_deck import CameraDeck
-from footscan.capture.camera_source import CameraSource
-from footscan.capture.camera_stream import CapturedFrame
+from footscan.capture.board.heads import Head, Heads
+from footscan.capture.cameras.deck import CameraDeck
+from footscan.capture.cameras.source import CameraSource
+from footscan.capture.cameras.stream import CapturedFrame
 from footscan.capture.film_frames import CameraTiming, FilmFrames, motion_of_head, place_frames, standing_frame
 from footscan.capture.frame_positions import Timed
-from footscan.capture.grbl_settings import BoardSettings
-from footscan.capture.heads import Head, Heads
+from footscan.capture.grbl.settings import BoardSettings
 from footscan.capture.passes import FilmedPass, PassPlan, film_name, film_pass
 from footscan.capture.recording import ScanRecording
-from footscan.virtual.board import Board
-from footscan.virtual.stream_faults import StreamFault
-from footscan.virtual.streams import SentFrame, VirtualStreams, free_running
-from schemas.errors import Fault
+from footscan.virtual.board.board import Board
+from footscan.virtual.filming.stream_faults import StreamFault
+from footscan.virtual.filming.streams import SentFrame, VirtualStreams, free_running
+from schemas.base.errors import Fault
 
 QUICK = {24: 1200, 25: 12000, 26: 5, 110: 12000, 111: 12000, 112: 12000, 120: 2000, 121: 2000, 122: 2000}
 SETTINGS = BoardSettings(

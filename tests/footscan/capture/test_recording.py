@@ -24,7 +24,7 @@ from footscan.capture.recording import LEAST_FREE_BYTES, ScanRecording
 from footscan.frames.array import is_recorded, read_manifest
 from footscan.frames.ingest import FrameWriter, ingest_film
 from footscan.frames.reader import read_frames
-from schemas.errors import Fault, RefusedInput
+from schemas.base.errors import Fault, RefusedInput
 from schemas.scan import Scan
 
 FILM = "frames.zarr/cam1"

@@ -6,12 +6,12 @@ from numpy.typing import NDArray
 
 from footscan.cloud.colour import as_level, camera_gains, linear_light, point_colours
 from footscan.stripe.points import STRIPE_DTYPE
-from footscan.virtual.block import make_block
-from footscan.virtual.render import CameraRenderer
-from footscan.virtual.scanner import standard_scanner
-from footscan.virtual.scene import SKIN as SKIN_SURFACE
-from footscan.virtual.scene import Mesh, Scene
-from footscan.virtual.texture import random_texture
+from footscan.virtual.filming.render import CameraRenderer
+from footscan.virtual.optics.scanner import standard_scanner
+from footscan.virtual.optics.scene import SKIN as SKIN_SURFACE
+from footscan.virtual.optics.scene import Mesh, Scene
+from footscan.virtual.optics.texture import random_texture
+from footscan.virtual.stage.block import make_block
 from schemas.parameters.simulation import SimulationSettings
 
 Image = NDArray[np.uint8]

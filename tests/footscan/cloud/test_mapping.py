@@ -4,8 +4,8 @@ import pytest
 from footscan.cloud.mapping import map_stripe
 from footscan.cloud.points import coordinates
 from footscan.stripe.points import STRIPE_DTYPE
+from schemas.base.errors import RefusedInput
 from schemas.calibration import CameraCalibration, PolynomialMap
-from schemas.errors import RefusedInput
 from schemas.parameters.mapping import MappingParameters
 
 CAMERA = CameraCalibration(

@@ -6,7 +6,7 @@ import pytest
 from footscan.cloud.normals import estimate_normals
 from footscan.cloud.points import coordinates, make_points
 from footscan.cloud.views import View
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 from schemas.parameters.normals import NormalParameters
 
 Film = Callable[..., tuple[np.ndarray, np.ndarray]]

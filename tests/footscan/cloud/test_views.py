@@ -1,7 +1,7 @@
 import numpy as np
 
-from footscan.calibration.maps import to_world
-from footscan.calibration.pose import camera_centres
+from footscan.calibration.models.maps import to_world
+from footscan.calibration.models.pose import camera_centres
 from footscan.cloud.views import views_of
 from schemas.calibration import CameraCalibration, HomographyMap, PolynomialMap
 

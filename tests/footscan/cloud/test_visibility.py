@@ -3,7 +3,7 @@ import pytest
 
 from footscan.cloud.views import View
 from footscan.cloud.visibility import CONFIRMED, DENIED, UNKNOWN, ask_others, sight_of
-from footscan.cloud.voxels import voxelise
+from footscan.mesh.voxels import voxelise
 
 WIDE = np.array([[-100.0, -100.0], [100.0, -100.0], [100.0, 100.0], [-100.0, 100.0]])
 LEFT, RIGHT = View(np.array([100.0, 150.0, 200.0]), WIDE), View(np.array([-100.0, -150.0, 200.0]), WIDE)

@@ -12,7 +12,7 @@ import simplejpeg
 
 from footscan.frames.film import Film, encoded_frames, film_files, frame_digest, open_film, pixel_frames
 from footscan.frames.ingest import ingest_film
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 
 MANIFEST = (
     b'{"attributes": {"film": null, "footscan": '

@@ -19,7 +19,7 @@ from footscan.frames.image import (
     pixel_buffer,
     read_image,
 )
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 
 RAMP = np.arange(8 * 9 * 3, dtype=np.uint8).reshape(8, 9, 3)
 JPEG = bytes(simplejpeg.encode_jpeg(RAMP, 90, "RGB", "420"))

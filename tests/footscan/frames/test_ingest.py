@@ -22,7 +22,7 @@ from footscan.frames import ingest
 from footscan.frames.array import chunk_name, is_complete
 from footscan.frames.ingest import discard, ingest_film
 from footscan.frames.reader import read_frames
-from schemas.errors import Fault, RefusedInput
+from schemas.base.errors import Fault, RefusedInput
 from schemas.frames import GROUP, FrameManifest
 
 SIZE = (48, 64)

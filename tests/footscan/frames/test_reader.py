@@ -11,7 +11,7 @@ import pytest
 from footscan.frames.array import chunk_name
 from footscan.frames.ingest import ingest_film
 from footscan.frames.reader import read_frame, read_frames
-from schemas.errors import DamagedError
+from schemas.base.errors import DamagedError
 from schemas.frames import FrameManifest
 
 SIZE = (48, 64)

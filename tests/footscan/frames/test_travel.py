@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from footscan.frames.travel import read_positions, travelled
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 from schemas.scan import Travel
 
 

@@ -6,11 +6,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from footscan.measure.frame import FootFrame, foot_frame
-from footscan.measure.place import apply
-from footscan.virtual.foot import Foot, make_foot, sample_shape
-from schemas.errors import Finding
+from footscan.mesh.rigid_transform import apply
+from footscan.virtual.foot.foot import Foot, make_foot, sample_shape
+from schemas.base.documents import Side
+from schemas.base.errors import Finding
 from schemas.measures import Axis
-from schemas.scan import Side
 
 ABOVE_GLASS = np.array([120.0, -40.0, 33.0])
 POSES = {

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from footscan.measure.foot_landmarks import Landmark
 from footscan.measure.frame import FootFrame
-from footscan.measure.landmarks import Landmark
 from footscan.measure.measures import measure_foot, take_measures
-from footscan.surface.export import read_mesh
-from footscan.surface.topology import vertex_normals
-from footscan.virtual.foot import Foot, make_foot
-from schemas.errors import Finding
+from footscan.mesh.formats.files import read_mesh
+from footscan.mesh.topology import vertex_normals
+from footscan.virtual.foot.foot import Foot, make_foot
+from schemas.base.errors import Finding
 from schemas.measures import Measure, Measures
 
 KNOWN_LANDMARKS = ("metatarsale_tibiale", "metatarsale_fibulare", "landing_point", "junction_point", "pternion")

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from footscan.measure.frame import foot_frame
 from footscan.measure.raw_mesh import MeshUnit, RawMesh, take_in
-from footscan.virtual.foot import Foot, make_foot
-from schemas.errors import Finding
+from footscan.virtual.foot.foot import Foot, make_foot
+from schemas.base.errors import Finding
 
 Shape = tuple[np.ndarray, np.ndarray]
 

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from footscan.measure.roughness import Roughness, roughness
-from footscan.surface.topology import vertex_normals
+from footscan.mesh.topology import vertex_normals
 
 
 def rough_sphere(noise: float) -> Roughness:

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from footscan.measure.foot_landmarks import Landmark
 from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame import FootFrame
-from footscan.measure.landmarks import Landmark
-from footscan.measure.landmarks_extreme import Cap
+from footscan.measure.landmarks.extreme import Cap
 from footscan.measure.quantity import NotThere
 from footscan.measure.solid import foot_surface, foot_volume
 

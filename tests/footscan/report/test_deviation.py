@@ -9,7 +9,7 @@ from footscan.report.colours import distance_colours
 from footscan.report.deviation import DOTS, PICTURES, Deviation, deviation_of, deviation_pictures, deviation_ply, drawn
 from footscan.verify.distances import Distances
 from footscan.verify.regions import FootRegions
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 
 NOTHING = np.zeros((0, 3), np.int32)
 CUBE = trimesh.creation.box(extents=(100, 60, 40))

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from footscan.report.missing import missing_list
 from footscan.report.quality_lights import apart_mm, quality_lights, worst
+from footscan.report.scan.missing import missing_list
 from schemas.calibration import Source
 from schemas.fusion import Disagreement, FusionReport, PairDisagreement
 from schemas.measures import Measure, Measures

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from footscan.mesh.topology import vertex_normals
 from footscan.report.render import rasterise, render_mesh
-from footscan.surface.topology import vertex_normals
 
 RED, GREEN, BLUE = [240.0, 0.0, 0.0], [0.0, 240.0, 0.0], [0.0, 0.0, 240.0]
 CORNER = np.array([[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [2.0, 0.0, 0.0]])

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from footscan.sizing.change import change_over_time, smallest_real_change
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
 from schemas.pairs import Change, ChangeRow
 from schemas.sizes import SizeTable

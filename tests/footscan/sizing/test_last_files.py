@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from footscan.sizing.last_files import read_lasts
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 
 TABLE = """\
 article,size,fullness,side,length_mm,ball_girth_mm,heel_girth_mm,heel_height_mm

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from footscan.sizing.lasts import rank_lasts
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
 from schemas.lasts import Last, LastRules, Ranking
 from schemas.sizes import SizeTable

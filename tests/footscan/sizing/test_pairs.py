@@ -6,7 +6,7 @@ import pytest
 
 from footscan.sizing.identity import refuse_other_patient
 from footscan.sizing.pairs import compare_pair
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
 from schemas.pairs import Pair, PairRow
 from schemas.sizes import SizeTable

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from footscan.sizing.sittings import latest_changes, latest_pair, passed_over
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
 
 MakeFoot = Callable[..., Foot]

@@ -7,7 +7,7 @@ import pytest
 
 from footscan.sizing.sizes import foot_sizes
 from footscan.sizing.table import TABLE, read_table
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
 
 

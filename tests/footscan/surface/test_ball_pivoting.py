@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from footscan.cloud.fusion import fuse
+from footscan.cloud.fusion.fuse import fuse
 from footscan.cloud.normals import estimate_normals
 from footscan.cloud.outliers import remove_outliers
 from footscan.cloud.points import coordinates, make_points
 from footscan.surface.ball_pivoting import mesh_cloud
 from footscan.surface.quality import mesh_quality
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 from schemas.parameters.fusion import FusionParameters
 from schemas.parameters.normals import NormalParameters
 from schemas.parameters.outliers import OutlierParameters

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from footscan.mesh.mesh import Mesh
 from footscan.surface.closed_surface import close_surface
-from footscan.surface.mesh import Mesh
 from footscan.surface.quality import mesh_quality
 from footscan.verify.distances import signed_distances
-from footscan.virtual.foot import make_foot
-from schemas.errors import Finding
+from footscan.virtual.foot.foot import make_foot
+from schemas.base.errors import Finding
 from schemas.parameters.surface import SurfaceParameters
 from schemas.quality import MeshQuality
 

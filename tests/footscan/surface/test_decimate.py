@@ -7,13 +7,13 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from footscan.mesh.formats.files import read_mesh
+from footscan.mesh.mesh import Mesh, signed_volume
 from footscan.surface.collapse import collapse_edges
 from footscan.surface.decimate import decimate, outermost
-from footscan.surface.export import read_mesh
 from footscan.surface.fidelity import fidelity
-from footscan.surface.mesh import Mesh, signed_volume
 from footscan.surface.quality import mesh_quality
-from footscan.virtual.foot import make_foot
+from footscan.virtual.foot.foot import make_foot
 
 PRESETS = (40_000, 20_000)
 """Triangles that CAD programs for orthopaedics want at most, of feet and of insoles."""

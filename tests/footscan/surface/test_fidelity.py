@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from footscan.mesh.mesh import Mesh
 from footscan.surface.fidelity import fidelity
-from footscan.surface.mesh import Mesh
 
 
 def box(length: float, breadth: float, height: float) -> Mesh:

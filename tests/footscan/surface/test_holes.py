@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from footscan.mesh.topology import edge_counts
 from footscan.surface.holes import close_holes, rims
-from footscan.surface.topology import edge_counts
 
 
 def sphere_without_cap(radius: float, height: float) -> tuple[np.ndarray, np.ndarray]:

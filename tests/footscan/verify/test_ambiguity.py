@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from footscan.surface.sampling import sample_surface
+from footscan.mesh.sampling import sample_surface
 from footscan.verify.ambiguity import evidence, patches_of, stiffness
 from footscan.verify.icp import Poses
 from footscan.verify.nearest import MeshSurface

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from footscan.surface.export import Shape
-from footscan.surface.mesh import Mesh
+from footscan.mesh.formats.files import Shape
+from footscan.mesh.mesh import Mesh
 from footscan.verify import compare as compare_module
 from footscan.verify import distances
 from footscan.verify.compare import apart_mm, cloud_normals, compare, moved, vertex_distances
 from footscan.verify.regions import foot_regions
-from footscan.virtual.foot import make_foot
-from schemas.errors import RefusedInput
+from footscan.virtual.foot.foot import make_foot
+from schemas.base.errors import RefusedInput
 
 NOTHING = np.zeros((0, 3), np.int32)
 

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from footscan.verify.distances import BLOCK, distances_to_cloud, distances_to_mesh, signed_distances
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 
 Mesh = tuple[np.ndarray, np.ndarray]
 

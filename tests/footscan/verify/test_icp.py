@@ -3,7 +3,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from footscan.surface.sampling import sample_surface
+from footscan.mesh.sampling import sample_surface
 from footscan.verify.icp import Poses, capped_squares, normal_equations, settle, tukey_weights
 from footscan.verify.nearest import MeshSurface
 

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from footscan.verify.regions import ANKLE, REGIONS, SOLE, foot_regions
-from footscan.virtual.foot import Foot, Side, make_foot, placed
+from footscan.virtual.foot.foot import Foot, Side, make_foot, placed
 
 NOTHING = np.zeros((0, 3), np.int32)
 

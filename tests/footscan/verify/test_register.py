@@ -17,11 +17,11 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from footscan.surface.export import Shape, read_mesh
-from footscan.surface.sampling import sample_surface
+from footscan.mesh.formats.files import Shape, read_mesh
+from footscan.mesh.sampling import sample_surface
 from footscan.verify.register import Registration, register
-from footscan.virtual.foot import FootShape, make_foot
-from schemas.errors import Finding
+from footscan.virtual.foot.foot import FootShape, make_foot
+from schemas.base.errors import Finding
 from schemas.parameters.registration import RegistrationParameters
 
 ASKED = os.environ.get("FOOTSCAN_FUZZ")

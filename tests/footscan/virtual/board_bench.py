@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 
-from footscan.virtual.board_firmware import Firmware
-from footscan.virtual.board_memory import Build, Memory
-from footscan.virtual.board_motion import Motion
-from footscan.virtual.board_rails import Rail, Triple
+from footscan.virtual.board.firmware import Firmware
+from footscan.virtual.board.memory import Build, Memory
+from footscan.virtual.board.motion import Motion
+from footscan.virtual.board.rails import Rail, Triple
 
 QUICK = {24: 600.0, 25: 6000.0, 26: 5, 110: 60000.0, 111: 60000.0, 112: 60000.0, 120: 1e4, 121: 1e4, 122: 1e4}
 WELCOME = ["", "Grbl 1.1h ['$' for help]"]

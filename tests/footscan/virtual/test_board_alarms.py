@@ -5,7 +5,7 @@ import math
 import pytest
 from board_bench import LOCKED, WELCOME, Bench
 
-from footscan.virtual.board_memory import Build
+from footscan.virtual.board.memory import Build
 
 # --- Alarms
 

@@ -3,7 +3,7 @@
 import pytest
 from board_bench import LOCKED, WELCOME, Bench
 
-from footscan.virtual.board_memory import FACTORY
+from footscan.virtual.board.memory import FACTORY
 
 # --- Start-up message
 

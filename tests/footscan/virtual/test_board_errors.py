@@ -5,10 +5,10 @@ from collections.abc import Callable, Mapping
 import pytest
 from board_bench import Bench, home
 
-from footscan.virtual.board_firmware import Firmware
-from footscan.virtual.board_memory import Build, Memory
-from footscan.virtual.board_motion import Motion
-from footscan.virtual.board_rails import Rail
+from footscan.virtual.board.firmware import Firmware
+from footscan.virtual.board.memory import Build, Memory
+from footscan.virtual.board.motion import Motion
+from footscan.virtual.board.rails import Rail
 
 # --- Error codes
 

@@ -3,7 +3,7 @@
 import pytest
 from board_bench import WELCOME, Bench, home
 
-from footscan.virtual.board_memory import Build
+from footscan.virtual.board.memory import Build
 
 # --- Realtime commands
 

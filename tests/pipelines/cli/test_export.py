@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from footscan.surface.export import WRITERS, mesh_bytes, read_file
-from footscan.surface.mesh import Mesh
+from footscan.mesh.formats.files import WRITERS, mesh_bytes, read_file
+from footscan.mesh.mesh import Mesh
 from pipelines.cli.main import run_command
 from pipelines.version import SOFTWARE
 

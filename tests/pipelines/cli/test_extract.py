@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from pipelines.cli.main import run_command
-from schemas.errors import Fault
+from schemas.base.errors import Fault
 from schemas.parameters.extraction import ExtractionParameters
 
 ROWS, COLUMNS = 120, 160
@@ -265,7 +265,7 @@ def test_nothing_is_printed_if_the_overlay_cannot_be_drawn(
     def fail(*_: object) -> bytes:
         raise Fault("out of ink")
 
-    monkeypatch.setattr("footscan.report.stripe_figure.frame_figure", fail)
+    monkeypatch.setattr("footscan.report.scan.stripe_figure.frame_figure", fail)
     assert extract(frame, "--overlay", tmp_path / "overlay.png") == (3, "", ["footscan: out of ink"])
 
 
@@ -348,8 +348,8 @@ def test_the_overlay_says_what_it_is_of(
         said.append(arguments[-1])
         return b""
 
-    monkeypatch.setattr("footscan.report.stripe_figure.frame_figure", keep)
-    monkeypatch.setattr("footscan.report.stripe_figure.film_figure", keep)
+    monkeypatch.setattr("footscan.report.scan.stripe_figure.frame_figure", keep)
+    monkeypatch.setattr("footscan.report.scan.stripe_figure.film_figure", keep)
     overlay = "--overlay", tmp_path / "overlay.png"
     off = write(tmp_path / "off.png", RED_THING)
     extract(frame, *overlay)

@@ -13,8 +13,8 @@ import trimesh
 from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
-from footscan.virtual.foot import Foot, make_foot
-from footscan.virtual.record import write_stl
+from footscan.virtual.filming.record import write_stl
+from footscan.virtual.foot.foot import Foot, make_foot
 from pipelines.cli.main import run_command
 from schemas.measures import Measures
 

@@ -14,8 +14,8 @@ import pytest
 
 from pipelines.cli.main import run_command
 from pipelines.regression.history import append
-from pipelines.regression.junit import junit_xml
-from schemas.documents import read_yaml
+from pipelines.regression.report.junit import junit_xml
+from schemas.base.documents import read_yaml
 from schemas.regression import NightEnded, Suite
 
 Regress = Callable[..., tuple[int, str, list[str]]]
@@ -134,11 +134,11 @@ def test_a_night_that_did_not_run(root: Path, regress: Regress) -> None:
 
 
 def test_the_line_of_a_crontab(root: Path) -> None:
-    line = f"cd {root} && {sys.executable} -m pipelines.regression suite.yaml --junit night.xml >> nights.log 2>&1"
+    line = f"cd {root} && {sys.executable} -m pipelines.cli regress suite.yaml --junit night.xml >> nights.log 2>&1"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     assert subprocess.run(["sh", "-c", line], env=environment, check=False).returncode == 0
     assert (root / "nights.log").read_text().endswith(f"Report: {root}/nights/index.html\n")
-    check = f"cd {root} && {sys.executable} -m pipelines.regression suite.yaml --check-last 26h"
+    check = f"cd {root} && {sys.executable} -m pipelines.cli regress suite.yaml --check-last 26h"
     assert subprocess.run(["sh", "-c", check], env=environment, check=False, capture_output=True).returncode == 0
 
 
@@ -150,7 +150,7 @@ def test_the_suites_of_the_project_keep_their_format(name: str) -> None:
 
 
 def test_names_are_data_in_the_xml() -> None:
-    from footscan.report.regress_result import JudgedFigure, JudgedSet, NightResult
+    from pipelines.regression.report.result import JudgedFigure, JudgedSet, NightResult
 
     figure = JudgedFigure("a<b", None, 1.0, 0.0, "less", None, "missing")
     sets = [JudgedSet("<set>", "broken & \x00 bent", [figure])]

@@ -9,12 +9,12 @@ import pytest
 import trimesh
 
 from footscan.cloud.points import coordinates, make_points
-from footscan.surface.formats.ply import ply_of
-from footscan.surface.mesh import Mesh
-from pipelines.archive import CACHE
+from footscan.mesh.formats.ply import ply_of
+from footscan.mesh.mesh import Mesh
+from pipelines.archive.job import CACHE
 from pipelines.arrays import pack
 from pipelines.cli.main import run_command
-from pipelines.engine.store import Row, open_store
+from pipelines.engine.store.store import Row, open_store
 from schemas.calibration import Calibration, CameraCalibration, PolynomialMap
 
 Verify = Callable[..., tuple[int, str, list[str]]]

@@ -9,11 +9,11 @@ import numpy as np
 import simplejpeg
 import trimesh
 
-from footscan.surface.formats.ply import ply_of
-from footscan.surface.mesh import Mesh
+from footscan.mesh.formats.ply import ply_of
+from footscan.mesh.mesh import Mesh
 from pipelines.console.scanner import Device, Health, Scanned, Side
 from pipelines.live.state import OnState, ScannerState, StateBoard
-from schemas.errors import Fault, RefusedInput
+from schemas.base.errors import Fault, RefusedInput
 
 CAMERAS = tuple(range(1, 9))
 GENEROUS_SECONDS = 60.0

@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 from pipelines.console.console import Console
 from pipelines.live.state import ScannerState
-from schemas.errors import Fault, RefusedInput
+from schemas.base.errors import Fault, RefusedInput
 
 PAGE, OTHER = "a" * 16, "b" * 16
 RIGHT = {"patient": "P1", "side": "right"}

@@ -8,7 +8,7 @@ from stand_in import StandIn
 from starlette.testclient import TestClient
 
 from pipelines.console.presence import GONE_SECONDS, Presence
-from schemas.errors import Fault
+from schemas.base.errors import Fault
 
 PAGE, OTHER = "a" * 16, "b" * 16
 

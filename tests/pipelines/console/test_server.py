@@ -13,7 +13,7 @@ from starlette.testclient import TestClient
 from pipelines.console.console import Console
 from pipelines.console.guard import is_loopback
 from pipelines.console.server import application, listen
-from schemas.errors import RefusedInput
+from schemas.base.errors import RefusedInput
 
 ADDRESS = "http://127.0.0.1:8760"
 OTHER_PAGE = "b" * 16

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.engine import code
+from pipelines.engine.actions import code
+from pipelines.engine.actions.step import Outcome, Step
 from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.run import run_plan
-from pipelines.engine.step import Outcome, Step
-from pipelines.engine.store import Store, open_store
+from pipelines.engine.store.store import Store, open_store
 
 PACKAGES = itertools.count()
 

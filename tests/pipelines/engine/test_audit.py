@@ -7,16 +7,17 @@ from typing import Any
 
 import pytest
 
+from pipelines.engine.actions.key import key_of
+from pipelines.engine.actions.step import Output, SourceFile, Step, Value
 from pipelines.engine.audit import Audit, Difference, repeat, repeatable, sample, verify
-from pipelines.engine.digest import FileDigests, sha256
-from pipelines.engine.key import key_of
-from pipelines.engine.lease import lease
-from pipelines.engine.pins import pin
+from pipelines.engine.files.digest import sha256
+from pipelines.engine.files.file_digests import FileDigests
 from pipelines.engine.plan import make_plan
-from pipelines.engine.step import Output, SourceFile, Step, Value
-from pipelines.engine.store import Row, Store, blob_name, latest_name, row_name
-from schemas.documents import canonical_json
-from schemas.errors import DamagedError
+from pipelines.engine.store.lease import lease
+from pipelines.engine.store.pins import pin
+from pipelines.engine.store.store import Row, Store, blob_name, latest_name, row_name
+from schemas.base.documents import canonical_json
+from schemas.base.errors import DamagedError
 
 Chain = Callable[..., list[Step]]
 
@@ -162,7 +163,7 @@ def test_failures_are_repeated_too(chain: Chain, package: Any, store: Store, run
     hidden = tmp_path / "hidden"
     source = f"""
 from pathlib import Path
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 def run(*_):
     if Path({str(hidden)!r}).exists():
         return b"found"

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.engine.digest import sha256
+from pipelines.engine.files.digest import sha256
 
 KILLS = int(os.environ.get("FOOTSCAN_FUZZ", "0"))
 FIRST = int(os.environ.get("FOOTSCAN_FUZZ_FIRST", "0"))

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from pipelines.engine.actions.step import Failure, Output, Step, Success, Value
 from pipelines.engine.plan import State, make_plan, with_places, without_places
-from pipelines.engine.step import Failure, Output, Step, Success, Value
-from pipelines.engine.store import Store, blob_name
-from schemas.documents import Document
+from pipelines.engine.store.store import Store, blob_name
+from schemas.base.documents import Document
 
 RunSteps = Callable[..., Any]
 
@@ -123,7 +123,7 @@ def test_planning_writes_nothing(chain: Any, store: Store) -> None:
 def test_cached_failure_is_a_hit_for_all_that_stand_behind_it(
     chain: Any, store: Store, run_steps: RunSteps, package: Any
 ) -> None:
-    source = "from schemas.errors import Finding\ndef run(*_):\n    raise Finding('no stripe')\n"
+    source = "from schemas.base.errors import Finding\ndef run(*_):\n    raise Finding('no stripe')\n"
     steps = chain()
     steps[0] = steps[0]._replace(module=package.step_module("bad", source))
     run_steps(*steps)

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
+from pipelines.engine.actions.step import Failure, Output, Step, Success, Value
 from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import Cluster, StepEnd, Threads, joined_cluster, local_cluster
 from pipelines.engine.run import run_plan
-from pipelines.engine.step import Failure, Output, Step, Success, Value
-from pipelines.engine.store import Store, open_store
-from schemas.errors import RefusedInput
+from pipelines.engine.store.store import Store, open_store
+from schemas.base.errors import RefusedInput
 
 JOIN = "def run(inputs, parameters, places):\n    return b'+'.join(inputs[name] for name in sorted(inputs))\n"
 KILLS = "import os, signal\ndef run(inputs, parameters, places):\n    os.kill(os.getpid(), signal.SIGKILL)\n"
@@ -24,7 +24,9 @@ def run(inputs, parameters, places):
         os.kill(os.getpid(), signal.SIGKILL)
     return b"alive"
 """
-FAILS = "from schemas.errors import Finding\ndef run(inputs, parameters, places):\n    raise Finding('no stripe')\n"
+FAILS = (
+    "from schemas.base.errors import Finding\ndef run(inputs, parameters, places):\n    raise Finding('no stripe')\n"
+)
 
 
 MODULES = {"join": JOIN, "killer": KILLS, "frail": KILLS_ONCE, "failing": FAILS}

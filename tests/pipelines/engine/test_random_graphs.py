@@ -17,12 +17,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
-from pipelines.engine.digest import FileDigests
+from pipelines.engine.actions.step import Failure, Input, Output, SourceFile, Step, Value
+from pipelines.engine.files.file_digests import FileDigests
 from pipelines.engine.plan import State, make_plan
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.run import run_plan
-from pipelines.engine.step import Failure, Input, Output, SourceFile, Step, Value
-from pipelines.engine.store import Store, open_store
+from pipelines.engine.store.store import Store, open_store
 
 ASKED = os.environ.get("FOOTSCAN_FUZZ")
 
@@ -39,7 +39,7 @@ def value():
 '''
 
 STEP = '''
-from schemas.errors import Finding
+from schemas.base.errors import Finding
 
 def run(inputs, parameters, places):
     # {comment}

@@ -11,16 +11,17 @@ import fsspec
 import pytest
 from fsspec.spec import AbstractFileSystem
 
-from pipelines.engine import audit, collect
-from pipelines.engine.files import open_files
-from pipelines.engine.key import image_text, key_of
-from pipelines.engine.lease import lease, live_leases
+from pipelines.engine import audit
+from pipelines.engine import garbage_collection as collect
+from pipelines.engine.actions.key import image_text, key_of
+from pipelines.engine.actions.step import Failure, Step, Success, Value
+from pipelines.engine.files.places import open_files
 from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import Threads
 from pipelines.engine.run import run_plan
-from pipelines.engine.step import Failure, Step, Success, Value
-from pipelines.engine.store import Row, Store, blob_name, open_store, row_name
-from schemas.errors import Fault
+from pipelines.engine.store.lease import lease, live_leases
+from pipelines.engine.store.store import Row, Store, blob_name, open_store, row_name
+from schemas.base.errors import Fault
 
 PLACE = "made-up://bucket/feet"
 NAME = "blobs/ab/abcd"

@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from pipelines.engine.digest import FileDigests
-from pipelines.engine.key import key_of
+from pipelines.engine.actions.key import key_of
+from pipelines.engine.actions.step import Failure, Output, SourceFile, Step, Success, Value
+from pipelines.engine.files.file_digests import FileDigests
 from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.run import run_plan
-from pipelines.engine.step import Failure, Output, SourceFile, Step, Success, Value
-from pipelines.engine.store import Row, Store, blob_name
-from schemas.documents import Document
-from schemas.errors import Fault
+from pipelines.engine.store.store import Row, Store, blob_name
+from schemas.base.documents import Document
+from schemas.base.errors import Fault
 
 RunSteps = Callable[..., Any]
 
@@ -25,7 +25,7 @@ class Factor(Document):
 
 
 def raising(error: str) -> str:
-    return f"from schemas.errors import *\ndef run(inputs, parameters, places):\n    raise {error}\n"
+    return f"from schemas.base.errors import *\ndef run(inputs, parameters, places):\n    raise {error}\n"
 
 
 @pytest.fixture
@@ -200,7 +200,9 @@ def test_file_that_changes_while_it_is_read_is_noticed(
         "remove": "places['film'].unlink()",
         "touch": "os.utime(places['film'], ns=(0, 0))",
     }[change]
-    source = f"import os\nfrom schemas.errors import *\ndef run(inputs, parameters, places):\n    {act}\n    {end}\n"
+    source = (
+        f"import os\nfrom schemas.base.errors import *\ndef run(inputs, parameters, places):\n    {act}\n    {end}\n"
+    )
     module = package.step_module("reader", source)
     step = Step("P/S", "read", module, None, {"film": source_file(film)}, places={"film": film})
     outcomes, _ = run_steps(step)

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from pipelines.engine.digest import FileDigests
-from pipelines.engine.key import key_of
-from pipelines.engine.step import Output, SourceFile, Step, Value
-from pipelines.engine.store import Row, Store, row_name
+from pipelines.engine.actions.key import key_of
+from pipelines.engine.actions.step import Output, SourceFile, Step, Value
+from pipelines.engine.files.file_digests import FileDigests
+from pipelines.engine.store.store import Row, Store, row_name
 from pipelines.engine.trace import Trace, blob_digest, read_actions, row_key, trace
-from schemas.documents import Document
+from schemas.base.documents import Document
 
 
 class Factor(Document):

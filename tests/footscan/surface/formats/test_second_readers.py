@@ -10,8 +10,8 @@ import pymeshlab
 import pytest
 import trimesh
 
-from footscan.surface.export import WRITERS, mesh_bytes
-from footscan.surface.mesh import Mesh, with_normals
+from footscan.mesh.formats.files import WRITERS, mesh_bytes
+from footscan.mesh.mesh import Mesh, with_normals
 
 METADATA = {"patient": "P0001", "scan": '2026 "R" <&\\', "side": "right", "software": "footscan 1.2"}
 KINDS = sorted(WRITERS)

@@ -1,0 +1,1 @@
+"""Calibration from films of the reference object."""

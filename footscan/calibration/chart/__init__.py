@@ -1,0 +1,1 @@
+"""Calibration from a chart of control points that a person has measured."""

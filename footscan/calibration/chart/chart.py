@@ -1,0 +1,142 @@
+"""A calibration chart: control points whose world position and pixel are known, one CSV for all cameras."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.base.errors import RefusedInput
+from schemas.base.limits import refuse_beyond
+from schemas.base.units import LengthUnit
+from schemas.tables import finite, read_records
+
+MAX_MAGNITUDE = 1e6
+"""No coordinate of a foot scanner is larger, in any unit; its powers stay finite."""
+
+_WORLD: dict[LengthUnit, tuple[str, str, str]] = {
+    "cm": ("x_cm", "y_cm", "z_cm"),
+    "mm": ("x_mm", "y_mm", "z_mm"),
+}
+_CAMERA = re.compile(r"[1-9][0-9]{0,8}")
+
+
+@dataclass(frozen=True)
+class Chart:
+    """The control points of one camera."""
+
+    camera: int
+    points: tuple[str, ...]
+    """Their names, each once."""
+    world: NDArray[np.float64]
+    """(N, 3): X, Y, Z in the chart's own `unit`, scanner frame."""
+    unit: LengthUnit
+    pixels: NDArray[np.float64]
+    """(N, 2): column i and row j, px, the centre of the top-left pixel at (0, 0)."""
+
+
+@dataclass(frozen=True)
+class _Row:
+    line: int
+    camera: int
+    point: str
+    world: tuple[float, float, float]
+    pixel: tuple[float, float]
+
+
+def read_chart(path: Path) -> dict[int, Chart]:
+    """The charts of all cameras in the CSV file `path`, by camera.
+
+    Columns `camera,point,x_cm,y_cm,z_cm,i,j`, or the same in `_mm`, in any order, one control point a row.
+
+    Raises
+    ------
+    RefusedInput
+        The file breaks the format; one line names file, line and column and what was expected.
+    """
+    records = read_records(path)
+    try:
+        line, header = next(records)
+    except StopIteration:
+        raise RefusedInput(path, f"is empty, expected a header {_header('mm')} and control points") from None
+    unit, columns = _columns(path, line, header)
+    rows: list[_Row] = []
+    seen: dict[tuple[int, str], int] = {}
+    for line, cells in records:
+        row = _row(path, line, cells, unit, columns)
+        first = seen.setdefault((row.camera, row.point), line)
+        if first != line:
+            problem = f"camera {row.camera} has {row.point!r} in line {first} already, expected each point once"
+            raise RefusedInput(path, problem, field=f"line {line}, column point")
+        rows.append(row)
+        refuse_beyond("chart_points", len(rows), path)
+    if not rows:
+        raise RefusedInput(path, "has a header but no control point, expected at least one row")
+    return {camera: _chart(camera, unit, rows) for camera in sorted({row.camera for row in rows})}
+
+
+def _columns(path: Path, line: int, header: list[str]) -> tuple[LengthUnit, dict[str, int]]:
+    """The unit of the chart, and where each column stands."""
+    where = f"line {line}"
+    names = [name.lower() for name in header]
+    units: list[LengthUnit] = [unit for unit, world in _WORLD.items() if set(world) & set(names)]
+    if len(units) > 1:
+        raise RefusedInput(path, "mixes cm and mm, expected one unit for x, y and z", field=where)
+    unit = units[0] if units else "mm"
+    expected = _header(unit) if units else f"{_header('cm')} or {_header('mm')}"
+    known = {"camera", "point", "i", "j", *_WORLD[unit]}
+    if len(header) == 1:
+        raise RefusedInput(path, f"one column, expected {expected}, with commas between them", field=where)
+    for name in header:
+        if name.lower() not in known:
+            raise RefusedInput(
+                path, f"unknown column, expected {expected}", field=f"{where}, column {name or '(empty)'}"
+            )
+        if names.count(name.lower()) > 1:
+            raise RefusedInput(path, "stands twice, expected each column once", field=f"{where}, column {name}")
+    for name in _header(unit).split(","):
+        if name not in names:
+            raise RefusedInput(path, f"is missing, expected {expected}", field=f"{where}, column {name}")
+    return unit, {name: index for index, name in enumerate(names)}
+
+
+def _header(unit: LengthUnit) -> str:
+    return ",".join(("camera", "point", *_WORLD[unit], "i", "j"))
+
+
+def _row(path: Path, line: int, cells: list[str], unit: LengthUnit, columns: dict[str, int]) -> _Row:
+    if len(cells) != len(columns):
+        problem = f"expected {len(columns)} values as the header has columns, found {len(cells)}"
+        raise RefusedInput(path, problem, field=f"line {line}")
+
+    def refuse(column: str, expected: str) -> RefusedInput:
+        found = cells[columns[column]][:80]
+        return RefusedInput(path, f"expected {expected}, found {found!r}", field=f"line {line}, column {column}")
+
+    def number(column: str) -> float:
+        text = cells[columns[column]]
+        value = finite(text)
+        if not abs(value) <= MAX_MAGNITUDE:
+            raise refuse(column, f"a number between -{MAX_MAGNITUDE:.0f} and {MAX_MAGNITUDE:.0f}")
+        return value
+
+    camera = cells[columns["camera"]]
+    if not _CAMERA.fullmatch(camera):
+        raise refuse("camera", "a whole number from 1")
+    point = cells[columns["point"]]
+    if not point:
+        raise refuse("point", "a name")
+    x, y, z = (number(column) for column in _WORLD[unit])
+    return _Row(line, int(camera), point, (x, y, z), (number("i"), number("j")))
+
+
+def _chart(camera: int, unit: LengthUnit, rows: list[_Row]) -> Chart:
+    own = [row for row in rows if row.camera == camera]
+    return Chart(
+        camera=camera,
+        points=tuple(row.point for row in own),
+        world=np.array([row.world for row in own]),
+        unit=unit,
+        pixels=np.array([row.pixel for row in own]),
+    )

@@ -1,0 +1,158 @@
+"""Mistakes of a whole camera in a chart: its columns swapped, or its coordinates or some of them in another unit."""
+
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.calibration.chart.chart import Chart
+from footscan.calibration.chart.plane_fit import (
+    PASSED,
+    ROBUST_POINTS,
+    agreeing,
+    fit_homographies,
+    misfits,
+    plausible_misfits,
+    project,
+    samples,
+)
+from footscan.calibration.models.maps import IMAGE_PX
+from schemas.base.units import MILLIMETRES
+
+Floats = NDArray[np.float64]
+
+OUTSIDE_PX = 2.5
+"""Pixels are counted from 0 or from 1, and clicks err: so little beyond the last is still the image's border."""
+BORDER_PX = 0.5
+VIEW_MM = (30.0, 600.0)
+"""An image that is less or more wide where the laser stands is none of a foot: 107 mm in the thesis."""
+GLASS_MM = 5.0
+"""Nothing is seen so far below the glass."""
+OTHER_UNIT = (10.0, 0.1)
+CLEARLY = 20.0
+"""With few points another unit must lessen the misfit so many times: chance does it a few times."""
+
+
+def outside_image(pixels: Floats) -> NDArray[np.bool_]:
+    """Which of `pixels` (N, 2) lie beyond the image and its border: (N,)."""
+    low, high = -OUTSIDE_PX, np.array(IMAGE_PX) - 1.0 + OUTSIDE_PX
+    return np.asarray(((pixels < low) | (pixels > high)).any(axis=1))
+
+
+def is_on_border(pixels: Floats) -> NDArray[np.bool_]:
+    """Which of `pixels` (N, 2) lie on the border of the image, be they counted from 0 or from 1: (N,)."""
+    high = np.array(IMAGE_PX) - 1.0 - BORDER_PX
+    return np.asarray(((pixels <= BORDER_PX) | (pixels >= high)).any(axis=1) & ~outside_image(pixels))
+
+
+def is_below_glass(chart: Chart) -> NDArray[np.bool_]:
+    """Which points of a chart, (N,), lie where nothing can be seen."""
+    return np.asarray(MILLIMETRES[chart.unit] * chart.world[:, 2] < -GLASS_MM)
+
+
+def swapped_columns(chart: Chart, limit_px: float) -> str | None:
+    """What to say of a camera whose columns are certainly swapped; None where they are not."""
+    x, y, z = chart.world.T
+    pixels = chart.pixels
+    for name, column in (("y", y), ("z", z)):
+        if np.ptp(column) == 0 and np.ptp(x) > 0 and len(x) > 2:
+            names = f"x_{chart.unit} and {name}_{chart.unit}"
+            return f"{name} is the same for all points and x is not, expected the reverse: {names} are swapped"
+    if outside_image(pixels).any() or _view_mm(chart) > VIEW_MM[1]:
+        world_as_pixels = chart.world[:, 1:]
+        if not outside_image(world_as_pixels).any() and _view_mm(_exchanged(chart)) < VIEW_MM[1]:
+            return "y and z are pixels and i and j lengths, expected the reverse: y, z and i, j are swapped"
+    notes = []
+    if _fits(chart, limit_px):
+        outside = outside_image(pixels)
+        if outside.any() and (pixels[outside, 1] > IMAGE_PX[1]).all() and not outside_image(pixels[:, ::-1]).any():
+            notes.append(f"j reaches {pixels[:, 1].max():g}, expected at most {IMAGE_PX[1] - 1}: i and j are swapped")
+        millimetres = MILLIMETRES[chart.unit]
+        if millimetres * z.min() < -GLASS_MM and millimetres * y.min() > -GLASS_MM:
+            notes.append(f"z reaches {z.min():g} {chart.unit}, below the glass at 0, y does not: y and z are swapped")
+    return "; ".join(notes) or None
+
+
+def other_unit(chart: Chart) -> str | None:
+    """What to say of a camera whose coordinates cannot be in the chart's unit; None where they can."""
+    view = _view_mm(chart)
+    if VIEW_MM[0] <= view <= VIEW_MM[1]:
+        return None
+    low, high = VIEW_MM
+    expected = f"expected {low:.0f} to {high:.0f} mm: x, y and z are in another unit than {chart.unit}"
+    return f"the image would be {view:.3g} mm wide at the laser, {expected}"
+
+
+def rows_in_other_unit(chart: Chart, limit_px: float) -> str | None:
+    """What to say of several rows that fit with the others when read in another unit; None where there are none."""
+    world = MILLIMETRES[chart.unit] * chart.world[:, 1:]
+    scales_of = _scales_of_few if len(world) < ROBUST_POINTS else _scales_of_many
+    scales = scales_of(world, chart.pixels, limit_px)
+    if scales is None:
+        return None
+    values, counts = np.unique(scales, return_counts=True)
+    usual = float(values[counts.argmax()])
+    rows = [int(row) for row in np.flatnonzero(scales != usual)]
+    factor = float(scales[rows[0]]) / usual
+    times = "ten times" if factor > 1 else "a tenth of"
+    names = ", ".join(chart.points[row] for row in rows[:10])
+    return f"{times} their y and z would fit with the other points, expected one unit: {names}"
+
+
+def _scales_of_few(world: Floats, pixels: Floats, limit_px: float) -> Floats | None:
+    """The factor (N,) of each row that brings the residual below the limit, where two rows or more need one."""
+    count = len(world)
+    if count <= PASSED:
+        return None
+    choices = [
+        np.where(np.isin(np.arange(count), rows), factor, 1.0)
+        for size in range(2, count // 2 + 1)
+        for rows in combinations(range(count), size)
+        for factor in OTHER_UNIT
+    ]
+    scales = np.array([np.ones(count), *choices])
+    misfit = plausible_misfits(scales[:, :, np.newaxis] * world, pixels[np.newaxis])
+    best = int(misfit.argmin())
+    return scales[best] if misfit[best] <= min(limit_px, misfit[0] / CLEARLY) else None
+
+
+def _scales_of_many(world: Floats, pixels: Floats, limit_px: float) -> Floats | None:
+    """As by `agreeing`, with each row in the unit in which it fits best."""
+    options = np.array([1.0, *OTHER_UNIT])
+    chosen = samples(len(world))
+    homographies = fit_homographies(world[chosen], pixels[chosen])
+    distances = np.stack(
+        [np.linalg.norm(project(homographies, (scale * world)[np.newaxis]) - pixels, axis=2) for scale in options]
+    )
+    usual = np.sort(distances.min(axis=0), axis=1)[:, (3 * len(world)) // 4]
+    own = distances[:, int(usual.argmin())]
+    scales = np.where(own[0] <= limit_px, 1.0, options[own.argmin(axis=0)])
+    agree = agreeing(scales[:, np.newaxis] * world, pixels, limit_px)
+    values, counts = np.unique(scales[agree], return_counts=True)
+    if agree.mean() < 0.75 or len(values) < 2 or np.sort(counts)[-2] < 2:
+        return None
+    return np.where(agree, scales, values[counts.argmax()])
+
+
+def _view_mm(chart: Chart) -> float:
+    """How wide the image is in the laser's plane, by the middle ratio of distances: mistakes of a few do not count."""
+    world, pixels = MILLIMETRES[chart.unit] * chart.world[:, 1:], chart.pixels
+    first, second = np.triu_indices(len(world), 1)
+    in_mm, in_px = (np.linalg.norm(p[first] - p[second], axis=1) for p in (world, pixels))
+    apart = (in_mm > 0) & (in_px > 0)
+    if not apart.any():
+        return float(np.mean(VIEW_MM))
+    return float(IMAGE_PX[0] * np.median(in_mm[apart] / in_px[apart]))
+
+
+def _exchanged(chart: Chart) -> Chart:
+    world = np.column_stack([chart.world[:, 0], chart.pixels])
+    return Chart(chart.camera, chart.points, world, chart.unit, chart.world[:, 1:])
+
+
+def _fits(chart: Chart, limit_px: float) -> bool:
+    """Whether nearly all points agree on a homography; four points or fewer always do."""
+    world = MILLIMETRES[chart.unit] * chart.world[:, 1:]
+    agree = agreeing(world, chart.pixels, limit_px)
+    squares = float(np.sum(misfits(world[np.newaxis, agree], chart.pixels[np.newaxis, agree]) ** 2))
+    return bool(agree.mean() > 0.8) and squares <= (2.0 * limit_px) ** 2 * max(1.0, agree.sum() - PASSED)

@@ -1,0 +1,221 @@
+"""Calibration from a chart of control points."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.calibration.chart.chart import Chart
+from footscan.calibration.chart.quadratic import ORDER as QUADRATIC
+from footscan.calibration.chart.quadratic import QuadraticFit, fit_quadratic
+from footscan.calibration.models.fit import Fit
+from footscan.calibration.models.maps import IMAGE_PX, Model
+from footscan.calibration.models.observations import Observations, of_points
+from footscan.calibration.models.polynomial import PolynomialModel, terms
+from footscan.calibration.models.region import region_of
+from footscan.calibration.models.selection import ModelTrial, asked_for, candidates, rms, select, try_model
+from footscan.rows import distinct_rows
+from schemas.base.errors import RefusedInput
+from schemas.base.units import MILLIMETRES
+from schemas.calibration import Calibration, CameraCalibration, Residual, Source
+from schemas.parameters.calibration import CalibrationParameters
+
+PLAIN_QUADRATIC = PolynomialModel(QUADRATIC, (0.0, 0.0), 1.0)
+"""The thesis's model: of pixels that are not normalised."""
+FEWEST_POINTS = 4
+"""A plane has three unknowns, and one more point tells how well it fits."""
+
+
+def calibrate_chart(
+    charts: Mapping[int, Chart],
+    *,
+    parameters: CalibrationParameters,
+    source: Source,
+    software: str,
+) -> tuple[Calibration, list[ModelTrial]]:
+    """A calibration in mm from charts, and what each model achieved, camera by camera.
+
+    `source` names the chart in messages and in the calibration. The order of the points does not matter.
+
+    Raises
+    ------
+    RefusedInput
+        A camera has too few control points, or they lie on one line, or cannot carry the model that was asked for.
+    """
+    cameras: list[CameraCalibration] = []
+    trials: list[ModelTrial] = []
+    for camera_id in sorted(charts):
+        camera, tried = _calibrate_camera(charts[camera_id], parameters, source.name)
+        cameras.append(camera)
+        trials += tried
+    return Calibration(sources=[source], software=software, cameras=cameras), trials
+
+
+def compare_models(chart: Chart, source: str = "chart") -> list[ModelTrial]:
+    """What every model achieves on the chart of one camera, that of the thesis first.
+
+    Raises
+    ------
+    RefusedInput
+        The camera has too few control points, or they lie on one line.
+    """
+    _refuse_poor(chart, source)
+    observations = observe(chart)
+    tried = select(candidates(observations.pixels, IMAGE_PX), observations, chart.camera, robust=False)[1]
+    return [_thesis_trial(chart, observations), *tried]
+
+
+def observe(chart: Chart) -> Observations:
+    """The control points of a camera as observations, in mm. Corners clicked twice are held out together."""
+    return of_points(chart.pixels, MILLIMETRES[chart.unit] * chart.world[:, 1:], _groups(chart))
+
+
+def _calibrate_camera(
+    chart: Chart, parameters: CalibrationParameters, source: str
+) -> tuple[CameraCalibration, list[ModelTrial]]:
+    _refuse_poor(chart, source)
+    observations = observe(chart)
+    if parameters.model == "quadratic":
+        return _quadratic(chart, observations)
+    tried = asked_for(candidates(chart.pixels, IMAGE_PX), parameters)
+    found, trials = select(tried, observations, chart.camera, robust=False)
+    if found is None and len(tried) == 1:  # it was asked for by name: what cannot be judged is taken all the same
+        found, _ = try_model(tried[0], observations, chart.camera, robust=False)
+    if found is None:
+        reasons = "; ".join(f"{trial.model}: {trial.remark or 'no point can be held out'}" for trial in trials[:1])
+        raise RefusedInput(source, f"no model can be judged: {reasons}", field=f"camera {chart.camera}")
+    chosen = next((trial for trial in trials if trial.status == "chosen"), trials[0])
+    return calibrated(found, observations, chosen, IMAGE_PX), trials
+
+
+def _refuse_poor(chart: Chart, source: str) -> None:
+    """Refuses control points that cannot carry any model."""
+    if len(chart.points) < FEWEST_POINTS:
+        problem = f"{len(chart.points)} control points, expected at least {FEWEST_POINTS}"
+        raise RefusedInput(source, problem, field=f"camera {chart.camera}")
+    if not region_of(chart.pixels):
+        problem = "the pixels of all control points lie on one line, expected them to cover a region of the image"
+        raise RefusedInput(source, problem, field=f"camera {chart.camera}")
+
+
+def calibrated(
+    found: Fit, observations: Observations, trial: ModelTrial, image_px: tuple[int, int]
+) -> CameraCalibration:
+    """What goes into the calibration file for a camera."""
+    covariance: list[list[float]] = []
+    if found.covariance is not None:
+        covariance = [row[: k + 1].tolist() for k, row in enumerate(found.covariance)]
+    return CameraCalibration(
+        camera=trial.camera,
+        image_px=image_px,
+        map=found.model.as_map(found.parameters),
+        covariance=covariance,
+        condition=found.condition,
+        region_px=region_of(observations.pixels),
+        points=observations.points,
+        rms_mm=trial.rms_mm,
+        held_out_rms_mm=trial.held_out_rms_mm,
+        worst_mm=trial.worst_mm,
+        residuals=_residuals(found.model, found.parameters, observations),
+    )
+
+
+def _residuals(model: Model, parameters: NDArray[np.float64], observations: Observations) -> list[Residual]:
+    """What the fit leaves at each place, in an order that does not depend on that of the observations."""
+    known = observations.sorted()
+    pixels, errors = known.errors(known.across(model.world(parameters, known.pixels)))
+    rows = np.column_stack([pixels.round(2), errors.round(5)]).tolist()
+    return [(i, j, y, z) for i, j, y, z in rows]
+
+
+def _quadratic(chart: Chart, observations: Observations) -> tuple[CameraCalibration, list[ModelTrial]]:
+    """The thesis's model: second order of the plain pixels; its held-out error is that of any second order."""
+    second_order = CalibrationParameters(model="polynomial", order=QUADRATIC)
+    (normalised,) = asked_for(candidates(chart.pixels, IMAGE_PX), second_order)
+    _, trial = try_model(normalised, observations, chart.camera, robust=False)
+    result = fit_quadratic(chart)
+    parameters = _in_mm(result)
+    world = MILLIMETRES[chart.unit] * chart.world[:, 1:]
+    distances = np.linalg.norm(PLAIN_QUADRATIC.world(parameters, chart.pixels) - world, axis=1)
+    worst = trial.worst_mm if trial.held_out_rms_mm is not None else float(distances.max())
+    trial = replace(
+        trial,
+        model="quadratic",
+        rms_mm=rms(distances),
+        worst_mm=worst,
+        status="chosen",
+        remark=result.remark or "",
+    )
+    camera = CameraCalibration(
+        camera=chart.camera,
+        image_px=IMAGE_PX,
+        map=PLAIN_QUADRATIC.as_map(parameters),
+        region_px=region_of(chart.pixels),
+        points=len(chart.points),
+        rms_mm=trial.rms_mm,
+        held_out_rms_mm=trial.held_out_rms_mm,
+        worst_mm=trial.worst_mm,
+        residuals=_residuals(PLAIN_QUADRATIC, parameters, observations),
+    )
+    return camera, [trial]
+
+
+def _thesis_trial(chart: Chart, observations: Observations) -> ModelTrial:
+    """The quadratic of the thesis; held out is each group of points in turn from its basic solution."""
+    world = MILLIMETRES[chart.unit] * chart.world[:, 1:]
+    group = observations.group[: len(world)]
+    distances = np.linalg.norm(_quadratic_world(chart, chart.pixels) - world, axis=1)
+    held_out = np.array(distances)
+    judged = bool(np.ptp(group) > 0)
+    for number in np.unique(group) if judged else ():
+        out = group == number
+        held_out[out] = np.linalg.norm(_quadratic_world(_part(chart, ~out), chart.pixels[out]) - world[out], axis=1)
+    worst = int(held_out.argmax())
+    determined = observations.independent <= 2 * terms(QUADRATIC)
+    return ModelTrial(
+        camera=chart.camera,
+        model="quadratic of the thesis",
+        unknowns=2 * terms(QUADRATIC),
+        observations=observations.independent,
+        points=observations.points,
+        rms_mm=rms(distances),
+        held_out_rms_mm=rms(held_out) if judged else None,
+        region_sigma_mm=None,
+        worst_mm=float(held_out[worst]),
+        worst_point=worst,
+        condition=None,
+        status="determined" if determined else "tried",
+        remark="passes through its points by construction" if determined else "",
+    )
+
+
+def _quadratic_world(chart: Chart, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Y and Z (N, 2), mm, of `pixels` (N, 2) by the quadratic of a chart."""
+    return PLAIN_QUADRATIC.world(_in_mm(fit_quadratic(chart)), pixels)
+
+
+def _in_mm(result: QuadraticFit) -> NDArray[np.float64]:
+    return MILLIMETRES[result.unit] * np.array(result.alpha_y + result.alpha_z)
+
+
+def _part(chart: Chart, chosen: NDArray[np.bool_]) -> Chart:
+    names = tuple(name for name, taken in zip(chart.points, chosen, strict=True) if taken)
+    return Chart(chart.camera, names, chart.world[chosen], chart.unit, chart.pixels[chosen])
+
+
+def _groups(chart: Chart) -> NDArray[np.intp]:
+    """A number (N,) for each point, the same for points that share a world position or a pixel.
+
+    The numbers follow from the points' places, not from their order.
+    """
+    places = np.column_stack([chart.world, chart.pixels])
+    order = np.lexsort(places.T[::-1])
+    group = np.empty(len(order), np.intp)
+    group[order] = np.arange(len(order))
+    for positions in (chart.world, chart.pixels):
+        same = distinct_rows(positions).number
+        for number in range(same.max() + 1):
+            touched = np.isin(group, group[same == number])
+            group[touched] = group[touched].min()
+    return group

@@ -1,0 +1,1 @@
+"""Two calibrations side by side, and the drift since the last one."""

@@ -1,0 +1,166 @@
+"""Where a camera stands, from its map of the laser's plane alone.
+
+The plane's picture is a homography K (r1 r2 t), and r1, r2 are unit vectors at right angles: two equations for what is
+not known of the camera (Z. Zhang, "A flexible new technique for camera calibration", IEEE TPAMI 22 (2000) 1330-1334,
+doi:10.1109/34.888718). With square pixels and the principal point at the image's middle that is the focal length.
+A map that is none of a pinhole's still tells in which direction the plane is foreshortened, and where it looks larger.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.calibration.models.homography import project
+from footscan.calibration.models.maps import IMAGE_PX, model_of, to_world
+from schemas.calibration import CameraCalibration, HomographyMap
+from schemas.mounting import CaptureCamera, mounting_of
+
+Floats = NDArray[np.float64]
+
+SAMPLES = 15
+"""Pixels a side of the region that are mapped."""
+FOCAL_WIDTHS = (0.4, 6.0)
+"""Focal lengths of cameras, in widths of their images: views of 100 to 10 degrees."""
+DISTANCES_MM = (40.0, 2000.0)
+"""How far cameras stand from the middle of what they film."""
+TYPICAL_MM = 300.0
+"""Where one stands of which no more than the direction is known."""
+LARGEST_MISFIT = 0.02
+"""Of a homography from a map that a camera could have made: root mean square in parts of the region's diagonal."""
+LEAST_TILT = 0.1
+"""Sine of the angle to the plane's normal below which a view is frontal, and says nothing of focal length or tilt."""
+SAME_SIDE, SAME_WAY = 0.95, 0.9
+"""Least share of samples that see the plane from one side; least cosine between foreshortening and growth."""
+
+
+def camera_centres(cameras: Iterable[CameraCalibration]) -> dict[int, Floats]:
+    """For each camera its `camera_centre`; where its map does not say it, what its number says, if that does."""
+    centres = {}
+    for camera in cameras:
+        centre = camera_centre(camera)
+        if centre is None:
+            stands = mounting_of(CaptureCamera(id=camera.camera, file="unknown"))
+            direction = np.array([stands.x, stands.y, stands.z], np.float64)
+            centre = TYPICAL_MM * direction / np.linalg.norm(direction) if direction.any() else None
+        if centre is not None:
+            centres[camera.camera] = centre
+    return centres
+
+
+def camera_centre(camera: CameraCalibration) -> Floats | None:
+    """The place of the camera's centre of projection, (3,) float64, mm: X from the laser's plane, Y and Z.
+
+    None where its map does not say it: one without perspective, or one that too few control points bent. A view along
+    the plane's normal gives the side of the plane and a typical distance. Glass in the way is not thought of: seen
+    through a plate of 6 mm a camera is taken to stand some 5 mm nearer.
+    """
+    pixels = _samples(camera)
+    plane = to_world(camera, pixels)
+    if not np.isfinite(plane).all():
+        return None
+    centre = _by_homography(camera, pixels, plane)
+    return centre if centre is not None else _by_foreshortening(camera, pixels, plane)
+
+
+def _samples(camera: CameraCalibration) -> Floats:
+    """(N, 2) pixels over the camera's region, or over its image."""
+    low, high = np.zeros(2), np.array(camera.image_px or IMAGE_PX) - 1.0
+    if camera.region_px:
+        low, high = np.min(camera.region_px, axis=0), np.max(camera.region_px, axis=0)
+    i, j = np.meshgrid(*(np.linspace(low[k], high[k], SAMPLES) for k in (0, 1)))
+    return np.column_stack([i.ravel(), j.ravel()])
+
+
+def _by_homography(camera: CameraCalibration, pixels: Floats, plane: Floats) -> Floats | None:
+    middle, image_middle = plane.mean(axis=0), (np.array(camera.image_px or IMAGE_PX) - 1) / 2
+    if isinstance(camera.map, HomographyMap):
+        image = _without_distortion(camera.map, plane) - image_middle
+    else:
+        image = pixels - image_middle
+    to_image = _homography(plane - middle, image)
+    misfit = np.sqrt(np.mean(np.sum((project(to_image, plane - middle)[0] - image) ** 2, axis=1)))
+    if not misfit <= LARGEST_MISFIT * np.linalg.norm(np.ptp(pixels, axis=0)):
+        return None
+    y, z = to_image[:, 0], to_image[:, 1]
+    # Zhang's equations (3) and (4) with the image of the absolute conic diag(1, 1, f^2) / f^2, by least squares.
+    in_image = np.array([y[0] * z[0] + y[1] * z[1], (y[0] ** 2 + y[1] ** 2 - z[0] ** 2 - z[1] ** 2) / 2])
+    in_depth = np.array([y[2] * z[2], (y[2] ** 2 - z[2] ** 2) / 2])
+    along = float(np.sum(in_image * in_depth))
+    if along >= 0:
+        return None
+    focal = float(np.sqrt(-np.sum(in_image**2) / along))
+    if not FOCAL_WIDTHS[0] <= focal / (2 * image_middle[0]) <= FOCAL_WIDTHS[1]:
+        return None
+    taken = to_image / np.array([[focal], [focal], [1.0]])
+    left, lengths, right = np.linalg.svd(taken[:, :2], full_matrices=False)
+    axes = left @ right  # the nearest two vectors of unit length at right angles
+    rotation = np.column_stack([np.cross(axes[:, 0], axes[:, 1]), axes])
+    centre = -rotation.T @ taken[:, 2] / lengths.mean()
+    tilt = np.hypot(centre[1], centre[2])
+    distance = np.linalg.norm(centre)
+    if not DISTANCES_MM[0] <= distance <= DISTANCES_MM[1] or tilt < LEAST_TILT * distance:
+        return None
+    return np.asarray(centre + np.array([0.0, *middle]))
+
+
+def _without_distortion(pixel_map: HomographyMap, plane: Floats) -> Floats:
+    """Where a camera whose lens does not distort sees points (N, 2) of the plane, px."""
+    to_plane = np.append(pixel_map.matrix, 1.0).reshape(3, 3)
+    uv, _ = project(np.linalg.inv(to_plane), plane)
+    return np.asarray(uv * pixel_map.scale_px + np.array(pixel_map.centre_px))
+
+
+def _homography(plane: Floats, image: Floats) -> Floats:
+    """(3, 3) matrix from points (N, 2) of the plane to the image, depths positive (Hartley & Zisserman 2004, 4.1)."""
+    to_unit, from_unit = _normalisation(plane), np.linalg.inv(_normalisation(image))
+    source, goal = project(to_unit, plane)[0], project(np.linalg.inv(from_unit), image)[0]
+    homogeneous = np.column_stack([source, np.ones(len(source))])
+    nothing = np.zeros_like(homogeneous)
+    rows = np.concatenate(
+        [
+            np.concatenate([homogeneous, nothing, -goal[:, :1] * homogeneous], axis=1),
+            np.concatenate([nothing, homogeneous, -goal[:, 1:] * homogeneous], axis=1),
+        ]
+    )
+    matrix = np.linalg.eigh(np.einsum("np,nq->pq", rows, rows))[1][:, 0].reshape(3, 3)
+    matrix = from_unit @ matrix @ to_unit
+    return np.asarray(matrix * (1.0 if matrix[2, 2] >= 0 else -1.0))
+
+
+def _normalisation(points: Floats) -> Floats:
+    """(3, 3) matrix that moves and scales `points` (N, 2) to the origin and about unit size."""
+    middle = points.mean(axis=0)
+    size = np.sqrt(np.mean((points - middle) ** 2)) or 1.0
+    return np.array([[1 / size, 0.0, -middle[0] / size], [0.0, 1 / size, -middle[1] / size], [0.0, 0.0, 1.0]])
+
+
+def _by_foreshortening(camera: CameraCalibration, pixels: Floats, plane: Floats) -> Floats | None:
+    """The camera's place by how its map shrinks the plane along one direction, and shows its nearer part larger.
+
+    A plane that is tilted by an angle is shrunk by its cosine; and at a distance D its picture's area grows with the
+    cube of the nearness, by 3 sin / D a mm towards the camera.
+    """
+    model, parameters = model_of(camera.map)
+    slopes = np.linalg.det(model.by_pixels(parameters, pixels))
+    sides = np.sign(slopes)
+    side = 1.0 if sides.sum() < 0 else -1.0  # of the mirror image that a camera in front, at +X, sees
+    regular = sides == -side
+    if np.mean(regular) < SAME_SIDE:
+        return None
+    middle = plane.mean(axis=0)
+    _, lengths, directions = np.linalg.svd(np.linalg.inv(model.by_pixels(parameters, pixels.mean(axis=0)[None])[0]))
+    cosine = lengths[1] / lengths[0]
+    sine = np.sqrt(1.0 - cosine**2)
+    if sine < LEAST_TILT:
+        return np.array([side * TYPICAL_MM, *middle])
+    about = np.column_stack([plane - middle, np.ones(len(plane))])[regular]
+    growth = np.linalg.lstsq(about, -np.log(np.abs(slopes[regular])), rcond=None)[0][:2]
+    towards = growth @ directions[1]
+    if abs(towards) < SAME_WAY * np.linalg.norm(growth) or towards == 0.0:
+        return None
+    distance = 3.0 * sine / abs(towards)
+    if not DISTANCES_MM[0] <= distance <= DISTANCES_MM[1]:
+        return None
+    in_plane = middle + distance * sine * np.sign(towards) * directions[1]
+    return np.array([side * distance * cosine, *in_plane])

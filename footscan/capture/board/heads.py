@@ -1,0 +1,394 @@
+"""The three range-sensor heads and their lasers, in world coordinates: homing, travels, light, and where they were.
+
+Light is tied to motion. `lasers` says how bright the next travels are; the board puts that out only while heads move
+(M4 in laser mode), so heads that stand are dark, whatever has become of the host. For a look at standing heads, `shine`
+lets them creep.
+"""
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import NamedTuple, Self
+
+from footscan.capture.board.controller import Controller
+from footscan.capture.board.position_log import HeadPosition, PositionLog, Triple
+from footscan.capture.board.state import BoardState
+from footscan.capture.grbl.report import Report
+from footscan.capture.grbl.settings import BoardSettings
+from footscan.capture.grbl.status_poll import TimedReport
+from schemas.base.errors import Fault, RefusedInput
+
+HEADS = (1, 2, 3)
+SLACK_MM = 0.05
+"""How far a reported position may be from the one that was asked for: steps, and decimals of the report."""
+STEPS_LOST_MM = 0.3
+"""From how far on a head's home switch is not where it was: a few times what a cheap switch repeats to."""
+FEELER_STEP_MM = 0.1
+SOFT_LIMITS, HARD_LIMITS = 20, 21
+"""The settings' numbers."""
+FEELER_MM = 1.5
+"""How far before and beyond where it should be a switch is looked for."""
+WELL_TIMED_SECONDS = 0.1
+"""Reports whose time is less certain are not logged."""
+LONGEST_SHINE_SECONDS = 5.0
+CREEP_MM_PER_S = 0.5
+"""Of heads that are lit where they stand: within an exposure of 20 ms a hundredth of a mm."""
+DWELL = "G4P0.01"
+"""Answered when all motion before it is done."""
+
+
+@dataclass(frozen=True)
+class Head:
+    """How a head's rail lies: world X of its laser plane = `offset_mm` + `direction` x machine position."""
+
+    offset_mm: float = -20.0
+    """World X where its home switch trips: found by calibration, it aligns the heads."""
+    direction: int = -1
+    """-1 where X grows away from the home switch, as machine positions fall there; 1 where it falls."""
+
+    def world(self, machine_mm: float) -> float:
+        """World X, mm."""
+        return self.offset_mm + self.direction * machine_mm
+
+    def machine(self, world_mm: float) -> float:
+        """Machine position, mm."""
+        return (world_mm - self.offset_mm) * self.direction
+
+
+class Travel(NamedTuple):
+    """A travel that was made."""
+
+    begin_seconds: float
+    """`time.monotonic()` before it began."""
+    end_seconds: float
+    """... and when the heads stood again."""
+
+
+class Heads:
+    """All heads of a scanner, moved together. Leaving the `with` block ends motion and light, whatever the reason."""
+
+    def __init__(
+        self,
+        port: str,
+        settings: BoardSettings | None = None,
+        heads: Sequence[Head] = (Head(), Head(), Head()),
+        *,
+        patience_seconds: float = 2.0,
+    ) -> None:
+        """Connects to the board at `port`, which must have these `settings`; errors as those of `Controller`."""
+        self.settings = settings or BoardSettings()
+        self.heads = tuple(heads)
+        self.log = PositionLog()
+        """Every report of where the heads were, while they are homed."""
+        self._power = 0.0
+        self._brightest = 0.0
+        self._suspect: HeadPosition | None = None
+        self.board = Controller(port, patience_seconds=patience_seconds)
+        try:
+            self._restore_limits()
+            self.board.check(self.settings)
+        except BaseException:
+            self.board.close()
+            raise
+        self.board.on_report(self._log)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends motion and light and lets the board go."""
+        self.board.close()
+
+    @property
+    def state(self) -> BoardState:
+        """What the board does, in words."""
+        return self.board.state
+
+    @property
+    def reach_mm(self) -> tuple[float, float]:
+        """Lowest and highest world X that all heads can stand at."""
+        ends = [
+            sorted((head.world(-self.settings.pull_off_mm), head.world(-travel)))
+            for head, travel in zip(self.heads, self.settings.travel_mm, strict=True)
+        ]
+        return max(low for low, _ in ends), min(high for _, high in ends)
+
+    def position_mm(self) -> Triple:
+        """World X of heads 1, 2, 3 now, as the firmware counts them; Fault where they are not homed."""
+        self._need_home()
+        return self._world(self.board.status().report)
+
+    def home(self) -> None:
+        """Finds the home switches, then aligns all heads at one X next to them; Fault where a head fails to."""
+        self._suspect = None
+        self.board.home(self._homing_limit())
+        self._restore_limits()
+        low, high = self.reach_mm
+        at = self._world(self.board.status().report)
+        self.travel_to(low if abs(at[0] - low) < abs(at[0] - high) else high)
+
+    def lasers(self, power: float) -> None:
+        """How bright the lasers are on travels from now on, 0 to 1. Nothing shines before heads travel."""
+        if not 0.0 <= power <= 1.0:
+            raise RefusedInput("lasers", f"expected a power from 0 to 1, found {power:g}", field="power")
+        self._power = power
+
+    def travel(self, start_mm: float, end_mm: float, mm_per_s: float) -> Travel:
+        """Moves all heads to `start_mm`, dark, and then on to `end_mm` at `mm_per_s` with the lasers on; waits for it.
+
+        The run begins before the start and ends behind the end by as much as the heads need to gain and to lose their
+        speed, where the rails have room for that: between the two, speed and brightness are even.
+
+        Raises
+        ------
+        RefusedInput
+            A place out of reach, or a speed that is not positive or beyond the heads'. Nothing has moved.
+        Fault
+            Not homed; or something ended the travel, and heads and lasers are stopped.
+        """
+        self._check_travel(start_mm, end_mm, mm_per_s)
+        way = 1.0 if end_mm >= start_mm else -1.0
+        run_up = mm_per_s**2 / (2.0 * min(self.settings.mm_per_s2))
+        low, high = self.reach_mm
+        begin, end = (min(max(x, low), high) for x in (start_mm - way * run_up, end_mm + way * run_up))
+        self.travel_to(begin)
+        return self._run(begin, end, mm_per_s, self._power)
+
+    def travel_to(self, x_mm: float, mm_per_s: float | None = None) -> Travel:
+        """Moves all heads to `x_mm` with the lasers off, at full speed where none is given; waits for it."""
+        speed = mm_per_s or min(self.settings.max_mm_per_s)
+        self._check_travel(x_mm, x_mm, speed)
+        at = self._world(self.board.status().report)
+        farthest = max(at, key=lambda x: abs(x - x_mm))
+        if abs(farthest - x_mm) < SLACK_MM / 2.0:
+            now = time.monotonic()
+            return Travel(now, now)
+        return self._run(farthest, x_mm, speed, 0.0)
+
+    def shine(self, power: float, seconds: float) -> Travel:
+        """Lights the heads where they stand, for as long, and waits until it is dark again.
+
+        They creep at 0.5 mm/s meanwhile and are taken back in the dark: the end of the motion is the end of the light,
+        whatever becomes of the host or of the line that should have switched it off.
+        """
+        if not (0.0 < power <= 1.0 and 0.0 < seconds <= LONGEST_SHINE_SECONDS):
+            expected = f"expected a power up to 1 and up to {LONGEST_SHINE_SECONDS:g} s"
+            raise RefusedInput("lasers", f"{expected}, found {power:g} and {seconds:g} s", field="shine")
+        self._need_home()
+        report = self.board.status().report
+        x, at = self._world(report), report.machine_mm
+        assert at is not None
+        by = CREEP_MM_PER_S * seconds
+        way = by if max(x) + by <= self.reach_mm[1] else -by
+        target = [one + head.direction * way for one, head in zip(at, self.heads, strict=True)]
+        feed = CREEP_MM_PER_S * math.sqrt(3.0)
+        begin = time.monotonic()
+        self._go_machine(target, feed, power, seconds)
+        end = time.monotonic()
+        self._go_machine(at, 10.0 * feed, 0.0)
+        return Travel(begin, end)
+
+    def jog(self, by_mm: float, mm_per_s: float, head: int | None = None) -> None:
+        """Begins to move all heads, or one, by so much along X in the dark, as with a hand-held controller.
+
+        Heads that are homed are refused to leave their reach. `stop_jog` ends it.
+        """
+        self._check_speed(mm_per_s)
+        moved = HEADS if head is None else (head,)
+        if not set(moved) <= set(HEADS):
+            raise RefusedInput("jog", f"expected 1, 2 or 3, found {head}", field="head")
+        if self.board.homed:
+            low, high = self.reach_mm
+            for one, at in zip(HEADS, self.position_mm(), strict=True):
+                if one in moved and not low - SLACK_MM <= at + by_mm <= high + SLACK_MM:
+                    raise RefusedInput("jog", _out_of_reach(at + by_mm, low, high), field=f"head {one}")
+        by = [frame.direction * by_mm if one in moved else 0.0 for one, frame in zip(HEADS, self.heads, strict=True)]
+        self.board.jog((by[0], by[1], by[2]), mm_per_s)
+
+    def stop_jog(self) -> None:
+        """Ends all jogs."""
+        self.board.cancel_jog()
+
+    def hold(self) -> None:
+        """Halts a travel; it goes on, with light, after `resume`."""
+        self.board.hold()
+
+    def resume(self) -> None:
+        """Goes on after `hold`, or after the lid was closed."""
+        self.board.resume()
+
+    def stop(self) -> None:
+        """Ends a travel for good, with the light off and the position kept; the call that made it raises Fault."""
+        self.board.stop()
+
+    def lost_steps_mm(self) -> Triple:
+        """How far each head's home switch is from where it was at homing, mm along X; a `Fault` beyond the tolerance.
+
+        The firmware counts the steps it gives and never learns of one that a motor did not make. This goes back to the
+        home switches, feels for them in steps of 0.1 mm, and compares. A head that never meets its switch is as bad.
+        Limits are off meanwhile ($20=0, $21=0), as the switches must be touched: four writes into the board's memory.
+        Whatever ends it before its time, heads must be homed again, and that switches them on.
+        """
+        low, high = self.reach_mm
+        home = low if abs(self.heads[0].world(0.0) - low) < abs(self.heads[0].world(0.0) - high) else high
+        slow = self.settings.homing_slow_mm_per_s
+        try:
+            self.travel_to(home)
+            self._go_machine([-FEELER_MM] * 3, slow, 0.0)
+            self.board.change(SOFT_LIMITS, 0)
+            self.board.change(HARD_LIMITS, 0)
+            tripped = self._feel_switches()
+            self.board.change(SOFT_LIMITS, 1)  # before the way back, hard ones behind it: leaving a switch trips them
+            self._go_machine([-self.settings.pull_off_mm] * 3, slow, 0.0)
+            self.board.change(HARD_LIMITS, 1)
+            self.travel_to(home)
+        except BaseException:
+            self.board.doubt_home()
+            raise
+        lost = [math.inf if at is None else head.direction * at for head, at in zip(self.heads, tripped, strict=True)]
+        wrong = [f"head {one} {_off(by)}" for one, by in zip(HEADS, lost, strict=True) if abs(by) > STEPS_LOST_MM]
+        if wrong:
+            self.board.doubt_home()
+            remedy = "see what holds them, then home the heads again"
+            raise Fault(f"heads are not where their steps say: {', '.join(wrong)}; {remedy}")
+        return lost[0], lost[1], lost[2]
+
+    def _restore_limits(self) -> None:
+        """Switches those on that feeling for the switches left off, as where the cable was pulled meanwhile."""
+        found = self.board.settings()
+        for number in (SOFT_LIMITS, HARD_LIMITS):
+            if found.get(number) == 0:
+                self.board.change(number, 1)
+
+    def _run(self, begin_mm: float, end_mm: float, mm_per_s: float, power: float) -> Travel:
+        """One straight run of all heads to `end_mm`; `mm_per_s` is that of a head that comes from `begin_mm`."""
+        self._need_home()
+        at = self.board.status().report.machine_mm
+        assert at is not None
+        target = [head.machine(end_mm) for head in self.heads]
+        along = [abs(b - a) for a, b in zip(at, target, strict=True)]
+        # The firmware's feed is that through the space of the three axes: of three equal ones sqrt(3) times theirs.
+        feed = mm_per_s * math.hypot(*along) / max(*along, 1e-9)
+        seconds = abs(end_mm - begin_mm) / mm_per_s + 2.0 * mm_per_s / min(self.settings.mm_per_s2)
+        began = time.monotonic()
+        self._brightest = 0.0
+        self._go_machine(target, feed, power, seconds)
+        ended = time.monotonic()
+        self._check_light(power, seconds)
+        return Travel(began, ended)
+
+    def _go_machine(self, target: Sequence[float], feed_mm_per_s: float, power: float, seconds: float = 5.0) -> None:
+        """Moves through the machine's space and sees that the heads arrived.
+
+        The line that ends the light is in the board's buffer before the motion begins. It waits for the motion's end
+        only where there is light; the dwell behind it always does, so the last answer says that the heads stand.
+        """
+        self.board.overrides_away()
+        words = "".join(f"{axis}{at:.3f}" for axis, at in zip("XYZ", target, strict=True))
+        light = [f"M4{self._s_word(power)}"] if power else []
+        lines = ["G21G90G94M5", *light, f"G53G1{words}F{60.0 * feed_mm_per_s:.1f}", "M5", DWELL]
+        self.board.stream(lines, limit_seconds=seconds)
+        report = self.board.status().report
+        arrived = report.machine_mm is not None and all(
+            abs(a - b) <= SLACK_MM for a, b in zip(report.machine_mm, target, strict=True)
+        )
+        if report.state != "Idle" or not arrived:
+            self.board.stop()
+            stand = "nowhere known" if report.machine_mm is None else ", ".join(f"{at:.2f}" for at in report.machine_mm)
+            wanted = ", ".join(f"{at:.2f}" for at in target)
+            raise Fault(f"the heads did not go where they were sent ({wanted}), they stand at {stand}; try again")
+
+    def _check_light(self, power: float, seconds: float) -> None:
+        """A travel of some length must have shown the power it was sent, and a dark one none."""
+        wanted = round(power * self.settings.full_power)
+        if self._brightest > wanted + 1 or (seconds > 1.0 and self._brightest < wanted - 1):
+            told = f"sent S{wanted}, put out S{self._brightest:g}"
+            raise Fault(f"the lasers were not as bright as they should be on this travel ({told}); try again")
+
+    def _feel_switches(self) -> list[float | None]:
+        """Machine position at which each home switch trips, mm; None where it does not.
+
+        No limit stops a head here, so each step is a short word of its own: a byte that is lost or doubled on the line
+        makes of it at most one of a millimetre.
+        """
+        tripped: list[float | None] = [None, None, None]
+        feed = 60.0 * self.settings.homing_slow_mm_per_s * math.sqrt(3.0)
+        step = "".join(f"{axis}{FEELER_STEP_MM:g}".replace("0.", ".") for axis in "XYZ")
+        for _ in range(round(2.0 * FEELER_MM / FEELER_STEP_MM)):
+            self.board.send(f"G91G1{step}F{feed:.0f}")
+            self.board.send(DWELL, limit_seconds=1.0)
+            report = self.board.status().report
+            for index, axis in enumerate("XYZ"):
+                if axis in report.pins and tripped[index] is None and report.machine_mm is not None:
+                    tripped[index] = report.machine_mm[index] - FEELER_STEP_MM / 2.0
+            if None not in tripped:
+                break
+        return tripped
+
+    def _check_travel(self, start_mm: float, end_mm: float, mm_per_s: float) -> None:
+        self._need_home()
+        self._check_speed(mm_per_s)
+        low, high = self.reach_mm
+        for name, x in (("start", start_mm), ("end", end_mm)):
+            if not low - 1e-6 <= x <= high + 1e-6:
+                raise RefusedInput("travel", _out_of_reach(x, low, high), field=name)
+
+    def _check_speed(self, mm_per_s: float) -> None:
+        most = min(self.settings.max_mm_per_s)
+        if not 0.0 < mm_per_s <= most:
+            raise RefusedInput("travel", f"expected up to {most:g} mm/s, found {mm_per_s:g}", field="speed")
+
+    def _need_home(self) -> None:
+        if not self.board.homed:
+            raise Fault(f"the heads are not homed: {self.state}")
+
+    def _homing_limit(self) -> float:
+        """The longest it can take: heads are homed one after the other, from the far end, and the last one fails.
+
+        Grbl looks for a switch over 1.5 times the travel, and for it again over 5 times the pull-off.
+        """
+        s = self.settings
+        search = (len(HEADS) - 1 + 1.5) * max(s.travel_mm) / s.homing_mm_per_s
+        return search + len(HEADS) * (5.0 * s.pull_off_mm / s.homing_slow_mm_per_s + 2.0)
+
+    def _s_word(self, power: float) -> str:
+        return f"S{round(power * self.settings.full_power)}"
+
+    def _world(self, report: Report) -> Triple:
+        if report.machine_mm is None:
+            raise Fault("the board does not report machine positions, expected $10=1")
+        x = [head.world(at) for head, at in zip(self.heads, report.machine_mm, strict=True)]
+        return x[0], x[1], x[2]
+
+    def _log(self, told: TimedReport) -> None:
+        """Keeps a report, in the thread that reads the line."""
+        if told.report.state in ("Run", "Jog"):
+            self._brightest = max(self._brightest, told.report.power)
+        if not self.board.homed or told.report.machine_mm is None or told.uncertain_seconds > WELL_TIMED_SECONDS:
+            return
+        moving = told.report.state in ("Run", "Jog") or (told.report.state, told.report.substate) == ("Hold", 1)
+        entry = HeadPosition(told.seconds, self._world(told.report), told.uncertain_seconds, moving)
+        # A byte lost on the line can leave a report that looks whole: a jump that no head can make must be told twice.
+        if self._suspect is None or self._can_follow(self._suspect, entry):
+            self.log.add(entry)
+        self._suspect = entry
+
+    def _can_follow(self, before: HeadPosition, entry: HeadPosition) -> bool:
+        passed = entry.seconds - before.seconds + entry.uncertain_seconds + before.uncertain_seconds
+        reach = 2.0 * max(self.settings.max_mm_per_s) * passed + SLACK_MM
+        return all(abs(b - a) <= reach for a, b in zip(before.x_mm, entry.x_mm, strict=True))
+
+
+def _off(by_mm: float) -> str:
+    return "never met its home switch" if math.isinf(by_mm) else f"by {by_mm:+.2f} mm"
+
+
+def _out_of_reach(x_mm: float, low: float, high: float) -> str:
+    return f"{x_mm:g} mm is out of reach, expected {low:g} to {high:g}"

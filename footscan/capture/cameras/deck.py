@@ -1,0 +1,122 @@
+"""The cameras of a scanner together: those that a pass needs are open, and their frames go where they are wanted."""
+
+import threading
+import time
+from collections.abc import Callable, Collection, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from types import TracebackType
+from typing import Self
+
+from footscan.capture.cameras.frame_clock import FrameTimes
+from footscan.capture.cameras.source import CameraSource
+from footscan.capture.cameras.stream import CameraStream, CapturedFrame, StreamHealth
+from schemas.base.errors import Fault
+
+Sink = Callable[[CapturedFrame], None]
+"""Takes a frame at once, on its camera's thread; `queue.Full` where it has no room."""
+
+FIRST_FRAMES = 5
+"""Of a camera that was just opened, before it is relied on."""
+LONGEST_WAIT_SECONDS = 20.0
+STREAMING_LOOKS_SECONDS = 0.02
+
+
+class CameraDeck:
+    """Opens and closes cameras; a context manager, whose end closes all."""
+
+    def __init__(self, sources: Mapping[int, CameraSource]) -> None:
+        self.sources = dict(sources)
+        self._streams: dict[int, CameraStream] = {}
+        self._latest: dict[int, CapturedFrame] = {}
+        self._sink: Sink | None = None
+        self._changing = threading.Lock()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def open_cameras(self) -> tuple[int, ...]:
+        """Those that film now."""
+        return tuple(sorted(self._streams))
+
+    def open_only(self, cameras: Collection[int], timeout_s: float = LONGEST_WAIT_SECONDS) -> dict[int, str]:
+        """Closes all others, opens these, and waits for their first frames.
+
+        Returns
+        -------
+        problems : what is wrong with each camera that gives no frames; those that do are open.
+        """
+        with self._changing:
+            self._close([camera for camera in self._streams if camera not in cameras])
+            for camera in sorted(set(cameras) - set(self._streams)):
+                self._streams[camera] = CameraStream(camera, self.sources[camera], self._deliver)
+        return self._wait_for(cameras, FIRST_FRAMES, timeout_s)
+
+    def health(self) -> dict[int, StreamHealth]:
+        """Of the open cameras."""
+        return {camera: stream.health for camera, stream in self._opened()}
+
+    def latest(self, camera: int) -> CapturedFrame | None:
+        """The last frame of a camera, for a live picture."""
+        return self._latest.get(camera)
+
+    def send_to(self, sink: Sink | None) -> None:
+        """Where the frames go from now on; None: nowhere."""
+        self._sink = sink
+
+    def times(self, camera: int) -> tuple[int, FrameTimes]:
+        """Arrival index of the first frame still known, and the times of all from there; see `CameraStream.times`."""
+        return self._streams[camera].times()
+
+    def wait_beyond(self, seconds: float, timeout_s: float) -> None:
+        """Returns when every open camera has sent a frame after `seconds`, or after `timeout_s`."""
+        end = time.monotonic() + timeout_s
+        while time.monotonic() < end:
+            last = [self._latest.get(camera) for camera in self.open_cameras]
+            if all(frame is not None and frame.seconds > seconds for frame in last):
+                return
+            time.sleep(STREAMING_LOOKS_SECONDS)
+
+    def close(self) -> None:
+        """Closes all cameras."""
+        with self._changing:
+            self._sink = None
+            self._close(list(self._streams))
+
+    def _opened(self) -> list[tuple[int, CameraStream]]:
+        with self._changing:
+            return sorted(self._streams.items())
+
+    def _deliver(self, frame: CapturedFrame) -> None:
+        self._latest[frame.camera] = frame
+        if (sink := self._sink) is not None:
+            sink(frame)
+
+    def _wait_for(self, cameras: Collection[int], frames: int, timeout_s: float) -> dict[int, str]:
+        end = time.monotonic() + timeout_s
+        problems = {}
+        for camera, stream in self._opened():
+            if camera not in cameras:
+                continue
+            try:
+                stream.wait_for_frames(frames, max(end - time.monotonic(), 0.1))
+            except Fault as fault:
+                problems[camera] = str(fault)
+        return problems
+
+    def _close(self, cameras: list[int]) -> None:
+        """At once: a camera that does not answer takes seconds to let go."""
+        streams = [self._streams.pop(camera) for camera in cameras]
+        for camera in cameras:
+            self._latest.pop(camera, None)
+        if not streams:
+            return
+        with ThreadPoolExecutor(len(streams)) as pool:
+            ends = [pool.submit(stream.close) for stream in streams]
+        for end in ends:
+            end.result()

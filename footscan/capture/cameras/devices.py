@@ -1,0 +1,69 @@
+"""Which cameras are plugged into this computer: what they are called, where, and what they film."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from footscan.capture.cameras.usb_bus import UsbCamera
+from footscan.capture.cameras.usb_topology import SYSFS, usb_place
+from footscan.capture.cameras.v4l2 import VideoFormat, camera_name, open_device, video_formats
+from schemas.base.errors import Fault
+
+DEV = Path("/dev")
+
+
+@dataclass(frozen=True)
+class CameraDevice:
+    """A camera on this computer."""
+
+    name: str
+    """What it calls itself; eight of a kind have the same."""
+    node: Path
+    """`/dev/video0`: given anew at every start."""
+    by_path: Path | None
+    """Names the port it is plugged into: the stable name for cameras of a kind, as long as each keeps its port."""
+    by_id: Path | None
+    """Names maker, model and serial number; of cameras without one, only the last that was plugged in has it."""
+    usb: UsbCamera
+    """Its place on USB; its `camera` is its place in the list, from 1."""
+    formats: tuple[VideoFormat, ...]
+    problem: str | None
+    """Why it cannot be asked; None where it could."""
+
+    @property
+    def stable_name(self) -> Path:
+        """What to write into a rig: by its port, else by its identity, else its node."""
+        return self.by_path or self.by_id or self.node
+
+
+def list_cameras(dev: Path = DEV, sysfs: Path = SYSFS) -> list[CameraDevice]:
+    """All devices that take pictures, in the order of their ports. A camera's second node, for metadata, is none."""
+    nodes = sorted(dev.glob("video*"), key=lambda node: (len(node.name), node.name))
+    found = [camera for node in nodes if (camera := _camera(node, dev, sysfs)) is not None]
+    found.sort(key=lambda camera: str(camera.stable_name))
+    return [_numbered(camera, place, sysfs) for place, camera in enumerate(found, start=1)]
+
+
+def _camera(node: Path, dev: Path, sysfs: Path) -> CameraDevice | None:
+    by_path, by_id = (_link_to(node, dev / "v4l" / kind) for kind in ("by-path", "by-id"))
+    try:
+        with open_device(node) as device:
+            name = camera_name(device)
+            if name is None:
+                return None
+            formats, problem = tuple(video_formats(device)), None
+    except Fault as fault:
+        name, formats, problem = node.name, (), str(fault)
+    return CameraDevice(name, node, by_path, by_id, usb_place(0, node, sysfs), formats, problem)
+
+
+def _numbered(camera: CameraDevice, place: int, sysfs: Path) -> CameraDevice:
+    usb = usb_place(place, camera.node, sysfs)
+    return CameraDevice(camera.name, camera.node, camera.by_path, camera.by_id, usb, camera.formats, camera.problem)
+
+
+def _link_to(node: Path, folder: Path) -> Path | None:
+    try:
+        links = sorted(folder.iterdir())
+    except OSError:
+        return None
+    return next((link for link in links if link.resolve() == node.resolve()), None)

@@ -1,0 +1,257 @@
+"""Which exposure of a camera each of its frames is, from the times they were stamped with.
+
+A camera exposes at an even period. Its frames arrive with a delay that varies, in bursts after a stall, and some never.
+A frame's X depends on its number, so a frame that is lost must leave its number empty, and a number that cannot be told
+for certain must say so in its standard deviation.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.robust import MAD_TO_SD
+from schemas.base.errors import RefusedInput
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+FIRST_FRAMES = 400
+"""Looked at first; the period they give is exact enough to number four times as many."""
+NEAR, FAR = 0.01, 0.2
+"""How far from the promised period the true one is sought, and how far from the middle interval, as shares of it."""
+PROMISE_HOLDS = 0.5
+"""The promised period is kept unless another makes the stamps so much more alike."""
+LATE_PERIODS = 0.5
+WAKE_PERIODS = 0.1
+EARLY_SIGMAS = 4.0
+EARLY_PERIODS = (0.1, 0.5)
+"""A frame cannot come before its exposure: what looks earlier than this much of a period is a frame before, late."""
+RECENT = 16
+
+
+@dataclass(frozen=True)
+class FrameTimes:
+    """The frames of one camera in the order of arrival, by its own clock. All arrays have shape (N,) but `missing`."""
+
+    number: Ints
+    """Exposures since the first frame's. Increases; only a frame sent twice has the number of the one before."""
+    seconds: Floats
+    """When the exposure was due, plus a latency that is the same for all frames of the camera."""
+    sd_s: Floats
+    """Standard deviation of `seconds`, if the camera exposes evenly: that of the fit, and of the number itself where
+    frames were lost in a stall and nobody can tell which."""
+    delay_s: Floats
+    """What the frame was stamped with, less `seconds`."""
+    is_late: Bools
+    """Stamped half a period after `seconds` or later."""
+    is_certain: Bools
+    """No other number is possible, delays being what they mostly are."""
+    missing: Ints
+    """Numbers between the first and the last that no frame has, shape (M,)."""
+    period_s: float
+    jitter_s: float
+    """Robust standard deviation of `delay_s`: of delivery if the camera exposes evenly, as a camera with fixed exposure
+    does; for one that does not, `seconds + delay_s` is the better time, and this its standard deviation."""
+
+
+def number_frames(stamps: Floats, is_repeated: Bools | None = None, period_s: float | None = None) -> FrameTimes:
+    """Numbers the frames of a camera, and smooths their times.
+
+    Parameters
+    ----------
+    stamps : (N,) float64, seconds, in the order of arrival
+    is_repeated : (N,) bool, optional
+        Frames with the very bytes of the frame before. One that came in the same period is a copy, and no exposure.
+    period_s : float, optional
+        What the camera promises; it is kept to a hundredth as long as the stamps do not speak against it.
+
+    Raises
+    ------
+    RefusedInput
+        No frames; a stamp before the one before it; one frame and no period.
+    """
+    _check(stamps, period_s)
+    expected = period_s or float(np.median(np.diff(stamps)))
+    repeated = np.zeros(len(stamps), bool) if is_repeated is None else is_repeated
+    is_copy = repeated & (np.diff(stamps, prepend=-np.inf) < LATE_PERIODS * expected)
+    at = stamps[~is_copy]
+    line = _first_line(at[:FIRST_FRAMES], period_s)
+    seen = min(FIRST_FRAMES, len(at))
+    while True:
+        line = _refined(at[:seen], line)
+        if seen == len(at):
+            break
+        seen = min(4 * seen, len(at))
+    latest, is_late = _latest_numbers(at, line)
+    slack = _slack(at, latest, is_late, line)
+    number = latest - slack // 2
+    fit_sd = line.sd(number)
+    sd = np.hypot(fit_sd, line.period * np.sqrt(_mean_square_error(slack)))
+    of_frame = np.cumsum(~is_copy) - 1  # a copy goes with the frame before
+    seconds = line.at(number)
+    return FrameTimes(
+        number=(number - number[0])[of_frame],
+        seconds=seconds[of_frame],
+        sd_s=sd[of_frame],
+        delay_s=stamps - seconds[of_frame],
+        is_late=(stamps - seconds[of_frame] >= LATE_PERIODS * line.period),
+        is_certain=(slack == 0)[of_frame],
+        missing=np.setdiff1d(np.arange(number[0], number[-1]), number) - number[0],
+        period_s=line.period,
+        jitter_s=line.jitter,
+    )
+
+
+class RunningNumber:
+    """A number for each frame as it comes. Provisional: only what comes later tells a late frame from a lost one."""
+
+    def __init__(self) -> None:
+        self._intervals: deque[float] = deque(maxlen=RECENT)
+        self._before = self._due = 0.0
+        self._number = -1
+
+    def next(self, stamp: float) -> int:
+        """Number of the frame stamped with so many seconds."""
+        if self._number < 0:
+            self._number, self._due = 0, stamp
+        else:
+            self._intervals.append(stamp - self._before)
+            period = max(median(self._intervals), 1e-6)
+            steps = max(1, round((stamp - self._due) / period))
+            self._number += steps
+            due = self._due + steps * period
+            self._due = due + (stamp - due) / 4
+        self._before = stamp
+        return self._number
+
+
+@dataclass(frozen=True)
+class _Line:
+    """Exposure n is due at phase + n * period; all in seconds, around the number `centre`."""
+
+    phase: float
+    period: float
+    jitter: float
+    centre: float = 0.0
+    phase_sd: float = 0.0
+    period_sd: float = 0.0
+
+    def at(self, number: Ints) -> Floats:
+        return np.asarray(self.phase + self.period * (number - self.centre), np.float64)
+
+    def sd(self, number: Ints) -> Floats:
+        return np.asarray(np.hypot(self.phase_sd, self.period_sd * (number - self.centre)), np.float64)
+
+    def position(self, stamps: Floats) -> Floats:
+        """In periods since exposure 0."""
+        return np.asarray((stamps - self.phase) / self.period + self.centre, np.float64)
+
+
+def _check(stamps: Floats, period_s: float | None) -> None:
+    if len(stamps) == 0:
+        raise RefusedInput("camera", "expected at least one frame, found none", field="frames")
+    if np.any(np.diff(stamps) < 0) or not np.all(np.isfinite(stamps)):
+        raise RefusedInput("camera", "expected time stamps that never run back", field="frames")
+    if period_s is None and np.ptp(stamps) == 0:
+        raise RefusedInput("camera", "expected two frames at different times, or a period", field="frames")
+
+
+def _first_line(stamps: Floats, promised: float | None) -> _Line:
+    found = []
+    if promised is not None:
+        found.append(_evenness(stamps, promised, NEAR))
+    if len(stamps) > 1 and np.ptp(stamps) > 0:
+        found.append(_evenness(stamps, max(float(np.median(np.diff(stamps))), 1e-3), FAR))
+    if promised is not None and found[0][0] >= PROMISE_HOLDS * found[-1][0]:
+        return found[0][1]
+    return found[-1][1]
+
+
+def _evenness(stamps: Floats, around: float, share: float) -> tuple[float, _Line]:
+    """The period near `around` at which the stamps are most alike modulo it, and how alike: 1 for an even row.
+
+    It is where the stamps' Fourier sum is greatest. Frames that are lost take nothing from it but strength, and late
+    ones add noise, so that no frame need be numbered yet.
+    """
+    start, length = stamps[0], max(np.ptp(stamps), around)
+    low, high = 1 / ((1 + share) * around), 1 / ((1 - share) * around)
+    frequencies = np.linspace(low, high, 2 + int((high - low) * 8 * length))
+    sums = np.exp(-2j * np.pi * np.outer(frequencies, stamps - start)).mean(axis=1)
+    # An even row has no greatest period but its own; where several are as good, as for one frame, the expected one.
+    best = int(np.argmax(np.abs(sums) - 1e-6 * np.abs(frequencies * around - 1)))
+    period = float(1 / frequencies[best])
+    phase = start - float(np.angle(sums[best])) / (2 * np.pi) * period
+    return float(np.abs(sums[best])), _Line(phase, period, jitter=EARLY_PERIODS[1] * period / EARLY_SIGMAS)
+
+
+def _refined(stamps: Floats, line: _Line) -> _Line:
+    """`line` fitted to the frames that are on time, until their numbers stay."""
+    numbers: Ints | None = None
+    for _ in range(10):
+        latest, is_late = _latest_numbers(stamps, line)
+        if numbers is not None and np.array_equal(latest, numbers):
+            break
+        numbers = latest
+        line = _fitted(stamps[~is_late], latest[~is_late], line)
+    return line
+
+
+def _latest_numbers(stamps: Floats, line: _Line) -> tuple[Ints, Bools]:
+    """The highest numbers that increase and are not in the future, and which frames are late for theirs."""
+    early = np.clip(EARLY_SIGMAS * line.jitter / line.period, *EARLY_PERIODS)
+    position = line.position(stamps)
+    rank = np.arange(len(stamps))
+    free = np.floor(position + early).astype(np.int64) - rank
+    latest = np.minimum.accumulate(free[::-1])[::-1] + rank
+    return latest, position - latest >= LATE_PERIODS
+
+
+def _fitted(stamps: Floats, number: Ints, before: _Line) -> _Line:
+    """Least squares over the frames within three robust standard deviations of `before`."""
+    residual = stamps - before.at(number)
+    if len(stamps) < 3 or number[0] == number[-1]:
+        return before
+    middle = np.median(residual)
+    jitter = float(MAD_TO_SD * np.median(np.abs(residual - middle)))
+    is_near = np.abs(residual - middle) <= max(3 * jitter, 1e-6)
+    stamps, number = stamps[is_near], number[is_near]
+    if len(stamps) < 3:
+        return before
+    centre = float(number.mean())
+    away = number - centre
+    spread = float(away @ away)
+    phase, period = float(stamps.mean()), float(away @ (stamps - stamps.mean()) / spread)
+    scatter = stamps - phase - period * away
+    sigma = float(np.sqrt(scatter @ scatter / (len(stamps) - 2)))
+    return _Line(phase, period, max(jitter, sigma), centre, sigma / len(stamps) ** 0.5, sigma / spread**0.5)
+
+
+def _slack(stamps: Floats, latest: Ints, is_late: Bools, line: _Line) -> Ints:
+    """(N,) how many numbers lower each frame of a burst could be: what was lost with it may have been newer.
+
+    A burst goes on from a late frame to the first that comes by itself, or on time and not in the wake of another.
+    """
+    slack = np.zeros(len(stamps), np.int64)
+    interval = np.diff(stamps, prepend=-np.inf) / line.period
+    on_time = min(3 * line.jitter / line.period, LATE_PERIODS / 2)
+    is_alone = interval >= LATE_PERIODS
+    is_on_time = (np.abs(line.position(stamps) - latest) <= max(on_time, 1e-6)) & (interval >= WAKE_PERIODS)
+    in_burst = False
+    for k in range(1, len(stamps)):
+        goes_on = in_burst and not is_alone[k] and not is_on_time[k]
+        if is_late[k] or goes_on:
+            slack[k] = (slack[k - 1] if in_burst else 0) + latest[k] - latest[k - 1] - 1
+        in_burst = bool(is_late[k] or goes_on)
+    return slack
+
+
+def _mean_square_error(slack: Ints) -> Floats:
+    """(N,) of the middle one of slack + 1 numbers, each as likely, in periods squared."""
+    below = slack - slack // 2
+    lengths = np.stack([slack // 2, below]).astype(np.float64)
+    squares = lengths * (lengths + 1) * (2 * lengths + 1) / 6
+    return np.asarray(squares.sum(axis=0) / (slack + 1))

@@ -1,0 +1,133 @@
+"""The serial line to the board: bytes out, lines in with the time they came at, and its loss told once."""
+
+import errno
+import os
+import threading
+import time
+from collections.abc import Callable
+from termios import error as termios_error
+
+import serial
+
+from schemas.base.errors import Fault, RefusedInput
+
+BAUD = 115_200
+BYTES_PER_SECOND = BAUD / 10
+LOOKS_EVERY_SECONDS = 0.2
+"""How long a read waits for bytes; a line that is closed ends within this."""
+WRITE_SECONDS = 1.0
+PAST_ALL_SECONDS = 0.02
+"""How long the last stop waits for another thread's write, which takes no time where the system takes the bytes."""
+HARMLESS = (b"?", b"!", b"\x18")
+"""Query, feed hold and reset: they move and light nothing."""
+GONE = (errno.EIO, errno.ENODEV, errno.ENXIO, errno.EBADF)
+"""What the system says of a port whose cable was pulled."""
+LONGEST_LINE = 400
+"""Longer than anything Grbl says: what has no line end until then is noise."""
+
+
+class SerialLine:
+    """An open port with a thread that reads it, from `start` to `close`."""
+
+    def __init__(self, port: str, on_line: Callable[[str, float], None], on_lost: Callable[[str], None]) -> None:
+        """Opens `port`.
+
+        Parameters
+        ----------
+        port : name of the serial port, best a stable one (/dev/serial/by-id/...).
+        on_line : called in the reading thread with each line, without its end, and the time its last byte was there.
+        on_lost : called once, in any thread, with the reason why nothing more will come.
+
+        Raises
+        ------
+        RefusedInput
+            There is no such port, or it may not be opened.
+        Fault
+            Another program has it open.
+        """
+        self._on_line = on_line
+        self._on_lost = on_lost
+        self._open = True
+        self.sealed: str | None = None
+        """Why nothing goes out but what stops the board; None where all does."""
+        self._writing = threading.Lock()
+        self._losing = threading.Lock()
+        self._port = _opened(port)
+        self._thread = threading.Thread(target=self._read, name=f"serial line {port}", daemon=True)
+
+    def start(self) -> None:
+        """Begins to read."""
+        self._thread.start()
+
+    def write(self, data: bytes) -> float:
+        """Sends all of `data`; the time when it was on its way, `time.monotonic()` s. Fault where the line is lost."""
+        try:
+            with self._writing:
+                if not self._open:
+                    raise Fault("the connection to the board is closed")
+                if self.sealed is not None and data not in HARMLESS:
+                    raise Fault(self.sealed)
+                seconds = time.monotonic()
+                self._port.write(data)
+                return seconds
+        except (OSError, termios_error) as error:  # SerialException is an OSError
+            self._lose(error)
+            raise Fault(f"the connection to the board is lost ({_reason(error)})") from None
+
+    def write_past_all(self, data: bytes) -> bool:
+        """Sends a realtime command although another thread's write hangs; whether it went. It may stand amid a line."""
+        waited = self._writing.acquire(timeout=PAST_ALL_SECONDS)
+        try:
+            return self._open and os.write(self._port.fileno(), data) == len(data)
+        except (OSError, termios_error, TypeError):  # pyserial's own state is gone when closed under it
+            return False
+        finally:
+            if waited:
+                self._writing.release()
+
+    def close(self) -> None:
+        """Ends the thread and closes the port."""
+        self._open = False
+        if hasattr(self._port, "cancel_read"):  # where the system has it, a read need not time out first
+            self._port.cancel_read()
+        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+            self._thread.join()
+        self._port.close()
+
+    def _read(self) -> None:
+        waiting = bytearray()
+        while self._open:
+            try:
+                data = self._port.read(max(self._port.in_waiting, 1))
+            except (OSError, termios_error, TypeError) as error:  # pyserial's own state is gone when closed under it
+                self._lose(error)
+                return
+            seconds = time.monotonic()
+            waiting += data
+            *lines, rest = waiting.split(b"\n")
+            waiting = bytearray(rest[-LONGEST_LINE:])
+            for line in lines:
+                self._on_line(line.rstrip(b"\r").decode("ascii", errors="replace"), seconds)
+
+    def _lose(self, error: BaseException) -> None:
+        with self._losing:
+            was_open, self._open = self._open, False
+        if was_open:
+            self._on_lost(_reason(error))
+
+
+def _opened(port: str) -> serial.Serial:
+    try:
+        return serial.Serial(port, BAUD, timeout=LOOKS_EVERY_SECONDS, write_timeout=WRITE_SECONDS, exclusive=True)
+    except (OSError, ValueError, termios_error) as error:
+        if isinstance(error, OSError) and "exclusively lock" in str(error):
+            raise Fault(f"{port}: another program is using this port") from None
+        why = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else _reason(error)
+        raise RefusedInput(port, f"cannot be opened ({why}), expected the serial port of a Grbl board") from None
+
+
+def _reason(error: BaseException) -> str:
+    gone = isinstance(error, TypeError) or "returned no data" in str(error)
+    if gone or (isinstance(error, OSError) and error.errno in GONE):
+        return "unplugged"
+    return str(error) or type(error).__name__

@@ -1,0 +1,1 @@
+"""The clouds of all cameras merged into one, after small corrections of each camera."""

@@ -1,0 +1,156 @@
+"""How far apart two cameras place the same skin."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.cloud.fusion.stripes import Floats, Stripes, boxes, meet
+from footscan.cloud.points import stripe_step
+from footscan.compiled import compiled
+from footscan.robust import MAD_TO_SD
+from schemas.fusion import Disagreement
+
+Pairs = dict[tuple[int, int], tuple[int, Disagreement]]
+"""By the numbers of two cameras: at how many places they were compared, and how far apart they put them."""
+
+COMPARED = 12_000
+"""About so many points are compared with all other cameras."""
+GAP_STEPS = 1.5
+"""Between the stripes of two planes the skin is taken to be straight, if these are no more steps apart."""
+
+
+@dataclass(frozen=True)
+class Overlaps:
+    """M places at which a point of one camera stands before or behind what another one sees."""
+
+    point: NDArray[np.intp]
+    """(M,) index of the point."""
+    other: NDArray[np.intp]
+    """(M,) index of the other camera."""
+    distance: Floats
+    """(M,) from the point to the other's stripe along the point's normal, mm, signed like the normal."""
+    variance: Floats
+    """(M,) of the distance, mm^2, by what is known of both."""
+
+
+def find_overlaps(stripes: Stripes, yz: Floats, reach_mm: float) -> Overlaps:
+    """Compares the cameras over a part of their points, evenly spread.
+
+    The stripe of another camera is taken in the point's own plane or else, where the cameras' planes lie between each
+    other's, halfway between those before and after it. That a chord lies inside of round skin makes both cameras of a
+    pair see the other one too far in, by as much.
+
+    Parameters
+    ----------
+    yz : (N, 2) mm, the coordinates of the points, which may have been moved.
+    """
+    usable = stripes.points["supported"] & ~stripes.bent & np.any(stripes.normals != 0, axis=1)
+    candidates = np.flatnonzero(usable)
+    sample = candidates[:: max(1, len(candidates) // COMPARED)]
+    count = len(stripes.cameras)
+    if count < 2:
+        sample = sample[:0]
+    point, other, distance, variance = _compare(
+        sample,
+        reach_mm,
+        GAP_STEPS * stripe_step(stripes.points),
+        count,
+        usable,
+        stripes.camera,
+        stripes.plane,
+        stripes.starts,
+        stripes.x,
+        yz,
+        stripes.sigma,
+        stripes.normals,
+        stripes.linked,
+        boxes(yz),
+    )
+    return Overlaps(point, other, distance, variance)
+
+
+def disagreements(stripes: Stripes, overlaps: Overlaps) -> Pairs:
+    """How far apart each two cameras that saw the same skin put it."""
+    outward = np.sign(np.sum(stripes.normals * (stripes.yz - _middles(stripes)), axis=1))[overlaps.point]
+    camera = stripes.camera[overlaps.point]
+    farther_out = -overlaps.distance * outward * np.where(camera < overlaps.other, 1.0, -1.0)
+    first, second = np.minimum(camera, overlaps.other), np.maximum(camera, overlaps.other)
+    found = {}
+    for a, b in combinations(range(len(stripes.cameras)), 2):
+        apart = farther_out[(first == a) & (second == b)]
+        if len(apart):
+            pair = (int(stripes.cameras[a]), int(stripes.cameras[b]))
+            found[pair] = (len(apart), _disagreement(apart))
+    return found
+
+
+def _disagreement(apart: Floats) -> Disagreement:
+    median = float(np.median(apart))
+    return Disagreement(
+        median_mm=median,
+        deviation_mm=MAD_TO_SD * float(np.median(np.abs(apart - median))),
+        rms_mm=float(np.sqrt(np.mean(apart**2))),
+    )
+
+
+def _middles(stripes: Stripes) -> Floats:
+    """(N, 2) the middle of the points of each point's plane, mm; from there to the skin is outward."""
+    count = np.maximum(np.bincount(stripes.plane), 1)
+    sums = np.column_stack([np.bincount(stripes.plane, stripes.yz[:, k]) for k in (0, 1)])
+    return np.asarray((sums / count[:, np.newaxis])[stripes.plane])
+
+
+@compiled
+def _compare(
+    sample: NDArray[np.intp],
+    reach: float,
+    gap: float,
+    cameras: int,
+    usable: NDArray[np.bool_],
+    camera: NDArray[np.intp],
+    plane: NDArray[np.intp],
+    starts: NDArray[np.intp],
+    x: Floats,
+    yz: Floats,
+    sigma: Floats,
+    normals: Floats,
+    linked: NDArray[np.bool_],
+    around: Floats,
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats]:
+    planes = (len(starts) - 1) // max(cameras, 1)
+    points, others = np.empty(len(sample) * cameras, np.intp), np.empty(len(sample) * cameras, np.intp)
+    distances, variances = np.empty(len(sample) * cameras), np.empty(len(sample) * cameras)
+    count = 0
+    for n in sample:
+        for b in range(cameras):
+            if b == camera[n]:
+                continue
+            before = plane[n]
+            while before > 0 and starts[before * cameras + b] == starts[before * cameras + b + 1]:
+                before -= 1
+            first, last = starts[before * cameras + b], starts[before * cameras + b + 1]
+            if first == last or x[n] - x[first] > gap:
+                continue
+            k, share, distance = meet(n, first, last, reach, yz, normals, linked, around)
+            if k < 0 or not (usable[k] and usable[k + 1]):
+                continue
+            variance = (1 - share) * sigma[k] ** 2 + share * sigma[k + 1] ** 2
+            if before != plane[n]:
+                after = plane[n]
+                while after < planes - 1 and starts[after * cameras + b] == starts[after * cameras + b + 1]:
+                    after += 1
+                from_x, first, last = x[first], starts[after * cameras + b], starts[after * cameras + b + 1]
+                if first == last or x[first] - from_x > gap:
+                    continue
+                k, share, there = meet(n, first, last, reach, yz, normals, linked, around)
+                if k < 0 or not (usable[k] and usable[k + 1]):
+                    continue
+                part = (x[n] - from_x) / (x[first] - from_x)
+                distance = (1 - part) * distance + part * there
+                variance = (1 - part) * variance + part * ((1 - share) * sigma[k] ** 2 + share * sigma[k + 1] ** 2)
+            points[count], others[count], distances[count] = n, b, distance
+            variances[count] = variance + sigma[n] ** 2
+            count += 1
+    return points[:count], others[:count], distances[:count], variances[:count]

@@ -1,0 +1,1 @@
+"""Triangle meshes and grids, as several rooms need them."""

@@ -1,0 +1,1 @@
+"""Figures of a calibration and of the capture behind it."""

@@ -1,0 +1,66 @@
+"""What a calibration tells of each camera, for its pictures: how sure its map is, and what the fit left."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.calibration.models.maps import IMAGE_PX, is_supported, model_of, prediction_covariance
+from schemas.calibration import CameraCalibration
+
+Floats = NDArray[np.float64]
+
+GRID_PX = 4
+"""Spacing of the places at which the map's uncertainty is drawn."""
+LONG_PX = 30.0
+"""An arrow as long as this in the image stands for the length that 95 % of all residuals do not reach, rounded up."""
+
+
+def round_up(value: float) -> float:
+    """The least of 1, 2 and 5 times a power of ten that is not below `value`; 0.001 at least."""
+    power = 10.0 ** np.floor(np.log10(max(value, 1e-3)))
+    return float(next(factor * power for factor in (1, 2, 5, 10) if factor * power >= value * (1 - 1e-9)))
+
+
+def arrow_unit_mm(cameras: Sequence[CameraCalibration]) -> float:
+    """What an arrow of `LONG_PX` stands for."""
+    lengths = [np.hypot(*residuals_of(camera)[:, 2:].T) for camera in cameras]
+    every = np.concatenate([np.empty(0), *lengths])
+    return round_up(float(np.quantile(every, 0.95))) if every.size else 1.0
+
+
+def figures_of(camera: CameraCalibration) -> str:
+    """The camera's residuals in words, or how many points it was fitted to."""
+    known = [("rms", camera.rms_mm), ("held out", camera.held_out_rms_mm), ("worst", camera.worst_mm)]
+    figures = ", ".join(f"{name} {mm:.3f}" for name, mm in known if mm is not None)
+    return f"{figures} mm" if figures else f"{camera.points} points"
+
+
+def deviation_of(camera: CameraCalibration, grid_px: int = GRID_PX) -> Floats | None:
+    """Standard deviation, mm, of (Y, Z) every `grid_px` of the image, (rows, columns), NaN where data do not support
+    the map; None where nothing is known of it."""
+    columns, rows = camera.image_px or IMAGE_PX
+    i, j = np.meshgrid(np.arange(0, columns, grid_px), np.arange(0, rows, grid_px))
+    pixels = np.column_stack([i.ravel(), j.ravel()]).astype(np.float64)
+    inside = is_supported(camera, pixels) & bool(camera.region_px)
+    covariance = prediction_covariance(camera, pixels[inside])
+    if covariance is None:
+        return None
+    sigma = np.full(len(pixels), np.nan)
+    sigma[inside] = np.sqrt(np.maximum(np.trace(covariance, axis1=1, axis2=2), 0.0))
+    return sigma.reshape(i.shape)
+
+
+def residuals_of(camera: CameraCalibration) -> Floats:
+    """(N, 4) i and j, px, and the errors there in Y and Z, mm."""
+    return np.array(camera.residuals, np.float64).reshape(-1, 4)
+
+
+def arrows_of(camera: CameraCalibration, residuals: Floats) -> Floats:
+    """Residuals (N, 2) as they point in the image, as long as they are in mm."""
+    model, parameters = model_of(camera.map)
+    errors = residuals[:, 2:]
+    slopes = model.by_pixels(parameters, residuals[:, :2])
+    seen = (np.linalg.pinv(slopes) @ errors[:, :, np.newaxis])[:, :, 0]
+    length = np.hypot(*seen.T)
+    return np.asarray(seen * (np.hypot(*errors.T) / np.where(length > 0, length, 1.0))[:, np.newaxis])

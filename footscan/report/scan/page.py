@@ -1,0 +1,246 @@
+"""The page of one scan: what a person opens to see whether it is good."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.report.calibration.panels import calibration_panels
+from footscan.report.colours import colour_bar, colour_limit, distance_colours
+from footscan.report.comparison.figures import figures_facts, moved_note, regions_table
+from footscan.report.filled import filled_colours, filled_key
+from footscan.report.markup import number, section, table, text, words
+from footscan.report.page import page
+from footscan.report.sample_frames import FRAMES_SCRIPT, FrameSample, sample_frames
+from footscan.report.scan.coverage import coverage_plot
+from footscan.report.scan.foot_colours import foot_colourings
+from footscan.report.scan.fusion_tables import corrections_table, disagreement_table, warnings_list
+from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
+from footscan.report.scan.mesh_facts import mesh_facts
+from footscan.report.scan.missing import missing_list
+from footscan.report.scan.removed import removed_pictures, removed_table
+from footscan.report.surface_views import surface_views, upright
+from footscan.report.viewer import Drawing, viewer
+from footscan.report.viewer_script import SCRIPT
+from schemas.calibration import Calibration, Source
+from schemas.fusion import FusionReport
+from schemas.measures import Measure, Measures
+from schemas.quality import Comparison, Quality
+
+_FIRST = (
+    "foot_length",
+    "foot_breadth",
+    "foot_height",
+    "ball_girth",
+    "instep_girth",
+    "waist_girth",
+    "heel_girth",
+    "heel_breadth",
+    "instep_height",
+    "arch_index",
+)
+"""Measures in the order in which they are read; others follow by name."""
+_TILES = 4
+_UNITS = {"mm": ("mm", 1), "mm2": ("mm²", 0), "mm3": ("mm³", 0), "deg": ("°", 1), "1": ("", 3)}
+"""How a unit is written, and to how many decimals its values are."""
+
+
+def scan_page(
+    *,
+    patient: str,
+    scan: str,
+    side: str,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.integer],
+    filled: NDArray[np.bool_] | None,
+    cut_mm: float | None,
+    points: NDArray[np.void],
+    codes: NDArray[np.uint8],
+    cloud: NDArray[np.void],
+    measures: Measures,
+    quality: Quality,
+    calibration: Calibration,
+    samples: Sequence[FrameSample],
+    truth_distance: NDArray[np.floating] | None,
+    provenance: Mapping[str, str],
+) -> str:
+    """A self-contained HTML page of one scan, the same for the same input.
+
+    Parameters
+    ----------
+    patient, scan, side : as in scan.yaml; any text is safe
+    vertices : (V, 3) float64, mm, scanner frame, V > 0
+    faces : (F, 3) int, counter-clockwise as seen from outside
+    filled : (V,) what was not measured, where that is known
+    cut_mm : Z of the flat cut above the ankle, where there is one
+    points, codes : (N,) of `footscan.cloud.points.POINT_DTYPE`, mm, scanner frame, and what became of each
+        As all cameras saw them, and as `footscan.cloud.outliers.Removed` tells it.
+    cloud : array of `footscan.cloud.points.POINT_DTYPE`, mm, scanner frame
+        What the surface was made of.
+    measures, quality : the content of measures.json and quality.json
+    calibration : what its pixels were mapped by
+    samples : a frame of each camera, in the order shown
+    truth_distance : (V,) float, mm, signed, positive outside the reference model; None where there is no such model
+    provenance : name and value of what the result came from, in the order shown
+    """
+    seen = upright(vertices, measures.transform)
+    plain = filled_colours(vertices, filled, cut_mm)
+    drawings = measure_drawings(vertices, faces, measures)
+    turned = viewer(
+        seen,
+        faces,
+        foot_colourings(vertices, filled, cut_mm, quality.mesh, cloud, truth_distance),
+        drawings,
+        {words(name): landmark_place(measures, name) for name in measures.landmarks},
+    )
+    parts = [
+        section("Refused or missing", missing_list(measures, quality)),
+        section("Measures", _tiles(measures), _measures(measures, drawings, turned)),
+        section("Surface", _GRID_NOTE, filled_key(quality.mesh), surface_views(seen, faces, plain, measures.side)),
+        "" if truth_distance is None else _distances(seen, faces, measures, quality.truth, truth_distance),
+        section("Stripe over the frames", _FRAMES_NOTE, sample_frames(samples)) if samples else "",
+        section("Mesh", mesh_facts(quality.mesh, quality.cloud_points)),
+        section("Cameras", _cameras_table(quality, cloud)),
+        section("Removed points", _REMOVED_NOTE, removed_table(quality.cameras), removed_pictures(points, codes)),
+        section("Agreement of the cameras", _AGREEMENT_NOTE, *_agreement(quality.fusion)),
+        section("Stripe coverage", _COVERAGE_NOTE, coverage_plot(cloud, quality.cameras)),
+        section("Calibration", _calibration(calibration, quality.calibration)),
+        section("Provenance", table(["", ""], ([text(name), text(value)] for name, value in provenance.items()))),
+    ]
+    return page(
+        title=f"{patient} {scan}",
+        kicker={"right": "Right foot", "left": "Left foot"}.get(side, "Foot, side unknown"),
+        heading=f"{text(patient)} <span>{text(scan)}</span>",
+        parts=parts,
+        scripts=[SCRIPT, *([FRAMES_SCRIPT] if samples else [])],
+    )
+
+
+def _distances(
+    seen: NDArray[np.float64],
+    faces: NDArray[np.integer],
+    measures: Measures,
+    figures: Comparison | None,
+    distance: NDArray[np.floating],
+) -> str:
+    """How far the surface, its vertices in the foot's frame, lies from the reference model."""
+    limit = colour_limit(distance)
+    colours = distance_colours(distance, limit)
+    told = (
+        []
+        if figures is None
+        else [
+            figures_facts(figures),
+            moved_note(figures.transform, _IN_ONE_FRAME),
+            regions_table(figures.regions),
+        ]
+    )
+    views = surface_views(seen, faces, colours, measures.side)
+    return section("Distance to the reference model", colour_bar(limit), views, *told)
+
+
+def _ordered(measures: Measures) -> Iterator[tuple[str, Measure]]:
+    for name in [*_FIRST, *sorted(measures.measures.keys() - set(_FIRST))]:
+        if name in measures.measures:
+            yield name, measures.measures[name]
+
+
+def _tiles(measures: Measures) -> str:
+    known = [(name, measure) for name, measure in _ordered(measures) if measure.value is not None][:_TILES]
+    tiles = "".join(
+        f"<div><span>{text(words(name))}</span><b>{_value(measure)}</b> {_UNITS[measure.unit][0]}</div>"
+        for name, measure in known
+    )
+    return f'<div class="tiles">{tiles}</div>' if tiles else ""
+
+
+def _measures(measures: Measures, drawings: Mapping[str, Drawing], turned: str) -> str:
+    """The foot to turn, and beside it the measures, of which a click shows where they were taken."""
+    if measures.finding is not None:
+        return f'<p class="note">Not measured: {text(measures.finding)}</p>{turned}'
+    rows = (
+        [
+            _name(name, measure, name in drawings),
+            _value(measure),
+            _UNITS[measure.unit][0],
+            f'<span class="status {measure.status}">{measure.status}</span>',
+            text(measure.definition) + (f'<p class="note">{text(note)}</p>' if (note := _note(measure)) else ""),
+        ]
+        for name, measure in _ordered(measures)
+    )
+    listed = table(["Measure", "Value", "Unit", "Status", "Definition"], rows, numeric=[1], kind="measures")
+    said = '<p class="note">A click on a measure shows where it was taken.</p>' if drawings else ""
+    return f'<div class="foot">{turned}<div class="list">{said}{listed}</div></div>'
+
+
+def _name(name: str, measure: Measure, is_drawn: bool) -> str:
+    if not is_drawn:
+        return text(words(name))
+    told = f"{words(name)} {_value(measure)} {_UNITS[measure.unit][0]}: {measure.definition}"
+    return (
+        f'<button type="button" data-shows="{text(name)}" data-told="{text(told)}" aria-pressed="false">'
+        f"{text(words(name))}</button>"
+    )
+
+
+def _note(measure: Measure) -> str:
+    """What is told beside the definition: a remark, and how sure the value is."""
+    unit, decimals = _UNITS[measure.unit]
+    sure = None
+    if measure.uncertainty is not None:
+        sure = f"standard deviation {number(measure.uncertainty, decimals + 1)} {unit}".rstrip()
+    return "; ".join(part for part in (measure.note, sure) if part)
+
+
+def _value(measure: Measure) -> str:
+    return "–" if measure.value is None else number(measure.value, _UNITS[measure.unit][1])
+
+
+def _cameras_table(quality: Quality, cloud: NDArray[np.void]) -> str:
+    headings = ["Camera", "Frames", "Lost", "With stripe", "Points", "Removed", "In cloud"]
+    rows = [
+        [
+            camera.frames,
+            camera.frames_lost,
+            camera.frames_with_stripe,
+            camera.points,
+            sum(camera.removed.values()),
+            int(np.count_nonzero(cloud["camera"] == camera.camera)),
+        ]
+        for camera in quality.cameras
+    ]
+    names = [str(camera.camera) for camera in quality.cameras]
+    if len(rows) > 1:
+        rows.append([sum(column) for column in zip(*rows, strict=True)])
+        names.append("All")
+    cells = ([name, *(number(count) for count in row)] for name, row in zip(names, rows, strict=True))
+    return table(headings, cells, numeric=range(1, len(headings)))
+
+
+def _agreement(report: FusionReport) -> list[str]:
+    return [disagreement_table(report), corrections_table(report), warnings_list(report)]
+
+
+def _calibration(calibration: Calibration, file: Source) -> str:
+    made = f"{calibration.created:%Y-%m-%d %H:%M} UTC" if calibration.created else "unknown"
+    rows = [["File", text(file.name)], ["SHA-256", text(file.sha256)], ["Made", made]]
+    return table(["", ""], rows) + calibration_panels(calibration)
+
+
+_GRID_NOTE = '<p class="note">The grid is 10 mm wide; its figures are mm from the rearmost heel point on the floor.</p>'
+_REMOVED_NOTE = (
+    '<p class="note">Before the fusion; each point counts once, and a reason without a column removed nothing. The '
+    "pictures show a camera’s points from the side, X to the right, and along the travel, Y to the left; the line is "
+    "the glass.</p>"
+)
+_AGREEMENT_NOTE = (
+    '<p class="note">Distances along the normal between what two cameras see of the same skin, before and after they '
+    "were moved onto each other; the median is positive where the first sees it farther out. Held out: over stretches "
+    "of the travel that took no part in the fit.</p>"
+)
+_COVERAGE_NOTE = (
+    '<p class="note">Points of the cloud by the frame they come from, all cameras to one scale. '
+    "On the right: the most of any frame.</p>"
+)
+_FRAMES_NOTE = '<p class="note">What the cameras saw along the travel, and the stripe points that were found in it.</p>'
+_IN_ONE_FRAME = "The surface was not moved beforehand: both are in the scanner’s frame."

@@ -1,0 +1,1 @@
+"""Bodies of known shape fitted to points: boxes and spheres."""

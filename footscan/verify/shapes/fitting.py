@@ -1,0 +1,36 @@
+"""What the fits of known bodies to points have in common."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.robust import MAD_TO_SD
+from footscan.rows import distinct_rows
+from schemas.base.errors import Finding
+from schemas.fits import Vector
+
+Floats = NDArray[np.float64]
+
+
+def distinct_points(points: Floats) -> Floats:
+    """(M, 3) the points, mm, without doubles, in an order that does not depend on the one they came in.
+
+    Raises
+    ------
+    Finding
+        Some coordinates are no numbers.
+    """
+    points = np.asarray(points, np.float64).reshape(-1, 3)
+    if not np.isfinite(points).all():
+        raise Finding("some coordinates are no numbers, expected mm")
+    return distinct_rows(points).rows
+
+
+def robust_deviation(values: Floats) -> float:
+    """Standard deviation of a normal distribution with the median absolute deviation of (N,) `values`; 0 for none."""
+    return MAD_TO_SD * float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
+
+
+def as_vector(values: Floats) -> Vector:
+    """(3,) `values` as a tuple."""
+    x, y, z = values.tolist()
+    return x, y, z

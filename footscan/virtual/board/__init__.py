@@ -1,0 +1,1 @@
+"""A virtual motion controller that speaks Grbl."""

@@ -1,0 +1,327 @@
+"""What the virtual board does for a line of G-code, a jog and the homing cycle: step by step, waiting in between."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from dataclasses import replace
+
+from footscan.virtual.board.gcode import IN_PLANE, OFFSETS, WORD, Block, GcodeError, Modes, Offsets, read_block
+from footscan.virtual.board.machine import Machine, Work
+from footscan.virtual.board.motion import Light, Move
+from footscan.virtual.board.rails import Triple
+from footscan.virtual.board.report import counted, probe_report
+
+SEARCH, LOCATE = 1.5, 5.0
+"""Homing goes this often the largest travel for a switch, and this often the pull-off to find it again."""
+CHORD = math.radians(5.0)
+"""An arc is followed in steps of this angle: nothing here travels in arcs, they are there for the protocol's sake."""
+PROBES_TOWARD, PROBES_SILENTLY = ("G38.2", "G38.3"), ("G38.3", "G38.5")
+
+
+def execute_gcode(board: Machine, line: str) -> Work:
+    """One block; the number of its error, 0 for `ok`."""
+    try:
+        block = read_block(line, board.modes, board.where, board.offsets, board.memory)
+    except GcodeError as error:
+        return error.number
+    yield from _set_light(board, block)
+    if block.modes.coolant != board.modes.coolant:
+        yield from _all_done(board)
+    if block.action == "G4" and board.state != "Check":
+        yield from _all_done(board)
+        yield _until(board, board.now + block.dwell)
+    keeps_feed = block.modes.feed_mode == "G94"
+    board.modes = block.modes if keeps_feed else replace(block.modes, feed=0.0)
+    _set_offsets(board, block)
+    yield from _travel(board, line, block)
+    if block.flow:
+        yield from _end_program(board, block.flow)
+    return 0
+
+
+def jog(board: Machine, line: str) -> Work:
+    """`$J=line`."""
+    try:
+        block = read_block(line, board.modes, board.where, board.offsets, board.memory, jog=True)
+    except GcodeError as error:
+        return error.number
+    if board.memory.flag(20) and _beyond(board, block.target):
+        return 15
+    light = _light(board, replace(board.modes, motion="G1"), block.modes.feed)
+    yield from _queue(board, block.target, block.modes.feed / 60.0, light, "Jog", fixed_feed=True)
+    return 0
+
+
+def home(board: Machine) -> Work:
+    """`$H`: each cycle finds its switches quickly, pulls off, finds them slowly, pulls off."""
+    board.state = "Home"
+    for cycle in board.build.homing_cycles:
+        failed = yield from _home_cycle(board, cycle)
+        if failed:
+            board.alarm(failed)
+            board.restart(after_alarm=True)
+            yield lambda: False
+    board.motion.locked = [False, False, False]
+    board.motion.watch = "none"
+    board.answer_query()  # of all queries since it began, before its own `ok`
+    board.where = board.motion.steps
+    board.state = "Idle"
+    board.homed()
+    return 0
+
+
+def _home_cycle(board: Machine, cycle: tuple[int, ...]) -> Generator[Callable[[], bool], None, int]:
+    """The number of the alarm it ends with, 0 where it found its switches."""
+    memory, motion = board.memory, board.motion
+    pull_off, seek = memory[27], memory[25] / 60.0
+    search = SEARCH * max(memory[130 + axis] for axis in cycle)
+    phases = (
+        (True, seek, search),
+        (False, seek, pull_off),
+        (True, memory[24] / 60.0, LOCATE * pull_off),
+        (False, seek, pull_off),
+    )
+    for approach, speed, distance in phases:
+        motion.locked = [axis not in cycle for axis in range(3)]
+        motion.watch = "homing" if approach else "none"
+        if approach and all(on or axis not in cycle for axis, on in enumerate(motion.pressed())):
+            motion.locked = [True, True, True]  # they stand on their switches already
+        else:
+            _drive(board, cycle, speed, distance if approach else -distance)
+            yield lambda: not motion.queue
+        if approach and not all(motion.locked):
+            return 10 if board.second_switch_missing else 9
+        if not approach and any(motion.pressed()[axis] for axis in cycle):
+            return 8
+        yield _until(board, board.now + memory[26] / 1000.0)
+    steps = list(motion.steps)
+    for axis in cycle:
+        negative = int(memory[23]) >> axis & 1
+        steps[axis] = pull_off - memory[130 + axis] if negative else -pull_off
+    motion.steps = (steps[0], steps[1], steps[2])
+    return 0
+
+
+def _drive(board: Machine, cycle: tuple[int, ...], speed: float, distance: float) -> None:
+    """All axes of a cycle at the same speed, each until it is locked."""
+    toward = [0.0, 0.0, 0.0]
+    for axis in cycle:
+        toward[axis] = -distance if int(board.memory[23]) >> axis & 1 else distance
+    steps = board.motion.steps
+    target = (steps[0] + toward[0], steps[1] + toward[1], steps[2] + toward[2])
+    board.motion.add(_move(board, steps, target, speed * math.sqrt(len(cycle)), Light(), fixed_feed=True))
+
+
+def _travel(board: Machine, line: str, block: Block) -> Work:
+    action, feed = block.action, block.modes.feed
+    if action in ("G28", "G30"):
+        if any(axis in line for axis in "XYZ"):
+            yield from _queue(board, block.target, math.inf, Light(), "Run", rapid=True)
+        yield from _queue(board, board.memory.systems[action], math.inf, Light(), "Run", rapid=True)
+    if not block.moves:
+        return 0
+    motion = block.modes.motion
+    if motion.startswith("G38"):
+        yield from _probe(board, block)
+        return 0
+    begin = board.where
+    for target in _points(line, block, begin):
+        speed = feed / 60.0
+        if block.modes.feed_mode == "G93":
+            speed = math.dist(board.where, target) * feed / 60.0
+        light = _light(board, block.modes, speed * 60.0)
+        yield from _queue(board, target, speed, light, "Run", rapid=motion == "G0")
+    return 0
+
+
+def _queue(
+    board: Machine,
+    target: Triple,
+    speed: float,
+    light: Light,
+    state: str,
+    *,
+    rapid: bool = False,
+    fixed_feed: bool = False,
+) -> Work:
+    if state != "Jog" and board.memory.flag(20) and _beyond(board, target):
+        yield from _refuse_target(board)
+    if board.state == "Check":
+        return 0
+    yield board.plan_has_room
+    if target != board.where:
+        move = _move(board, board.where, target, speed, light, rapid=rapid, fixed_feed=fixed_feed)
+        board.begin("Jog" if state == "Jog" else "Run")
+        board.motion.add(move)
+        board.where = target
+    return 0
+
+
+def _move(
+    board: Machine,
+    begin: Triple,
+    target: Triple,
+    speed: float,
+    light: Light,
+    *,
+    rapid: bool = False,
+    fixed_feed: bool = False,
+) -> Move:
+    along = [b - a for a, b in zip(begin, target, strict=True)]
+    length = math.hypot(*along)
+    unit = (along[0] / length, along[1] / length, along[2] / length)
+    limit, acceleration = (
+        min(most / abs(u) for most, u in zip(board.memory.axes(first), unit, strict=True) if u) for first in (110, 120)
+    )
+    if board.state == "Home":
+        limit = math.inf  # it homes as fast as the settings of homing say
+    return Move(target, unit, length, speed, limit / 60.0, acceleration, light, rapid, fixed_feed)
+
+
+def _refuse_target(board: Machine) -> Work:
+    """A target beyond the soft limits: a controlled stop, then an alarm that keeps the position."""
+    if board.state == "Run":
+        board.motion.holding = True
+        yield lambda: board.motion.speed == 0.0
+    board.motion.flush()
+    board.alarm(2)
+    yield lambda: False
+    return 0
+
+
+def _probe(board: Machine, block: Block) -> Work:
+    yield from _all_done(board)
+    kind = block.modes.motion
+    away = kind not in PROBES_TOWARD
+    if board.pins.probe != away:
+        board.alarm(4)
+        return 0
+    yield from _queue(board, block.target, block.modes.feed / 60.0, Light(), "Run", fixed_feed=True)
+    yield lambda: board.is_still() or board.pins.probe != away
+    touched = board.pins.probe != away
+    board.motion.flush()
+    board.where = board.motion.steps
+    board.probed = (counted(board), touched)
+    board.state = "Idle"
+    if not touched and kind not in PROBES_SILENTLY:
+        board.alarm(5)
+    board.say(probe_report(board))
+    return 0
+
+
+def _set_light(board: Machine, block: Block) -> Work:
+    """S, M3, M4 and M5. In laser mode a change of S that comes with a motion goes with it, without a stop."""
+    laser = board.memory.flag(32)
+    old, new = board.modes, block.modes
+    dark = laser and new.motion not in ("G1", "G2", "G3")
+    turned_dark = laser and old.spindle == "M3" and dark != (old.motion not in ("G1", "G2", "G3"))
+    if (new.power != old.power or turned_dark) and old.spindle != "M5" and not (laser and block.moves):
+        yield from _all_done(board)
+        _shine(board, old.spindle, 0.0 if dark else new.power)
+    if new.spindle != old.spindle:
+        yield from _all_done(board)
+        _shine(board, new.spindle, 0.0 if dark else new.power)
+    elif laser and new.spindle == "M3" and block.moves and block.target == board.where:
+        yield from _all_done(board)
+        _shine(board, "M3", 0.0 if dark else new.power)
+    return 0
+
+
+def _shine(board: Machine, spindle: str, power: float) -> None:
+    """Light on heads that stand: under M4 there is none in laser mode."""
+    off = board.state == "Check" or spindle == "M5" or (board.memory.flag(32) and spindle == "M4")
+    board.motion.stand_in_light(Light() if off else Light(_level(board, power)))
+    board.counters.overrides = 0
+
+
+def _light(board: Machine, modes: Modes, feed: float) -> Light:
+    """Light on a motion: under M4 it follows the speed, with its full level at the programmed one."""
+    if modes.spindle == "M5":
+        return Light()
+    if not board.memory.flag(32):
+        return Light(_level(board, modes.power))
+    if modes.motion not in ("G1", "G2", "G3"):
+        return Light()
+    return Light(_level(board, modes.power), feed / 60.0 if modes.spindle == "M4" else None)
+
+
+def _level(board: Machine, power: float) -> float:
+    """The share of full power that S stands for, between the settings $31 and $30."""
+    most, least = board.memory[30], board.memory[31]
+    if power == 0.0:
+        return 0.0
+    return 1.0 if least >= most else min(max(power, least), most) / most
+
+
+def _set_offsets(board: Machine, block: Block) -> None:
+    memory, offsets = board.memory, board.offsets
+    if block.action == "G10":
+        memory.systems[block.stored_system] = block.target
+    elif block.action in ("G28.1", "G30.1"):
+        memory.systems[block.action[:3]] = board.where
+    elif block.action == "G92":
+        offsets = replace(offsets, shifted=block.target)
+    elif block.action == "G92.1":
+        offsets = replace(offsets, shifted=(0.0, 0.0, 0.0))
+    if block.tool_length is not None:
+        offsets = replace(offsets, tool=block.tool_length)
+    offsets = replace(offsets, system=memory.systems[board.modes.system])
+    if offsets != board.offsets:
+        board.counters.offsets = 0
+    board.offsets = offsets
+
+
+def _end_program(board: Machine, flow: str) -> Work:
+    yield from _all_done(board)
+    if flow == "M0" and board.state != "Check":
+        board.motion.holding = True
+        board.state = "Hold"
+        yield lambda: board.state != "Hold"
+    elif flow in ("M2", "M30"):
+        old = board.modes
+        board.modes = Modes(motion="G1", units=old.units, tool=old.tool, feed=old.feed, power=old.power)
+        board.offsets = Offsets(board.memory.systems["G54"], board.offsets.shifted, board.offsets.tool)
+        board.counters.offsets = 0
+        _shine(board, "M5", 0.0)
+        board.say("[MSG:Pgm End]")
+    return 0
+
+
+def _all_done(board: Machine) -> Work:
+    if board.state != "Check":
+        yield board.is_still
+        if board.state == "Run":
+            board.state = "Idle"
+    return 0
+
+
+def _until(board: Machine, seconds: float) -> Callable[[], bool]:
+    return lambda: board.now >= seconds
+
+
+def _beyond(board: Machine, target: Triple) -> bool:
+    return any(at > 0.0 or at < -travel for at, travel in zip(target, board.memory.axes(130), strict=True))
+
+
+def _points(line: str, block: Block, begin: Triple) -> list[Triple]:
+    """Where a motion goes: one point, or those along an arc given by its centre."""
+    motion, target = block.modes.motion, block.target
+    words = {letter: float(number) for letter, number in WORD.findall(line) if letter in OFFSETS and number}
+    if motion not in ("G2", "G3") or not words:
+        return [target]
+    first, second = IN_PLANE[block.modes.plane]
+    x, y = -words.get(OFFSETS[first], 0.0), -words.get(OFFSETS[second], 0.0)
+    centre = (begin[first] - x, begin[second] - y)
+    turn = math.atan2(target[second] - centre[1], target[first] - centre[0]) - math.atan2(y, x)
+    turn = turn % math.tau or math.tau
+    turn = turn - math.tau if motion == "G2" and turn < math.tau else -turn if motion == "G2" else turn
+    count = max(round(abs(turn) / CHORD), 1)
+    points = []
+    for k in range(1, count):
+        part = k / count
+        point = [a + (b - a) * part for a, b in zip(begin, target, strict=True)]
+        point[first] = centre[0] + x * math.cos(turn * part) - y * math.sin(turn * part)
+        point[second] = centre[1] + x * math.sin(turn * part) + y * math.cos(turn * part)
+        points.append((point[0], point[1], point[2]))
+    return [*points, target]

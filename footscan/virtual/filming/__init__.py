@@ -1,0 +1,1 @@
+"""Films and streams of a virtual scene, with the truth behind them."""

@@ -1,0 +1,175 @@
+"""One frame of one camera: all light that falls on its sensor, and the JPEG that it makes of it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.compiled import compiled
+from footscan.virtual.optics.laser_light import stripe_picture
+from footscan.virtual.optics.scanner import HEIGHT, WIDTH, VirtualScanner
+from footscan.virtual.optics.scene import Scene, Surface
+from footscan.virtual.optics.sensor import compress, photograph
+from footscan.virtual.optics.texture import Texture
+from footscan.virtual.optics.views import camera_views
+from footscan.virtual.portable import gaussian_blur, gaussian_kernel
+from footscan.virtual.room.room import COARSE, LEVELS, Backdrop, backdrop, coarse_rays, lit_object
+from schemas.parameters.simulation import SimulationSettings
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+
+LASER_COLOUR = (1.0, 0.12, 0.09)
+"""What a red, green and blue pixel make of the laser's 650 nm; the last two are the filters' leaks."""
+_BLOCK = 4
+_MARGIN_PX = 6
+
+
+class CameraRenderer:
+    """Films with one camera; what does not change from frame to frame is worked out once.
+
+    Raises nothing of its own; equal arguments give equal bytes, in whatever order frames are asked for.
+    """
+
+    def __init__(self, scanner: VirtualScanner, camera_id: int, settings: SimulationSettings, texture: Texture) -> None:
+        self.camera = scanner.camera(camera_id)
+        self._lasers = scanner.lasers
+        self._settings = settings
+        self._straight, self._reflected = camera_views(self.camera)
+        self._coarse = coarse_rays(self._straight)
+        mirror = self._reflected.mirrored and settings.ghost > 0.0
+        self._coarse_mirrored = coarse_rays(self._reflected) if mirror else None
+        self._backdrop = backdrop(self.camera, scanner.seed, settings)
+        self._texture = texture
+
+    def jpeg(self, scene: Scene, x: float, frame: int) -> bytes:
+        """Frame number `frame`, with the laser plane at X = `x` mm, as the camera sends it."""
+        return compress(self.picture(scene, x, frame), self._settings)
+
+    def picture(self, scene: Scene, x: float, frame: int) -> NDArray[np.uint8]:
+        """The same before compression, (480, 640, 3) uint8 RGB."""
+        random = np.random.default_rng([self._settings.seed, self.camera.id, frame, 4])
+        light = self.light(scene, x, random)
+        return photograph(light, random, self._settings)
+
+    def light(self, scene: Scene, x: float, random: np.random.Generator) -> Singles:
+        """Light on the sensor, (480, 640, 3) float32, 1 being its white."""
+        settings = self._settings
+        stripe = stripe_picture(scene, x, self._lasers, self._straight, self._texture, settings)
+        if settings.ghost > 0.0:
+            stripe += settings.ghost * stripe_picture(scene, x, self._lasers, self._reflected, self._texture, settings)
+        level = LEVELS[settings.ambient]
+        brightness, coverage = lit_object(scene, x, self._coarse, self._coarse_mirrored, self._texture, level)
+        return light_on_sensor(stripe, brightness, coverage, scene.surface, self._backdrop, settings, random)
+
+
+def light_on_sensor(
+    stripe: Floats,
+    brightness: Singles,
+    coverage: Singles,
+    surface: Surface,
+    behind: Backdrop,
+    settings: SimulationSettings,
+    random: np.random.Generator,
+) -> Singles:
+    """All light of a frame, (480, 640, 3) float32, 1 being the sensor's white.
+
+    Parameters
+    ----------
+    stripe : (480, 640) laser light that the surface sends to each pixel, before speckle, halo and lens.
+    brightness, coverage : (240, 320) the object in the light of the room, and where it is; see `lit_object`.
+    """
+    share = min(surface.halo * settings.halo, 0.9)
+    glow, veil = _glow(stripe, coverage, share, settings.halo)
+    line = _line(stripe * (1.0 - share), settings, random)
+    room_flicker, white_flicker, red_flicker = 1.0 + settings.flicker * random.normal(0.0, (0.02, 0.15, 0.15))
+    albedo = np.array(surface.albedo, dtype=np.float32)
+    flickers = np.maximum(np.array([room_flicker, white_flicker, red_flicker]), 0.0).astype(np.float32)
+    return np.asarray(
+        _compose(
+            line, glow, veil, brightness, coverage, behind.room, behind.white_glints, behind.red_glints,
+            albedo, laser_colour(settings), flickers,
+        )
+    )  # fmt: skip
+
+
+def laser_colour(settings: SimulationSettings) -> Singles:
+    """(3,) what a red, green and blue pixel make of laser light 1."""
+    return np.array([1.0, LASER_COLOUR[1] * settings.leak, LASER_COLOUR[2] * settings.leak], dtype=np.float32)
+
+
+def _glow(stripe: Floats, coverage: Singles, share: float, veil: float) -> tuple[Singles, Singles]:
+    """Laser light scattered under the surface, seen on the object only, and in the lens, seen everywhere.
+
+    Both (120, 160) float32, in blocks of 4 x 4 pixels. Skin passes red light over millimetres; two Gaussians stand for
+    its diffusion profile, as in E. d'Eon and D. Luebke, "Advanced techniques for realistic real-time skin rendering",
+    GPU Gems 3 (2007), chapter 14.
+    """
+    blocks = stripe.reshape(HEIGHT // _BLOCK, _BLOCK, WIDTH // _BLOCK, _BLOCK).mean(axis=(1, 3)).astype(np.float32)
+    near, far, lens = (gaussian_blur(blocks, sigma, truncate=3.0) for sigma in (1.3, 3.5, 10.0))
+    step = _BLOCK // COARSE
+    on_object = coverage.reshape(HEIGHT // _BLOCK, step, WIDTH // _BLOCK, step).mean(axis=(1, 3))
+    glow = share * (0.6 * near + 0.4 * far) * on_object
+    return glow.astype(np.float32), (0.012 * veil * lens).astype(np.float32)
+
+
+def _line(stripe: Floats, settings: SimulationSettings, random: np.random.Generator) -> Singles:
+    """The stripe through the lens, with speckle: the grain of coherent light on the sensor, about a pixel wide."""
+    line = np.zeros((HEIGHT, WIDTH), dtype=np.float32)
+    rows, columns = np.flatnonzero(stripe.any(axis=1)), np.flatnonzero(stripe.any(axis=0))
+    if not len(rows):
+        return line
+    window = (
+        slice(max(rows[0] - _MARGIN_PX, 0), rows[-1] + _MARGIN_PX + 1),
+        slice(max(columns[0] - _MARGIN_PX, 0), columns[-1] + _MARGIN_PX + 1),
+    )
+    part = gaussian_blur(stripe[window].astype(np.float32), settings.blur_px, truncate=5.0, mode="constant")
+    if settings.speckle > 0.0:
+        sigma = 0.55
+        grain = gaussian_blur(random.standard_normal(part.shape, dtype=np.float32), sigma, truncate=6.0)
+        grain /= (gaussian_kernel(sigma, 3) ** 2).sum()  # white noise keeps this share of its standard deviation
+        part *= np.maximum(1.0 + settings.speckle * grain, 0.0)
+    line[window] = part
+    return line
+
+
+@compiled
+def _compose(
+    line: Singles,
+    glow: Singles,
+    veil: Singles,
+    brightness: Singles,
+    coverage: Singles,
+    room: Singles,
+    white_glints: Singles,
+    red_glints: Singles,
+    albedo: Singles,
+    colour: Singles,
+    flickers: Singles,
+) -> Singles:
+    """The sum of all light, the coarse parts interpolated."""
+    height, width = line.shape
+    light = np.empty((height, width, 3), dtype=np.float32)
+    one = np.float32(1.0)
+    for j in range(height):
+        for i in range(width):
+            covered = _between(coverage, j, i, COARSE)
+            laser = line[j, i] + _between(glow, j, i, _BLOCK) + _between(veil, j, i, _BLOCK)
+            laser += (one - covered) * red_glints[j, i] * flickers[2]
+            lit = _between(brightness, j, i, COARSE) * flickers[0]
+            white = (one - covered) * white_glints[j, i] * flickers[1]
+            for c in range(3):
+                seen = lit * albedo[c] + (one - covered) * room[j, i, c] * flickers[0]
+                light[j, i, c] = seen + white + laser * colour[c]
+    return light
+
+
+@compiled
+def _between(coarse: Singles, j: int, i: int, block: int) -> np.float32:
+    """Value at pixel (i, j) of a picture in blocks of `block` x `block` pixels, bilinear between their middles."""
+    rows, columns = coarse.shape
+    v = min(max((j - (block - 1) / 2.0) / block, 0.0), rows - 1.0)
+    u = min(max((i - (block - 1) / 2.0) / block, 0.0), columns - 1.0)
+    top, left = min(int(v), rows - 2), min(int(u), columns - 2)
+    v, u = v - top, u - left
+    upper = coarse[top, left] * (1.0 - u) + coarse[top, left + 1] * u
+    lower = coarse[top + 1, left] * (1.0 - u) + coarse[top + 1, left + 1] * u
+    return np.float32(upper * (1.0 - v) + lower * v)

@@ -1,0 +1,1 @@
+"""A parametric foot with known measures."""

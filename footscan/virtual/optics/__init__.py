@@ -1,0 +1,1 @@
+"""Light from the laser to the sensor: rays, glass, lens, surfaces, noise."""

@@ -1,0 +1,146 @@
+"""The filmed object: which point a ray meets, whether anything stands between two points, what lies near some X."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.compiled import compiled
+from footscan.virtual.optics.ray_tree import any_hits, first_hits, ray_tree
+from footscan.virtual.portable import cos_sin
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+Ints = NDArray[np.int64]
+
+CREASE_DEGREES = 40.0
+"""Faces that meet more sharply than this keep an edge; others are shaded as one smooth surface."""
+PATCH_MM = 2.0
+CLEARANCE_MM = 0.03
+"""How far a shadow ray starts from its facet, which stands for a smooth surface: its neighbours do not shade it."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """How the object reflects light, diffusely."""
+
+    albedo: tuple[float, float, float]
+    """For red, green and blue room light."""
+    laser_albedo: float
+    halo: float
+    """Share of laser light that comes out millimetres beside the line, scattered inside the object."""
+    unevenness: float
+    """Standard deviation of its colour from place to place."""
+
+
+SKIN = Surface(albedo=(0.66, 0.43, 0.32), laser_albedo=0.62, halo=0.22, unevenness=0.05)
+MATT_GREY = Surface(albedo=(0.5, 0.5, 0.5), laser_albedo=0.5, halo=0.015, unevenness=0.015)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles, counter-clockwise seen from outside."""
+
+    vertices: Floats
+    """(N, 3) mm, scanner frame."""
+    faces: Ints
+    """(M, 3) indices of vertices."""
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Where rays meet the object; arrays over those rays that do."""
+
+    ray: Ints
+    """(H,) index of the ray."""
+    distance: Floats
+    """(H,) mm along the ray."""
+    facet_normals: Floats
+    """(H, 3) of the triangle."""
+    normals: Floats
+    """(H, 3) of the smooth surface that the triangles stand for."""
+
+
+class Scene:
+    """A triangle mesh made ready for casting rays at it."""
+
+    def __init__(self, mesh: Mesh, surface: Surface) -> None:
+        vertices, faces = mesh.vertices, mesh.faces
+        self.surface = surface
+        self._tree = ray_tree(vertices, faces)
+        corners = vertices[faces]
+        crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(crossed, axis=1, keepdims=True)
+        self._facet_normals = crossed / np.maximum(area, 1e-30)
+        self._corner_normals = _smooth_normals(faces, crossed, self._facet_normals, len(vertices))
+        patches = _patches(corners, PATCH_MM)
+        reach = np.stack([patches[:, :, 0].min(axis=1), patches[:, :, 0].max(axis=1)], axis=1)
+        order = np.argsort(reach[:, 0], kind="stable")
+        self._patches, self._reach = patches[order], reach[order]
+        self._longest = float((reach[:, 1] - reach[:, 0]).max())
+
+    def cast(self, origins: Floats, directions: Floats) -> Hits:
+        """First hits of rays, each array (N, 3)."""
+        met, distance, shares = first_hits(np.ascontiguousarray(origins), np.ascontiguousarray(directions), self._tree)
+        ray = np.flatnonzero(met >= 0)
+        face = met[ray]
+        u, v = shares[ray].T
+        corners = self._corner_normals[face]
+        normals = corners[:, 0] * (1.0 - u - v)[:, None] + corners[:, 1] * u[:, None] + corners[:, 2] * v[:, None]
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        return Hits(ray, distance[ray], self._facet_normals[face], normals)
+
+    def hidden(self, points: Floats, facet_normals: Floats, ends: Floats) -> NDArray[np.bool_]:
+        """Whether the object stands between surface points and `ends`, all (N, 3) mm; the surface faces its end."""
+        starts = points + CLEARANCE_MM * facet_normals
+        return np.asarray(any_hits(starts, ends - starts, 1.0 - 1e-4, self._tree))
+
+    def patches_near(self, x: float, reach: float) -> Floats:
+        """Corners, (K, 3, 3), of small triangles that cover all of the surface within `reach` mm of X = x."""
+        first = np.searchsorted(self._reach[:, 0], x - reach - self._longest)
+        last = np.searchsorted(self._reach[:, 0], x + reach, side="right")
+        return self._patches[first:last][self._reach[first:last, 1] >= x - reach]
+
+
+def _smooth_normals(faces: Ints, crossed: Floats, facet_normals: Floats, vertices: int) -> Floats:
+    """A normal for each corner of each face, (M, 3, 3): the mean of the faces around it on this side of any crease."""
+    around = np.argsort(faces.ravel(), kind="stable")
+    starts = np.searchsorted(faces.ravel()[around], np.arange(vertices + 1))
+    return np.asarray(_mean_normals(faces, crossed, facet_normals, around // 3, starts, cos_sin(CREASE_DEGREES)[0]))
+
+
+@compiled
+def _mean_normals(
+    faces: Ints, crossed: Floats, facet_normals: Floats, around: Ints, starts: Ints, least_cosine: float
+) -> Floats:
+    normals = np.empty((len(faces), 3, 3))
+    for face in range(len(faces)):
+        for corner in range(3):
+            total = np.zeros(3)
+            vertex = faces[face, corner]
+            for k in range(starts[vertex], starts[vertex + 1]):
+                other = around[k]
+                if (
+                    facet_normals[face, 0] * facet_normals[other, 0]
+                    + facet_normals[face, 1] * facet_normals[other, 1]
+                    + facet_normals[face, 2] * facet_normals[other, 2]
+                ) >= least_cosine:
+                    total += crossed[other]
+            length = np.sqrt((total * total).sum())
+            normals[face, corner] = total / length if length > 0.0 else facet_normals[face]
+    return normals
+
+
+def _patches(corners: Floats, longest: float) -> Floats:
+    """Triangles (K, 3, 3) that cover those of `corners`, with no edge above `longest` mm: longest edges are halved."""
+    done = []
+    while len(corners):
+        edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+        edge = edges.argmax(axis=1)
+        long = edges.max(axis=1) > longest
+        done.append(corners[~long])
+        rows, edge = np.arange(len(corners))[long], edge[long]
+        a, b, c = (corners[rows, (edge + k) % 3] for k in range(3))
+        middle = (a + b) / 2.0
+        corners = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+    return np.concatenate(done)

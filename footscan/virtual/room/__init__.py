@@ -1,0 +1,1 @@
+"""What stands and shines around the scanner."""

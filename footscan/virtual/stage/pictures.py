@@ -1,0 +1,232 @@
+"""Pictures of what stands on the glass, one for each place of the heads on a fine grid, kept in a folder.
+
+Rendering a picture takes a tenth of a second: eight cameras at full rate want fifteen times what two cores render. So
+pictures of a whole travel are rendered before it starts, and once for all: the folder's name tells what is on them.
+"""
+
+import os
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import lru_cache
+from hashlib import sha256
+from math import log2
+from multiprocessing import get_context, parent_process
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import simplejpeg
+
+from footscan.virtual.filming.render import CameraRenderer
+from footscan.virtual.optics.scanner import standard_scanner
+from footscan.virtual.optics.scene import MATT_GREY, Mesh, Scene, Surface
+from footscan.virtual.optics.sensor import compress, photograph
+from footscan.virtual.optics.texture import random_texture
+from schemas.base.documents import canonical_json
+from schemas.parameters.simulation import SimulationSettings
+
+Progress = Callable[[int, int], None]
+
+LEVELS_A_STOP = 4
+"""Power, exposure and gain are rendered in steps of a quarter of a stop, 19 %: the nearest stands for what was set."""
+FAINTEST = 2.0**-8
+"""Of power or exposure, what is less is none."""
+GRAIN_GREY = 3.0
+"""Its standard deviation, grey levels; compression leaves about as much as a camera's own noise does."""
+INDICES_A_TASK = 10
+_RENDERERS_A_PROCESS = 2
+"""One takes 90 MB."""
+
+
+class Light(NamedTuple):
+    """What was set, as factors of what the simulation's settings say."""
+
+    power: float = 1.0
+    """Of the lasers; 0 is off."""
+    exposure: float = 1.0
+    gain: float = 1.0
+
+    def nearest_level(self) -> "Light":
+        """The light that is rendered for this one."""
+        return Light(*map(_nearest_level, self))
+
+
+class Subject(NamedTuple):
+    """What stands on the glass."""
+
+    mesh: Mesh | None
+    """mm, scanner frame; None where nothing stands there."""
+    surface: Surface = MATT_GREY
+
+
+class StagePictures:
+    """The pictures of one subject by one scanner; a context manager, whose end ends its processes.
+
+    Picture `index` of a camera shows the laser plane at X = `index` * `grid_mm`. At light 1 it has the bytes of frame
+    `index` in a film; elsewhere the light of room and laser is scaled by exposure and gain, and noise by the root of
+    the gain, as shot noise is. Read noise, which would grow with all of the gain, is smaller than that here.
+    """
+
+    def __init__(
+        self, subject: Subject, settings: SimulationSettings, cache: Path, grid_mm: float = 0.5, workers: int = 2
+    ) -> None:
+        self.grid_mm = grid_mm
+        self._job = _Job(subject, settings, grid_mm)
+        self._folder = cache / self._job.digest()
+        self._workers = workers
+        self._pool: ProcessPoolExecutor | None = None
+        self._opening = threading.Lock()
+
+    def __enter__(self) -> "StagePictures":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends the processes; pictures that are there can still be had."""
+        with self._opening:
+            if self._pool is not None:
+                self._pool.shutdown(cancel_futures=True)
+                self._pool = None
+
+    def picture(self, camera: int, index: int, light: Light) -> bytes:
+        """The JPEG picture, from the folder or rendered now (some tenths of a second)."""
+        light, index = light.nearest_level(), self._seen(index)
+        path = self._path(camera, index, light)
+        try:
+            return path.read_bytes()
+        except FileNotFoundError:
+            self._processes().submit(_render, camera, light, [index], path.parent).result()
+            return path.read_bytes()
+
+    def prepare(
+        self, cameras: Iterable[int], indices: Iterable[int], light: Light, progress: Progress | None = None
+    ) -> int:
+        """Renders what is not there yet, and says how much that was; `progress` hears of pictures done and in all."""
+        light = light.nearest_level()
+        wanted = sorted({self._seen(index) for index in indices})
+        tasks = []
+        for camera in cameras:
+            missing = [index for index in wanted if not self._path(camera, index, light).exists()]
+            tasks += [(camera, missing[k : k + INDICES_A_TASK]) for k in range(0, len(missing), INDICES_A_TASK)]
+        total, done = sum(len(part) for _, part in tasks), 0
+        futures = [
+            self._processes().submit(_render, camera, light, part, self._path(camera, 0, light).parent)
+            for camera, part in tasks
+        ]
+        try:
+            for future, (_, part) in zip(futures, tasks, strict=True):
+                future.result()
+                done += len(part)
+                if progress is not None:
+                    progress(done, total)
+        except BaseException:  # such as a pipe that nobody listens to any more: the rest is for nobody
+            self.close()
+            raise
+        return total
+
+    def with_grain(self, jpeg: bytes, number: int) -> bytes:
+        """The same picture with some noise more: what a camera sees twice is never the same to the byte."""
+        picture = simplejpeg.decode_jpeg(jpeg, colorspace="RGB")
+        grain = np.random.default_rng([number, 7]).normal(0.0, GRAIN_GREY, picture.shape)
+        return compress(np.clip(np.rint(picture + grain), 0, 255).astype(np.uint8), self._job.settings)
+
+    def _seen(self, index: int) -> int:
+        return 0 if self._job.subject.mesh is None else index  # an empty scanner looks the same everywhere
+
+    def _path(self, camera: int, index: int, light: Light) -> Path:
+        level = "-".join(f"{factor:.3f}" for factor in light)
+        return self._folder / level / f"cam{camera}" / f"{index}.jpg"
+
+    def _processes(self) -> ProcessPoolExecutor:
+        with self._opening:
+            if self._pool is None:
+                # Spawned: a forked process has locks of threads that it has not.
+                spawn = get_context("spawn")
+                self._pool = ProcessPoolExecutor(self._workers, spawn, _open_studio, (self._job,))
+            return self._pool
+
+
+class _Job(NamedTuple):
+    """All that pictures depend on, apart from camera, place and light."""
+
+    subject: Subject
+    settings: SimulationSettings
+    grid_mm: float
+
+    def digest(self) -> str:
+        """Of the job and of the modules that render."""
+        mesh = self.subject.mesh
+        content = sha256(canonical_json(self.settings.model_dump(mode="json")).encode())
+        content.update(repr((self.grid_mm, self.subject.surface)).encode())
+        if mesh is not None:
+            content.update(mesh.vertices.tobytes() + mesh.faces.tobytes())
+        for module in _modules_that_render():
+            content.update(module.read_bytes())
+        return content.hexdigest()[:16]
+
+
+def _modules_that_render() -> Iterator[Path]:
+    virtual = Path(__file__).parents[1]
+    yield from sorted((virtual / "optics").glob("*.py"))
+    yield from (virtual / "filming/render.py", virtual / "room/room.py", Path(__file__))
+
+
+def _nearest_level(factor: float) -> float:
+    return 0.0 if factor < FAINTEST else float(2.0 ** (round(LEVELS_A_STOP * log2(factor)) / LEVELS_A_STOP))
+
+
+_NOTHING = Mesh(np.array([[1e6, 0, 0], [1e6, 1, 0], [1e6, 0, 1]], np.float64), np.array([[0, 1, 2]], np.int64))
+"""A triangle a kilometre away: a scene wants one."""
+
+
+class _Studio:
+    """What one process renders with."""
+
+    def __init__(self, job: _Job) -> None:
+        self._job = job
+        settings, subject = job.settings, job.subject
+        scanner = standard_scanner(settings.scanner_seed, settings.distortion)
+        texture = random_texture(settings.seed, subject.surface.unevenness * settings.texture)
+        self._scene = Scene(subject.mesh or _NOTHING, subject.surface)
+
+        @lru_cache(maxsize=_RENDERERS_A_PROCESS)
+        def renderer(camera: int, power: float) -> CameraRenderer:
+            lit = settings.model_copy(update={"laser_exposure": min(settings.laser_exposure * power, 100.0)})
+            return CameraRenderer(scanner, camera, lit, texture)
+
+        self._renderer = renderer
+
+    def jpeg(self, camera: int, index: int, light: Light) -> bytes:
+        settings = self._job.settings
+        random = np.random.default_rng([settings.seed, camera, index % 2**32, 4])  # as films have it
+        seen = self._renderer(camera, light.power).light(self._scene, index * self._job.grid_mm, random)
+        noisy = settings.model_copy(update={"noise": min(settings.noise * light.gain**0.5, 100.0)})
+        return compress(photograph(seen * np.float32(light.exposure * light.gain), random, noisy), settings)
+
+
+_studios: list[_Studio] = []
+
+
+def _open_studio(job: _Job) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    _studios[:] = [_Studio(job)]
+
+
+def _end_with_parent() -> None:
+    """A pool that is killed cannot end its processes: they would wait for work for ever."""
+    parent = parent_process()
+    assert parent is not None, "runs in a process of a pool"
+    parent.join()
+    os._exit(1)
+
+
+def _render(camera: int, light: Light, indices: list[int], folder: Path) -> None:
+    """Writes pictures into `folder`, each under its name when it is whole."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for index in indices:
+        partial = folder / f"{index}.{os.getpid()}.part"
+        partial.write_bytes(_studios[0].jpeg(camera, index, light))
+        partial.replace(folder / f"{index}.jpg")

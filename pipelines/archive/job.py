@@ -1,0 +1,359 @@
+"""An archive of scans: planned as a whole, run as a whole; one scan's failure is its own."""
+
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple
+
+from pipelines.archive.workflow_file import check_archives, read_workflow
+from pipelines.engine.actions.step import Failure, Outcome, Step, Success
+from pipelines.engine.deliver import deliver
+from pipelines.engine.files.access import group_number, share
+from pipelines.engine.files.digest import sha256
+from pipelines.engine.files.file_digests import FileDigests
+from pipelines.engine.files.places import open_files
+from pipelines.engine.plan import Plan, make_plan
+from pipelines.engine.pool import OnStepEnd, Pool, cores
+from pipelines.engine.run import run_plan
+from pipelines.engine.store.erasure_notes import cut_off
+from pipelines.engine.store.lease import lease
+from pipelines.engine.store.permissions import warn_if_others_can_write
+from pipelines.engine.store.store import Store, open_store
+from pipelines.recordings.calibration_choice import CalibrationPlace, calibration_places, choose_calibration
+from pipelines.recordings.scans import RecordedScan, read_scan, scan_folders
+from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
+from schemas.base.documents import read_text
+from schemas.base.errors import RefusedInput
+from schemas.calibration import calibration_from_json
+from schemas.frames import GROUP
+from schemas.measures import Measures
+from schemas.parameters.scan import ScanParameters
+from schemas.scan import Scan
+
+CACHE = ".footscan"
+WINDOW = 8
+"""Scans for each worker whose steps are handed over at once: an archive's memory does not grow with its scans."""
+
+log = logging.getLogger("footscan.archive")
+
+
+@dataclass(frozen=True)
+class Job:
+    """Which scans, with what, to where."""
+
+    folders: list[Path]
+    archives: tuple[Path, ...]
+    """Roots that the scans' paths may not leave; without one, that is two levels above each scan."""
+    calibrations: tuple[CalibrationPlace, ...]
+    """Win over the scans' own where `calibration_wins`, stand in for it otherwise."""
+    calibration_wins: bool
+    results: Path
+    cache: Path | str
+    """Folder of the store, or its URL."""
+    parameters: ScanParameters
+    threads: int
+    """Steps that run at once where no other pool is given."""
+    group: int | None = None
+    """Number of the group that what is written is for, as well as its owner."""
+
+    def archive_of(self, folder: Path) -> Path | None:
+        """The archive that a scan lies in."""
+        return next((archive for archive in self.archives if folder.is_relative_to(archive)), None)
+
+
+class Waiting(NamedTuple):
+    """A step that a run would have to run, or to look at again."""
+
+    scan: str
+    kind: str
+    camera: int | None
+    name: str
+    """See `Step.name`."""
+    reason: str
+
+
+class Refused(NamedTuple):
+    """A scan whose input breaks its format."""
+
+    scan: str
+    """`patient/scan`; its folder where that cannot be read, or is another's."""
+    folder: Path
+    error: RefusedInput
+
+
+@dataclass(frozen=True)
+class PlannedScan:
+    """What is known of a scan before anything runs."""
+
+    scan: RecordedScan
+    steps: int
+    """How many it has."""
+    to_run: int
+    """How many of them are no hits."""
+    failure: Failure | None
+    """Why it is known that it cannot be measured."""
+    delivered: Mapping[str, str]
+    """Digests of the files in its results, as far as they are known."""
+
+
+@dataclass
+class PlannedJob:
+    """What a job has to do."""
+
+    job: Job
+    store: Store
+    digests: FileDigests
+    calibrations: dict[Path, CalibrationFile] = field(default_factory=dict)
+    refused: list[Refused] = field(default_factory=list)
+    scans: list[PlannedScan] = field(default_factory=list)
+    waiting: list[Waiting] = field(default_factory=list)
+    """Filled where reasons were asked for."""
+
+    @property
+    def steps(self) -> int:
+        """How many steps all scans have."""
+        return sum(planned.steps for planned in self.scans)
+
+    @property
+    def to_run(self) -> int:
+        """How many of them are no hits."""
+        return sum(planned.to_run for planned in self.scans)
+
+
+@dataclass(frozen=True)
+class ScanEnd:
+    """What became of one scan."""
+
+    scan: str
+    source: Path
+    """The scan's own folder."""
+    folder: Path | None
+    """Its results; None where it has none."""
+    problem: str | None
+    kind: str | None
+    """`refused`, `finding`, `fault` or `damaged`, as in `Failure`."""
+    digests: Mapping[str, str] = field(default_factory=dict)
+    """Of the files in its results."""
+    known: bool = False
+    """Whether nothing had to run for it."""
+    document: Scan | None = None
+    """Its scan.yaml; None where that was refused."""
+
+
+def job_of_workflow(path: Path, threads: int | None = None, *, may_be_empty: bool = False) -> Job:
+    """The job that a workflow.yaml describes.
+
+    Raises
+    ------
+    RefusedInput
+        It breaks its format, an archive is missing, or empty and may not be so, or no store can lie where it says.
+    """
+    workflow = read_workflow(path)
+    check_archives(path, workflow)
+    base = path.resolve().parent
+    archives = tuple(base / archive for archive in workflow.archive)
+    results = base / workflow.results
+    folders = [folder for archive in archives for folder in scan_folders(archive)]
+    if not folders and not may_be_empty:
+        below = ", ".join(map(str, archives))
+        raise RefusedInput(path, f"expected folders with a scan.yaml below {below}, found none", field="archive")
+    return Job(
+        folders=folders,
+        archives=archives,
+        calibrations=calibration_places(workflow, base),
+        calibration_wins=False,
+        results=results,
+        cache=_cache(path, workflow.cache) or results / CACHE,
+        parameters=workflow.parameters,
+        threads=threads or workflow.workers or cores(),
+        group=None if workflow.group is None else group_number(workflow.group, path),
+    )
+
+
+def job_of_scan(folder: Path, calibration: Path | None, results: Path, threads: int | None = None) -> Job:
+    """The job of one scan without a workflow."""
+    if results.exists() and not results.is_dir():
+        raise RefusedInput(results, "is a file, expected a folder for the results")
+    return Job(
+        folders=[folder],
+        archives=(),
+        calibrations=() if calibration is None else (CalibrationPlace(calibration),),
+        calibration_wins=True,
+        results=results,
+        cache=results / CACHE,
+        parameters=ScanParameters(),
+        threads=threads or cores(),
+    )
+
+
+def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None = None) -> PlannedJob:
+    """Draw the graph of each scan of a job and look every step up in the cache.
+
+    Parameters
+    ----------
+    reasons : bool
+        Whether what would run is listed step by step, not only counted.
+    folders : dict, optional
+        Of the scans of earlier jobs on the same archive, by name, so that none is overwritten; those of this job are
+        added.
+    """
+    local = job.cache if isinstance(job.cache, Path) else job.results / CACHE
+    store = open_store(job.cache, local / "known.sqlite")
+    planned = PlannedJob(job, store, FileDigests.load(local / "files.json", store.secret))
+    folders = {} if folders is None else folders
+    for folder in job.folders:
+        name = str(folder)
+        try:
+            scan = read_scan(folder, job.archive_of(folder))
+            other = folders.get(scan.name, folder)
+            if other != folder and _is_still(scan.name, other, job.archive_of(other)):
+                raise RefusedInput(scan.file, f"{scan.name} is also in {other}, expected each scan once")
+            name = scan.name
+            folders[name] = folder
+            plan = make_plan(draw_steps(scan, planned), planned.store)
+        except RefusedInput as error:
+            planned.refused.append(Refused(name, folder.resolve(), error))
+            continue
+        planned.scans.append(_sum_up(scan, plan))
+        if reasons:
+            planned.waiting += [
+                Waiting(scan.name, p.step.kind, p.step.camera, p.step.name, p.reason) for p in plan.to_run
+            ]
+    return planned
+
+
+def draw_steps(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
+    """The steps of one scan of a job; RefusedInput as in `scan_steps`, or where it has no calibration."""
+    calibration = _calibration(scan, planned.job, planned.calibrations)
+    return scan_steps(scan, calibration, planned.job.parameters, planned.digests)
+
+
+def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
+    """Run what is left of a planned job and deliver each scan's results; yields what became of each scan."""
+    for name, folder, error in planned.refused:
+        yield ScanEnd(name, folder, None, str(error), "refused")
+    waiting = iter(planned.scans)
+    share_written(planned)
+    warn_if_others_can_write(planned.store, planned.job.group)
+    for name in cut_off(planned.store):
+        log.warning("%s: its erasure was cut off; 'footscan forget' of it finishes that", name)
+    held = lease(planned.store) if planned.to_run else nullcontext()  # what runs nothing uses what it has looked up
+    try:
+        with held:
+            while window := list(islice(waiting, WINDOW * pool.count)):
+                yield from _run_window(window, planned, pool, on_step_end)
+    finally:
+        planned.digests.save()
+        if planned.store.memory is not None:
+            planned.store.memory.close()
+
+
+def share_written(planned: PlannedJob) -> None:
+    """Let the group of a job, if it has one, read and write all that its run writes."""
+    job = planned.job
+    frames = [scan.scan.folder / GROUP for scan in planned.scans if scan.to_run]
+    share([job.results, *([job.cache] if isinstance(job.cache, Path) else []), *frames], job.group)
+
+
+def _cache(workflow: Path, named: str | None) -> Path | str | None:
+    """Where the store lies that a workflow names; a URL is tried, for each scan would be refused for it otherwise."""
+    if named is None or "://" not in named:
+        return None if named is None else workflow.resolve().parent / named
+    try:
+        open_files(named)
+    except RefusedInput as error:
+        raise RefusedInput(workflow, f"{named}: {error.problem}", field="cache") from None
+    return named
+
+
+def _is_still(name: str, folder: Path, archive: Path | None) -> bool:
+    """Whether a scan lies where it was found before."""
+    try:
+        return read_scan(folder, archive).name == name
+    except RefusedInput:
+        return False
+
+
+def _sum_up(scan: RecordedScan, plan: Plan) -> PlannedScan:
+    outcomes = {p.step.kind: p.outcome for p in plan.steps if p.step.camera is None}
+    failures = [p.outcome for p in plan.steps if isinstance(p.outcome, Failure)]
+    delivered = {
+        file: outcome.digest for file, kind in DELIVERED.items() if isinstance(outcome := outcomes[kind], Success)
+    }
+    return PlannedScan(scan, len(plan.steps), len(plan.to_run), failures[0] if failures else None, delivered)
+
+
+def _run_window(
+    window: Sequence[PlannedScan], planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd
+) -> Iterator[ScanEnd]:
+    """Run some scans together; of those that are known as a whole, only the results are looked at."""
+    steps: list[Step] = []
+    for scan in window:
+        if scan.to_run:
+            steps += draw_steps(scan.scan, planned)
+    outcomes = _run_and_mend(steps, planned, pool, on_step_end)
+    for scan in window:
+        end = _end_scan(scan, outcomes, planned)
+        if end.kind == "damaged":
+            log.warning("%s", end.problem)
+            again = _run_and_mend(draw_steps(scan.scan, planned), planned, pool, on_step_end)
+            end = _end_scan(scan, again, planned)
+        yield end
+
+
+def _run_and_mend(steps: Sequence[Step], planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> dict[str, Outcome]:
+    """Run steps; what turns out to be damaged has been set aside then, and is made anew by another run of them."""
+    told: set[str] = set()
+    while True:  # behind what was damaged there may be more
+        plan = make_plan(steps, planned.store)
+        outcomes = run_plan(plan, planned.store, pool=pool, on_step_end=on_step_end)
+        damage = _damage(outcomes) - told
+        if not damage:
+            return outcomes
+        for problem in sorted(damage):
+            log.warning("%s", problem)
+        told |= damage
+
+
+def _damage(outcomes: Mapping[str, Outcome]) -> set[str]:
+    return {end.problem for end in outcomes.values() if isinstance(end, Failure) and end.kind == "damaged"}
+
+
+def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planned: PlannedJob) -> ScanEnd:
+    """Deliver a scan's results, if it has them."""
+    scan = planned_scan.scan
+    target = planned.job.results / scan.document.patient / scan.document.scan
+    digests: dict[str, str] = {}
+    for file, kind in DELIVERED.items():
+        known = planned_scan.failure or Success(planned_scan.delivered.get(file, ""))
+        outcome = outcomes.get(f"{scan.name}/{kind}", known)
+        if isinstance(outcome, Failure):
+            told = outcome.problem + _what_stays(target)
+            return ScanEnd(scan.name, scan.folder, None, told, outcome.kind, document=scan.document)
+        digests[file] = outcome.digest
+    problem = deliver(digests, planned.store, planned.digests, target)
+    if problem is not None:
+        whole = all(planned.store.has(digest) for digest in digests.values())  # what is damaged has been set aside
+        kind = "fault" if whole else "damaged"
+        return ScanEnd(scan.name, scan.folder, None, problem, kind, document=scan.document)
+    finding = Measures.model_validate_json((target / "measures.json").read_bytes()).finding
+    ended = None if finding is None else "finding"
+    is_known = not planned_scan.to_run
+    return ScanEnd(scan.name, scan.folder, target, finding, ended, digests, is_known, scan.document)
+
+
+def _what_stays(target: Path) -> str:
+    """A warning where a scan that failed has results, which then are an earlier run's."""
+    return f" ({target} still holds the results of an earlier run)" if target.exists() else ""
+
+
+def _calibration(scan: RecordedScan, job: Job, known: dict[Path, CalibrationFile]) -> CalibrationFile:
+    own = None if job.calibration_wins and job.calibrations else scan.calibration
+    path = own or choose_calibration(scan, job.calibrations)
+    if path not in known:
+        text = read_text(path, "json_bytes")
+        known[path] = CalibrationFile(path, calibration_from_json(text, path), sha256(text.encode()))
+    return known[path]

@@ -1,0 +1,106 @@
+"""All results of an archive as one table, a row a scan: for spreadsheets, for programs, and as a page for people."""
+
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pipelines.archive.job import ScanEnd
+from pipelines.archive.page import write_archive_page
+from pipelines.engine.files.atomic import write_atomically
+from pipelines.scan import DELIVERED
+from pipelines.version import SOFTWARE
+from schemas.quality import MeshQuality
+from schemas.tables import Cell, csv_text
+
+CSV, PARQUET = "results.csv", "results.parquet"
+
+TEXTS = {"scan", "status", "problem", "side", "software", "calibration_sha256"} | {
+    f"{file}_sha256" for file in DELIVERED
+}
+COUNTS = {"cameras", "frames_lost", "stripe_points", "cloud_points"} | {
+    f"mesh_{name}"
+    for name, field in MeshQuality.model_json_schema()["properties"].items()
+    if {kind["type"] for kind in field.get("anyOf", [field])} <= {"integer", "null"}
+}
+"""Names of columns; all others hold measures, distances and shares."""
+
+
+def write_results_table(ends: Sequence[ScanEnd], folder: Path) -> None:
+    """Write `results.csv`, `results.parquet` and `index.html` into the folder of the results; not again what is there.
+
+    A row holds the scan and what became of it, the foot's side, its measures (their unit in the name of the column),
+    quality figures, the version of this program and the digests of the scan's files.
+    """
+    write_archive_page(ends, folder)
+    rows = [_row(end) for end in ends]
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    table = _as_csv(columns, rows).encode()
+    if (folder / PARQUET).exists() and _is(folder / CSV, table):
+        return
+    write_atomically(folder / PARQUET, _as_parquet(columns, rows))
+    write_atomically(folder / CSV, table)
+
+
+def _row(end: ScanEnd) -> dict[str, Cell]:
+    row: dict[str, Cell] = {"scan": end.scan, "status": end.kind or "done", "problem": end.problem}
+    if end.folder is None:
+        return row
+    measures = _read(end.folder / "measures.json")
+    row["side"] = measures.get("side")
+    for name, measure in measures.get("measures", {}).items():
+        unit = measure["unit"]
+        row[name if unit == "1" else f"{name}_{unit}"] = measure["value"]
+    quality = _read(end.folder / "quality.json")
+    cameras = quality.get("cameras", [])
+    row["cameras"] = len(cameras)
+    row["frames_lost"] = sum(camera["frames_lost"] for camera in cameras)
+    row["stripe_points"] = sum(camera["points"] for camera in cameras)
+    row["cloud_points"] = quality.get("cloud_points")
+    row |= {f"mesh_{name}": value for name, value in quality.get("mesh", {}).items()}
+    truth = quality.get("truth") or {}
+    row |= {f"truth_{name}_mm": truth[name] for name in ("mean", "p95", "max") if name in truth}
+    row["calibration_sha256"] = quality.get("calibration", {}).get("sha256")
+    row["software"] = SOFTWARE
+    row |= {f"{file}_sha256": digest for file, digest in sorted(end.digests.items())}
+    return row
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        value = json.loads(path.read_bytes())
+    except (OSError, ValueError):  # a person may have moved it meanwhile
+        return {}
+    return value if isinstance(value, dict) else {}
+
+
+def _is(path: Path, content: bytes) -> bool:
+    try:
+        return path.read_bytes() == content
+    except OSError:
+        return False
+
+
+def _as_csv(columns: Sequence[str], rows: Sequence[dict[str, Cell]]) -> str:
+    return csv_text([columns, *([row.get(column) for column in columns] for row in rows)])
+
+
+def _as_parquet(columns: Sequence[str], rows: Sequence[dict[str, Cell]]) -> bytes:
+    import pyarrow
+    from pyarrow import parquet
+
+    types = {column: _type(column) for column in columns}
+    table = pyarrow.Table.from_pylist(rows, pyarrow.schema(types.items()))
+    out = io.BytesIO()
+    parquet.write_table(table, out)
+    return out.getvalue()
+
+
+def _type(column: str) -> Any:
+    """The same in every table, so that those of several archives can be joined."""
+    import pyarrow
+
+    if column in TEXTS:
+        return pyarrow.string()
+    return pyarrow.int64() if column in COUNTS else pyarrow.float64()

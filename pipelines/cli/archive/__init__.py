@@ -1,0 +1,1 @@
+"""Commands on an archive and its store."""

@@ -1,0 +1,396 @@
+"""`footscan cache`: what lies in the store, what of it can go, and whether it is sound."""
+
+import socket
+import time
+from collections.abc import Collection, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.archive.run import WORKFLOW, WorkflowFile
+from pipelines.cli.archive.why import json_time, local_time, plan_of_scan
+from pipelines.cli.terminal.output import AsJson, message, print_json, print_line, print_table
+from schemas.base.errors import Fault, RefusedInput, one_line
+
+if TYPE_CHECKING:
+    from pipelines.engine.audit import Difference
+    from pipelines.engine.garbage_collection import Contents, Garbage
+    from pipelines.engine.store.lease import Lease
+    from pipelines.engine.store.store import Store
+
+cache = typer.Typer(help="The store of all results: its size, what can go, whether it is sound.", no_args_is_help=True)
+
+HOUR_S = 3600.0
+
+Place = Annotated[str | None, typer.Option("--cache", help="The store: a folder or a URL, without a workflow.")]
+OfWorkflow = Annotated[Path | None, typer.Option("--workflow", help="The workflow; workflow.yaml where absent.")]
+ScanName = Annotated[str, typer.Argument(help="A scan: its folder, or patient/scan.")]
+TakeOver = Annotated[
+    bool, typer.Option("--take-over", help="Remove the leases of runs elsewhere, or with a wrong clock, that are gone.")
+]
+OlderThan = Annotated[float, typer.Option(min=0, help="Hours below which nothing goes.")]
+
+
+@cache.command("stats")
+def stats(workflow: WorkflowFile = None, place: Place = None, as_json: AsJson = False) -> None:
+    """Say what lies in the store, by kind of step, and what gc would free."""
+    from pipelines.engine.garbage_collection import read_contents
+    from pipelines.engine.store.pins import read_pins
+
+    store = _store(workflow, place)
+    contents = read_contents(store)
+    garbage, _ = _garbage(contents, store, workflow, place, 24.0)
+    pinned = list(read_pins(store))
+    if as_json:
+        print_json(
+            {
+                "store": _place(store),
+                **_shares_json(contents, contents.sizes),
+                "pins": pinned,
+                "gc": _garbage_json(contents, garbage),
+            }
+        )
+        return
+    _print_shares(_place(store), contents, contents.sizes)
+    if pinned:
+        print_line(f"pinned: {', '.join(pinned)}")
+    print_line(f"gc would free {_sum(contents, garbage.names)}")
+
+
+@cache.command("gc")
+def gc(
+    workflow: WorkflowFile = None,
+    place: Place = None,
+    delete: Annotated[bool, typer.Option("--delete", help="Delete it; otherwise it is only listed.")] = False,
+    older_than: OlderThan = 24.0,
+    take_over: TakeOver = False,
+    as_json: AsJson = False,
+) -> int:
+    """List, and with --delete delete, what no step's last action and no pin reaches, or a vanished scan's alone.
+
+    Nothing is deleted while a run is under way.
+    """
+    from pipelines.engine import garbage_collection as collect
+    from pipelines.engine.store.lease import live_leases
+
+    store = _store(workflow, place)
+    taken_over = take_over_leases(store) if take_over else []
+    contents = collect.read_contents(store)
+    garbage, vanished = _garbage(contents, store, workflow, place, older_than)
+    if not as_json:
+        if vanished:
+            print_line(f"gone from the archive: {', '.join(vanished)}")
+        if garbage.names:
+            _print_shares(f"{_place(store)}: what would go", contents, garbage.names)
+        print_line(f"to go: {_sum(contents, garbage.names)}; too young to go: {_sum(contents, garbage.young)}")
+    deleted: list[str] = []
+    if delete:
+        deleted, live = collect.delete(garbage, store)
+    else:
+        live = live_leases(store)
+    if as_json:
+        facts = {
+            "deleted": len(deleted),
+            "deleted_bytes": _bytes(contents, deleted),
+            "vanished": vanished,
+            "runs": [_run_json(one) for one in live],
+            "taken_over": [_run_json(one) for one in taken_over],
+        }
+        print_json({"store": _place(store), **_garbage_json(contents, garbage), **facts})
+    elif delete:
+        print_line(f"deleted: {_sum(contents, deleted)}")
+    elif garbage.names:
+        print_line("nothing was deleted: --delete does it")
+    for one in live:
+        message(f"footscan: {told_lease(one)}; nothing is deleted while it is")
+    return 1 if delete and live else 0
+
+
+@cache.command("verify")
+def verify(
+    workflow: WorkflowFile = None,
+    place: Place = None,
+    recompute: Annotated[str | None, typer.Option(help="Do a share of the actions again, such as 5%.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the choice of these actions.")] = 0,
+    as_json: AsJson = False,
+) -> int:
+    """Read everything in the store and hold it against its digests and seals; remove what is damaged."""
+    from pipelines.engine import audit
+
+    share = None if recompute is None else _share(recompute)
+    if share is not None and place is not None:
+        raise RefusedInput("--recompute", "needs the workflow that says what the steps are, not --cache")
+    store = _store(workflow, place)
+    read = audit.verify(store)
+    facts: dict[str, Any] = {"store": _place(store), "files": read.files, "damaged": read.damaged}
+    if not as_json:
+        print_line(f"{_place(store)}: {read.files} files read, {len(read.damaged)} damaged")
+    failed = bool(read.damaged)
+    if share is not None:
+        count, differences, problems = _recompute(workflow or WORKFLOW, share, seed)
+        facts |= {
+            "recomputed": count,
+            "differences": [vars(difference) for difference in differences],
+            "problems": problems,
+        }
+        if not as_json:
+            print_line(f"{count} action{'s' * (count != 1)} done again, {len(differences)} came to something else")
+        for one in differences:
+            message(f"footscan: {one.step}: NOT REPRODUCED: recorded {one.recorded}, now {one.found}")
+        for problem in problems:
+            message(f"footscan: {problem}")
+        failed = failed or bool(differences or problems)
+    if as_json:
+        print_json(facts)
+    return int(failed)
+
+
+@cache.command("seal")
+def seal(
+    workflow: WorkflowFile = None,
+    place: Place = None,
+    every: Annotated[
+        bool, typer.Option("--all", help="Also what was written without the seal since: only if you wrote all of it.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Seal the rows of a store with a secret of yours, so that nobody else can make one.
+
+    The first time, what lies in the store is sealed; from then on, a row without the seal counts as missing.
+    """
+    from pipelines.engine.audit import seal_store
+    from pipelines.engine.files.secret import secret_file
+
+    sealing = seal_store(_store(workflow, place), every=every)
+    store = _store(workflow, place)
+    facts = {"store": _place(store), "secret": str(secret_file(store.files)), **vars(sealing)}
+    if as_json:
+        print_json(facts)
+        return
+    print_line(f"{_place(store)}: {sealing.sealed} rows sealed, {sealing.unsealed} without the seal")
+    print_line(f"secret: {facts['secret']}")
+
+
+@cache.command("pin")
+def pin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_json: AsJson = False) -> None:
+    """Keep the present results of a scan, whatever is computed of it later."""
+    from pipelines.engine.store import pins
+
+    store, name = _store(workflow, place), _scan_name(scan)
+    steps = pins.pin(name, store)
+    if as_json:
+        print_json({"store": _place(store), "scan": name, "steps": steps})
+    else:
+        print_line(f"{name}: the results of {steps} steps are kept")
+
+
+@cache.command("unpin")
+def unpin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_json: AsJson = False) -> None:
+    """Keep them no longer than others."""
+    from pipelines.engine.store import pins
+
+    store, name = _store(workflow, place), _scan_name(scan)
+    pins.unpin(name, store)
+    if as_json:
+        print_json({"store": _place(store), "scan": name})
+    else:
+        print_line(f"{name}: kept no longer than other results")
+
+
+def open_place(place: Path | str, group: int | None = None) -> "Store":
+    """The store at a place, read anew at every turn; RefusedInput where there is none."""
+    from pipelines.engine.files.places import LocalFiles
+    from pipelines.engine.store.permissions import warn_if_others_can_write
+    from pipelines.engine.store.store import open_store
+
+    store = open_store(place)
+    if isinstance(store.files, LocalFiles) and not Path(store.files.root).is_dir():
+        raise RefusedInput(store.files.root, "no such folder, expected the store of a run")
+    warn_if_others_can_write(store, group)
+    return store
+
+
+def _store(workflow: Path | None, place: str | None) -> "Store":
+    from pipelines.archive.job import job_of_workflow
+    from pipelines.engine.files.access import share
+
+    if place is None:
+        job = job_of_workflow(workflow or WORKFLOW, may_be_empty=True)
+        share([job.cache] if isinstance(job.cache, Path) and job.cache.is_dir() else [], job.group)
+        return open_place(job.cache, job.group)
+    if workflow is not None:
+        raise RefusedInput(workflow, "a workflow and --cache exclude each other, expected one of them")
+    return open_place(place)
+
+
+def _garbage(
+    contents: "Contents", store: "Store", workflow: Path | None, place: str | None, older_than: float
+) -> "tuple[Garbage, list[str]]":
+    """What of a store can go, and the scans that are no more; a workflow's present results, and what they came from,
+    stay."""
+    from pipelines.archive.job import CACHE, job_of_workflow, plan_job
+    from pipelines.archive.vanished import vanished_scans
+    from pipelines.engine.audit import repeatable
+    from pipelines.engine.garbage_collection import find_garbage
+
+    keys: set[str] = set()
+    delivered: set[str] = set()
+    vanished: list[str] = []
+    if place is None:
+        job = job_of_workflow(workflow or WORKFLOW, may_be_empty=True)
+        planned = plan_job(job)
+        for scan in planned.scans:
+            keys |= repeatable(plan_of_scan(scan, planned), store).keys()
+        vanished = vanished_scans(contents.actions, {scan.scan.name for scan in planned.scans}, job.archives)
+        delivered = _delivered(job.results, store.secret, vanished)
+    elif Path(place).name == CACHE:
+        delivered = _delivered(Path(place).resolve().parent, store.secret)
+    times = {"now": time.time(), "older_than_s": older_than * HOUR_S}
+    found = find_garbage(contents, store, keys=keys, delivered=delivered, vanished=vanished, **times)
+    return found, vanished
+
+
+def _delivered(results: Path, secret: bytes | None, without: Collection[str] = ()) -> set[str]:
+    """Digests of the files that lie in a folder of results, but for those of some scans."""
+    from pipelines.archive.job import CACHE
+    from pipelines.engine.files.file_digests import FileDigests
+    from pipelines.scan import DELIVERED
+
+    digests = FileDigests.load(results / CACHE / "files.json", secret)
+    files = (file for name in DELIVERED for file in results.glob(f"*/*/{name}") if file.is_file())
+    return {digests.of(file)[0] for file in files if "/".join(file.parts[-3:-1]) not in without}
+
+
+def _place(store: "Store") -> str:
+    return store.files.path("").rstrip("/")
+
+
+def _scan_name(scan: str) -> str:
+    """`patient/scan` of a scan that is named so, or by its folder."""
+    from pipelines.recordings.scans import SCAN_FILE, read_scan
+
+    folder = Path(scan)
+    return read_scan(folder).name if (folder / SCAN_FILE).is_file() else scan
+
+
+def _share(text: str) -> float:
+    number, sign, rest = text.strip().partition("%")  # which must be there: 0.5 might be half of them, or 0.5%
+    try:
+        share = float(number) / 100 if sign and not rest else 0.0
+    except ValueError:
+        share = 0.0
+    if not 0 < share <= 1:
+        raise RefusedInput("--recompute", f"expected a share above 0% and at most 100%, such as 5%, found {text!r}")
+    return share
+
+
+def _recompute(workflow: Path, share: float, seed: int) -> "tuple[int, list[Difference], list[str]]":
+    """Do a sample of the actions of all scans of a workflow again: how many, what differed, what could not be done."""
+    from pipelines.archive.job import job_of_workflow, plan_job
+    from pipelines.engine import audit
+
+    planned = plan_job(job_of_workflow(workflow))
+    chosen = audit.sample(
+        (key for scan in planned.scans for key in audit.repeatable(plan_of_scan(scan, planned), planned.store)),
+        share,
+        seed,
+    )
+    done: set[str] = set()
+    differences: list[Difference] = []
+    problems: list[str] = []
+
+    with ThreadPoolExecutor(planned.job.threads) as pool:
+        for scan in planned.scans:  # one at a time: the graphs of all would be too much
+            actions = audit.repeatable(plan_of_scan(scan, planned), planned.store)
+            mine = {key: action for key, action in actions.items() if key in chosen - done}
+            done |= mine.keys()
+            for ended in [pool.submit(audit.repeat, action, planned.store) for action in mine.values()]:
+                try:
+                    difference = ended.result()
+                except Fault as error:
+                    problems.append(str(error))
+                    continue
+                except Exception as error:  # a defect in one step must not hide what becomes of the others
+                    problems.append(one_line(f"{scan.scan.name}: {type(error).__name__}: {error}"))
+                    continue
+                if difference is not None:
+                    differences.append(difference)
+    return len(done), differences, problems
+
+
+def _bytes(contents: "Contents", names: Iterable[str]) -> int:
+    return sum(contents.sizes[name] for name in names)
+
+
+def _sum(contents: "Contents", names: Iterable[str]) -> str:
+    names = list(names)
+    return f"{len(names)} file{'s' * (len(names) != 1)}, {_mb(_bytes(contents, names))} MB"
+
+
+def _mb(size: int) -> str:
+    return f"{size / 1e6:.2f}"
+
+
+def _print_shares(title: str, contents: "Contents", names: Iterable[str]) -> None:
+    shares = contents.shares(names)
+    rows = [[kind, str(one.actions), str(one.results), _mb(one.bytes)] for kind, one in shares.items()]
+    every = shares.values()
+    total = [sum(one.actions for one in every), sum(one.results for one in every)]
+    rows.append(["all", *map(str, total), _mb(sum(one.bytes for one in every))])
+    print_table(title, ["step", "actions", "results", "MB"], rows)
+
+
+def _shares_json(contents: "Contents", names: Iterable[str]) -> dict[str, Any]:
+    shares = contents.shares(names)
+    return {
+        "actions": sum(one.actions for one in shares.values()),
+        "blobs": sum(one.results for one in shares.values()),
+        "bytes": sum(one.bytes for one in shares.values()),
+        "kinds": {kind: vars(one) for kind, one in shares.items()},
+    }
+
+
+def _garbage_json(contents: "Contents", garbage: "Garbage") -> dict[str, Any]:
+    return {
+        "files": len(garbage.names),
+        "bytes": _bytes(contents, garbage.names),
+        "young_files": len(garbage.young),
+        "young_bytes": _bytes(contents, garbage.young),
+    }
+
+
+def _run_json(one: "Lease") -> dict[str, Any]:
+    from pipelines.engine.store.lease import is_ahead
+
+    started, heartbeat = json_time(one.started), json_time(one.heartbeat)
+    times = {"started": started, "heartbeat": heartbeat, "ahead": is_ahead(one)}
+    return {"host": one.host, "process": one.process, **times}
+
+
+def take_over_leases(store: "Store") -> "list[Lease]":
+    """Take over all leases but those of this machine's own runs, and say which they were."""
+    from pipelines.engine.store.lease import take_over
+
+    taken = take_over(store)
+    for one in taken:
+        message(f"footscan: taken over: {one.name} of {_holder(one)}")
+    return taken
+
+
+def told_lease(one: "Lease") -> str:
+    """Who holds a lease, since when, and what to do where it is no run's."""
+    from pipelines.engine.store.lease import is_ahead
+
+    if one.host is None:
+        return f"{one.name}: damaged, so a run may be under way ('footscan cache verify' removes it)"
+    if is_ahead(one):
+        when = f"is dated in the future, {local_time(one.heartbeat)}: the clock there is wrong, or the one here"
+        return f"{_holder(one)} {when} (if no run is under way there, --take-over removes {one.name})"
+    hint = "" if one.host == socket.gethostname() else " (if that host is gone, --take-over)"
+    return f"{_holder(one)} is running since {local_time(one.started)}{hint}"
+
+
+def _holder(one: "Lease") -> str:
+    return "an unknown process" if one.host is None else one_line(f"process {one.process} on {one.host}")

@@ -1,0 +1,88 @@
+"""`footscan config`: what a workflow says, and what is wrong with it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from pipelines.cli.archive.run import WORKFLOW, Settings, WorkflowFile
+from pipelines.cli.terminal.output import AsJson, print_json, print_line, print_table
+from schemas.base.errors import RefusedInput
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+config = typer.Typer(help="What a workflow says, and what is wrong with it.", no_args_is_help=True)
+
+
+@config.command("show")
+def show(workflow: WorkflowFile = None, settings: Settings = None, as_json: AsJson = False) -> None:
+    """Every value in force, and where it comes from: a line of the file, --set, or the default."""
+    from pipelines.archive.workflow_file import read_workflow
+    from schemas.base.documents import read_text
+    from schemas.base.overrides import overridden, parse_settings
+    from schemas.parameters.scan import ScanParameters
+
+    path = workflow or WORKFLOW
+    document, text = read_workflow(path), read_text(path, "yaml_bytes")
+    given = parse_settings(settings or [])
+    changed = overridden(ScanParameters, document.parameters.model_dump(mode="json"), settings or [])
+    rows = []
+    for names, value in _values(document.model_copy(update={"parameters": changed})):
+        name = ".".join(names)
+        origin = "--set" if name.removeprefix("parameters.") in given else _origin(document, names, text, path)
+        rows.append((name, value, origin))
+    if as_json:
+        print_json([{"name": name, "value": value, "from": origin} for name, value, origin in rows])
+    else:
+        print_table(
+            str(path), ["name", "value", "from"], [[name, _shown(value), origin] for name, value, origin in rows]
+        )
+
+
+@config.command("check")
+def check(workflow: WorkflowFile = None, as_json: AsJson = False) -> int:
+    """Every mistake in a workflow, with its line and column and what was expected."""
+    from pipelines.archive.workflow_file import workflow_mistakes
+
+    path = workflow or WORKFLOW
+    found = workflow_mistakes(path)
+    if as_json:
+        print_json([{"file": str(path), **mistake._asdict()} for mistake in found])
+    for line, column, field, problem in [] if as_json else found:
+        print_line(f"{path}:{line}:{column}: {field}: {problem}".replace(" : ", " "))
+    if not found and not as_json:
+        print_line(f"{path}: nothing is wrong")
+    return RefusedInput.exit_status if found else 0
+
+
+def _values(document: "BaseModel", above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Every value of a document, after the names that lead to it."""
+    from pydantic import BaseModel
+
+    for name in type(document).model_fields:
+        value = getattr(document, name)
+        if isinstance(value, BaseModel):
+            yield from _values(value, (*above, name))
+        else:
+            yield (*above, name), document.model_dump(mode="json", include={name})[name]
+
+
+def _origin(document: "BaseModel", names: tuple[str, ...], text: str, path: Path) -> str:
+    """The line of a value that the file holds; otherwise it is the default."""
+    from pydantic import BaseModel
+
+    from schemas.base.yaml_text import place_in_yaml
+
+    for name in names:
+        if name not in document.model_fields_set:
+            return "default"
+        value = getattr(document, name)
+        if isinstance(value, BaseModel):
+            document = value
+    return f"{path}:{place_in_yaml(text, names)[0]}"
+
+
+def _shown(value: Any) -> str:
+    return "-" if value is None else str(value)

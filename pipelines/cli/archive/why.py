@@ -1,0 +1,259 @@
+"""`footscan why`."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines.cli.archive.run import WORKFLOW, Settings, with_settings
+from pipelines.cli.terminal.output import AsJson, print_json, print_line, print_table
+from schemas.base.errors import RefusedInput
+
+if TYPE_CHECKING:
+    from pipelines.archive.job import Job, PlannedJob, PlannedScan
+    from pipelines.engine.actions.step import Step
+    from pipelines.engine.explain import Change
+    from pipelines.engine.plan import Plan, PlannedStep
+    from pipelines.engine.store.store import Row, Store
+
+SHOWN_LINES = 40
+"""Of one change in a table; all are in the JSON."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What is known of a step."""
+
+    step: "Step"
+    state: str
+    """`hit`, `miss` or `waits`."""
+    reason: str
+    changes: "tuple[Change, ...]"
+    """Against its last action."""
+    last: "Row | None"
+    """What its last action came to; of a hit, what it comes to now."""
+    made: float | None
+    """When, s since 1970."""
+
+
+def why(
+    scan: Annotated[str, typer.Argument(help="A scan: its folder, or patient/scan.")],
+    step: Annotated[
+        str | None, typer.Argument(help="A step: extract, extract-3; all that would run where absent.")
+    ] = None,
+    workflow: Annotated[Path | None, typer.Option(help="The workflow; workflow.yaml where absent.")] = None,
+    calibration: Annotated[Path | None, typer.Option(help="Calibration, for a scan folder without a workflow.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the results, for a scan folder without a workflow.")
+    ] = None,
+    settings: Settings = None,
+    as_json: AsJson = False,
+) -> None:
+    """Say what changed since the last result of each step that would run, old and new side by side."""
+    from pipelines.archive.job import plan_job
+
+    planned = plan_job(with_settings(_job(scan, workflow, calibration, out), settings))
+    for refused in planned.refused:
+        raise refused.error
+    [found] = planned.scans
+    plan = plan_of_scan(found, planned)
+    every = [_explain(one, plan, planned.store) for one in plan.steps]
+    chosen = _named(step, every) if step is not None else [one for one in every if one.state != "hit"]
+    if as_json:
+        print_json(_json(found.scan.name, every, chosen))
+    elif chosen:
+        _show(chosen)
+    else:
+        newest = _newest(every)
+        print_line(f"{found.scan.name}: nothing would run; last result: {_short(newest.step)}, {_came_to(newest)}")
+
+
+def plan_of_scan(found: "PlannedScan", planned: "PlannedJob") -> "Plan":
+    """The plan of one scan of a job, with all its steps."""
+    from pipelines.archive.job import draw_steps
+    from pipelines.engine.plan import make_plan
+
+    return make_plan(draw_steps(found.scan, planned), planned.store)
+
+
+def local_time(seconds: float | None) -> str:
+    """A time, s since 1970, for a person."""
+    return "at an unknown time" if seconds is None else f"{datetime.fromtimestamp(seconds):%Y-%m-%d %H:%M:%S}"
+
+
+def json_time(seconds: float | None) -> str | None:
+    """The same for a program."""
+    return None if seconds is None else datetime.fromtimestamp(seconds, UTC).isoformat(timespec="seconds")
+
+
+def _job(scan: str, workflow: Path | None, calibration: Path | None, out: Path | None) -> "Job":
+    """The job of the one scan."""
+    from pipelines.archive.job import job_of_scan, job_of_workflow
+
+    if out is not None:
+        if workflow is not None:
+            raise RefusedInput("--workflow", "and --out exclude each other, expected one of them")
+        return job_of_scan(Path(scan), calibration, out)
+    if calibration is not None:
+        raise RefusedInput("--calibration", "goes with --out, expected it in the workflow")
+    job = job_of_workflow(workflow or WORKFLOW)
+    return replace(job, folders=[_folder(scan, job)])
+
+
+def _folder(scan: str, job: "Job") -> Path:
+    """The folder of a scan that is named by its folder, or as `patient/scan`."""
+    from pipelines.recordings.scans import read_scan
+
+    named = Path(scan).resolve()
+    for folder in job.folders:
+        if folder.resolve() == named:
+            return folder
+    for folder in sorted(job.folders, key=lambda folder: not folder.as_posix().endswith(f"/{scan}")):
+        try:
+            if read_scan(folder, job.archive_of(folder)).name == scan:
+                return folder
+        except RefusedInput:
+            continue
+    archives = ", ".join(map(str, job.archives))
+    raise RefusedInput(scan, f"no such scan in the workflow's archive {archives}, expected a folder or patient/scan")
+
+
+def _named(step: str, every: Sequence[Explanation]) -> list[Explanation]:
+    chosen = [one for one in every if step in {one.step.name, _short(one.step), one.step.kind}]
+    if not chosen:
+        kinds = ", ".join(dict.fromkeys(one.step.kind for one in every))
+        raise RefusedInput(step, f"no such step, expected one of {kinds}; one camera's as extract-3")
+    return chosen
+
+
+def _explain(planned: "PlannedStep", plan: "Plan", store: "Store") -> Explanation:
+    from pipelines.engine.actions.key import image_text, key_of
+    from pipelines.engine.audit import input_digests
+    from pipelines.engine.explain import changes, inputs_of
+    from pipelines.engine.store.store import row_name
+
+    step = planned.step
+    digests = input_digests(step, {one.step.name: one.outcome for one in plan.steps})
+    state, reason, found = planned.state.value, planned.reason, []
+    is_complete = digests.keys() == step.inputs.keys()
+    if state == "hit" and is_complete:
+        key = key_of(image_text(step, digests))
+    else:
+        latest = store.latest(step.name)
+        key = "" if latest is None else latest.key
+    last = store.row(key) if key else None
+    if state == "hit":
+        reason = "would not run" if is_complete else "fails with a step before it"
+    elif last is not None:
+        # What is still to be made is taken for what it was: all else can be told already.
+        was = {name: digest for name, (_, digest) in inputs_of(last.image).items()}
+        present = {name: digests.get(name, was.get(name, "")) for name in step.inputs}
+        found = changes(step, last.image, json.loads(image_text(step, present)), store)
+    return Explanation(step, state, reason, tuple(found), last, store.files.written(row_name(key)) if last else None)
+
+
+def _newest(every: Sequence[Explanation]) -> Explanation:
+    return max(every, key=lambda one: one.made or 0.0)
+
+
+def _show(chosen: Sequence[Explanation]) -> None:
+    """A table for all steps of which the same is to be said, such as those of the cameras."""
+    alike: dict[tuple[str, tuple[object, ...]], list[Explanation]] = {}
+    for one in chosen:
+        alike.setdefault((one.reason, one.changes), []).append(one)
+    for (reason, _), steps in alike.items():
+        print_line(f"{', '.join(_short(one.step) for one in steps)}: {reason}")
+        if steps[0].last is not None:
+            print_line(f"  last result: {_came_to(steps[0])}" + ", and others" * (len(steps) > 1))
+        rows = [row for change in steps[0].changes for row in _rows(change)]
+        if rows:
+            print_table("", ["changed", "last time", "now"], rows)
+
+
+def _rows(change: "Change") -> list[list[str]]:
+    """Old and new side by side; of texts, the lines that differ."""
+    from pipelines.engine.explain import side_by_side
+
+    made_by = f" (result of {change.step})" if change.step else ""
+    what = f"{change.what} {change.name}{made_by}"
+    if change.what == "code" and (change.old is None or change.new is None):
+        missing = "its text is not in the store"
+        if change.old is None and change.new is None:
+            return [[what, missing, ""]]
+        return [[what, "-" if change.old is None else "was there", "-" if change.new is None else "is there"]]
+    if change.what != "code" and "\n" not in f"{change.old}{change.new}":
+        return [[what, _value(change.old), _value(change.new)]]
+    pairs = side_by_side(change)
+    rows = [["", old, new] for old, new in pairs[:SHOWN_LINES]]
+    if len(pairs) > SHOWN_LINES:
+        rows.append(["", f"... {len(pairs) - SHOWN_LINES} more lines", ""])
+    return [[what, *rows[0][1:]], *rows[1:]] if rows else [[what, "", ""]]
+
+
+def _value(text: str | None) -> str:
+    if text is None:
+        return "-"
+    return text[:12] if _is_digest(text) else text
+
+
+def _is_digest(text: str) -> bool:
+    return len(text) == 64 and text.isalnum()
+
+
+def _came_to(one: Explanation) -> str:
+    """What the last action of a step came to, and when."""
+    if one.last is None:
+        return "none"
+    result = one.last.failure[1] if one.last.failure is not None else f"{one.last.digest}"[:12]
+    return f"{_plain(result, one.step)} of {local_time(one.made)}"
+
+
+def _plain(problem: str, step: "Step") -> str:
+    from pipelines.engine.plan import with_places
+
+    return with_places(problem, step.places)
+
+
+def _short(step: "Step") -> str:
+    """`extract-3`."""
+    return step.name.removeprefix(f"{step.scan}/")
+
+
+def _json(scan: str, every: Sequence[Explanation], chosen: Sequence[Explanation]) -> dict[str, Any]:
+    return {
+        "scan": scan,
+        "steps": len(every),
+        "to_run": sum(one.state != "hit" for one in every),
+        "explained": [
+            {
+                "step": _short(one.step),
+                "state": one.state,
+                "reason": one.reason,
+                "last": _last_json(one),
+                "changes": [_change_json(change) for change in one.changes],
+            }
+            for one in chosen
+        ],
+        "last": None if chosen else _last_json(_newest(every)),
+    }
+
+
+def _last_json(one: Explanation) -> dict[str, Any] | None:
+    if one.last is None:
+        return None
+    problem = None if one.last.failure is None else _plain(one.last.failure[1], one.step)
+    made = json_time(one.made)
+    return {"step": _short(one.step), "made": made, "digest": one.last.digest, "problem": problem}
+
+
+def _change_json(change: "Change") -> dict[str, Any]:
+    from pipelines.engine.explain import side_by_side
+
+    facts: dict[str, Any] = {"what": change.what, "name": change.name, "step": change.step}
+    if change.what == "code" or "\n" in f"{change.old}{change.new}":
+        return {**facts, "lines": side_by_side(change)}
+    return {**facts, "old": change.old, "new": change.new}

@@ -1,0 +1,1 @@
+"""`footscan calibrate`."""

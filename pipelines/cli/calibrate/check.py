@@ -1,0 +1,95 @@
+"""`footscan calibrate check`."""
+
+from dataclasses import asdict
+from math import hypot
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pipelines.cli.calibrate.refused_picture import Picture, drawn
+from pipelines.cli.terminal.output import AsJson, figure, keep_inputs, message, print_json, print_table
+
+if TYPE_CHECKING:
+    from footscan.calibration.checks.drift import Drift
+
+
+def check(
+    calibration: Annotated[Path, typer.Argument(help="Calibration file.")],
+    capture: Annotated[Path, typer.Argument(help="Folder with capture.yaml, filmed today.")],
+    tolerance_mm: Annotated[
+        float, typer.Option(min=0.001, max=100, help="A camera that is off by more (rms) has drifted.")
+    ] = 0.2,
+    placement_tolerance_mm: Annotated[
+        float, typer.Option(min=0.01, max=50, help="How far the object may stand from where it should.")
+    ] = 1.0,
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> int:
+    """Measure how far each camera has drifted since its calibration; the exit status is 1 unless all are steady."""
+    from pipelines.calibrate import check_calibration
+    from pipelines.engine.pool import cores
+    from pipelines.recordings.captures import read_capture
+    from schemas.calibration import read_calibration
+    from schemas.parameters.calibration import CaptureCalibrationParameters
+
+    today = read_capture(capture)
+    keep_inputs([picture], calibration, *today.files)
+    known = read_calibration(calibration)
+    parameters = CaptureCalibrationParameters(placement_tolerance_mm=placement_tolerance_mm)
+    with drawn(today, picture):
+        drifts = check_calibration(known, today, parameters, tolerance_mm, cores())
+    moved = [drift for drift in drifts if drift.verdict != "steady"]
+    if as_json:
+        print_json(
+            {
+                "verdict": "drifted" if moved else "steady",
+                "tolerance_mm": tolerance_mm,
+                "cameras": [asdict(drift) for drift in drifts],
+            }
+        )
+    else:
+        _print_drifts(drifts)
+    if not moved:
+        message(f"{calibration}: holds; every camera is within {tolerance_mm:g} mm")
+        return 0
+    said = "; ".join(f"camera {drift.camera} {_said(drift)}" for drift in moved)
+    if (alike := _alike([drift.shift_mm for drift in drifts if drift.shift_mm])) is not None:
+        y, z = alike
+        message(
+            f"all cameras are off alike, by {y:+.2f}, {z:+.2f} mm: perhaps the object stood so, not the scanner moved"
+        )
+    message(f"{calibration}: does not hold: {said}; {tolerance_mm:g} mm are allowed")
+    return 1
+
+
+def _alike(shifts: list[tuple[float, float]]) -> tuple[float, float] | None:
+    """The shift that all cameras share, where what they do not share is less than half of it."""
+    if len(shifts) < 2:
+        return None
+    y, z = (median(shift[axis] for shift in shifts) for axis in (0, 1))
+    apart = max(hypot(shift[0] - y, shift[1] - z) for shift in shifts)
+    return (y, z) if apart < hypot(y, z) / 2 else None
+
+
+def _said(drift: "Drift") -> str:
+    if drift.rms_mm is None:
+        return f"is {drift.verdict}" + (f" ({drift.remark})" if drift.remark else "")
+    return f"is off by {drift.rms_mm:.2f} mm" + (f" ({drift.remark})" if drift.remark else "")
+
+
+def _print_drifts(drifts: "list[Drift]") -> None:
+    rows = [
+        [
+            str(drift.camera),
+            str(drift.points),
+            *(["-", "-"] if drift.shift_mm is None else [f"{mm:+.3f}" for mm in drift.shift_mm]),
+            figure(drift.rms_mm),
+            figure(drift.worst_mm),
+            drift.verdict,
+        ]
+        for drift in drifts
+    ]
+    columns = ["camera", "points", "Y mm", "Z mm", "off rms mm", "worst mm", "verdict"]
+    print_table("Where the calibration puts today's stripe, against where it is", columns, rows)

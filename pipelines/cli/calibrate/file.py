@@ -1,0 +1,38 @@
+"""What the commands say of a calibration, and where it is written."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipelines.cli.terminal.output import message, print_table
+
+if TYPE_CHECKING:
+    from schemas.calibration import Calibration, PairAgreement
+
+
+def write_calibration(calibration: "Calibration", out: Path | None) -> None:
+    """Writes the file, dated, where one was asked for."""
+    from pipelines.engine.files.atomic import write_atomically
+
+    if out is not None:
+        dated = calibration.model_copy(update={"created": datetime.now(UTC).replace(microsecond=0)})
+        write_atomically(out, (dated.model_dump_json(indent=2) + "\n").encode())
+
+
+def tell_calibration(calibration: "Calibration", out: Path | None) -> None:
+    """What became of it, after the tables."""
+    if out is None:
+        message("nothing was written; --out FILE writes the calibration")
+    else:
+        count = len(calibration.cameras)
+        message(f"{out}: calibration of {count} camera{'s' * (count != 1)}")
+
+
+def print_pairs(pairs: "list[PairAgreement]") -> None:
+    """How far apart each two cameras place the edges that both see."""
+    rows = [
+        [f"{pair.cameras[0]} and {pair.cameras[1]}", str(pair.places), f"{pair.rms_mm:.3f}", f"{pair.worst_mm:.3f}"]
+        for pair in pairs
+    ]
+    if rows:
+        print_table("The same edges seen by two cameras", ["cameras", "places", "apart rms mm", "worst mm"], rows)

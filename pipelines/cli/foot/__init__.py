@@ -1,0 +1,1 @@
+"""Commands on a foot that was measured."""

@@ -1,0 +1,115 @@
+"""Feet on the command line: measures.json, the folder of a scan's results, or that of a patient's."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from pipelines.cli.terminal.output import message
+from schemas.base.errors import RefusedInput, one_line
+
+if TYPE_CHECKING:
+    from schemas.feet import Foot
+    from schemas.sizes import People
+
+FEET = "measures.json, or the folder of a scan's results"
+PATIENT = "RESULTS/<patient> alone"
+MEASURES_FILE = "measures.json"
+
+TableFile = Annotated[
+    Path | None, typer.Option("--table", help="Table of sizes, widths and lasts: an edited copy of the one here.")
+]
+ForPeople = Annotated[
+    Literal["all", "men", "women", "children"], typer.Option("--for", help="Whose sizes are asked for.")
+]
+AnyPatient = Annotated[bool, typer.Option("--any-patient", help="Take feet of two patients all the same.")]
+
+
+def read_feet(places: Sequence[Path], any_patient: bool) -> "list[Foot]":
+    """The feet of one person; of whomever with `any_patient`.
+
+    Raises
+    ------
+    RefusedInput
+        One is not there, is of somebody else, or stands twice.
+    """
+    from footscan.sizing.identity import refuse_other_patient
+
+    feet = [read_foot(place) for place in places]
+    files = [_measures_file(place).resolve() for place in places]
+    for index, place in enumerate(places):
+        if files[index] in files[:index]:
+            raise RefusedInput(place, "stands twice, expected another measurement")
+    for other in [] if any_patient else feet[1:]:
+        try:
+            refuse_other_patient(feet[0], other)
+        except RefusedInput as error:
+            raise RefusedInput(error.source, f"{error.problem} (--any-patient takes it all the same)") from None
+    return feet
+
+
+def is_patient(place: Path) -> bool:
+    """Whether this is the folder of a patient's results, RESULTS/<patient>, with a folder for each scan."""
+    return not _measures_file(place).exists() and bool(_scans(place))
+
+
+def read_patient(folder: Path) -> "list[Foot]":
+    """The feet of all scans of a patient, in the order of the scans' names."""
+    return [read_foot(scan) for scan in _scans(folder)]
+
+
+def read_latest_pair(folder: Path) -> "list[Foot]":
+    """A patient's left and right foot of the latest day that has both."""
+    from footscan.sizing.sittings import latest_pair
+
+    feet = read_patient(folder)
+    pair = list(latest_pair(str(folder), feet))
+    tell_passed_over(folder, feet, pair)
+    return pair
+
+
+def tell_passed_over(folder: Path, feet: "Sequence[Foot]", taken: "Sequence[Foot]") -> None:
+    """Scans that were not taken although they are no older."""
+    from footscan.sizing.sittings import passed_over
+
+    if names := ", ".join(foot.scan or foot.source for foot in passed_over(feet, taken)):
+        message(one_line(f"{folder}: not taken: {names}"))
+
+
+def read_foot(place: Path) -> "Foot":
+    """The foot of a measures.json, or of the folder that holds one.
+
+    Its patient and scan are those of the folders that it lies in, RESULTS/<patient>/<scan>/measures.json.
+
+    Raises
+    ------
+    RefusedInput
+        No such file, or not as measures are.
+    """
+    from schemas.base.documents import read_json
+    from schemas.feet import Foot
+
+    file = _measures_file(place)
+    if is_patient(place):
+        names = ", ".join(scan.name for scan in _scans(place))
+        raise RefusedInput(place, f"is the folder of a patient, expected one of its scans: {names}")
+    foot = read_json(file, Foot)
+    told = {"source": str(place)}
+    if file.name == MEASURES_FILE:
+        folder = file.resolve().parent
+        told |= {"patient": foot.patient or folder.parent.name, "scan": foot.scan or folder.name}
+    return foot.model_copy(update=told)
+
+
+def _measures_file(place: Path) -> Path:
+    return place / MEASURES_FILE if place.is_dir() else place
+
+
+def _scans(folder: Path) -> list[Path]:
+    return sorted(file.parent for file in folder.glob(f"*/{MEASURES_FILE}"))
+
+
+def chosen(people: Literal["all", "men", "women", "children"]) -> "People | None":
+    """None for all."""
+    return None if people == "all" else people

@@ -1,0 +1,120 @@
+"""`footscan measure`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from pipelines.cli.terminal.output import AsJson, figure, keep_inputs, message, print_json, print_line, print_table
+from schemas.base.errors import Finding, RefusedInput
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from schemas.measures import Measures
+
+
+DECIMALS = {"mm": 2, "mm2": 0, "mm3": 0, "deg": 1, "1": 3}
+"""That a measure is printed with, by its unit."""
+
+
+def measure(
+    file: Annotated[Path, typer.Argument(help="Mesh of a foot, in any pose: STL, PLY or OBJ.")],
+    side: Annotated[
+        Literal["right", "left", "unknown"], typer.Option(help="Which foot it is; told by its form where unknown.")
+    ] = "unknown",
+    axis: Annotated[
+        Literal["toe2", "ball_center", "brannock"], typer.Option(help="The axis that lengths run along.")
+    ] = "toe2",
+    unit: Annotated[
+        Literal["mm", "cm", "m", "in"] | None, typer.Option(help="Of the mesh; told by the foot's size where absent.")
+    ] = None,
+    landmarks: Annotated[
+        Path | None, typer.Option(help="Landmarks that were set by hand (YAML), in the mesh's own frame, mm.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Write measures.json here.")] = None,
+    csv: Annotated[
+        Path | None, typer.Option(help="Write the values here as a row; to a file with such rows it is added.")
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Draw the foot with landmarks, axis and girths here (PNG).")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Measure a foot's mesh, of this scanner or of any other."""
+    from footscan.measure.foot_landmarks import check_manual
+    from footscan.measure.measures import measure_foot
+    from footscan.measure.raw_mesh import take_in
+    from footscan.mesh.formats.files import read_mesh
+    from pipelines.engine.files.atomic import write_atomically
+
+    keep_inputs((out, csv, picture), file)
+    if picture is not None and picture.suffix.lower() != ".png":
+        raise RefusedInput("--picture", f"expected a name that ends with .png, found {picture.name!r}")
+    manual = {} if landmarks is None else _manual_landmarks(landmarks)
+    vertices, faces = read_mesh(file)
+    try:
+        mesh = take_in(vertices, faces, unit)
+        if landmarks is not None:
+            try:
+                check_manual(manual, mesh.vertices)
+            except ValueError as error:
+                raise RefusedInput(landmarks, str(error)) from None
+        measures = measure_foot(mesh.vertices, mesh.faces, side, axis=axis, manual=manual)
+    except Finding as error:
+        raise RefusedInput(file, str(error)) from None
+    for note in (*mesh.notes, *([] if measures.side_note is None else [measures.side_note])):
+        message(f"{file}: {note}")
+    if out is not None:
+        write_atomically(out, (measures.model_dump_json(indent=2) + "\n").encode())
+    if csv is not None:
+        write_atomically(csv, _with_row(csv, file, measures).encode())
+    if picture is not None:
+        from footscan.report.scan.measure_figure import measure_figure
+
+        write_atomically(picture, measure_figure(mesh.vertices, mesh.faces, measures))
+    if as_json:
+        print_json(measures.model_dump(mode="json"))
+    else:
+        print_measures(measures, {})
+
+
+def _manual_landmarks(file: Path) -> "dict[str, NDArray[np.float64]]":
+    import numpy as np
+
+    from schemas.base.documents import read_yaml
+    from schemas.landmarks import ManualLandmarks
+
+    return {name: np.array(point) for name, point in read_yaml(file, ManualLandmarks).points().items()}
+
+
+def _with_row(table: Path, file: Path, measures: "Measures") -> str:
+    """The CSV `table` with a row for one foot, in place of one that it has for the same file and side; a value is empty
+    where it could not be taken."""
+    from schemas.tables import csv_text, plain_cell, read_records
+
+    header = ["file", "side", "axis", *(f"{name}_{m.unit}" for name, m in measures.measures.items())]
+    row = [plain_cell(str(file)), measures.side, measures.axis, *(m.value for m in measures.measures.values())]
+    there = [cells for _, cells in read_records(table)] if table.exists() else []
+    if there and there[0] != header:
+        raise RefusedInput(table, "has another header, expected rows of measures to add one to", field="line 1")
+    return csv_text([header, *(cells for cells in there[1:] if cells[:2] != row[:2]), row])
+
+
+def print_measures(measures: "Measures", known: dict[str, float]) -> None:
+    """A table of measures, beside the known values where there are any."""
+    rows = []
+    for name, measured in measures.measures.items():
+        value = "-" if measured.value is None else f"{measured.value:.{DECIMALS[measured.unit]}f}"
+        row = [name, value, figure(measured.uncertainty, f".{DECIMALS[measured.unit]}f"), measured.unit]
+        if known:
+            true = known.get(name)
+            row.append("-" if true is None else f"{true:.2f}")
+            row.append("-" if true is None or measured.value is None else f"{measured.value - true:+.2f}")
+        rows.append([*row, measured.status])
+    columns = ["measure", "value", "sd", "unit", *(["known", "difference"] if known else []), "status"]
+    print_table(f"Foot, side {measures.side}, axis {measures.axis}", columns, rows)
+    for name, measured in measures.measures.items():
+        if measured.status != "ok" and measured.note is not None:
+            print_line(f"{name} is {measured.status}: {measured.note}")

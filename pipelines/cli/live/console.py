@@ -1,0 +1,95 @@
+"""`footscan console`."""
+
+import secrets
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from footscan.capture.board.termination import EndedBySignal
+from pipelines.cli.live.options import VIRTUAL_FOLDER, RigFile, Virtual, VirtualFolder, opened_rig, plain_world
+from pipelines.cli.terminal.output import message
+from schemas.base.errors import RefusedInput
+
+if TYPE_CHECKING:
+    from pipelines.console.scanner import Scanner
+
+LOOPBACK = "127.0.0.1"
+ASKED_TO_END = (None, signal.SIGINT, signal.SIGTERM)
+"""The ordinary ways to end a console; after others its exit status tells the signal."""
+EVERYWHERE = ("0.0.0.0", "::")
+
+
+def console(
+    rig: RigFile = None,
+    out: Annotated[Path, typer.Option(help="The archive.")] = Path("archive"),
+    results: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
+    calibration: Annotated[Path | None, typer.Option(help="The rig's where absent.")] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any that is free.")] = 8760,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on. Other than loopback, the page is opened with a token.")
+    ] = LOOPBACK,
+    token: Annotated[
+        bool | None,
+        typer.Option(
+            help="Open the page with a token, which other accounts of this computer do not have. Default: only where "
+            "the address is not loopback; there it cannot be switched off."
+        ),
+    ] = None,
+    virtual: Virtual = False,
+    virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
+    grid_mm: Annotated[
+        float, typer.Option(min=0.05, max=10, help="Between two places that the virtual cameras have pictures of.")
+    ] = 0.5,
+) -> None:
+    """Run the scanner from a web page; Ctrl-C ends it, with the lasers off."""
+    from pipelines.console.console import Console
+    from pipelines.console.guard import is_loopback
+    from pipelines.console.server import listen, server_of
+
+    if token is False and not is_loopback(host):
+        raise RefusedInput("--no-token", "leaves the scanner open to the network, expected it with loopback alone")
+    secret = secrets.token_urlsafe(32) if token or not is_loopback(host) else None
+    with (
+        listen(host, port) as socket,
+        listen(host, 0) as aside,
+        _opened(rig, out, results, calibration, virtual_folder, grid_mm if virtual else None) as scanner,
+        Console(scanner, out, results) as one,
+    ):
+        shown = f"[{host}]" if ":" in host else host
+        if not is_loopback(host):
+            message("footscan: anyone who can read the network's traffic can read the token: use a network of your own")
+        if host in EVERYWHERE:
+            shown = "ADDRESS-OF-THIS-COMPUTER"
+        ports = socket.getsockname()[1], aside.getsockname()[1]
+        print(f"http://{shown}:{ports[0]}/{f'?token={secret}' if secret else ''}", flush=True)
+        one.connect()
+        server = server_of(one, host, secret, ports)
+        server.run(sockets=[socket, aside])
+    if server.ended_by not in ASKED_TO_END:
+        raise EndedBySignal(server.ended_by)
+    message("the lasers are off, the console has ended")
+
+
+@contextmanager
+def _opened(
+    rig: Path | None, archive: Path, results: Path, calibration: Path | None, folder: Path, grid_mm: float | None
+) -> "Iterator[Scanner]":
+    """The scanner of a rig; with a grid a virtual one, whose foot is put onto the glass as it is asked for."""
+    from pipelines.console.live_adapter import OverLive
+    from pipelines.live.light import light_by_hand
+    from pipelines.live.scanner import LiveScanner
+    from pipelines.live.virtual.world import EXPOSURE_MS
+
+    world = plain_world(grid_mm is not None, folder)
+    if world is not None:
+        world = world.model_copy(update={"grid_mm": grid_mm})
+    with opened_rig(rig, folder, world, calibrated=world is not None) as opened:
+        # Pictures of a virtual scanner are made beforehand, and for one light.
+        light = None if opened.world is None else light_by_hand(opened.rig, 1.0, EXPOSURE_MS)
+        place_foot = None if opened.world is None else opened.world.put
+        with LiveScanner(opened.rig) as scanner:
+            yield OverLive(scanner, archive, results, calibration, light, place_foot)

@@ -1,0 +1,92 @@
+"""What the commands of the live scanner share: which rig, or which virtual world instead of one."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from pipelines.cli.terminal.output import message
+from schemas.base.errors import RefusedInput
+
+if TYPE_CHECKING:
+    from pipelines.live.state import ScannerState
+    from pipelines.live.virtual.process import WorldProcess
+    from pipelines.live.virtual.world import World
+    from schemas.rig import Rig
+
+RIG = Path("rig.yaml")
+
+RigFile = Annotated[Path | None, typer.Option("--rig", help="What the scanner consists of; rig.yaml where absent.")]
+Virtual = Annotated[bool, typer.Option("--virtual", help="A virtual scanner, without any hardware.")]
+VirtualFolder = Annotated[
+    Path, typer.Option("--virtual-folder", help="Where the virtual scanner keeps its rig, calibration and pictures.")
+]
+VIRTUAL_FOLDER = Path("virtual")
+
+
+@dataclass(frozen=True)
+class OpenRig:
+    """A rig that can be used now."""
+
+    rig: "Rig"
+    file: Path
+    world: "WorldProcess | None" = None
+    """Of a virtual one."""
+
+
+@contextmanager
+def opened_rig(rig: Path | None, folder: Path, world: "World | None", *, calibrated: bool = False) -> Iterator[OpenRig]:
+    """The rig of a file, or the virtual one of `folder` in a `world`; `calibrated` as in `virtual_rig`.
+
+    While it is open, a signal that ends the program stops heads and lasers first.
+    """
+    from footscan.capture.board.termination import signals_end_the_program
+    from pipelines.live.rig_file import read_rig
+
+    with signals_end_the_program():
+        if world is None:
+            file = rig or RIG
+            yield OpenRig(read_rig(file), file)
+            return
+        if rig is not None:
+            raise RefusedInput("--rig", "goes without --virtual, which has a rig of its own")
+        from pipelines.live.virtual.rig import virtual_rig
+
+        with virtual_rig(folder, world, _Told(), calibrated=calibrated) as one:
+            yield OpenRig(one.rig, one.file, one.world)
+
+
+def plain_world(virtual: bool, folder: Path, subject: Literal["block", "nothing"] = "nothing") -> "World | None":
+    """A world for commands that need no foot; None where none is wanted."""
+    from pipelines.live.virtual.world import World
+
+    return World(pictures=str(folder / "pictures"), subject=subject) if virtual else None
+
+
+class StateTeller:
+    """Says a line for each thing that the scanner begins."""
+
+    def __init__(self) -> None:
+        self._told = ("", "")
+
+    def __call__(self, state: "ScannerState") -> None:
+        """Hears of a state."""
+        if (state.name, state.words) != self._told:
+            self._told = (state.name, state.words)
+            message(f"{state.name}: {state.words}" if state.words else state.name)
+
+
+class _Told:
+    """Says what is being prepared, now and then."""
+
+    def __init__(self) -> None:
+        self._told = ("", -1)
+
+    def __call__(self, what: str, done: int, total: int) -> None:
+        share = 10 * done // max(total, 1)
+        if (what, share) != self._told:
+            self._told = (what, share)
+            message(f"preparing the virtual scanner: {what} {done} of {total}")

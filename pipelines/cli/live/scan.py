@@ -1,0 +1,243 @@
+"""`footscan scan`, `footscan home` and `footscan jog`."""
+
+import datetime
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from pipelines.cli.live.options import (
+    VIRTUAL_FOLDER,
+    RigFile,
+    StateTeller,
+    Virtual,
+    VirtualFolder,
+    opened_rig,
+    plain_world,
+)
+from pipelines.cli.terminal.output import AsJson, message, print_json, print_line
+from schemas.base.errors import Fault, FootscanError, RefusedInput
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pipelines.live.light import ScanLight
+    from pipelines.live.scanner import LiveResult, LiveScanner
+    from pipelines.live.virtual.world import World
+    from schemas.rig import Rig
+
+DARK_GRID_MM = 100.0
+"""Nothing of a virtual foot is looked at in the dark, unless for its colours."""
+
+Speed = Annotated[float | None, typer.Option("--speed", min=0.1, help="mm/s; the rig's where absent.")]
+
+
+def scan(
+    patient: Annotated[str, typer.Argument(help="Pseudonym.")],
+    side: Annotated[Literal["right", "left"], typer.Argument(help="Which foot stands on the glass.")],
+    rig: RigFile = None,
+    out: Annotated[Path, typer.Option(help="The archive.")] = Path("archive"),
+    results: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
+    name: Annotated[str | None, typer.Option(help="Of the scan; day and side where absent.")] = None,
+    calibration: Annotated[Path | None, typer.Option(help="The rig's where absent.")] = None,
+    speed: Speed = None,
+    from_mm: Annotated[float | None, typer.Option(help="X of the first frame; the rig's where absent.")] = None,
+    to_mm: Annotated[float | None, typer.Option(help="X of the last frame; the rig's where absent.")] = None,
+    power: Annotated[
+        float | None, typer.Option(min=0.01, max=1, help="Of the lasers; chosen by what the cameras see where absent.")
+    ] = None,
+    exposure_ms: Annotated[
+        float | None, typer.Option(min=0.05, max=1000, help="Of all cameras; goes with --power.")
+    ] = None,
+    texture: Annotated[
+        bool, typer.Option("--texture", help="Film the way back in the dark, for the colours of the skin.")
+    ] = False,
+    keep_partial: Annotated[
+        bool, typer.Option("--keep-partial", help="Keep a scan without the cameras whose films are not whole.")
+    ] = False,
+    measure: Annotated[bool, typer.Option("--measure/--no-measure", help="Reconstruct and measure at once.")] = True,
+    virtual: Virtual = False,
+    virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
+    foot_seed: Annotated[
+        int | None, typer.Option(min=0, help="A virtual foot of the population instead of the mean man's.")
+    ] = None,
+    light: Annotated[Literal["dark", "ambient", "bright"], typer.Option(help="Light in the virtual room.")] = "ambient",
+    ripple: Annotated[
+        float, typer.Option(min=0, max=0.5, help="Part of the virtual heads' speed that swings once a second.")
+    ] = 0.0,
+    pause: Annotated[
+        float, typer.Option(min=0, max=60, help="How long the virtual heads stand in the middle, s.")
+    ] = 0.0,
+    jitter_ms: Annotated[float, typer.Option(min=0, max=25, help="How unevenly the virtual cameras expose.")] = 10.0,
+    grid_mm: Annotated[
+        float,
+        typer.Option(min=0.05, max=10, help="Between two places that the virtual cameras have pictures of."),
+    ] = 0.5,
+    as_json: AsJson = False,
+) -> int:
+    """Scan a foot: home, film, store, reconstruct and measure."""
+    from pipelines.live.scanner import LiveScanner, ScanOrder
+    from pipelines.live.storing import ScanName, next_scan_name
+    from pipelines.live.virtual.world import World
+    from schemas.base.documents import pseudonym
+
+    pseudonym(patient, "PATIENT")
+    if name is not None:
+        pseudonym(name, "--name")
+    world = None
+    if virtual:
+        world = World(
+            pictures=str(virtual_folder / "pictures"), subject=side, foot_seed=foot_seed, light=light, ripple=ripple,
+            pause_s=pause, jitter_ms=jitter_ms, grid_mm=grid_mm, start_mm=0.0 if from_mm is None else from_mm,
+            end_mm=400.0 if to_mm is None else to_mm, mm_per_s=speed or 400.0 / 11.0,
+            dark_grid_mm=grid_mm if texture else DARK_GRID_MM,
+        )  # fmt: skip
+    with opened_rig(rig, virtual_folder, world, calibrated=True) as opened:
+        used = _with_travel(opened.rig, speed, from_mm, to_mm)
+        today = datetime.datetime.now().astimezone().date()
+        order = ScanOrder(
+            ScanName(patient, name or next_scan_name(out, patient, side, today), side, today),
+            out,
+            results if measure else None,
+            calibration,
+            _light(used, power, exposure_ms, virtual),
+            texture,
+            keep_partial,
+        )
+        with LiveScanner(used) as scanner:
+            scanner.listen(StateTeller())
+            if problems := scanner.connect():
+                raise Fault("; ".join(problems.values()))
+            result = scanner.scan(order)
+    _print(result, _known(world), as_json)
+    return 0 if result.measured is None else _status(result.measured.kind)
+
+
+def home(
+    rig: RigFile = None,
+    virtual: Virtual = False,
+    virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
+    as_json: AsJson = False,
+) -> None:
+    """Send the heads to their home switches, and align them."""
+    with _homed(rig, virtual, virtual_folder) as one:
+        _print_heads(one.heads.position_mm(), as_json)
+
+
+def jog(
+    heads: Annotated[Literal["all", "1", "2", "3"], typer.Argument(help="Which.")],
+    mm: Annotated[float, typer.Argument(help="How far along X; behind -- where it is negative.")],
+    rig: RigFile = None,
+    speed: Speed = 20.0,
+    virtual: Virtual = False,
+    virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
+    as_json: AsJson = False,
+) -> None:
+    """Move the heads by hand, with the lasers off; heads that are not homed are homed first."""
+    with _homed(rig, virtual, virtual_folder) as one:
+        _print_heads(one.jog(mm, speed or 20.0, None if heads == "all" else int(heads)), as_json)
+
+
+@contextmanager
+def _homed(rig: RigFile, virtual: bool, virtual_folder: Path) -> "Iterator[LiveScanner]":
+    """The scanner with its heads homed; states are told."""
+    from pipelines.live.scanner import LiveScanner
+
+    with (
+        opened_rig(rig, virtual_folder, plain_world(virtual, virtual_folder)) as opened,
+        LiveScanner(opened.rig) as one,
+    ):
+        one.listen(StateTeller())
+        one.home()
+        yield one
+
+
+def _light(rig: "Rig", power: float | None, exposure_ms: float | None, virtual: bool) -> "ScanLight | None":
+    """The light that was given by hand; None where it is to be chosen."""
+    from pipelines.live.light import light_by_hand
+    from pipelines.live.virtual.world import EXPOSURE_MS
+
+    if power is None and exposure_ms is None:
+        # Pictures of a virtual scanner are made beforehand, and for one light.
+        return light_by_hand(rig, 1.0, EXPOSURE_MS) if virtual else None
+    if power is None or exposure_ms is None:
+        raise RefusedInput("--power, --exposure-ms", "go together, expected both or none")
+    return light_by_hand(rig, power, exposure_ms)
+
+
+def _with_travel(rig: "Rig", speed: float | None, from_mm: float | None, to_mm: float | None) -> "Rig":
+    start = rig.travel.start_mm if from_mm is None else from_mm
+    end = rig.travel.end_mm if to_mm is None else to_mm
+    if end <= start:
+        raise RefusedInput("--to-mm", f"expected more than {start:g}, found {end:g}")
+    travel = {"start_mm": start, "length_mm": end - start, "mm_per_s": speed or rig.travel.mm_per_s}
+    return rig.model_copy(update={"travel": rig.travel.model_copy(update=travel)})
+
+
+def _known(world: "World | None") -> dict[str, float]:
+    """The true measures of a virtual foot."""
+    if world is None or world.subject not in {"right", "left"}:
+        return {}
+    from pipelines.live.virtual.world import virtual_foot
+
+    return virtual_foot(world, world.subject).measures
+
+
+def _print(result: "LiveResult", known: dict[str, float], as_json: bool) -> None:
+    from pipelines.cli.foot.measure import print_measures
+
+    for camera, problem in sorted(result.stored.left_out.items()):
+        message(f"camera {camera} is left out: {problem}")
+    measured = result.measured
+    if measured is not None and measured.problem is not None:
+        message(f"footscan: {measured.problem}")
+    if as_json:
+        print_json(_json(result))
+        return
+    print_line(f"Scan: {result.stored.place}")
+    if measured is not None and measured.folder is not None and measured.measures is not None:
+        print_measures(measured.measures, known)
+        print_line(f"Report: {measured.folder / 'report.html'}")
+
+
+def _json(result: "LiveResult") -> dict[str, Any]:
+    measured = result.measured
+    return {
+        "scan": str(result.stored.place),
+        "cameras": [
+            {
+                "camera": camera,
+                "frames": len(film.x_mm),
+                "lost": {str(frame): reason for frame, reason in film.lost.items()},
+                "position_sd_mm": round(float((film.sd_mm**2).mean() ** 0.5), 4),
+                "mm_per_s": round(film.mm_per_s, 3),
+            }
+            for camera, film in sorted(result.stored.films.items())
+        ],
+        "left_out": {str(camera): problem for camera, problem in result.stored.left_out.items()},
+        "results": None if measured is None or measured.folder is None else str(measured.folder),
+        "problem": None if measured is None else measured.problem,
+        "measures": None
+        if measured is None or measured.measures is None
+        else measured.measures.model_dump(mode="json")["measures"],
+    }
+
+
+def _print_heads(x_mm: tuple[float, float, float], as_json: bool) -> None:
+    if as_json:
+        print_json({"x_mm": list(x_mm)})
+    else:
+        print_line(", ".join(f"head {head} at X = {x:.2f} mm" for head, x in enumerate(x_mm, start=1)))
+
+
+def _status(kind: str | None) -> int:
+    """Exit status of a command for one scan."""
+    match kind:
+        case None:
+            return 0
+        case "refused":
+            return RefusedInput.exit_status
+        case "finding":
+            return 1
+    return FootscanError.exit_status

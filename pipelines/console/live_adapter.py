@@ -1,0 +1,196 @@
+"""The live scanner as the page sees it: its devices in words, and one call for each thing that an operator does."""
+
+import datetime
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from footscan.capture.cameras.stream import StreamHealth
+from footscan.capture.cameras.usb_bus import Pass
+from pipelines.console.scanner import Device, Health, Level, Scanned, Side
+from pipelines.live.devices import passes_of
+from pipelines.live.light import ScanLight
+from pipelines.live.scanner import LiveScanner, ScanOrder
+from pipelines.live.state import OnState, ScannerState
+from pipelines.live.storing import ScanName, next_scan_name
+from schemas.base.errors import FootscanError
+
+JOG_MM_PER_S = 20.0
+SHINE_SECONDS = 4.0
+SHINE_POWER = 0.5
+SCAN_BYTES = 40_000 * 8 * 400
+"""Of a scan with its laser-off frames, at most."""
+LEVELS: dict[str, Level] = {"lost": "bad", "closed": "bad", "alarm": "bad", "door": "warning", "held": "warning"}
+CABLE = "check its cable and hub, then connect again"
+
+PlaceFoot = Callable[[Side, Callable[[int, int], None]], None]
+"""Puts the foot of a side onto the glass, and tells how far that is; for a virtual scanner, whose operator cannot."""
+
+
+class OverLive:
+    """A `Scanner` over a `LiveScanner`."""
+
+    def __init__(
+        self,
+        scanner: LiveScanner,
+        archive: Path,
+        results: Path,
+        calibration: Path | None = None,
+        light: ScanLight | None = None,
+        place_foot: PlaceFoot | None = None,
+    ) -> None:
+        """`calibration` and `light` as in `ScanOrder`."""
+        self._scanner = scanner
+        self._archive, self._results, self._calibration = archive, results, calibration
+        self._light, self._place_foot = light, place_foot
+        self._placed: Side | None = None
+        self._passes, self._plan_problem = _planned(scanner)
+        self._not_opened: dict[int, str] = {}
+        self._before_pass: dict[int, int] = {}
+        self._was_filming = False
+        scanner.listen(self._count_from_here)
+
+    @property
+    def state(self) -> ScannerState:
+        """As `Scanner.state`."""
+        return self._scanner.state
+
+    def listen(self, listener: OnState) -> Callable[[], None]:
+        """As `Scanner.listen`."""
+        return self._scanner.listen(listener)
+
+    def health(self) -> Health:
+        """As `Scanner.health`."""
+        streams = self._scanner.deck.health()
+        devices = [
+            *self._board(),
+            *(self._camera(camera.id, streams.get(camera.id)) for camera in self._scanner.rig.cameras),
+            *self._plan(),
+            self._space(),
+        ]
+        frames = {camera: one.received - self._before_pass.get(camera, 0) for camera, one in streams.items()}
+        cameras = tuple(camera.id for camera in self._scanner.rig.cameras)
+        return Health(devices, cameras, frames, resumable=self._is_held())
+
+    def picture(self, camera: int) -> bytes | None:
+        """As `Scanner.picture`."""
+        frame = self._scanner.deck.latest(camera)
+        return None if frame is None else frame.jpeg
+
+    def connect(self) -> None:
+        """As `Scanner.connect`."""
+        self._not_opened = {}
+        self._not_opened = self._scanner.connect()
+
+    def home(self) -> None:
+        """As `Scanner.home`."""
+        self._scanner.home()
+
+    def jog(self, by_mm: float, head: int | None) -> None:
+        """As `Scanner.jog`."""
+        self._scanner.jog(by_mm, JOG_MM_PER_S, head)
+
+    def shine(self) -> None:
+        """As `Scanner.shine`."""
+        self._scanner.shine(SHINE_POWER if self._light is None else self._light.power, SHINE_SECONDS)
+
+    def film(self, patient: str, side: Side, *, keep_partial: bool) -> Scanned:
+        """As `Scanner.film`."""
+        if self._place_foot is not None and side != self._placed:
+            with self._scanner.waiting_for(f"a virtual {side} foot is put onto the glass") as progress:
+                self._place_foot(side, progress)
+            self._placed = side
+        today = datetime.datetime.now().astimezone().date()
+        name = ScanName(patient, next_scan_name(self._archive, patient, side, today), side, today)
+        order = ScanOrder(name, self._archive, self._results, self._calibration, self._light, keep_partial=keep_partial)
+        done = self._scanner.scan(order)
+        problem = None if done.measured is None else done.measured.problem
+        return Scanned(patient, name.scan, side, problem, dict(done.stored.left_out))
+
+    def resume(self) -> None:
+        """As `Scanner.resume`."""
+        self._scanner.heads.resume()
+
+    def stop(self) -> None:
+        """As `Scanner.stop`."""
+        self._scanner.stop()
+
+    def close(self) -> None:
+        """As `Scanner.close`."""
+        self._scanner.close()
+
+    def _count_from_here(self, state: ScannerState) -> None:
+        """Frames are counted from the begin of each pass."""
+        begins = state.name == "filming" and (not self._was_filming or state.progress == 0.0)
+        self._was_filming = state.name == "filming"
+        if begins:
+            self._before_pass = {camera: one.received for camera, one in self._scanner.deck.health().items()}
+
+    def _board(self) -> Iterator[Device]:
+        try:
+            heads = self._scanner.heads
+        except FootscanError:
+            yield Device("Controller", "bad", "not connected", "check its USB cable and its power, then connect")
+            yield from (Device(f"Head {head}", "unknown", "not known") for head in (1, 2, 3))
+            return
+        state = heads.state
+        door = "" if heads.board.watches_door else "; it has no input for a lid: nothing stops where one is opened"
+        level = LEVELS.get(state.name, "ok" if heads.board.watches_door else "warning")
+        yield Device("Controller", level, f"{state.words}{door}", state.remedy)
+        reports = heads.log.between(time.monotonic() - 1.0, float("inf"))
+        for head in (1, 2, 3):
+            if not heads.board.homed:
+                yield Device(f"Head {head}", "warning", "where it stands is not known", "home the heads")
+            elif reports:
+                yield Device(f"Head {head}", "ok", f"at X = {reports[-1].x_mm[head - 1]:.1f} mm")
+            else:
+                yield Device(f"Head {head}", "unknown", "homed; the controller says nothing")
+
+    def _camera(self, camera: int, stream: StreamHealth | None) -> Device:
+        name = f"Camera {camera}"
+        latency = next(one.latency for one in self._scanner.rig.cameras if one.id == camera)
+        if stream is None:
+            problem = self._not_opened.get(camera)
+            return Device(name, "bad", problem, CABLE) if problem else Device(name, "unknown", "not open")
+        if stream.state in {"lost", "silent", "closed"} or (stream.problem and stream.state == "connecting"):
+            return Device(name, "bad", stream.problem or f"is {stream.state}", CABLE)
+        if stream.state == "connecting":
+            return Device(name, "unknown", "connecting")
+        if latency is None:
+            return Device(name, "bad", "its latency is not known", "run 'footscan calibrate latency'")
+        wrong = [
+            f"{count} {what}"
+            for what, count in (("torn", stream.torn), ("repeated", stream.repeated), ("overflowed", stream.overflowed))
+            if count
+        ]
+        if wrong:
+            return Device(name, "warning", f"{stream.received} frames, of these {', '.join(wrong)}", CABLE)
+        return Device(name, "ok", f"{stream.received} frames")
+
+    def _plan(self) -> Iterator[Device]:
+        if self._plan_problem is not None:
+            yield Device("Passes", "bad", self._plan_problem)
+        for number, one in enumerate(self._passes, start=1):
+            yield Device("Passes" if len(self._passes) == 1 else f"Pass {number}", "ok", one.reason)
+
+    def _space(self) -> Device:
+        there = next(folder for folder in (self._archive, *self._archive.absolute().parents) if folder.exists())
+        free = shutil.disk_usage(there).free
+        words = f"{free / 1e9:.1f} GB are free for scans"
+        if free < 2 * SCAN_BYTES:
+            return Device("Disk", "bad", words, f"make room: a scan takes up to {SCAN_BYTES / 1e9:.1f} GB")
+        return Device("Disk", "warning" if free < 20 * SCAN_BYTES else "ok", words)
+
+    def _is_held(self) -> bool:
+        try:
+            return self._scanner.heads.state.name in {"door", "held"}
+        except FootscanError:
+            return False
+
+
+def _planned(scanner: LiveScanner) -> tuple[list[Pass], str | None]:
+    try:
+        return passes_of(scanner.rig, [camera.id for camera in scanner.rig.cameras]), None
+    except FootscanError as error:
+        return [], str(error)

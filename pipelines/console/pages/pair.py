@@ -1,0 +1,76 @@
+"""The page of both feet of a person: how they differ, and the sizes for both."""
+
+from pathlib import Path
+
+from footscan.report.markup import number, section, table, text, words
+from footscan.sizing.pairs import compare_pair
+from footscan.sizing.table import read_table
+from pipelines.console.pages.results import read_measures
+from pipelines.console.pages.shell import shell
+from schemas.feet import Foot
+from schemas.pairs import Pair, PairRow
+from schemas.sizes import Sizes
+
+DECIMALS = {"mm": 1, "mm2": 0, "mm3": 0, "deg": 1}
+UNITS = {"mm2": "mm²", "mm3": "mm³", "deg": "°", "1": ""}
+
+
+def pair_page(results: Path, patient: str, left: str, right: str) -> str:
+    """The page of two scans of a patient.
+
+    Raises
+    ------
+    RefusedInput
+        One has no results, or is of the other side.
+    """
+    pair = compare_pair(_foot(results, patient, left), _foot(results, patient, right), read_table())
+    links = "".join(
+        f'<a class="button" href="/foot/{text(patient)}/{text(scan)}">{side} foot</a>'
+        for side, scan in (("Left", left), ("Right", right))
+    )
+    headings = ["Measure", "Left", "Right", "Right minus left", "Unit", "Larger"]
+    parts = [
+        f'<h1 tabindex="-1" id="result">Both feet <span>{text(patient)}</span></h1>',
+        section("Sizes for both", *_sizes(pair)),
+        section("Measures", table(headings, map(_row, pair.rows), numeric=[1, 2, 3]), *map(_note, pair.notes)),
+        f'<div class="row next">{links}<button id="new-person" type="button">Next person</button>'
+        '<a class="button" href="/">Back</a></div><p id="next-told" class="note" aria-live="polite"></p>',
+    ]
+    return shell(title=f"Both feet {patient}", parts=parts, scripts=["foot.js"])
+
+
+def _foot(results: Path, patient: str, scan: str) -> Foot:
+    told = read_measures(results, patient, scan).model_dump(mode="json")
+    return Foot.model_validate(told | {"patient": patient, "scan": scan, "source": f"{patient}/{scan}"})
+
+
+def _sizes(pair: Pair) -> list[str]:
+    sides = ", ".join(f"{words(name).lower()}: {side}" for name, side in pair.decided_by.items() if side)
+    decided = [_note(f"Larger foot that decides: {sides}.")] if sides else []
+    return [_size_table(pair.sizes), *decided, _note(f"{pair.sizes.caution[:1].upper()}{pair.sizes.caution[1:]}.")]
+
+
+def _size_table(sizes: Sizes) -> str:
+    rows = [
+        [text(one.label), text(", ".join(one.people)), f"<b>{text(one.size or '–')}</b>", text(one.note or "")]
+        for one in sizes.sizes
+    ]
+    rows += [
+        [text(one.label), text(", ".join(one.people)), f"<b>{text(one.width or '–')}</b>", text(one.note or "")]
+        for one in sizes.widths
+    ]
+    return table(["System", "For", "Size", ""], rows)
+
+
+def _row(row: PairRow) -> list[str]:
+    decimals = DECIMALS.get(row.unit, 3)
+    left, right, difference = (
+        "–" if value is None else number(value, decimals) for value in (row.left, row.right, row.difference)
+    )
+    note = f'<p class="note">{text(row.note)}</p>' if row.note else ""
+    unit = UNITS.get(row.unit, row.unit)
+    return [text(words(row.measure)) + note, left, right, difference, text(unit), text(row.larger or "–")]
+
+
+def _note(said: str) -> str:
+    return f'<p class="note">{text(said)}</p>'

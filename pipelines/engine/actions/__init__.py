@@ -1,0 +1,1 @@
+"""A step, the identity of its code, and the key of an action."""

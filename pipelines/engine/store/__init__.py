@@ -1,0 +1,1 @@
+"""The store of results: its rows and blobs, pins, leases and permissions."""

@@ -1,0 +1,1 @@
+"""A virtual scanner in place of the real one."""

@@ -1,0 +1,127 @@
+"""A virtual scanner ready to scan: its world runs, and its rig says what a user's rig would say.
+
+What it is like stays in a folder, `rig.yaml` and its calibration, so that the second start is quick. Latencies are
+found as those of any scanner are: the rig never learns them from the world.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipelines.archive.job import CACHE
+from pipelines.engine.deliver import deliver
+from pipelines.engine.files.file_digests import FileDigests
+from pipelines.engine.plan import make_plan
+from pipelines.engine.pool import Threads
+from pipelines.engine.run import run_plan
+from pipelines.engine.store.lease import lease
+from pipelines.engine.store.store import open_store
+from pipelines.live.latencies import measure_latencies, rig_with
+from pipelines.live.light import light_by_hand
+from pipelines.live.rig_file import read_rig, write_rig
+from pipelines.live.scanner import LiveScanner
+from pipelines.live.virtual.process import WorldProcess
+from pipelines.live.virtual.world import CAMERAS, EXPOSURE_MS, World, block_range_mm
+from pipelines.simulate import calibration_steps, digests_of
+from schemas.base.errors import Fault
+from schemas.parameters.simulation import SimulationSettings
+from schemas.rig import Rig, RigCamera
+
+TRIES = 3
+"""Of measuring latencies: nothing can be wrong with a virtual scanner but that its host was held up meanwhile."""
+OnProgress = Callable[[str, int, int], None]
+"""Hears what is being prepared, how much of it is there, and how much there is."""
+
+
+@dataclass(frozen=True)
+class VirtualRig:
+    """A virtual scanner that is ready."""
+
+    rig: Rig
+    file: Path
+    world: WorldProcess
+
+
+@contextmanager
+def virtual_rig(
+    folder: Path, world: World, on_progress: OnProgress, *, calibrated: bool = True
+) -> Iterator[VirtualRig]:
+    """The virtual scanner of `folder` in a world of its own, prepared as far as it is not yet.
+
+    Parameters
+    ----------
+    calibrated : whether its latencies are found where the rig does not have them.
+    """
+
+    def pictures(done: int, total: int) -> None:
+        on_progress("pictures", done, total)
+
+    file = folder / "rig.yaml"
+    rig = _known_rig(file, world)
+    lacks = calibrated and any(camera.latency is None for camera in rig.cameras)
+    calibration = folder / f"calibration-{world.scanner_seed}.json"
+    if calibrated and not calibration.exists():
+        on_progress("calibration", 0, 1)
+        _calibrate(folder, calibration, world.scanner_seed)
+    with WorldProcess(world.model_copy(update={"subject": "block"}) if lacks else world, pictures) as process:
+        rig = _plugged_in(rig, process, calibration if calibration.exists() else None)
+        write_rig(file, rig)
+        if lacks:
+            rig = _with_latencies(rig, world, on_progress)
+            write_rig(file, rig)
+            process.put(world.subject, pictures)
+        yield VirtualRig(rig, file, process)
+
+
+def _known_rig(file: Path, world: World) -> Rig:
+    scanner = f"virtual-{world.scanner_seed}"
+    if file.exists() and (rig := read_rig(file)).scanner == scanner:
+        return rig
+    cameras = [RigCamera(id=camera, device=f"camera {camera}") for camera in CAMERAS]
+    return Rig(format="footscan.rig/1", scanner=scanner, port="unknown", cameras=cameras)
+
+
+def _plugged_in(rig: Rig, process: WorldProcess, calibration: Path | None) -> Rig:
+    """The rig with the addresses that the devices have today."""
+    cameras = [
+        camera.model_copy(
+            update={
+                "device": process.cameras[camera.id],
+                "control_url": process.cameras[camera.id].replace("/stream", "/control"),
+            }
+        )
+        for camera in rig.cameras
+    ]
+    path = None if calibration is None else str(calibration.resolve())
+    return rig.model_copy(update={"port": process.port, "cameras": cameras, "calibration": path})
+
+
+def _with_latencies(rig: Rig, world: World, on_progress: OnProgress) -> Rig:
+    light = light_by_hand(rig, 1.0, EXPOSURE_MS)
+    with LiveScanner(rig) as scanner:
+        scanner.connect()
+        for _ in range(TRIES):
+            measured = measure_latencies(
+                scanner, *block_range_mm(world), light, lambda done, total: on_progress("latencies", done, total)
+            )
+            if not measured.problems:
+                return rig_with(rig, measured.latencies, light)
+    raise Fault("; ".join(measured.problems.values()))
+
+
+def _calibrate(folder: Path, file: Path, scanner_seed: int) -> None:
+    """The scanner's calibration, from a capture of the reference object."""
+    store = open_store(folder / CACHE)
+    steps = calibration_steps(
+        f"virtual-{scanner_seed}", folder / f"capture-{scanner_seed}", SimulationSettings(scanner_seed=scanner_seed)
+    )
+    plan = make_plan(steps, store)
+    with lease(store):
+        outcomes = run_plan(plan, store, pool=Threads(1), on_step_end=lambda _: None)
+    digests = digests_of(steps, outcomes)
+    files = FileDigests.load(folder / CACHE / "files.json", store.secret)
+    if problem := deliver({file.name: digests["calibrate"]}, store, files, folder):
+        raise Fault(problem)
+    if store.memory is not None:
+        store.memory.close()

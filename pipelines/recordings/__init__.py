@@ -1,0 +1,1 @@
+"""Recorded scans and captures: finding them, and checking what their documents promise."""

@@ -1,0 +1,127 @@
+"""Recorded scans: finding them in an archive and checking what their scan.yaml promises."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pipelines.recordings.film_paths import film_inside
+from schemas.base.documents import inside, read_yaml
+from schemas.base.errors import RefusedInput
+from schemas.frames import GROUP
+from schemas.scan import CameraFilm, Scan
+
+SCAN_FILE = "scan.yaml"
+
+
+@dataclass(frozen=True)
+class RecordedScan:
+    """A scan folder that follows its format."""
+
+    folder: Path
+    archive: Path
+    """No path in scan.yaml may leave it."""
+    document: Scan
+    _found: dict[str, Path] = field(default_factory=dict, compare=False, repr=False)
+    """Where the paths in scan.yaml lead: each is followed once."""
+    _films: dict[str, Path] = field(default_factory=dict, compare=False, repr=False)
+    """Likewise, of films and arrays of frames."""
+
+    @property
+    def name(self) -> str:
+        """`patient/scan`: its place in the results."""
+        return f"{self.document.patient}/{self.document.scan}"
+
+    @property
+    def file(self) -> Path:
+        """Its scan.yaml."""
+        return self.folder / SCAN_FILE
+
+    def film(self, camera: CameraFilm) -> Path:
+        """The film of a camera, which may be missing."""
+        return self._film(camera.file, f"file of camera {camera.id}")
+
+    def arrays(self) -> Path:
+        """The Zarr group of all cameras' frames, which may not be there yet."""
+        return self._film(GROUP, "frames")
+
+    def array(self, camera: CameraFilm) -> Path:
+        """The Zarr array of a camera's frames, which may not be there yet."""
+        return self._film(f"{GROUP}/cam{camera.id}", f"frames of camera {camera.id}")
+
+    def background(self, camera: CameraFilm) -> Path | None:
+        """The film of a camera with the laser off, which may be missing."""
+        named = camera.background
+        return None if named is None else self._film(named, f"background of camera {camera.id}")
+
+    def background_array(self, camera: CameraFilm) -> Path:
+        """The Zarr array of a camera's laser-off frames, which may not be there yet."""
+        return self._film(f"{GROUP}/cam{camera.id}-background", f"background frames of camera {camera.id}")
+
+    def positions(self, camera: CameraFilm) -> Path | None:
+        """The file with the positions of a camera's frames."""
+        return self._optional(camera.positions, f"positions of camera {camera.id}")
+
+    @property
+    def calibration(self) -> Path | None:
+        """The calibration that the scan names."""
+        return self._optional(self.document.calibration, "calibration")
+
+    @property
+    def truth(self) -> Path | None:
+        """The reference model that the scan names."""
+        return self._optional(self.document.truth, "truth")
+
+    def _optional(self, named: str | None, field: str) -> Path | None:
+        return None if named is None else self._inside(named, field)
+
+    def _film(self, named: str, field: str) -> Path:
+        """As `_inside`; what lies in a folder of frames is looked at, too."""
+        if named not in self._films:
+            self._films[named] = film_inside(self.archive, self.file, named, field)
+        return self._films[named]
+
+    def _inside(self, named: str, field: str) -> Path:
+        if named not in self._found:
+            self._found[named] = inside(self.archive, self.file, named, field)
+        return self._found[named]
+
+
+def read_scan(folder: Path, archive: Path | None = None) -> RecordedScan:
+    """The scan in `folder`; without an archive, that is the folder above the patient's.
+
+    Raises
+    ------
+    RefusedInput
+        No scan.yaml, or one that breaks its format.
+    """
+    folder = recorded_folder(folder, SCAN_FILE, "a recorded scan")
+    scan = RecordedScan(folder, (archive or folder.parent.parent).resolve(), read_yaml(folder / SCAN_FILE, Scan))
+    scan.arrays()
+    for camera in scan.document.cameras:
+        scan.film(camera)  # refused here, before any work, where they leave the archive
+        scan.array(camera)
+        if scan.background(camera) is not None:
+            scan.background_array(camera)
+        scan.positions(camera)
+    return scan
+
+
+def recorded_folder(folder: Path, file: str, what: str) -> Path:
+    """`folder`, resolved; a refusal where it is none and so cannot hold `file`, the document of `what`."""
+    if folder.is_file():
+        raise RefusedInput(folder, f"is a file, expected the folder that holds {file}")
+    if not folder.is_dir():
+        raise RefusedInput(folder, f"no such folder, expected {what}")
+    return folder.resolve()
+
+
+def scan_folders(archive: Path) -> Iterator[Path]:
+    """The folders below `archive` that hold a scan.yaml, in order."""
+    if not archive.is_dir():
+        raise RefusedInput(archive, "no such folder, expected an archive of scans")
+    for folder, below, files in os.walk(archive):
+        below.sort()
+        if SCAN_FILE in files:
+            below.clear()  # thousands of frames may lie below
+            yield Path(folder)

@@ -1,0 +1,79 @@
+"""A night's figures beside the accepted ones."""
+
+from collections.abc import Mapping, Sequence
+
+from pipelines.regression.figures.of_scan import Goal, goal_of, measure_figure, rounded, tolerance_of
+from pipelines.regression.report.result import JudgedFigure, Verdict
+from schemas.regression import NightEnded, Suite
+
+ROUNDING = 1e-9
+"""Differences of decimal numbers are no exact ones."""
+
+
+def judge_figures(
+    data_set: str,
+    figures: Mapping[str, float | None],
+    accepted: Mapping[str, float | None],
+    known: Mapping[str, float],
+    suite: Suite,
+    history: Sequence[NightEnded] = (),
+) -> list[JudgedFigure]:
+    """Each figure that there is, or that was accepted, in the order of their names.
+
+    Parameters
+    ----------
+    known : true measures of the foot by name
+    history : earlier nights
+    """
+    truths = {measure_figure(name, unit): value for name, value in known.items() for unit in _UNITS}
+    judged = []
+    for name in sorted(figures.keys() | accepted.keys(), key=in_order):
+        value, before = rounded(name, figures.get(name)), accepted.get(name)
+        goal, truth = goal_of(name), truths.get(name)
+        allowed = 0.0 if before is None else tolerance_of(data_set, name, suite).allows(before)
+        nights = [night.sets.get(data_set, {}).get(name) for night in history]
+        judged.append(
+            JudgedFigure(
+                name=name,
+                value=value,
+                accepted=before,
+                allowed=allowed,
+                better=goal,
+                truth=truth,
+                verdict=verdict(value, before, allowed, goal, truth, is_known=name in accepted),
+                history=[*nights, value],
+            )
+        )
+    return judged
+
+
+def verdict(
+    value: float | None, accepted: float | None, allowed: float, goal: Goal, truth: float | None, *, is_known: bool
+) -> Verdict:
+    """What to think of one figure; `is_known` whether the baseline has it, be it as null."""
+    if value is None and accepted is None:
+        return "same" if is_known else "new"
+    if value is None:
+        return "missing"
+    if accepted is None:
+        return "better" if is_known else "new"  # what could not be told before can be told now
+    gain = accepted - value
+    if abs(gain) <= allowed + ROUNDING:
+        return "same"
+    is_better = {
+        "less": gain > 0,
+        "more": gain < 0,
+        "nearer": truth is not None and abs(value - truth) < abs(accepted - truth) - ROUNDING,
+        "same": False,
+    }[goal]
+    return "better" if is_better else "worse"
+
+
+def in_order(figure: str) -> tuple[int, str]:
+    """For sorting: what matters most first."""
+    group = figure.partition(".")[0]
+    return (_GROUPS.index(group) if group in _GROUPS else len(_GROUPS)), figure
+
+
+_GROUPS = ("accuracy", "measures", "cameras", "points", "surface", "steps", "time", "memory")
+_UNITS = ("mm", "mm2", "mm3", "deg", "1")

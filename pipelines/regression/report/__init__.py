@@ -1,0 +1,1 @@
+"""What a night found, its page and its JUnit file."""

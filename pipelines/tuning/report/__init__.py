@@ -1,0 +1,1 @@
+"""What a search for parameters found, and its page."""

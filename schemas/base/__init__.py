@@ -1,0 +1,1 @@
+"""What all schemas are made of: documents and their errors, limits, units."""

@@ -1,0 +1,20 @@
+"""The parameters of a scan: those of its steps, section by section."""
+
+from schemas.base.documents import Document
+from schemas.parameters.extraction import ExtractionParameters
+from schemas.parameters.fusion import FusionParameters
+from schemas.parameters.mapping import MappingParameters
+from schemas.parameters.normals import NormalParameters
+from schemas.parameters.outliers import OutlierParameters
+from schemas.parameters.surface import SurfaceParameters
+
+
+class ScanParameters(Document):
+    """What the steps of a scan can be told, a model a step."""
+
+    extraction: ExtractionParameters = ExtractionParameters()
+    mapping: MappingParameters = MappingParameters()
+    fusion: FusionParameters = FusionParameters()
+    outliers: OutlierParameters = OutlierParameters()
+    normals: NormalParameters = NormalParameters()
+    surface: SurfaceParameters = SurfaceParameters()

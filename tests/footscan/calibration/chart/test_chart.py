@@ -1,0 +1,82 @@
+"""Reading of calibration charts: what the format allows is taken, what breaks it is refused in one line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from footscan.calibration.chart.chart import read_chart
+from schemas.base.errors import RefusedInput
+
+DATA = Path(__file__).parent / "data"
+HEADER = "camera,point,x_mm,y_mm,z_mm,i,j\n"
+
+
+def write(folder: Path, text: str | bytes) -> Path:
+    path = folder / "chart.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def test_thesis_chart() -> None:
+    charts = read_chart(DATA / "calibration_charts.csv")
+    assert list(charts) == [1, 2, 3, 4, 5, 6, 7, 8]
+    assert all(chart.unit == "cm" and chart.points == ("P1", "P2", "P3", "P4", "P5") for chart in charts.values())
+    np.testing.assert_array_equal(charts[8].world[3], [0, -5, 3])
+    np.testing.assert_array_equal(charts[8].pixels[3], [143, 132])
+
+
+def test_tolerates_order_spaces_mark_and_blank_lines(tmp_path: Path) -> None:
+    text = "\ufeff j , i,camera, point,z_mm,y_mm,x_mm\r\n\r\n 2.5,1e1 , 3, A b ,-.5,+4,0\r\n  \r\n,,,,,,\r\n"
+    charts = read_chart(write(tmp_path, text))
+    assert list(charts) == [3]
+    assert charts[3].points == ("A b",)
+    assert charts[3].unit == "mm"
+    np.testing.assert_array_equal(charts[3].world, [[0, 4, -0.5]])
+    np.testing.assert_array_equal(charts[3].pixels, [[10, 2.5]])
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("", "is empty"),
+        ("\n \n", "is empty"),
+        (HEADER, "no control point"),
+        ("camera,point,x_mm,y_mm,i,j\n1,A,0,0,0,0\n", "line 1, column z_mm: is missing"),
+        ("camera,point,i,j\n1,A,0,0\n", "column x_mm: is missing, expected camera,point,x_cm"),
+        ("camera,point,x_mm,y_cm,z_mm,i,j\n", "mixes cm and mm"),
+        ("camera,point,x_mm,y_mm,z_mm,i,j,k\n", "line 1, column k: unknown column"),
+        ("camera,point,x_mm,y_mm,z_mm,i,i,j\n", "column i: stands twice"),
+        ("camera;point;x_mm;y_mm;z_mm;i;j\n", "one column, expected camera,point"),
+        (HEADER + "1,A,0,0,0,1,2\n1,B,0,zero,0,1,2\n", "line 3, column y_mm: expected a number"),
+        (HEADER + "1,A,0,0,0,nan,2\n", "line 2, column i"),
+        (HEADER + "1,A,0,0,0,1,inf\n", "line 2, column j"),
+        (HEADER + "1,A,0,0,0,1,1e400\n", "line 2, column j"),
+        (HEADER + "1,A,0,0,0,1,1_0\n", "line 2, column j"),
+        (HEADER + "1,A,0,0,0,1,\n", "line 2, column j"),
+        (HEADER + "0,A,0,0,0,1,2\n", "line 2, column camera: expected a whole number from 1, found '0'"),
+        (HEADER + "1.5,A,0,0,0,1,2\n", "line 2, column camera"),
+        (HEADER + "-1,A,0,0,0,1,2\n", "line 2, column camera"),
+        (HEADER + "²,A,0,0,0,1,2\n", "line 2, column camera"),
+        (HEADER + "1,,0,0,0,1,2\n", "line 2, column point: expected a name"),
+        (HEADER + "1,A,0,0,0,1\n", "line 2: expected 7 values"),
+        (HEADER + "1,A,0,5,0,0,1,2\n", "line 2: expected 7 values"),
+        (HEADER + "1,A,0,0,0,1,2\n2,A,0,0,0,1,2\n1,A,0,0,0,1,2\n", "line 4, column point: camera 1 has 'A' in line 2"),
+        (HEADER + '1,"A,0,0,0,1,2\n', "expected a CSV file"),
+        (b"camera,point\xff", "expected a CSV file in UTF-8"),
+    ],
+)
+def test_refuses(tmp_path: Path, text: str | bytes, named: str) -> None:
+    path = write(tmp_path, text)
+    with pytest.raises(RefusedInput) as caught:
+        read_chart(path)
+    assert str(path) in str(caught.value)
+    assert named in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_refuses_what_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(RefusedInput, match="no such file"):
+        read_chart(tmp_path / "absent.csv")
+    with pytest.raises(RefusedInput, match="expected a file"):
+        read_chart(tmp_path)

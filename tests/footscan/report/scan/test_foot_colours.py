@@ -1,0 +1,41 @@
+"""Colours of a foot: each vertex by the measured point that is nearest to it."""
+
+import numpy as np
+
+from footscan.cloud.points import make_points
+from footscan.report.filled import CUT
+from footscan.report.scan.foot_colours import CAMERAS, SURE, UNSURE, foot_colourings
+from schemas.quality import MeshQuality
+
+VERTICES = np.array([[0.0, 0, 0], [10, 0, 0], [20, 0, 0], [9, 1, 0]])
+FILLED = np.array([False, False, False, True])
+CLOUD = make_points(VERTICES[:3] + 0.1, camera=np.array([1, 2, 9]), sigma=np.array([0.0, 0.05, 0.1]))
+MESH = MeshQuality(vertices=4, triangles=2, open_edges=0, non_manifold_edges=0, components=1, holes=0)
+
+
+def test_cameras_and_uncertainty_are_those_of_the_nearest_point_and_filled_is_grey() -> None:
+    colourings = {one.name: one for one in foot_colourings(VERTICES, FILLED, None, MESH, CLOUD, None)}
+    assert list(colourings) == ["Measured and filled", "Camera", "Uncertainty"]
+    # The ninth camera has the colour of the first.
+    assert colourings["Camera"].colours.tolist() == [list(CAMERAS[0]), list(CAMERAS[1]), list(CAMERAS[0]), list(CUT)]
+    uncertain = colourings["Uncertainty"].colours
+    assert uncertain[0].tolist() == SURE.tolist()
+    assert uncertain[2].tolist() == UNSURE.tolist()
+    assert uncertain[3].tolist() == list(CUT)
+    for camera in (1, 2, 9):
+        assert f"Camera {camera}</span>" in colourings["Camera"].meaning
+
+
+def test_the_distance_to_a_reference_comes_first_where_there_is_one() -> None:
+    first, *_ = foot_colourings(VERTICES, None, None, MESH, CLOUD, np.array([-1.0, 0.0, 1.0, np.nan]))
+    assert first.name == "Distance to reference"
+    red, _, blue = first.colours.astype(int).T
+    assert red[0] < blue[0]
+    assert red[2] > blue[2]
+    assert "blue lies inside" in first.meaning
+
+
+def test_without_a_cloud_the_surface_alone_is_shown() -> None:
+    assert [one.name for one in foot_colourings(VERTICES, FILLED, None, MESH, CLOUD[:0], None)] == [
+        "Measured and filled"
+    ]

@@ -1,0 +1,76 @@
+"""The live scanner in words: what is not there is named, with what to do."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pipelines.console.live_adapter import OverLive
+from pipelines.console.scanner import Side
+from pipelines.live.scanner import STOPPED, LiveScanner
+from schemas.base.errors import FootscanError
+from schemas.rig import Rig
+
+RIG = {
+    "format": "footscan.rig/1",
+    "scanner": "S1",
+    "port": "no-board",
+    "cameras": [{"id": 1, "device": "http://127.0.0.1:9/1"}],
+}
+
+
+@pytest.fixture
+def over_nothing(tmp_path: Path) -> OverLive:
+    """Over a rig of which nothing is plugged in."""
+    rig = Rig.model_validate(
+        {
+            "format": "footscan.rig/1",
+            "scanner": "S1",
+            "port": str(tmp_path / "no-board"),
+            "cameras": [{"id": camera, "device": f"http://127.0.0.1:9/{camera}"} for camera in (1, 5)],
+        }
+    )
+    return OverLive(LiveScanner(rig), tmp_path / "archive", tmp_path / "results", tmp_path / "calibration.json")
+
+
+def test_what_is_not_connected_is_told(over_nothing: OverLive) -> None:
+    health = over_nothing.health()
+    told = {device.name: (device.level, device.words) for device in health.devices}
+    assert told["Controller"] == ("bad", "not connected")
+    assert told["Head 2"] == ("unknown", "not known")
+    assert told["Camera 5"] == ("unknown", "not open")
+    assert told["Passes"] == ("ok", "All 2 cameras in one pass: cameras 1, 5 on no USB bus of this computer.")
+    assert told["Disk"][1].endswith("GB are free for scans")
+    assert health.cameras == (1, 5)
+    assert not health.resumable
+    assert over_nothing.state.name == "disconnected"
+    assert over_nothing.picture(1) is None
+
+
+def test_orders_to_nothing_are_faults_and_a_stop_is_none(over_nothing: OverLive, tmp_path: Path) -> None:
+    over_nothing.stop()
+    for order in (over_nothing.connect, over_nothing.home, over_nothing.resume, over_nothing.shine):
+        with pytest.raises(FootscanError):
+            order()
+    with pytest.raises(FootscanError, match=r"^camera 1: latency: has none"):
+        over_nothing.film("P1", "right", keep_partial=False)
+    assert not (tmp_path / "archive").exists()
+    over_nothing.close()
+    over_nothing.close()
+
+
+def test_a_foot_that_is_put_onto_the_glass_is_told_and_can_be_stopped(tmp_path: Path) -> None:
+    scanner = LiveScanner(Rig.model_validate(RIG))
+    told: list[str] = []
+    scanner.listen(lambda state: told.append(str(state)))
+
+    def place(side: Side, progress: Callable[[int, int], None]) -> None:
+        progress(1, 4)
+        over.stop()
+        assert side == "left"
+
+    over = OverLive(scanner, tmp_path / "archive", tmp_path / "results", place_foot=place)
+    with pytest.raises(FootscanError, match="stopped"):
+        over.film("P1", "left", keep_partial=False)
+    words = "a virtual left foot is put onto the glass"
+    assert told == [f"idle: {words}", f"idle 25 %: {words}", f"failed: {STOPPED}"]
