@@ -18,7 +18,7 @@ from pipelines.engine.store.store import Store, open_store
 from pipelines.recordings.calibration_choice import CalibrationPlace
 from pipelines.recordings.scans import SCAN_FILE
 from pipelines.regression.film import PATIENT
-from pipelines.simulate import calibration_steps, digests_of
+from pipelines.simulate import digests_of, filmed_calibration_steps
 from schemas.base.documents import canonical_json, validate
 from schemas.base.errors import Fault, RefusedInput
 from schemas.parameters.scan import ScanParameters
@@ -92,7 +92,7 @@ def _virtual(
     film = Step(
         name, "film", "pipelines.regression.film", virtual, places={"folder": scan}, writes=scan / SCAN_FILE
     )  # fmt: skip
-    filming = [film, *calibration_steps(name, capture, once)]
+    filming = [film, *filmed_calibration_steps(name, capture, once)]
     store = store_of(out)
     outcomes = run_plan(make_plan(filming, store), store, pool=Threads(1), on_step_end=on_step_end)
     digests = digests_of(filming, outcomes)

@@ -23,7 +23,7 @@ from pipelines.live.rig_file import read_rig, write_rig
 from pipelines.live.scanner import LiveScanner
 from pipelines.live.virtual.process import WorldProcess
 from pipelines.live.virtual.world import CAMERAS, EXPOSURE_MS, World, block_range_mm
-from pipelines.simulate import calibration_steps, digests_of
+from pipelines.simulate import digests_of, filmed_calibration_steps
 from schemas.base.errors import Fault
 from schemas.parameters.simulation import SimulationSettings
 from schemas.rig import Rig, RigCamera
@@ -113,7 +113,7 @@ def _with_latencies(rig: Rig, world: World, on_progress: OnProgress) -> Rig:
 def _calibrate(folder: Path, file: Path, scanner_seed: int) -> None:
     """The scanner's calibration, from a capture of the reference object."""
     store = open_store(folder / CACHE)
-    steps = calibration_steps(
+    steps = filmed_calibration_steps(
         f"virtual-{scanner_seed}", folder / f"capture-{scanner_seed}", SimulationSettings(scanner_seed=scanner_seed)
     )
     plan = make_plan(steps, store)
