@@ -121,6 +121,45 @@ def calibration_steps(
     return [*steps, _step(name, "calibrate", "calibrate", None, known)]
 
 
+@dataclass
+class CaptureOfScan:
+    """The calibration of a scan, made from a capture by steps of the scan's own graph."""
+
+    name: str
+    """Of the graph's scan."""
+    capture: CaptureInputs
+    steps: list[Step]
+    """From the capture's films to what the scan takes of its calibration."""
+
+    @classmethod
+    def drawn(cls, name: str, capture: CaptureInputs) -> "CaptureOfScan":
+        """The calibration of the scan `name`; what is taken of it is added to its steps."""
+        return cls(name, capture, calibration_steps(name, capture, CaptureCalibrationParameters()))
+
+    @property
+    def source(self) -> Output:
+        """Its name and digest."""
+        named = {"name": Value(canonical_json(self.capture.file.parent.name).encode())}
+        return self._taken("calibration-source", "calibration_source", named)
+
+    def camera(self, camera: int) -> Output:
+        """The map of one camera; RefusedInput where the capture lacks it."""
+        if camera not in self.capture.paths:
+            known = ", ".join(map(str, self.capture.paths))
+            raise RefusedInput(self.capture.file, f"has no camera {camera}, expected one of {known}", field="cameras")
+        return self._taken("camera-map", "camera_map", {"camera": Value(canonical_json(camera).encode())}, camera)
+
+    def cameras(self, ids: frozenset[int]) -> Output:
+        """All of it, with the maps of these cameras alone."""
+        return self._taken("camera-maps", "camera_maps", {"cameras": Value(canonical_json(sorted(ids)).encode())})
+
+    def _taken(self, kind: str, module: str, told: Mapping[str, Input], camera: int | None = None) -> Output:
+        calibration = {"calibration": Output(f"{self.name}/calibrate")}
+        step = _step(self.name, kind, module, None, {**calibration, **told}, camera)
+        self.steps.append(step)
+        return Output(step.name)
+
+
 def _step(
     name: str,
     kind: str,

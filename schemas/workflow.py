@@ -46,13 +46,23 @@ Folders = Annotated[
 
 
 class ChosenCalibration(Document):
-    """A calibration, and for which scans it is meant."""
+    """A calibration, and for which scans it is meant: either its file, or the capture that it is made from."""
 
-    file: AnyPath
+    file: AnyPath | None = None
+    """The calibration file."""
+    capture: AnyPath | None = None
+    """Folder of a capture of the reference object."""
     scanner: Pseudonym | None = None
     """For scans of this scanner; of any where absent."""
     since: datetime.date | None = None
     """For scans of this day and later, until the next one takes over; from the start where absent."""
+
+    @model_validator(mode="after")
+    def _file_or_capture(self) -> Self:
+        if (self.file is None) == (self.capture is None):
+            found = "neither" if self.file is None else "both"
+            raise ValueError(f"expected exactly one of file and capture, found {found}")
+        return self
 
 
 class Workflow(Document):

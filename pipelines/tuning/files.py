@@ -43,7 +43,8 @@ def best_yaml(folder: Path, workflow: Path, document: Workflow, result: TuneResu
     for name in {"calibration", "cache"} & values.keys():
         values[name] = None if values[name] is None else moved(values[name])
     for calibration in values.get("calibrations", []):
-        calibration["file"] = moved(calibration["file"])
+        for name in {"file", "capture"} & calibration.keys():
+            calibration[name] = None if calibration[name] is None else moved(calibration[name])
     values["parameters"] = parameters.model_dump(mode="json", exclude_unset=True)
     trial = f"trial {result.winner.number} of {len(result.trials) - 1}" if result.winner.number else "as it was before"
     head = f"# Found by footscan tune: {trial}. Paths are relative to this file's folder.\n"

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -30,20 +29,19 @@ from schemas.parameters.calibration import CaptureCalibrationParameters
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.parameters.simulation import SimulationSettings
 
-MadeOnce = Callable[[str, Callable[[Path], None]], Path]
 Calibrated = tuple[dict[str, Outcome], list[str]]
 JOINT = ["all-recognise", "calibrate", "own-side", "place"]
 
 
 @pytest.fixture(scope="module")
-def filmed(made_once: MadeOnce) -> Path:
-    def film(folder: Path) -> None:
-        reference = standard_reference()
-        reference = reference.model_copy(update={"placements_mm": reference.placements_mm[:3]})
-        record_capture(folder, reference, settings=SimulationSettings(scanner_seed=3))
-        keep_cameras(folder, [1, 2, 3])
-
-    return made_once("capture-of-three-cameras", film)
+def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A capture of three placements by three cameras; the films of the others lie beside it."""
+    folder = tmp_path_factory.mktemp("filmed")
+    reference = standard_reference()
+    reference = reference.model_copy(update={"placements_mm": reference.placements_mm[:3]})
+    record_capture(folder, reference, settings=SimulationSettings(scanner_seed=3))
+    keep_cameras(folder, [1, 2, 3])
+    return folder
 
 
 def keep_cameras(folder: Path, cameras: list[int]) -> None:
