@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.capture.as_arrays import stripe_arrays
+from footscan.calibration.capture.stripe_arrays import stripe_arrays
 from footscan.frames.film import open_film, pixel_frames
 from footscan.stripe.extract import extract_stripe
 from pipelines.arrays import pack

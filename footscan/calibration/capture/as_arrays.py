@@ -29,18 +29,6 @@ class Seen:
     """Why a camera does not recognise the object."""
 
 
-def stripe_arrays(
-    stripes: Sequence[Floats], image_px: tuple[int, int], lost: Sequence[int]
-) -> dict[str, NDArray[np.generic]]:
-    """The stripes of one camera, (N, 2) px for each of K frames, the size of its images, px, and its lost frames."""
-    return {
-        "pixels": np.concatenate([np.empty((0, 2)), *stripes]),
-        "counts": np.array([len(stripe) for stripe in stripes], np.int64),
-        "image_px": np.array(image_px, np.int64),
-        "lost": np.array(lost, np.int64),
-    }
-
-
 def view_of(camera: int, stripe: Arrays, mounting: Mounting) -> CameraView:
     """What a camera saw, from its `stripe_arrays` and where it stands."""
     columns, rows = stripe["image_px"].tolist()
