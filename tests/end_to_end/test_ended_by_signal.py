@@ -111,7 +111,7 @@ def test_output_that_nobody_reads_leaves_nothing_moving(scanner: Scanner) -> Non
     assert process.stderr is not None
     process.stdout.close()
     process.stderr.close()
-    assert process.wait(LONG_SECONDS) == 1
+    assert process.wait(LONG_SECONDS) in (0, 1)  # 1 where Python hands on each line at once, and notices
     time.sleep(0.3)
     scanner.assert_dark_and_standing(time.monotonic() - 0.3)
 
