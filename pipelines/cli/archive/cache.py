@@ -25,7 +25,7 @@ cache = typer.Typer(help="The store of all results: its size, what can go, wheth
 HOUR_S = 3600.0
 
 Place = Annotated[str | None, typer.Option("--cache", help="The store: a folder or a URL, without a workflow.")]
-OfWorkflow = Annotated[Path | None, typer.Option("--workflow", help="The workflow; workflow.yaml where absent.")]
+OfWorkflow = Annotated[Path | None, typer.Option("--workflow", help="The workflow; default: workflow.yaml.")]
 ScanName = Annotated[str, typer.Argument(help="A scan: its folder, or patient/scan.")]
 TakeOver = Annotated[
     bool, typer.Option("--take-over", help="Remove the leases of runs elsewhere, or with a wrong clock, that are gone.")

@@ -43,9 +43,9 @@ class Explanation:
 def why(
     scan: Annotated[str, typer.Argument(help="A scan: its folder, or patient/scan.")],
     step: Annotated[
-        str | None, typer.Argument(help="A step: extract, extract-3; all that would run where absent.")
+        str | None, typer.Argument(help="A step, such as extract or extract-3; default: all steps that would run.")
     ] = None,
-    workflow: Annotated[Path | None, typer.Option(help="The workflow; workflow.yaml where absent.")] = None,
+    workflow: Annotated[Path | None, typer.Option(help="The workflow; default: workflow.yaml.")] = None,
     calibration: Annotated[Path | None, typer.Option(help="Calibration, for a scan folder without a workflow.")] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the results, for a scan folder without a workflow.")

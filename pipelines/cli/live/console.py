@@ -27,7 +27,7 @@ def console(
     rig: RigFile = None,
     out: Annotated[Path, typer.Option(help="The archive.")] = Path("archive"),
     results: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
-    calibration: Annotated[Path | None, typer.Option(help="The rig's where absent.")] = None,
+    calibration: Annotated[Path | None, typer.Option(help="Calibration file; default: the rig's.")] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any that is free.")] = 8760,
     host: Annotated[
         str, typer.Option(help="Address to listen on. Other than loopback, the page is opened with a token.")

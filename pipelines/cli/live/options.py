@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 RIG = Path("rig.yaml")
 
-RigFile = Annotated[Path | None, typer.Option("--rig", help="What the scanner consists of; rig.yaml where absent.")]
+RigFile = Annotated[Path | None, typer.Option("--rig", help="What the scanner consists of; default: rig.yaml.")]
 Virtual = Annotated[bool, typer.Option("--virtual", help="A virtual scanner, without any hardware.")]
 VirtualFolder = Annotated[
     Path, typer.Option("--virtual-folder", help="Where the virtual scanner keeps its rig, calibration and pictures.")

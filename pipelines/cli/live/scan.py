@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 DARK_GRID_MM = 100.0
 """Nothing of a virtual foot is looked at in the dark, unless for its colours."""
 
-Speed = Annotated[float | None, typer.Option("--speed", min=0.1, help="mm/s; the rig's where absent.")]
+Speed = Annotated[float | None, typer.Option("--speed", min=0.1, help="Speed of the heads, mm/s; default: the rig's.")]
 
 
 def scan(
@@ -39,13 +39,14 @@ def scan(
     rig: RigFile = None,
     out: Annotated[Path, typer.Option(help="The archive.")] = Path("archive"),
     results: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
-    name: Annotated[str | None, typer.Option(help="Of the scan; day and side where absent.")] = None,
-    calibration: Annotated[Path | None, typer.Option(help="The rig's where absent.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the scan; default: day and side.")] = None,
+    calibration: Annotated[Path | None, typer.Option(help="Calibration file; default: the rig's.")] = None,
     speed: Speed = None,
-    from_mm: Annotated[float | None, typer.Option(help="X of the first frame; the rig's where absent.")] = None,
-    to_mm: Annotated[float | None, typer.Option(help="X of the last frame; the rig's where absent.")] = None,
+    from_mm: Annotated[float | None, typer.Option(help="X of the first frame; default: the rig's.")] = None,
+    to_mm: Annotated[float | None, typer.Option(help="X of the last frame; default: the rig's.")] = None,
     power: Annotated[
-        float | None, typer.Option(min=0.01, max=1, help="Of the lasers; chosen by what the cameras see where absent.")
+        float | None,
+        typer.Option(min=0.01, max=1, help="Power of the lasers; default: chosen by what the cameras see."),
     ] = None,
     exposure_ms: Annotated[
         float | None, typer.Option(min=0.05, max=1000, help="Of all cameras; goes with --power.")

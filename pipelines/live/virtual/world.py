@@ -63,7 +63,7 @@ class World(Document):
     subject: SubjectName = "nothing"
     """What stands on the glass."""
     foot_seed: Seed | None = None
-    """Of the population that the feet are drawn from; the mean man's where absent."""
+    """Of the population that the feet are drawn from; default: the mean man's."""
     light: Literal["dark", "ambient", "bright"] = "ambient"
     scanner_seed: Seed = 1
     """Of mounting and lenses, and of the latencies of its cameras, which nobody is told."""
