@@ -195,7 +195,7 @@ def _steps_to(kind: str, scan: Path, calibration: Path, results: Path) -> tuple[
     for step in reversed(steps):
         if step.name in wanted:
             wanted |= {source.step for source in step.inputs.values() if isinstance(source, Output)}
-    return [step for step in steps if step.name in wanted], planned.store
+    return [step for step in steps if step.name in wanted], planned.workspace.store
 
 
 def _run(

@@ -292,8 +292,9 @@ def _recompute(workflow: Path, share: float, seed: int) -> "tuple[int, list[Diff
     from pipelines.engine import audit
 
     planned = plan_job(job_of_workflow(workflow))
+    store = planned.workspace.store
     chosen = audit.sample(
-        (key for scan in planned.scans for key in audit.repeatable(plan_of_scan(scan, planned), planned.store)),
+        (key for scan in planned.scans for key in audit.repeatable(plan_of_scan(scan, planned), store)),
         share,
         seed,
     )
@@ -303,10 +304,10 @@ def _recompute(workflow: Path, share: float, seed: int) -> "tuple[int, list[Diff
 
     with ThreadPoolExecutor(planned.job.threads) as pool:
         for scan in planned.scans:  # one at a time: the graphs of all would be too much
-            actions = audit.repeatable(plan_of_scan(scan, planned), planned.store)
+            actions = audit.repeatable(plan_of_scan(scan, planned), store)
             mine = {key: action for key, action in actions.items() if key in chosen - done}
             done |= mine.keys()
-            for ended in [pool.submit(audit.repeat, action, planned.store) for action in mine.values()]:
+            for ended in [pool.submit(audit.repeat, action, store) for action in mine.values()]:
                 try:
                     difference = ended.result()
                 except Fault as error:

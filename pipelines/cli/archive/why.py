@@ -61,7 +61,7 @@ def why(
         raise refused.error
     [found] = planned.scans
     plan = plan_of_scan(found, planned)
-    every = [_explain(one, plan, planned.store) for one in plan.steps]
+    every = [_explain(one, plan, planned.workspace.store) for one in plan.steps]
     chosen = _named(step, every) if step is not None else [one for one in every if one.state != "hit"]
     if as_json:
         print_json(_json(found.scan.name, every, chosen))
@@ -75,9 +75,8 @@ def why(
 def plan_of_scan(found: "PlannedScan", planned: "PlannedJob") -> "Plan":
     """The plan of one scan of a job, with all its steps."""
     from pipelines.archive.job import draw_steps
-    from pipelines.engine.plan import make_plan
 
-    return make_plan(draw_steps(found.scan, planned), planned.store)
+    return planned.workspace.plan(draw_steps(found.scan, planned))
 
 
 def local_time(seconds: float | None) -> str:
