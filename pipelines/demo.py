@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from footscan.recordings.scans import SCAN_FILE, scan_folders
 from pipelines.archive.job import CACHE, Job, plan_job, run_job
 from pipelines.engine.actions.step import Step
 from pipelines.engine.deliver import deliver
@@ -17,7 +18,6 @@ from pipelines.engine.run import run_plan
 from pipelines.engine.store.lease import lease
 from pipelines.engine.store.store import open_store
 from pipelines.recordings.calibration_choice import CalibrationPlace
-from pipelines.recordings.scans import SCAN_FILE, scan_folders
 from pipelines.scan import STEPS
 from pipelines.simulate import calibration_steps, digests_of
 from schemas.base.errors import Fault

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from footscan.recordings.scans import SCAN_FILE
 from pipelines.archive.job import Job
 from pipelines.engine.actions.step import Outcome, Step
 from pipelines.engine.deliver import deliver
@@ -16,7 +17,6 @@ from pipelines.engine.pool import OnStepEnd, Threads, cores
 from pipelines.engine.run import run_plan
 from pipelines.engine.store.store import Store, open_store
 from pipelines.recordings.calibration_choice import CalibrationPlace
-from pipelines.recordings.scans import SCAN_FILE
 from pipelines.regression.film import PATIENT
 from pipelines.simulate import calibration_steps, digests_of
 from schemas.base.documents import canonical_json, validate

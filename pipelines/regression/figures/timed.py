@@ -19,6 +19,7 @@ from pathlib import Path
 from statistics import fmean
 from tempfile import TemporaryDirectory
 
+from footscan.recordings.scans import RecordedScan, read_scan
 from pipelines.archive.job import Job, PlannedJob, draw_steps
 from pipelines.engine.actions.step import Success
 from pipelines.engine.files.file_digests import FileDigests
@@ -26,7 +27,6 @@ from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.run import run_plan
 from pipelines.engine.store.store import open_store
-from pipelines.recordings.scans import RecordedScan, read_scan
 from pipelines.regression.figures.process_memory import forget_peak, held_mb, peak_mb
 from pipelines.regression.figures.reference_computation import reference_seconds
 from schemas.base.errors import Fault
