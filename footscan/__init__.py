@@ -6,11 +6,12 @@
 from importlib import import_module
 from typing import Any
 
-__all__ = ["open_scan", "results"]
+PUBLIC = {"open_scan": "scan", "results": "results_table"}
+"""Functions, and the modules that they are in."""
 
 
 def __getattr__(name: str) -> Any:
     """Imported when first asked for: a step, which uses one module, neither loads the others nor depends on them."""
-    if name in __all__:
-        return getattr(import_module("footscan.public"), name)
+    if name in PUBLIC:
+        return getattr(import_module(f"footscan.{PUBLIC[name]}"), name)
     raise AttributeError(f"module 'footscan' has no attribute {name!r}")

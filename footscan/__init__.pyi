@@ -1,3 +1,3 @@
-from footscan.public import measure as measure
-from footscan.public import open_scan as open_scan
-from footscan.public import results as results
+from footscan.measure.any_mesh import measure as measure
+from footscan.results_table import results as results
+from footscan.scan import open_scan as open_scan

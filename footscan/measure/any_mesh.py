@@ -1,7 +1,6 @@
-"""What `import footscan` offers: scans, measures and results as arrays and tables."""
+"""The measures of any foot's mesh: what `footscan.measure(mesh)` calls."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,15 +9,8 @@ from footscan.measure.measures import measure_foot
 from footscan.measure.raw_mesh import take_in
 from footscan.mesh.formats.files import read_mesh
 from footscan.mesh.mesh import Mesh
-from footscan.scan import OpenScan, open_scan
 from schemas.base.documents import Side
-from schemas.base.errors import RefusedInput
 from schemas.measures import Axis, Measures
-
-if TYPE_CHECKING:
-    import pyarrow
-
-__all__ = ["OpenScan", "measure", "open_scan", "results"]
 
 
 def measure(
@@ -58,23 +50,3 @@ def measure(
         vertices, faces = read_mesh(Path(mesh))
     whole = take_in(vertices, faces, None)
     return measure_foot(whole.vertices, whole.faces, side, axis=axis)
-
-
-def results(folder: Path | str) -> "pyarrow.Table":
-    """The results of an archive as a table, a row a scan; `.to_pandas()` and `.to_pydict()` lead on from there.
-
-    Parameters
-    ----------
-    folder : the results of a workflow
-
-    Raises
-    ------
-    RefusedInput
-        There is no table yet.
-    """
-    from pyarrow import parquet
-
-    table = Path(folder) / "results.parquet"
-    if not table.is_file():
-        raise RefusedInput(table, "no such file, expected the results of 'footscan run'")
-    return parquet.read_table(table)
