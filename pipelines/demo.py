@@ -7,12 +7,12 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from footscan.recordings.scans import SCAN_FILE, scan_folders
 from pipelines.archive.job import CACHE, Job, plan_job, run_job
 from pipelines.engine.actions.step import Step
 from pipelines.engine.pool import OnStepEnd, Threads, cores
 from pipelines.engine.workspace import Workspace, digests_by_kind
 from pipelines.recordings.calibration_choice import CalibrationPlace
-from pipelines.recordings.scans import SCAN_FILE, scan_folders
 from pipelines.scan import STEPS
 from pipelines.simulate import calibration_steps
 from schemas.base.errors import Fault

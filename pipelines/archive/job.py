@@ -8,6 +8,7 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
+from footscan.recordings.scans import RecordedScan, read_scan, scan_folders
 from pipelines.archive.workflow_file import check_archives, read_workflow
 from pipelines.engine.actions.step import Failure, Outcome, Step, Success
 from pipelines.engine.files.access import group_number, share
@@ -19,7 +20,6 @@ from pipelines.engine.store.erasure_notes import cut_off
 from pipelines.engine.store.permissions import warn_if_others_can_write
 from pipelines.engine.workspace import Workspace
 from pipelines.recordings.calibration_choice import CalibrationPlace, calibration_places, choose_calibration
-from pipelines.recordings.scans import RecordedScan, read_scan, scan_folders
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
 from schemas.base.documents import read_text
 from schemas.base.errors import RefusedInput

@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from footscan.recordings.scans import read_scan
 from pipelines.archive.job import Job, PlannedJob, ScanEnd, draw_steps, plan_job, run_job
 from pipelines.engine.actions.step import Outcome, Step, Success
 from pipelines.engine.pool import OnStepEnd, Threads
 from pipelines.engine.store.store import Store
-from pipelines.recordings.scans import read_scan
 from pipelines.regression.figures.costs import cost_figures, unsteady
 from pipelines.regression.figures.delivered import MADE_OF, delivered_figures
 from pipelines.regression.figures.of_scan import result_figures

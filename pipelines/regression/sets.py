@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from footscan.recordings.scans import SCAN_FILE
 from pipelines.archive.job import Job
 from pipelines.engine.actions.step import Outcome, Step
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.pool import OnStepEnd, Threads, cores
 from pipelines.engine.workspace import Workspace, digests_by_kind
 from pipelines.recordings.calibration_choice import CalibrationPlace
-from pipelines.recordings.scans import SCAN_FILE
 from pipelines.regression.film import PATIENT
 from pipelines.simulate import calibration_steps
 from schemas.base.documents import canonical_json, validate

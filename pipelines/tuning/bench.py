@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from footscan.recordings.scans import RecordedScan
 from pipelines.archive.job import WINDOW, PlannedJob, draw_steps
 from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.pool import OnStepEnd, Pool, StepEnd
-from pipelines.recordings.scans import RecordedScan
 from pipelines.scan import source_files
 from pipelines.tuning.clock import Clock
 from pipelines.tuning.objectives import Judged, figures_of, lengths_of

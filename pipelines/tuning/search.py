@@ -3,10 +3,10 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from footscan.recordings.scans import RecordedScan
 from pipelines.archive.job import Job, PlannedJob, plan_job, share_written
 from pipelines.engine.pool import OnStepEnd, Pool
 from pipelines.engine.store.permissions import warn_if_others_can_write
-from pipelines.recordings.scans import RecordedScan
 from pipelines.tuning.bench import Bench
 from pipelines.tuning.changes import frame_changes
 from pipelines.tuning.clock import Clock

@@ -269,7 +269,7 @@ def _place(store: "Store") -> str:
 
 def _scan_name(scan: str) -> str:
     """`patient/scan` of a scan that is named so, or by its folder."""
-    from pipelines.recordings.scans import SCAN_FILE, read_scan
+    from footscan.recordings.scans import SCAN_FILE, read_scan
 
     folder = Path(scan)
     return read_scan(folder).name if (folder / SCAN_FILE).is_file() else scan

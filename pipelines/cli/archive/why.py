@@ -105,7 +105,7 @@ def _job(scan: str, workflow: Path | None, calibration: Path | None, out: Path |
 
 def _folder(scan: str, job: "Job") -> Path:
     """The folder of a scan that is named by its folder, or as `patient/scan`."""
-    from pipelines.recordings.scans import read_scan
+    from footscan.recordings.scans import read_scan
 
     named = Path(scan).resolve()
     for folder in job.folders:

@@ -19,11 +19,11 @@ from pathlib import Path
 from statistics import fmean
 from tempfile import TemporaryDirectory
 
+from footscan.recordings.scans import RecordedScan, read_scan
 from pipelines.archive.job import Job, PlannedJob, draw_steps
 from pipelines.engine.actions.step import Success
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.workspace import Workspace
-from pipelines.recordings.scans import RecordedScan, read_scan
 from pipelines.regression.figures.process_memory import forget_peak, held_mb, peak_mb
 from pipelines.regression.figures.reference_computation import reference_seconds
 from schemas.base.errors import Fault
