@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from pipelines.cli.live.options import (
+    OF_VIRTUAL,
     VIRTUAL_FOLDER,
+    GridMm,
     RigFile,
     StateTeller,
     Virtual,
@@ -49,7 +51,7 @@ def scan(
         typer.Option(min=0.01, max=1, help="Power of the lasers; default: chosen by what the cameras see."),
     ] = None,
     exposure_ms: Annotated[
-        float | None, typer.Option(min=0.05, max=1000, help="Of all cameras; goes with --power.")
+        float | None, typer.Option(min=0.05, max=1000, help="Exposure of all cameras; needs --power.")
     ] = None,
     texture: Annotated[
         bool, typer.Option("--texture", help="Film the way back in the dark, for the colours of the skin.")
@@ -61,20 +63,26 @@ def scan(
     virtual: Virtual = False,
     virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
     foot_seed: Annotated[
-        int | None, typer.Option(min=0, help="A virtual foot of the population instead of the mean man's.")
+        int | None,
+        typer.Option(min=0, rich_help_panel=OF_VIRTUAL, help="Draw a foot of the population; default: the mean man's."),
     ] = None,
-    light: Annotated[Literal["dark", "ambient", "bright"], typer.Option(help="Light in the virtual room.")] = "ambient",
+    light: Annotated[
+        Literal["dark", "ambient", "bright"], typer.Option(rich_help_panel=OF_VIRTUAL, help="Light in its room.")
+    ] = "ambient",
     ripple: Annotated[
-        float, typer.Option(min=0, max=0.5, help="Part of the virtual heads' speed that swings once a second.")
+        float,
+        typer.Option(
+            min=0, max=0.5, rich_help_panel=OF_VIRTUAL, help="Share of its heads' speed that varies, once a second."
+        ),
     ] = 0.0,
     pause: Annotated[
-        float, typer.Option(min=0, max=60, help="How long the virtual heads stand in the middle, s.")
-    ] = 0.0,
-    jitter_ms: Annotated[float, typer.Option(min=0, max=25, help="How unevenly the virtual cameras expose.")] = 10.0,
-    grid_mm: Annotated[
         float,
-        typer.Option(min=0.05, max=10, help="Between two places that the virtual cameras have pictures of."),
-    ] = 0.5,
+        typer.Option(min=0, max=60, rich_help_panel=OF_VIRTUAL, help="How long its heads stop halfway, s."),
+    ] = 0.0,
+    jitter_ms: Annotated[
+        float, typer.Option(min=0, max=25, rich_help_panel=OF_VIRTUAL, help="Jitter of its cameras' exposures, ms.")
+    ] = 10.0,
+    grid_mm: GridMm = 0.5,
     as_json: AsJson = False,
 ) -> int:
     """Scan a foot: home, film, store, reconstruct and measure."""
