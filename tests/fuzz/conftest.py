@@ -19,7 +19,7 @@ def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("filmed") / "capture"
     with pytest.MonkeyPatch.context() as patch:
         for module in ("record", "capture"):
-            patch.setattr(f"footscan.virtual.{module}.CAMERAS", CAMERAS)
+            patch.setattr(f"footscan.virtual.filming.{module}.CAMERAS", CAMERAS)
         arguments = ["simulate", "capture", "--out", str(folder), "--placements", "3", "--scanner-seed", "3"]
         assert run_command(arguments) == 0
     return folder
