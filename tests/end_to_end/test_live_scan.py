@@ -18,6 +18,8 @@ from pipelines.live.virtual import rig as virtual_rig
 from pipelines.live.virtual.world import CAMERAS, LATENCIES_S
 from schemas.rig import RigLatency
 
+pytestmark = pytest.mark.real_time  # cameras stream while heads move
+
 Footscan = Callable[..., subprocess.CompletedProcess[str]]
 
 

@@ -30,6 +30,8 @@ from schemas.base.errors import Fault, Finding, RefusedInput
 from schemas.recording import Recording
 from schemas.rig import Rig, RigCamera, RigLatency, RigTravel
 
+pytestmark = pytest.mark.real_time  # cameras stream while heads move
+
 DARK = bytes(simplejpeg.encode_jpeg(np.full((480, 640, 3), 20, np.uint8), 90, "RGB", "420"))
 DAY = datetime.date(2026, 11, 20)
 RATE = 20.0
