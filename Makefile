@@ -13,10 +13,10 @@ setup:    ## system libraries, .venv, pinned packages; starts at once when they 
 demo: setup   ## films, calibrates, scans and measures a foot; the result is in demo/
 	@$(BIN)/footscan demo
 
-test: lint    ## lint, then every test, in the end those that keep time; pages in Debian's Chromium
+test: lint    ## lint, then every test, in the end those that keep time; pages in Debian's Chromium; films are kept in .pytest_cache
 	@scripts/browser.sh
-	$(BIN)/pytest -n 2 -m "not real_time"
-	$(BIN)/pytest -n 2 -m real_time --reruns 2 -r fER
+	$(BIN)/pytest -n 2 --dist worksteal -m "not real_time"
+	$(BIN)/pytest -n 2 --dist worksteal -m real_time --reruns 2 -r fER
 
 lint: setup   ## style, layout and types
 	$(BIN)/ruff check

@@ -18,8 +18,8 @@ import numpy as np
 
 from benchmarks.compare import interleave, print_ratios, python, ratio_text, spread
 from footscan.frames.film import encoded_frames, open_film
+from footscan.recordings.scans import read_scan
 from footscan.virtual.filming.film import write_film
-from pipelines.recordings.scans import read_scan
 
 DEFAULT = Path("demo/archive/P0001/demo-R")
 EVERY = 5

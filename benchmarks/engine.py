@@ -269,8 +269,8 @@ def _run_footscan(folder: Path, scans: int) -> int:
             raise RuntimeError(end.outcome.problem)
         results[step.name] = end.outcome.digest
         runs += end.ran
-    assert store.memory is not None
-    store.memory.close()
+    assert store.verified is not None
+    store.verified.close()
     return runs
 
 

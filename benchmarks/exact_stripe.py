@@ -18,11 +18,11 @@ from scipy.spatial import cKDTree
 
 from benchmarks.extraction import DEFAULT, Packets, extract, extract_plainly, load
 from footscan.mesh.formats.files import read_mesh
+from footscan.recordings.scans import read_scan
 from footscan.virtual.filming.renderers import Shot
 from footscan.virtual.filming.stripe_truth import write_stripe_truth
 from footscan.virtual.optics.scanner import standard_scanner
 from footscan.virtual.optics.scene import SKIN, Mesh
-from pipelines.recordings.scans import read_scan
 from schemas.parameters.simulation import SimulationSettings
 from schemas.scan import Travel
 

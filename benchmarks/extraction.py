@@ -26,8 +26,8 @@ from footscan.frames.film import decode_or_none, encoded_frames, open_film
 from footscan.frames.image import Rgb, pixel_buffer
 from footscan.frames.ingest import ingest_film
 from footscan.frames.reader import read_frames
+from footscan.recordings.scans import RecordedScan, read_scan
 from footscan.stripe.film import extract_film
-from pipelines.recordings.scans import RecordedScan, read_scan
 from schemas.frames import FrameManifest
 from schemas.parameters.extraction import ExtractionParameters
 

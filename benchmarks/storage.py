@@ -15,7 +15,7 @@ from benchmarks.compare import interleave, print_ratios
 from footscan.frames.film import open_film, pixel_frames
 from footscan.frames.ingest import ingest_film
 from footscan.frames.reader import read_frames
-from pipelines.recordings.scans import read_scan
+from footscan.recordings.scans import read_scan
 from schemas.frames import FrameManifest
 
 DEFAULT = Path("demo/archive/P0001/demo-R")

@@ -23,6 +23,7 @@ from footscan.cloud.points import coordinates, stripe_step
 from footscan.frames.reader import read_frames
 from footscan.mesh.formats.files import Shape, read_mesh
 from footscan.mesh.sampling import sample_surface
+from footscan.recordings.scans import RecordedScan, read_scan
 from footscan.surface.ball_pivoting import mesh_cloud
 from footscan.surface.closed_surface import close_surface
 from footscan.surface.quality import mesh_quality
@@ -35,7 +36,6 @@ from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.run import run_plan
 from pipelines.engine.store.store import Store
-from pipelines.recordings.scans import RecordedScan, read_scan
 from schemas.frames import FrameManifest
 from schemas.parameters.surface import SurfaceParameters
 
@@ -195,7 +195,7 @@ def _steps_to(kind: str, scan: Path, calibration: Path, results: Path) -> tuple[
     for step in reversed(steps):
         if step.name in wanted:
             wanted |= {source.step for source in step.inputs.values() if isinstance(source, Output)}
-    return [step for step in steps if step.name in wanted], planned.store
+    return [step for step in steps if step.name in wanted], planned.workspace.store
 
 
 def _run(

@@ -14,6 +14,7 @@ from PIL import Image, ImageDraw
 
 from footscan.frames.film import open_film, pixel_frames
 from footscan.mesh.formats.files import read_mesh
+from footscan.recordings.scans import read_scan
 from footscan.report.calibration.figure import calibration_figure
 from footscan.report.colours import distance_colours
 from footscan.report.deviation import draw_colour_bar, write
@@ -22,7 +23,6 @@ from footscan.stripe.film import extract_film
 from footscan.stripe.points import StripePoints
 from footscan.verify.distances import signed_distances
 from footscan.virtual.optics.scanner import FAN_DEGREES, VOLUME_MM, standard_scanner
-from pipelines.recordings.scans import read_scan
 from schemas.calibration import read_calibration
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.scan import Travel

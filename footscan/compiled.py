@@ -12,8 +12,11 @@ import hashlib
 import logging
 import os
 import re
+import shutil
 import stat
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -30,6 +33,8 @@ IMPORT = re.compile(
     r"|import[ \t]+(?P<module>[\w.]+))",
     re.MULTILINE,
 )
+KEPT_SECONDS = 30 * 86400
+"""How long the machine code of earlier sources is kept: a developer goes back and forth between branches."""
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
@@ -87,11 +92,21 @@ def _folder(module: str, file: Path) -> Path | None:
     if place is None:
         return None
     folder = place / f"{module}-{_digest_of_closure(module, file)[:16]}"
+    if not folder.is_dir():
+        _drop_old(place, module)
     problem = _problem(folder)
     if problem is not None:
         _warn(problem)
         return None
     return folder
+
+
+def _drop_old(place: Path, module: str) -> None:
+    """Remove the machine code of earlier sources of a module; a checkout that still has them compiles them again."""
+    for folder in place.glob(f"{module}-*"):
+        with suppress(OSError):  # another program may be doing the same
+            if time.time() - folder.stat().st_mtime > KEPT_SECONDS:
+                shutil.rmtree(folder)
 
 
 def _digest_of_closure(module: str, file: Path) -> str:

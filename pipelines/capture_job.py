@@ -24,12 +24,10 @@ from footscan.report.calibration.capture_figure import capture_figure
 from pipelines.arrays import unpack
 from pipelines.calibrate import CaptureInputs, calibration_steps, camera_steps, fit_steps, recorded_inputs
 from pipelines.engine.actions.step import Failure, Outcome, Output, Step
-from pipelines.engine.files.file_digests import FileDigests
-from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import Threads
-from pipelines.engine.run import content_of, run_plan
-from pipelines.engine.store.lease import lease
-from pipelines.engine.store.store import Store, open_store
+from pipelines.engine.run import content_of
+from pipelines.engine.store.store import Store
+from pipelines.engine.workspace import Workspace
 from pipelines.recordings.captures import RecordedCapture
 from schemas.base.errors import DamagedError, Fault
 from schemas.calibration import Calibration, CameraCalibration
@@ -134,7 +132,7 @@ class _Job:
 
     name: str
     inputs: CaptureInputs
-    store: Store
+    workspace: Workspace
     workers: int
 
     @property
@@ -144,17 +142,16 @@ class _Job:
 
     def run(self, steps: Sequence[Step]) -> dict[str, bytes]:
         """The result of every step by its name; raises what refused one."""
-        plan = make_plan(steps, self.store)
-        with lease(self.store):
-            outcomes = run_plan(plan, self.store, pool=Threads(self.workers), on_step_end=lambda _: None)
+        with self.workspace.lease():
+            outcomes = self.workspace.run(steps, Threads(self.workers), lambda _: None)
             for step in steps:
                 if isinstance(failure := outcomes[step.name], Failure):
-                    _raise(failure, {step.name: step for step in steps}, outcomes, self.store)
+                    _raise(failure, {step.name: step for step in steps}, outcomes, self.workspace.store)
             return {name: self._result(name, outcome) for name, outcome in outcomes.items()}
 
     def _result(self, name: str, outcome: Outcome) -> bytes:
         assert not isinstance(outcome, Failure), "raised before"
-        result = self.store.get(outcome.digest)
+        result = self.workspace.store.get(outcome.digest)
         if result is None:
             raise DamagedError(f"{name}: the result is damaged, expected what was stored; run again")
         return result
@@ -163,16 +160,9 @@ class _Job:
 @contextmanager
 def _job(capture: RecordedCapture, workers: int, cache: Path | None) -> Iterator[_Job]:
     """The job of a capture; without a `cache` its store lasts as long as the job."""
-    with TemporaryDirectory(prefix="footscan-") as passing:
-        folder = cache or Path(passing)
-        store = open_store(folder, folder / "known.sqlite")
-        digests = FileDigests.load(folder / "files.json", store.secret)
-        try:
-            yield _Job(f"capture/{capture.folder.name}", recorded_inputs(capture, digests), store, workers)
-        finally:
-            digests.save()
-            if store.memory is not None:
-                store.memory.close()
+    with TemporaryDirectory(prefix="footscan-") as passing, Workspace(cache or Path(passing)) as workspace:
+        inputs = recorded_inputs(capture, workspace.digests)
+        yield _Job(f"capture/{capture.folder.name}", inputs, workspace, workers)
 
 
 def _raise(failure: Failure, steps: Mapping[str, Step], outcomes: Mapping[str, Outcome], store: Store) -> None:

@@ -7,19 +7,14 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from footscan.recordings.scans import SCAN_FILE, scan_folders
 from pipelines.archive.job import CACHE, Job, plan_job, run_job
 from pipelines.engine.actions.step import Step
-from pipelines.engine.deliver import deliver
-from pipelines.engine.files.file_digests import FileDigests
-from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import OnStepEnd, Threads, cores
-from pipelines.engine.run import run_plan
-from pipelines.engine.store.lease import lease
-from pipelines.engine.store.store import open_store
+from pipelines.engine.workspace import Workspace, digests_by_kind
 from pipelines.recordings.calibration_choice import CalibrationPlace
-from pipelines.recordings.scans import SCAN_FILE, scan_folders
 from pipelines.scan import STEPS
-from pipelines.simulate import digests_of, filmed_calibration_steps
+from pipelines.simulate import filmed_calibration_steps
 from schemas.base.errors import Fault
 from schemas.parameters.demo import FilmedFoot
 from schemas.parameters.scan import ScanParameters
@@ -49,7 +44,6 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
         The demo could not be run to its end.
     """
     results = folder / "results"
-    store = open_store(results / CACHE)
     seconds: dict[str, float] = {}
 
     @contextmanager
@@ -60,15 +54,14 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
         seconds[part] = time.perf_counter() - start
 
     filming = _filming(folder, foot)
-    plan = make_plan(filming, store)
-    with timed("filming and calibration", len(plan.to_run), len(plan.steps)) as on_step_end, lease(store):
-        outcomes = run_plan(plan, store, pool=Threads(1), on_step_end=on_step_end)
-    digests = digests_of(filming, outcomes)
-    files = FileDigests.load(results / CACHE / "files.json", store.secret)
-    if problem := deliver(
-        {"calibration.json": digests["calibrate"], "known.json": digests["film"]}, store, files, folder
-    ):
-        raise Fault(problem)
+    with Workspace(results / CACHE) as workspace:
+        plan = workspace.plan(filming)
+        with timed("filming and calibration", len(plan.to_run), len(plan.steps)) as on_step_end, workspace.lease():
+            outcomes = workspace.run(filming, Threads(1), on_step_end)
+        digests = digests_by_kind(filming, outcomes)
+        files = {"calibration.json": digests["calibrate"], "known.json": digests["film"]}
+        if problem := workspace.deliver(files, folder):
+            raise Fault(problem)
 
     planned = plan_job(_job(folder, results))
     with timed("reconstruction", planned.to_run, planned.steps) as on_step_end:

@@ -10,11 +10,11 @@ from typing import Protocol
 
 from footscan.frames.film import film_files
 from footscan.frames.travel import read_positions
+from footscan.recordings.scans import RecordedScan
 from pipelines.engine.actions.key import parameters_text
 from pipelines.engine.actions.step import Input, Output, SourceFile, Step, Value
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
-from pipelines.recordings.scans import RecordedScan
 from schemas.base.documents import Document, canonical_json
 from schemas.calibration import Calibration, Source
 from schemas.parameters.foot import FootParameters

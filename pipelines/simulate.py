@@ -1,13 +1,11 @@
-"""What every virtual recording needs beside its scan: a calibration of the virtual scanner, and its results by kind."""
+"""What every virtual recording needs beside its scan: a calibration of the virtual scanner."""
 
-from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from pipelines.calibrate import CaptureInputs, calibration_steps
-from pipelines.engine.actions.step import Failure, Outcome, Output, Step
+from pipelines.engine.actions.step import Output, Step
 from pipelines.recordings.captures import CAPTURE_FILE
 from pipelines.scan import STEPS
-from schemas.base.errors import Fault
 from schemas.parameters.calibration import CaptureCalibrationParameters
 from schemas.parameters.simulation import SimulationSettings
 
@@ -39,14 +37,3 @@ def _filmed_inputs(folder: Path, listing: Output) -> CaptureInputs:
         [CAPTURE_FILE, document.reference, *names.values()],
         listing,
     )
-
-
-def digests_of(steps: Iterable[Step], outcomes: Mapping[str, Outcome]) -> dict[str, str]:
-    """What each of `steps` came to, by its kind; Fault where one failed."""
-    digests: dict[str, str] = {}
-    for step in steps:
-        outcome = outcomes[step.name]
-        if isinstance(outcome, Failure):
-            raise Fault(f"{step.name}: {outcome.problem}")
-        digests[step.kind] = outcome.digest
-    return digests

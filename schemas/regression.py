@@ -20,7 +20,7 @@ class DataSet(Document):
     """Folder of a recorded scan."""
     virtual: VirtualScan | None = None
     calibration: Name | None = None
-    """File for a recorded scan; the one that it names where absent. A virtual scanner is calibrated by its own."""
+    """File for a recorded scan; default: the one that it names. A virtual scanner is calibrated by its own."""
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """In place of those of the suite, by section and name."""
 

@@ -56,7 +56,7 @@ class RigCamera(Document):
     device: Annotated[str, Field(min_length=1, max_length=1000)]
     """A stable name (/dev/v4l/by-id/..., /dev/v4l/by-path/...) or a URL."""
     head: HeadNumber | None = None
-    """The head it stands on; where absent, the usual one of its number."""
+    """The head that it is mounted on; default: the usual one of its number."""
     control_url: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
     """Where a network camera takes exposure and gain."""
     latency: RigLatency | None = None

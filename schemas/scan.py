@@ -31,7 +31,7 @@ class CameraFilm(CameraSource):
     background: RelativePath | None = None
     """A film, a folder of frames or an image with the laser off: one frame for all, or one for each of the film's."""
     travel: Travel | None = None
-    """The camera's own travel; the scan's where absent."""
+    """The camera's own travel; default: the scan's."""
     positions: RelativePath | None = None
     """CSV with columns frame, x_mm for uneven steps; it wins over `travel`."""
 
@@ -48,7 +48,7 @@ class Scan(Document):
     scanner: Pseudonym | None = None
     """Which scanner filmed it: a workflow may have a calibration for each."""
     date: datetime.date | None = None
-    """When; where absent, the day that the scan's name begins with, if it does."""
+    """Day of the scan; default: the day that the scan's name begins with, if any."""
     truth: RelativePath | None = None
     """Reference model in the scanner's own frame, for verification only."""
     cameras: Annotated[list[CameraFilm], Field(min_length=1)]

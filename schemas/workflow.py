@@ -53,9 +53,9 @@ class ChosenCalibration(Document):
     capture: AnyPath | None = None
     """Folder of a capture of the reference object."""
     scanner: Pseudonym | None = None
-    """For scans of this scanner; of any where absent."""
+    """For scans of this scanner; default: of any."""
     since: datetime.date | None = None
-    """For scans of this day and later, until the next one takes over; from the start where absent."""
+    """For scans of this day and later, until the next one takes over; default: from the start."""
 
     @model_validator(mode="after")
     def _file_or_capture(self) -> Self:
@@ -78,11 +78,11 @@ class Workflow(Document):
     results: AnyPath
     """Folder for `<patient>/<scan>/`."""
     cache: Annotated[str, AfterValidator(_place)] | None = None
-    """Folder of the content store, or its URL as fsspec has it; `.footscan` in the results where absent."""
+    """Folder of the content store, or its URL as fsspec has it; default: `.footscan` in the results."""
     group: Annotated[str, Field(min_length=1, max_length=64)] | None = None
-    """Group of users of this machine who share what is written; it is the owner's alone where absent."""
+    """Group of users of this machine who share what is written; default: it is the owner's alone."""
     workers: Annotated[int, Field(ge=1, le=256)] | None = None
-    """How many steps run at once; as many as there are cores where absent."""
+    """How many steps run at once; default: as many as there are cores."""
     parameters: Annotated[ScanParameters, BeforeValidator(_without_empty)] = ScanParameters()
     tune: Tuning | None = None
     """What `footscan tune` seeks."""

@@ -17,6 +17,9 @@ from footscan.virtual.filming.film import write_film
 from schemas.calibration import Calibration, CameraCalibration, HomographyMap, Source
 
 sys.path.insert(0, str(Path(__file__).parent / "helpers"))  # this folder itself would hide the packages
+
+from shared_folders import MadeOnce, once_a_code, once_a_run
+
 settings.register_profile("untimed", deadline=None)  # machines stand still now and then
 settings.load_profile("untimed")
 
@@ -33,19 +36,6 @@ STATIONS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 HALF_BREADTHS_MM = (24.0, 26.0, 28.0, 32.0, 32.0, 22.0)
 HEIGHTS_MM = (52.0, 52.0, 34.0, 20.0, 12.0, 8.0)
 DEPTHS_MM = (9.0, 10.5, 11.0, 11.5, 11.0, 9.0)
-
-REAL_TIME = (
-    "footscan/capture/",
-    "footscan/virtual/test_board",
-    "footscan/virtual/test_stage",
-    "footscan/virtual/test_stream",
-    "pipelines/console/",
-    "pipelines/live/",
-    "end_to_end/test_console",
-    "end_to_end/test_live_scan",
-    "fuzz/test_fuzz_scanner",
-)
-"""Tests that keep time with virtual hardware: `make test` runs them when no others compute."""
 
 WORKFLOW = """\
 format: footscan.workflow/1
@@ -65,6 +55,18 @@ cameras:
   - {{id: 1, file: cam1.avi}}
   - {{id: 5, file: cam5.avi}}
 """
+
+
+@pytest.fixture(scope="session")
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
+    """Folders that the workers of this test run share."""
+    return once_a_run(tmp_path_factory)
+
+
+@pytest.fixture(scope="session")
+def films(request: pytest.FixtureRequest) -> MadeOnce:
+    """Folders of films that test runs of the same simulator share. To be read only."""
+    return once_a_code(request.config.cache.mkdir("films"))
 
 
 @pytest.fixture(scope="session")
@@ -125,11 +127,3 @@ def _frame(camera: int, half_breadth: float, height: float, depth: float) -> byt
     light = 200 * np.exp(-0.5 * (distance / 1.8) ** 2) * is_seen
     image = np.clip(light[..., None] * [1.0, 0.12, 0.1] + 20, 0, 255).astype(np.uint8)
     return bytes(simplejpeg.encode_jpeg(image, 90, "RGB", "420"))
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Marks the tests that keep time."""
-    root = Path(__file__).parent
-    for item in items:
-        if item.path.relative_to(root).as_posix().startswith(REAL_TIME):
-            item.add_marker(pytest.mark.real_time)

@@ -15,6 +15,10 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("pipelines", "footscan", "schemas")
 LONGEST_MODULE = 400
 MOST_MODULES = 17
+PUBLIC = {"footscan/__init__.py", "footscan/measure/__init__.py"}
+"""What a script imports."""
+MOST_PARAMETERS = 9
+"""Of a compiled loop: what belongs together goes in as one named tuple."""
 KINDS = {"pipelines/steps", "schemas"}
 """Folders in which each module is one of a kind: a step, a document."""
 
@@ -34,6 +38,10 @@ def test_imports_run_pipelines_footscan_schemas_and_never_back() -> None:
 
 def test_modules_are_short() -> None:
     assert long_modules(ROOT) == []
+
+
+def test_compiled_loops_take_few_parameters() -> None:
+    assert wide_loops(ROOT) == []
 
 
 def test_no_circle_of_modules_or_of_rooms() -> None:
@@ -97,6 +105,14 @@ def test_a_module_of_one_line_too_many_is_seen(tmp_path: Path) -> None:
     line = "x = 1\n"
     build(tmp_path, {"footscan/a.py": line * 401, "pipelines/b.py": line * 400, "tests/test_c.py": line * 402})
     assert long_modules(tmp_path) == ["footscan/a.py: 401 lines", "tests/test_c.py: 402 lines"]
+
+
+def test_a_loop_of_one_parameter_too_many_is_seen(tmp_path: Path) -> None:
+    names = [f"array_{n}" for n in range(MOST_PARAMETERS)]
+    few, many = ", ".join(names), ", ".join([*names, "*", "last"])
+    source = f"@compiled\ndef few({few}): ...\n@compiled\ndef many({many}): ...\ndef plain({many}): ...\n"
+    build(tmp_path, {"footscan/stripe/profile.py": source})
+    assert wide_loops(tmp_path) == ["footscan/stripe/profile.py: many takes 10 parameters"]
 
 
 def test_a_silent_folder_is_seen(tmp_path: Path) -> None:
@@ -271,6 +287,21 @@ def first_circles(arrows: dict[str, set[str]]) -> list[str]:
     return found
 
 
+def wide_loops(root: Path) -> list[str]:
+    """Functions compiled to machine code that take more parameters than one sees at a glance."""
+    complaints = []
+    for path in modules_of(root, PACKAGES):
+        for function in ast.walk(ast.parse(path.read_bytes())):
+            if not isinstance(function, ast.FunctionDef):
+                continue
+            is_compiled = any(isinstance(by, ast.Name) and by.id == "compiled" for by in function.decorator_list)
+            taken = function.args
+            count = len(taken.posonlyargs) + len(taken.args) + len(taken.kwonlyargs)
+            if is_compiled and count > MOST_PARAMETERS:
+                complaints.append(f"{path.relative_to(root).as_posix()}: {function.name} takes {count} parameters")
+    return complaints
+
+
 def large_folders(root: Path) -> list[str]:
     """Folders of more modules than one sees at a glance, and prefixes that should be a folder."""
     complaints = []
@@ -295,7 +326,9 @@ def silent_folders(root: Path) -> list[str]:
             complaints.append(f"{folder.relative_to(root)}: no __init__.py")
             continue
         tree = ast.parse(introduction.read_bytes())
-        if ast.get_docstring(tree) is None or len(tree.body) > 1:
+        if introduction.relative_to(root).as_posix() not in PUBLIC and (
+            ast.get_docstring(tree) is None or len(tree.body) > 1
+        ):
             complaints.append(f"{introduction.relative_to(root)}: not a docstring alone")
     return complaints
 

@@ -1,6 +1,7 @@
 """Normals of a cloud, all pointing outward."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,18 @@ LEAST_BREADTH = 0.15
 stripe alone lie on a line. Else the radius is doubled."""
 PASSES = 50
 """So many times what neighbours decide spreads to their neighbours."""
+
+
+class Cells(NamedTuple):
+    """Points (N, 3) cell by cell, and which cells may hold neighbours."""
+
+    starts: NDArray[np.int64]
+    """(V + 1,): where the points of each cell begin."""
+    number: Ints
+    place: Ints
+    """Both as in `Voxels`."""
+    window: NDArray[np.int64]
+    """(3,): how many cells away along each axis a neighbour may be."""
 
 
 def estimate_normals(
@@ -58,14 +71,14 @@ def estimate_normals(
     order = np.argsort(voxels.voxel, kind="stable")
     starts = np.searchsorted(voxels.voxel[order], np.arange(len(voxels.place) + 1))
     windows = np.ceil(radius / voxels.size).astype(np.int64)
-    cells = (starts, voxels.number, voxels.place, windows)
+    cells = Cells(starts, voxels.number, voxels.place, windows)
 
     places = np.ascontiguousarray(xyz[order])
     normals = _fit(places, radius, *cells)
     cosines = _cosines(cloud[order], places, normals, views)
     normals[cosines < 0] *= -1
     sure = np.abs(cosines) >= parameters.grazing
-    _spread(places, radius, *cells, np.where(sure, PASSES, 0), normals)
+    _spread(places, radius, cells, np.where(sure, PASSES, 0), normals)
     oriented = np.empty((len(cloud), 3), np.float32)
     oriented[order] = normals
     return oriented
@@ -143,10 +156,7 @@ def _cosines(cloud: NDArray[np.void], xyz: Floats, normals: Floats, views: Mappi
 def _spread(
     xyz: Floats,
     radius: float,
-    starts: NDArray[np.int64],
-    number: Ints,
-    place: Ints,
-    window: NDArray[np.int64],
+    cells: Cells,
     since: NDArray[np.int64],
     normals: Floats,
 ) -> None:
@@ -154,13 +164,14 @@ def _spread(
 
     `since` (N,): the pass from which each counts, counted down; 0 for those that are not sure.
     """
+    starts, _, place, _ = cells
     for step in range(PASSES - 1, 0, -1):
         found = False
         for v in range(len(place)):
             for n in range(starts[v], starts[v + 1]):
                 if since[n]:
                     continue
-                vote = _vote(n, xyz, radius, starts, number, place[v], window, since, step, normals)
+                vote = _vote(n, place[v], xyz, radius, cells, since, step, normals)
                 if vote != 0.0:
                     found = True
                     since[n] = step
@@ -177,17 +188,16 @@ def _spread(
 @compiled
 def _vote(
     n: int,
+    place: Ints,
     xyz: Floats,
     radius: float,
-    starts: NDArray[np.int64],
-    number: Ints,
-    place: Ints,
-    window: NDArray[np.int64],
+    cells: Cells,
     since: NDArray[np.int64],
     step: int,
     normals: Floats,
 ) -> float:
-    """How well the normal of point `n` agrees with those around it that were sure before this step."""
+    """How well the normal of point `n`, in the cell at `place`, agrees with those around that were sure before."""
+    starts, number, _, window = cells
     total = 0.0
     for i in range(place[0] - window[0], place[0] + window[0] + 1):
         for j in range(place[1] - window[1], place[1] + window[1] + 1):

@@ -47,6 +47,17 @@ class Sight(NamedTuple):
     """Cells of twice the size that hold points."""
 
 
+class Eyes(NamedTuple):
+    """Where cameras stand and what they can see."""
+
+    centres: Floats
+    """(C, 3) mm; NaN where a camera's place is not known."""
+    sides: Floats
+    """As `_sides` gives them, of all cameras one after the other."""
+    bounds: NDArray[np.int64]
+    """(C + 1,): where the sides of each camera begin."""
+
+
 def sight_of(xyz: Floats, camera: NDArray[np.uint8], cameras: int, voxels: Voxels) -> Sight:
     """Sums up points (N, 3); `camera` (N,) is the place of each one's camera in a list of so many."""
     seen, films, normals = _sum_up(xyz, camera, cameras, voxels.number, voxels.voxel, voxels.place)
@@ -68,10 +79,7 @@ def ask_others(
     centres = np.array([np.full(3, np.nan) if view is None else view.centre for view in views])
     sides = [_sides(view) for view in views]
     bounds = np.concatenate([[0], np.cumsum([len(side) for side in sides])])
-    return _ask(
-        xyz, camera, voxel, centres, np.concatenate(sides), bounds,
-        voxels.origin, voxels.size, voxels.number, voxels.place, *sight,
-    )  # fmt: skip
+    return _ask(xyz, camera, voxel, Eyes(centres, np.concatenate(sides), bounds), voxels, sight)
 
 
 def _sides(view: View | None) -> Floats:
@@ -117,18 +125,13 @@ def _ask(
     xyz: Floats,
     camera: NDArray[np.uint8],
     voxel: Ints,
-    centres: Floats,
-    sides: Floats,
-    bounds: NDArray[np.int64],
-    origin: Floats,
-    size: Floats,
-    number: Ints,
-    place: Ints,
-    seen: NDArray[np.uint64],
-    normals: Floats,
-    films: NDArray[np.bool_],
-    solid: NDArray[np.bool_],
+    eyes: Eyes,
+    voxels: Voxels,
+    sight: Sight,
 ) -> NDArray[np.uint8]:
+    centres, sides, bounds = eyes
+    origin, size, number, _, place = voxels
+    seen, normals, films, solid = sight
     answers = np.zeros(len(xyz), np.uint8)
     for n in range(len(xyz)):
         x, y, z = xyz[n]
@@ -143,7 +146,7 @@ def _ask(
         facing_own = 0.0 if np.isnan(to_own) else np.sign(to_own)
         own_cosine = abs(to_own) / np.sqrt(dx * dx + dy * dy + dz * dz)
         facing = max(min(FACING, AS_WELL * own_cosine), GRAZING)
-        if not np.isnan(to_own) and _behind_surface(x, y, z, dx, dy, dz, origin, size, number, seen, ~own):
+        if not np.isnan(to_own) and _behind_surface(x, y, z, dx, dy, dz, voxels, seen, ~own):
             answers[n] = DENIED
             continue
         nx, ny, nz = facing_own * nx, facing_own * ny, facing_own * nz
@@ -206,10 +209,11 @@ def _hidden(
 
 @compiled
 def _behind_surface(
-    x: float, y: float, z: float, dx: float, dy: float, dz: float, origin: Floats, size: Floats, number: Ints,
+    x: float, y: float, z: float, dx: float, dy: float, dz: float, voxels: Voxels,
     seen: NDArray[np.uint64], others: np.uint64,
 ) -> bool:  # fmt: skip
     """Whether what other cameras saw lies on the way (dx, dy, dz) from a point to the camera that says it saw it."""
+    origin, size, number, _, _ = voxels
     stride = 0.5 * size[1] / np.sqrt(dx * dx + dy * dy + dz * dz)
     part = BEFORE_CELLS * 2.0 * stride
     while part < 1.0:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, BinaryIO, TypeVar
 
 import numpy as np
 
@@ -232,8 +232,25 @@ def _declared_length(path: Path) -> tuple[int, int | None]:
             if position - size % 2 > length:
                 missing = position - size % 2 - length
                 raise RefusedInput(path, f"truncated: {missing} of {position} bytes are missing", field="length")
+            _refuse_large_frames(file, path, position - 8 - size - size % 2, position)
     declared = int.from_bytes(head[48:52], "little")
     return declared, declared if declared and chunks == 1 else None
+
+
+def _refuse_large_frames(file: BinaryIO, path: Path, begin: int, end: int) -> None:
+    """Refuses a RIFF chunk with frames larger than an image may be: FFmpeg would read each as a whole."""
+    position, chunks = begin + 12, 0
+    while position + 8 <= end:
+        file.seek(position)
+        tag, size, kind = file.read(4), int.from_bytes(file.read(4), "little"), file.read(4)
+        chunks += 1
+        if tag == b"LIST" and kind in {b"movi", b"rec "}:
+            position += 12  # its chunks follow
+            continue
+        if tag[2:] in {b"dc", b"db"}:
+            refuse_beyond("image_bytes", size, path)
+        refuse_beyond("film_chunks", chunks, path)
+        position += 8 + size + size % 2
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 import math
 import threading
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +63,6 @@ def find_stripe(
     rows, columns, _ = image.shape
     if rows == 0 or columns == 0:
         return np.empty((0, MEASURED))
-    buffers = _buffers(rows, columns)
     words = as_words(image)
     light = words
     if background is not None:
@@ -73,9 +73,7 @@ def find_stripe(
             words,
             light,
             background is not None,
-            buffers.excess,
-            buffers.signal,
-            buffers.ridges,
+            _memory(rows, columns),
             gaussian(0.5 * parameters.ridge_px),
             limits_of(parameters),
             (
@@ -106,6 +104,16 @@ def as_points(found: NDArray[np.float64], frame: NDArray[np.int32]) -> StripePoi
     return points
 
 
+class Memory(NamedTuple):
+    """What a frame of (rows, columns) is worked out in."""
+
+    excess: NDArray[np.uint16]
+    signal: NDArray[np.uint16]
+    """Both (ceil(rows / 2), ceil(columns / 2))."""
+    ridges: NDArray[np.float64]
+    """(M, 5)."""
+
+
 class _Buffers(threading.local):
     """Working memory of one thread, used again for every frame of one size."""
 
@@ -115,17 +123,16 @@ class _Buffers(threading.local):
     def allocate(self, rows: int, columns: int) -> None:
         self.shape = rows, columns
         half = math.ceil(rows / 2), math.ceil(columns / 2)
-        self.excess, self.signal = np.empty(half, np.uint16), np.empty(half, np.uint16)
-        self.ridges = np.empty((8 * sum(half), 5))
+        self.memory = Memory(np.empty(half, np.uint16), np.empty(half, np.uint16), np.empty((8 * sum(half), 5)))
 
 
 _BUFFERS = _Buffers()
 
 
-def _buffers(rows: int, columns: int) -> _Buffers:
+def _memory(rows: int, columns: int) -> Memory:
     if _BUFFERS.shape != (rows, columns):
         _BUFFERS.allocate(rows, columns)
-    return _BUFFERS
+    return _BUFFERS.memory
 
 
 @compiled
@@ -133,9 +140,7 @@ def _find_points(
     words: NDArray[np.uint32],
     light: NDArray[np.uint32],
     has_background: bool,
-    excess: NDArray[np.uint16],
-    signal: NDArray[np.uint16],
-    ridges: NDArray[np.float64],
+    memory: Memory,
     kernel: NDArray[np.float32],
     limits: Limits,
     piece_limits: tuple[float, float, float, float, float, float],
@@ -143,6 +148,7 @@ def _find_points(
     smoothing_widths: float,
 ) -> NDArray[np.float64]:
     rows, columns = words.shape
+    excess, signal, ridges = memory
     halve(light, limits.saturation, excess, signal)
     if has_background:
         mark_saturated(words, limits.saturation, excess)

@@ -6,6 +6,7 @@ so is the mean of both where the stripe runs along the rows.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,44 @@ FOOT_SAMPLES = 4
 """So many samples at the foot tell how red it is."""
 
 
+class Way(NamedTuple):
+    """The normal of a stripe through the pixels of a picture (rows * columns,), line by line."""
+
+    line: int
+    pixel: int
+    """How far apart, in the picture, two lines are and two pixels of one."""
+    at: int
+    """The line on which the ridge is."""
+    beside: float
+    """Where the normal meets that line, px."""
+    slope: float
+    """How far that moves on from line to line, px."""
+    back: int
+    ahead: int
+    """How many lines it may be followed."""
+
+
+class Samples(NamedTuple):
+    """Memory for the samples of one profile, the ridge in the middle of it."""
+
+    signal: NDArray[np.float64]
+    white: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    """The pixel nearest to each."""
+    clipped: NDArray[np.bool_]
+
+
+class Feet(NamedTuple):
+    """Where a profile begins and ends."""
+
+    first: int
+    last: int
+    base: float
+    """The level of the higher foot."""
+    is_even: bool
+    """Whether both feet are even."""
+
+
 @compiled
 def measure_profiles(
     words: NDArray[np.uint32],
@@ -59,8 +98,8 @@ def measure_profiles(
     """
     rows, columns = words.shape
     reach = math.ceil(limits.largest_width)
-    samples, white = np.empty(2 * reach + 1), np.empty(2 * reach + 1)
-    clipped, cells = np.empty(2 * reach + 1, np.bool_), np.empty(2 * reach + 1, np.int64)
+    size = 2 * reach + 1
+    samples = Samples(np.empty(size), np.empty(size), np.empty(size, np.int64), np.empty(size, np.bool_))
     words, light = words.ravel(), light.ravel()
     count = 0
     for n in range(len(ridges)):
@@ -75,14 +114,12 @@ def measure_profiles(
         at = round(ridge)
         beside = other + (at - ridge) * slope
         back, ahead = _steps_inside(at, lines, beside, pixels, slope, reach)
-        first, last, base, is_even = _walk(
-            light, line, pixel, at, beside, slope, reach, back, ahead, limits, samples, white, cells
-        )
+        way = Way(line, pixel, at, beside, slope, back, ahead)
+        first, last, base, is_even = _walk(light, way, limits, samples)
         if first == last:
             continue
-        centre = _measure(
-            words, light, samples, white, cells, clipped, first, last, base, is_even, step, limits, profiles, count
-        )
+        feet = Feet(first, last, base, is_even)
+        centre = _measure(words, light, samples, feet, step, limits, profiles, count)
         if math.isnan(centre):
             continue
         ridge, other = at + centre - reach, beside + (centre - reach) * slope
@@ -109,27 +146,15 @@ def _steps_inside(at: int, lines: int, beside: float, pixels: int, slope: float,
 
 
 @compiled
-def _walk(
-    light: NDArray[np.uint32],
-    line: int,
-    pixel: int,
-    at: int,
-    beside: float,
-    slope: float,
-    middle: int,
-    back: int,
-    ahead: int,
-    limits: Limits,
-    samples: NDArray[np.float64],
-    white: NDArray[np.float64],
-    cells: NDArray[np.int64],
-) -> tuple[int, int, float, bool]:
+def _walk(light: NDArray[np.uint32], way: Way, limits: Limits, memory: Samples) -> tuple[int, int, float, bool]:
     """Samples outward from the ridge to both feet of the stripe; the first and the last one, equal where there is none.
 
     And the level of the higher foot: what lies above it is the laser's, whatever edge runs beside the stripe; and
     whether both feet are even, not valleys before other light.
-    `line` and `pixel` are the distances, in `light` (rows * columns,), of two lines and of two pixels of one.
     """
+    line, pixel, at, beside, slope, back, ahead = way
+    samples, white, cells, _ = memory
+    middle = samples.size // 2
     if back < 1 or ahead < 1:
         return 0, 0, 0.0, False
     smallest = SIGNAL_SCALE * limits.faintest
@@ -181,20 +206,16 @@ def _walk(
 def _measure(
     words: NDArray[np.uint32],
     light: NDArray[np.uint32],
-    samples: NDArray[np.float64],
-    white: NDArray[np.float64],
-    cells: NDArray[np.int64],
-    clipped: NDArray[np.bool_],
-    first: int,
-    last: int,
-    base: float,
-    is_even: bool,
+    memory: Samples,
+    feet: Feet,
     step: float,
     limits: Limits,
     profiles: NDArray[np.float64],
     n: int,
 ) -> float:
     """The centre in samples; NaN where it is no stripe. What the profile is like goes into row `n` of `profiles`."""
+    samples, white, cells, clipped = memory
+    first, last, base, is_even = feet
     middle = samples.size // 2
     if is_even:
         base = _level(samples, first, middle, last, base)

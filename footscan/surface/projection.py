@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
-from footscan.mesh.buckets import sort_into_cubes
+from footscan.mesh.buckets import Buckets, sort_into_cubes
 
 STEEPEST = 0.35
 """Sine of the angle between surface and stripe planes below which neighbouring stripes count as no farther apart: what
@@ -65,7 +65,7 @@ def project(
     rounds : each starts from where the one before has moved to, with the normal found there
     """
     buckets = sort_into_cubes(cloud, reach_steps * step_mm)
-    moved = _project(points, normals, cloud, cloud_normals, step_mm, reach_steps, rounds, *buckets)
+    moved = _project(points, normals, cloud, cloud_normals, step_mm, reach_steps, rounds, buckets)
     return Projection(*moved)
 
 
@@ -78,12 +78,9 @@ def _project(  # noqa: PLR0912, PLR0915 (a call a neighbour would cost more than
     step: float,
     reach: float,
     rounds: int,
-    edge: float,
-    low: Floats,
-    dims: NDArray[np.int64],
-    start: NDArray[np.int64],
-    order: NDArray[np.int64],
+    buckets: Buckets,
 ) -> tuple[Floats, Floats, Floats, NDArray[np.int64], NDArray[np.int64]]:
+    edge, low, dims, start, order = buckets
     count = len(points)
     moved, turned = points.copy(), normals.copy()
     gap, sectors, nearest = np.full(count, np.inf), np.zeros(count, np.int64), np.full(count, -1)

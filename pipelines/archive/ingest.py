@@ -7,7 +7,7 @@ from typing import Any
 
 from footscan.frames.film import film_files
 from footscan.frames.ingest import ingest_background, ingest_film
-from pipelines.recordings.scans import SCAN_FILE, read_scan, scan_folders
+from footscan.recordings.scans import SCAN_FILE, read_scan, scan_folders
 from schemas.base.errors import FootscanError, RefusedInput
 
 

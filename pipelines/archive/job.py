@@ -8,24 +8,20 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
+from footscan.recordings.scans import RecordedScan, read_scan, scan_folders
 from pipelines.archive.workflow_file import check_archives, read_workflow
 from pipelines.calibrate import CaptureInputs, CaptureOfScan, recorded_inputs
 from pipelines.engine.actions.step import Failure, Outcome, Step, Success
-from pipelines.engine.deliver import deliver
 from pipelines.engine.files.access import group_number, share
 from pipelines.engine.files.digest import sha256
-from pipelines.engine.files.file_digests import FileDigests
 from pipelines.engine.files.places import open_files
-from pipelines.engine.plan import Plan, make_plan
+from pipelines.engine.plan import Plan
 from pipelines.engine.pool import OnStepEnd, Pool, cores
-from pipelines.engine.run import run_plan
 from pipelines.engine.store.erasure_notes import cut_off
-from pipelines.engine.store.lease import lease
 from pipelines.engine.store.permissions import warn_if_others_can_write
-from pipelines.engine.store.store import Store, open_store
+from pipelines.engine.workspace import Workspace
 from pipelines.recordings.calibration_choice import CalibrationPlace, calibration_places, choose_calibration
 from pipelines.recordings.captures import read_capture
-from pipelines.recordings.scans import RecordedScan, read_scan, scan_folders
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
 from schemas.base.documents import read_text
 from schemas.base.errors import RefusedInput
@@ -106,8 +102,7 @@ class PlannedJob:
     """What a job has to do."""
 
     job: Job
-    store: Store
-    digests: FileDigests
+    workspace: Workspace
     calibrations: dict[Path, CalibrationFile] = field(default_factory=dict)
     captures: dict[Path, CaptureInputs] = field(default_factory=dict)
     """By their folders, as `calibrations` by their files."""
@@ -204,9 +199,7 @@ def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None
         Of the scans of earlier jobs on the same archive, by name, so that none is overwritten; those of this job are
         added.
     """
-    local = job.cache if isinstance(job.cache, Path) else job.results / CACHE
-    store = open_store(job.cache, local / "known.sqlite")
-    planned = PlannedJob(job, store, FileDigests.load(local / "files.json", store.secret))
+    planned = PlannedJob(job, workspace_of(job))
     folders = {} if folders is None else folders
     for folder in job.folders:
         name = str(folder)
@@ -217,7 +210,7 @@ def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None
                 raise RefusedInput(scan.file, f"{scan.name} is also in {other}, expected each scan once")
             name = scan.name
             folders[name] = folder
-            plan = make_plan(draw_steps(scan, planned), planned.store)
+            plan = planned.workspace.plan(draw_steps(scan, planned))
         except RefusedInput as error:
             planned.refused.append(Refused(name, folder.resolve(), error))
             continue
@@ -229,6 +222,11 @@ def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None
     return planned
 
 
+def workspace_of(job: Job) -> Workspace:
+    """Where the graphs of a job run; RefusedInput as in `Workspace`."""
+    return Workspace(job.cache, job.cache if isinstance(job.cache, Path) else job.results / CACHE)
+
+
 def draw_steps(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
     """The steps of one scan of a job, and those of the capture that it is calibrated from.
 
@@ -238,7 +236,7 @@ def draw_steps(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
         As in `scan_steps` and `recorded_inputs`, or the scan has no calibration.
     """
     calibration = _calibration(scan, planned)
-    steps = scan_steps(scan, calibration, planned.job.parameters, planned.digests)
+    steps = scan_steps(scan, calibration, planned.job.parameters, planned.workspace.digests)
     return [*calibration.steps, *steps] if isinstance(calibration, CaptureOfScan) else steps
 
 
@@ -248,18 +246,14 @@ def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator
         yield ScanEnd(name, folder, None, str(error), "refused")
     waiting = iter(planned.scans)
     share_written(planned)
-    warn_if_others_can_write(planned.store, planned.job.group)
-    for name in cut_off(planned.store):
+    warn_if_others_can_write(planned.workspace.store, planned.job.group)
+    for name in cut_off(planned.workspace.store):
         log.warning("%s: its erasure was cut off; 'footscan forget' of it finishes that", name)
-    held = lease(planned.store) if planned.to_run else nullcontext()  # what runs nothing uses what it has looked up
-    try:
-        with held:
-            while window := list(islice(waiting, WINDOW * pool.count)):
-                yield from _run_window(window, planned, pool, on_step_end)
-    finally:
-        planned.digests.save()
-        if planned.store.memory is not None:
-            planned.store.memory.close()
+    # What runs nothing uses what it has looked up.
+    held = planned.workspace.lease() if planned.to_run else nullcontext()
+    with planned.workspace, held:
+        while window := list(islice(waiting, WINDOW * pool.count)):
+            yield from _run_window(window, planned, pool, on_step_end)
 
 
 def share_written(planned: PlannedJob) -> None:
@@ -305,32 +299,14 @@ def _run_window(
     for scan in window:
         if scan.to_run:
             steps += draw_steps(scan.scan, planned)
-    outcomes = _run_and_mend(steps, planned, pool, on_step_end)
+    outcomes = planned.workspace.run(steps, pool, on_step_end)
     for scan in window:
         end = _end_scan(scan, outcomes, planned)
         if end.kind == "damaged":
             log.warning("%s", end.problem)
-            again = _run_and_mend(draw_steps(scan.scan, planned), planned, pool, on_step_end)
+            again = planned.workspace.run(draw_steps(scan.scan, planned), pool, on_step_end)
             end = _end_scan(scan, again, planned)
         yield end
-
-
-def _run_and_mend(steps: Sequence[Step], planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> dict[str, Outcome]:
-    """Run steps; what turns out to be damaged has been set aside then, and is made anew by another run of them."""
-    told: set[str] = set()
-    while True:  # behind what was damaged there may be more
-        plan = make_plan(steps, planned.store)
-        outcomes = run_plan(plan, planned.store, pool=pool, on_step_end=on_step_end)
-        damage = _damage(outcomes) - told
-        if not damage:
-            return outcomes
-        for problem in sorted(damage):
-            log.warning("%s", problem)
-        told |= damage
-
-
-def _damage(outcomes: Mapping[str, Outcome]) -> set[str]:
-    return {end.problem for end in outcomes.values() if isinstance(end, Failure) and end.kind == "damaged"}
 
 
 def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planned: PlannedJob) -> ScanEnd:
@@ -345,9 +321,10 @@ def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planne
             told = outcome.problem + _what_stays(target)
             return ScanEnd(scan.name, scan.folder, None, told, outcome.kind, document=scan.document)
         digests[file] = outcome.digest
-    problem = deliver(digests, planned.store, planned.digests, target)
+    problem = planned.workspace.deliver(digests, target)
     if problem is not None:
-        whole = all(planned.store.has(digest) for digest in digests.values())  # what is damaged has been set aside
+        has = planned.workspace.store.has  # not what is damaged: that has been set aside
+        whole = all(has(digest) for digest in digests.values())
         kind = "fault" if whole else "damaged"
         return ScanEnd(scan.name, scan.folder, None, problem, kind, document=scan.document)
     finding = Measures.model_validate_json((target / "measures.json").read_bytes()).finding
@@ -368,7 +345,7 @@ def _calibration(scan: RecordedScan, planned: PlannedJob) -> CalibrationFile | C
     path = place.file
     if place.is_capture:
         if path not in planned.captures:
-            planned.captures[path] = recorded_inputs(read_capture(path), planned.digests)
+            planned.captures[path] = recorded_inputs(read_capture(path), planned.workspace.digests)
         return CaptureOfScan.drawn(scan.name, planned.captures[path])
     if path not in planned.calibrations:
         text = read_text(path, "json_bytes")

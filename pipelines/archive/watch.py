@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from footscan.frames.film import film_files
-from pipelines.recordings.scans import SCAN_FILE, read_scan, scan_folders
+from footscan.recordings.scans import SCAN_FILE, read_scan, scan_folders
 from schemas.base.errors import FootscanError
 
 QUIET_S = 5.0

@@ -36,7 +36,7 @@ def extract(
         Path, typer.Argument(parser=_path("FILE"), help="An image, a film (AVI) or a folder of frames, of any size.")
     ],
     out: Annotated[
-        Path | None, typer.Option(parser=_path("--out"), help="CSV to write; standard output where absent.")
+        Path | None, typer.Option(parser=_path("--out"), help="CSV to write; default: standard output.")
     ] = None,
     overlay: Annotated[
         Path | None, typer.Option(parser=_path("--overlay"), help="Draw the points over the frames here (PNG).")

@@ -27,7 +27,7 @@ def simulate_scan(
     foot: Annotated[Literal["right", "left"] | None, typer.Option(help="The parametric foot, not a mesh.")] = None,
     block: Annotated[bool, typer.Option("--block", help="The block of 150 x 100 x 50 mm instead of a mesh.")] = False,
     patient: Annotated[str, typer.Option(help="Pseudonym.")] = "P0001",
-    scan: Annotated[str, typer.Option(help="Name of the scan; the folder's name where absent.")] = "",
+    scan: Annotated[str, typer.Option(help="Name of the scan; default: the folder's name.")] = "",
     side: Annotated[Literal["right", "left", "unknown"], typer.Option(help="Which foot a mesh is.")] = "unknown",
     calibration: Annotated[str | None, typer.Option(help="Path that scan.yaml shall name, relative to it.")] = None,
     turn_deg: Annotated[

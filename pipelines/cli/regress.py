@@ -22,15 +22,13 @@ SUITE = Path("regression/suite.yaml")
 
 
 def regress(
-    suite: Annotated[Path | None, typer.Argument(help=f"The suite; {SUITE} where absent.", metavar="[SUITE]")] = None,
+    suite: Annotated[Path | None, typer.Argument(help=f"The suite; default: {SUITE}.", metavar="[SUITE]")] = None,
     accept: Annotated[
         str | None, typer.Option("--accept", metavar="REASON", help="Make what comes out the baseline, and say why.")
     ] = None,
-    accepted_by: Annotated[
-        str | None, typer.Option("--by", help="Who accepts; the name that you are logged in by where absent.")
-    ] = None,
+    accepted_by: Annotated[str | None, typer.Option("--by", help="Who accepts; default: your login name.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of films, cache, history and page; the suite's where absent.")
+        Path | None, typer.Option(help="Folder of films, cache, history and page; default: the suite's.")
     ] = None,
     junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here.")] = None,
     check_last: Annotated[

@@ -59,7 +59,7 @@ def make_plan(steps: Sequence[Step], store: Store) -> Plan:
         Each after the steps whose results it takes.
     """
     planned: dict[str, PlannedStep] = {}
-    with _all_kept(), nullcontext() if store.memory is None else store.memory.reading():
+    with _all_kept(), nullcontext() if store.verified is None else store.verified.reading():
         for step in steps:
             planned[step.name] = _plan_step(step, planned, store)
     return Plan(list(planned.values()))

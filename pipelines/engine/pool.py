@@ -233,7 +233,7 @@ def _deaf_to_ctrl_c() -> Iterator[None]:
 def joined_cluster(address: str, certificates: Certificates | None = None) -> Iterator[Cluster]:
     """The workers of a scheduler that was started elsewhere; RefusedInput where none answers.
 
-    `certificates` : for an address that begins with `tls://`; those of Dask's own configuration where absent.
+    `certificates` : for an address that begins with `tls://`; default: those of Dask's own configuration.
     """
     _quieten()
     from distributed import Client

@@ -6,12 +6,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.archive.job import CACHE, Job
-from pipelines.engine.files.file_digests import FileDigests
+from pipelines.archive.job import Job, workspace_of
 from pipelines.engine.files.places import LocalFiles
 from pipelines.engine.store.erasure_notes import FOLDER, note_name
 from pipelines.engine.store.lease import Lease, lease, live_leases
-from pipelines.engine.store.store import Store, open_store
+from pipelines.engine.store.store import Store
+from pipelines.engine.workspace import Workspace
 from pipelines.forget.nights import Nights, erase_nights, find_nights
 from pipelines.forget.proof import find_remains
 from pipelines.forget.shares import Shares, find_shares
@@ -32,7 +32,7 @@ class Erasure:
 
     subject: Subject
     job: Job
-    store: Store
+    workspace: Workspace
     belongings: Belongings
     shares: Shares
     texts: list[Path]
@@ -40,6 +40,11 @@ class Erasure:
     was_cut_off: bool
     remains: list[str] = field(default_factory=list)
     """Where something was found after all."""
+
+    @property
+    def store(self) -> Store:
+        """The store of the workflow."""
+        return self.workspace.store
 
     @property
     def is_empty(self) -> bool:
@@ -70,12 +75,11 @@ def find_erasure(
     RefusedInput
         A folder of this name is a link, or a log is not there.
     """
-    local = job.cache if isinstance(job.cache, Path) else job.results / CACHE
-    store = open_store(job.cache, local / "known.sqlite")
+    workspace = workspace_of(job)
+    store = workspace.store
     belongings = find_belongings(subject, job.archives, job.results)
-    digests = FileDigests.load(local / "files.json", store.secret)
     files = (file for name in DELIVERED for file in job.results.glob(f"*/*/{name}") if file.is_file())
-    delivered = {digests.of(file)[0] for file in files if not subject.has("/".join(file.parts[-3:-1]))}
+    delivered = {workspace.digests.of(file)[0] for file in files if not subject.has("/".join(file.parts[-3:-1]))}
     shares = find_shares(subject, store, delivered)
     was_cut_off = store.files.state(note_name(subject.name)) is not None
     if was_cut_off:
@@ -83,9 +87,9 @@ def find_erasure(
         known = parse_json(store.files.path(name), store.files.read(name).decode())
         belongings.digests |= set(known["digests"])
         belongings.sizes |= set(known["sizes"])
-    texts = texts_that_name(subject, [job.results, *([local] if local.is_dir() else [])], logs)
+    texts = texts_that_name(subject, [job.results, *([workspace.local] if workspace.local.is_dir() else [])], logs)
     nights = find_nights(subject, suites, belongings.folders)
-    return Erasure(subject, job, store, belongings, shares, texts, nights, was_cut_off)
+    return Erasure(subject, job, workspace, belongings, shares, texts, nights, was_cut_off)
 
 
 def erase(found: Erasure) -> list[Lease]:
@@ -128,11 +132,10 @@ def _erase_from_store(found: Erasure, own: str) -> list[Lease]:
         if number % CHECK_EVERY == 0 and (live := [one for one in live_leases(found.store) if one.name != own]):
             return live
         found.store.files.remove(name)
-    if found.store.memory is not None:
-        found.store.memory.keep_only(found.shares.kept_keys)
-    digests = FileDigests.load(_local(found.job) / "files.json", found.store.secret)
+    if found.store.verified is not None:
+        found.store.verified.keep_only(found.shares.kept_keys)
     roots = [place.absolute() for place in found.belongings.folders]
-    digests.forget(
+    found.workspace.digests.forget(
         lambda path, digest: (
             any(Path(path).is_relative_to(root) for root in roots)
             or digest in found.belongings.digests
@@ -179,7 +182,3 @@ def _clear_folders(found: Erasure, kind: str) -> None:
         for folder in (f"{kind}/{found.subject.patient}", kind):
             with suppress(OSError):
                 Path(found.store.files.path(folder)).rmdir()
-
-
-def _local(job: Job) -> Path:
-    return job.cache if isinstance(job.cache, Path) else job.results / CACHE

@@ -4,9 +4,9 @@ import os
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
+from footscan.recordings.scans import SCAN_FILE
 from pipelines.engine.store.store import Store
 from pipelines.forget.subject import CHUNK, Subject, digest_of, files_below
-from pipelines.recordings.scans import SCAN_FILE
 
 OF_A_SCAN = (SCAN_FILE, "measures.json")
 """A folder that holds one of these is a scan's, or that of its results."""

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.recordings.scans import read_scan, scan_folders
+from footscan.recordings.scans import read_scan, scan_folders
 from schemas.base.documents import pseudonym
 from schemas.base.errors import FootscanError, RefusedInput
 from schemas.frames import GROUP

@@ -5,12 +5,12 @@ import json
 from collections.abc import Collection
 from pathlib import Path
 
+from footscan.recordings.scans import read_scan, scan_folders
 from pipelines.archive.job import ScanEnd
 from pipelines.archive.page import FILES, PAGE
 from pipelines.archive.table import CSV, PARQUET, write_results_table
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.forget.subject import Subject
-from pipelines.recordings.scans import read_scan, scan_folders
 from pipelines.scan import DELIVERED
 from schemas.base.errors import FootscanError, RefusedInput
 from schemas.scan import Scan

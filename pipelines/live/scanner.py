@@ -46,7 +46,7 @@ class ScanOrder:
     results: Path | None = None
     """None: the scan is stored, and not measured."""
     calibration: Path | None = None
-    """The one of the rig where absent."""
+    """Default: the one of the rig."""
     light: ScanLight | None = None
     """None: chosen by what the cameras see."""
     texture: bool = False

@@ -1,1 +1,1 @@
-"""Recorded scans and captures: finding them, and checking what their documents promise."""
+"""Captures of a scanner and its calibrations: finding them, and choosing the one of a scan."""

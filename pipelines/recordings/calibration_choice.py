@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from pipelines.recordings.scans import RecordedScan
+from footscan.recordings.scans import RecordedScan
 from schemas.base.errors import RefusedInput
 from schemas.workflow import Workflow
 

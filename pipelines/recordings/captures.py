@@ -5,8 +5,8 @@ from pathlib import Path
 
 from footscan.frames.film import film_files, open_film
 from footscan.frames.ingest import FRAME_SIZE
-from pipelines.recordings.film_paths import film_inside
-from pipelines.recordings.scans import recorded_folder
+from footscan.recordings.film_paths import film_inside
+from footscan.recordings.scans import recorded_folder
 from schemas.base.documents import inside, read_yaml
 from schemas.base.errors import RefusedInput
 from schemas.mounting import CaptureCamera

@@ -9,7 +9,6 @@ from typing import Literal
 
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.pool import OnStepEnd
-from pipelines.engine.store.lease import lease
 from pipelines.regression.baseline import (
     read_baseline,
     read_good_steps,
@@ -26,7 +25,7 @@ from pipelines.regression.pictures import difference_pictures
 from pipelines.regression.report.page import regress_page
 from pipelines.regression.report.result import Accepted, JudgedSet, NightResult, Verdict
 from pipelines.regression.run_set import SetRun, run_set
-from pipelines.regression.sets import parameters_of, prepare, store_of
+from pipelines.regression.sets import parameters_of, prepare, workspace_of
 from pipelines.version import SOFTWARE
 from schemas.base.documents import read_yaml
 from schemas.base.errors import Fault, FootscanError, RefusedInput
@@ -114,7 +113,7 @@ def run_night(regression: Regression, on_step_end: OnStepEnd, on_set: OnSet, acc
         append(out, NightBegun(night=name, time=_now(), software=SOFTWARE, host=platform.node()))
         gathered = _Run()
         judged: list[JudgedSet] = []
-        with lease(store_of(out)):
+        with workspace_of(out).lease():
             good = read_good_steps(out)
             for data_set in suite.sets:
                 known = KnownSteps(was.sets.get(data_set, []), good.get(data_set, []))

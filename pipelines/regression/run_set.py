@@ -3,12 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from footscan.recordings.scans import read_scan
 from pipelines.archive.job import Job, PlannedJob, ScanEnd, draw_steps, plan_job, run_job
 from pipelines.engine.actions.step import Outcome, Step, Success
-from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import OnStepEnd, Threads
 from pipelines.engine.store.store import Store
-from pipelines.recordings.scans import read_scan
 from pipelines.regression.figures.costs import cost_figures, unsteady
 from pipelines.regression.figures.delivered import MADE_OF, delivered_figures
 from pipelines.regression.figures.of_scan import result_figures
@@ -49,9 +48,8 @@ def run_set(prepared: PreparedSet, passes: int, on_step_end: OnStepEnd) -> SetRu
         return SetRun(problem=end.problem, known=prepared.known)
     again = plan_job(job)
     steps, outcomes = _outcomes(prepared, again)
-    if again.store.memory is not None:
-        again.store.memory.close()
-    store = Store(again.store.files)  # what follows reads a few results once
+    again.workspace.close()
+    store = Store(again.workspace.store.files)  # what follows reads a few results once
     present = present_steps(steps, outcomes)
     figures = _figures(end, steps, outcomes, store)
     figures |= {"steps.all": len(steps), "steps.run_again": again.to_run}
@@ -67,7 +65,7 @@ def _outcomes(prepared: PreparedSet, planned: PlannedJob) -> tuple[list[Step], d
     """All steps of a set that has been run, those that filmed it first, and what they came to."""
     [folder] = prepared.job.folders
     steps = draw_steps(read_scan(folder, prepared.job.archive_of(folder)), planned)
-    plan = make_plan(steps, planned.store)
+    plan = planned.workspace.plan(steps)
     outcomes = dict(prepared.outcomes) | {p.step.name: p.outcome for p in plan.steps if p.outcome is not None}
     return [*prepared.filming, *steps], outcomes
 

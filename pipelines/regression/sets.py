@@ -6,19 +6,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from footscan.recordings.scans import SCAN_FILE
 from pipelines.archive.job import Job
 from pipelines.engine.actions.step import Outcome, Step
-from pipelines.engine.deliver import deliver
 from pipelines.engine.files.digest import sha256
-from pipelines.engine.files.file_digests import FileDigests
-from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import OnStepEnd, Threads, cores
-from pipelines.engine.run import run_plan
-from pipelines.engine.store.store import Store, open_store
+from pipelines.engine.workspace import Workspace, digests_by_kind
 from pipelines.recordings.calibration_choice import CalibrationPlace
-from pipelines.recordings.scans import SCAN_FILE
 from pipelines.regression.film import PATIENT
-from pipelines.simulate import digests_of, filmed_calibration_steps
+from pipelines.simulate import filmed_calibration_steps
 from schemas.base.documents import canonical_json, validate
 from schemas.base.errors import Fault, RefusedInput
 from schemas.parameters.scan import ScanParameters
@@ -77,9 +73,9 @@ def parameters_of(name: str, suite: Suite) -> ScanParameters:
         raise RefusedInput(f"sets.{name}.parameters", error.problem, field=error.field) from None
 
 
-def store_of(out: Path) -> Store:
-    """Where all sets of a suite keep what was computed."""
-    return open_store(out / "cache")
+def workspace_of(out: Path) -> Workspace:
+    """Where all sets of a suite run, and keep what was computed."""
+    return Workspace(out / "cache")
 
 
 def _virtual(
@@ -93,14 +89,13 @@ def _virtual(
         name, "film", "pipelines.regression.film", virtual, places={"folder": scan}, writes=scan / SCAN_FILE
     )  # fmt: skip
     filming = [film, *filmed_calibration_steps(name, capture, once)]
-    store = store_of(out)
-    outcomes = run_plan(make_plan(filming, store), store, pool=Threads(1), on_step_end=on_step_end)
-    digests = digests_of(filming, outcomes)
-    calibration = films / "calibrations" / name / "calibration.json"
-    files = FileDigests.load(out / "cache" / "files.json", store.secret)
-    if problem := deliver({calibration.name: digests["calibrate"]}, store, files, calibration.parent):
-        raise Fault(problem)
-    filmed = json.loads(store.get(digests["film"]) or b"{}")
+    with workspace_of(out) as workspace:
+        outcomes = workspace.run(filming, Threads(1), on_step_end)
+        digests = digests_by_kind(filming, outcomes)
+        calibration = films / "calibrations" / name / "calibration.json"
+        if problem := workspace.deliver({calibration.name: digests["calibrate"]}, calibration.parent):
+            raise Fault(problem)
+        filmed = json.loads(workspace.store.get(digests["film"]) or b"{}")
     job = _job(name, scan, calibration, parameters, out)
     return PreparedSet(name, job, filmed.get("known", {}), filming, outcomes)
 

@@ -3,12 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from footscan.recordings.scans import RecordedScan
 from pipelines.archive.job import WINDOW, PlannedJob, draw_steps
 from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
-from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import OnStepEnd, Pool, StepEnd
-from pipelines.engine.run import run_plan
-from pipelines.recordings.scans import RecordedScan
 from pipelines.scan import source_files
 from pipelines.tuning.clock import Clock
 from pipelines.tuning.objectives import Judged, figures_of, lengths_of
@@ -94,7 +92,7 @@ class Bench:
         job = replace(self.planned.job, parameters=parameters)
         steps = draw_steps(scan, replace(self.planned, job=job))
         if scan.truth is not None:
-            truth = source_files(scan.truth, self.planned.digests)
+            truth = source_files(scan.truth, self.planned.workspace.digests)
             made = {"oriented": Output(f"{scan.name}/orient"), "surface": Output(f"{scan.name}/surface")}
             places = {"truth": scan.truth}
             steps.append(
@@ -103,20 +101,11 @@ class Bench:
         return _leading_to(kinds, steps)
 
     def _run(self, steps: Sequence[Step]) -> dict[str, Outcome]:
-        """Run steps; what turns out to be damaged has been set aside then, and is made anew by another run of them."""
-
         def on_step_end(end: StepEnd) -> None:
             self.clock.on_step_end(end)
             self.on_step_end(end)
 
-        told: set[str] = set()
-        while True:
-            plan = make_plan(steps, self.planned.store)
-            outcomes = run_plan(plan, self.planned.store, pool=self.pool, on_step_end=on_step_end)
-            damage = {o.problem for o in outcomes.values() if isinstance(o, Failure) and o.kind == "damaged"} - told
-            if not damage:
-                return outcomes
-            told |= damage
+        return self.planned.workspace.run(steps, self.pool, on_step_end)
 
     def _judged(self, scan: str, steps: Sequence[Step], outcomes: Mapping[str, Outcome]) -> Judged:
         for step in steps:
@@ -129,13 +118,13 @@ class Bench:
             return Judged(problem=f"{scan}: its quality is damaged, run again to make it anew", kind="fault")
         figures = figures_of(Quality.model_validate_json(quality), shares)
         if "time" in self.goals:
-            figures["time"] = self.clock.of(steps, outcomes, self.planned.store)
+            figures["time"] = self.clock.of(steps, outcomes, self.planned.workspace.store)
         return Judged(figures, {} if measures is None else lengths_of(Measures.model_validate_json(measures)))
 
     def _read(self, step: str, outcomes: Mapping[str, Outcome]) -> bytes | None:
         """A step's result; None where it has none, or there is no such step."""
         outcome = outcomes.get(step)
-        return self.planned.store.get(outcome.digest) if isinstance(outcome, Success) else None
+        return self.planned.workspace.store.get(outcome.digest) if isinstance(outcome, Success) else None
 
 
 def _leading_to(kinds: set[str], steps: Sequence[Step]) -> list[Step]:

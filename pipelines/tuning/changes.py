@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from footscan.cloud.outliers import KEPT
 from footscan.frames.reader import read_frame
+from footscan.recordings.scans import RecordedScan
 from footscan.stripe.points import STRIPE_DTYPE, StripePoints
 from pipelines.arrays import unpack
-from pipelines.recordings.scans import RecordedScan
 from pipelines.tuning.bench import Bench
 from pipelines.tuning.report.result import FrameChange
 from pipelines.tuning.report.stripe_change import change_by_frame

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from footscan.recordings.scans import RecordedScan, read_scan
 from pipelines.archive.job import Job
 from pipelines.engine.files.digest import sha256
-from pipelines.recordings.scans import RecordedScan, read_scan
 from schemas.base.errors import RefusedInput
 from schemas.tuning import Tuning
 

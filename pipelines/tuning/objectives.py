@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from math import sqrt
 from statistics import fmean, variance
 
-from pipelines.recordings.scans import RecordedScan
+from footscan.recordings.scans import RecordedScan
 from pipelines.tuning.report.result import Goal
 from schemas.base.errors import RefusedInput
 from schemas.measures import Measures

@@ -3,11 +3,10 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from footscan.recordings.scans import RecordedScan
 from pipelines.archive.job import Job, PlannedJob, plan_job, share_written
 from pipelines.engine.pool import OnStepEnd, Pool
-from pipelines.engine.store.lease import lease
 from pipelines.engine.store.permissions import warn_if_others_can_write
-from pipelines.recordings.scans import RecordedScan
 from pipelines.tuning.bench import Bench
 from pipelines.tuning.changes import frame_changes
 from pipelines.tuning.clock import Clock
@@ -61,13 +60,9 @@ def tune(job: Job, tuning: Tuning, pool: Pool, on_step_end: OnStepEnd, on_trial:
     """
     planned = plan_job(replace(job, folders=[folder for folder in job.folders if may_be_meant(folder, job, tuning)]))
     share_written(planned)
-    warn_if_others_can_write(planned.store, planned.job.group)
-    try:
+    warn_if_others_can_write(planned.workspace.store, planned.job.group)
+    with planned.workspace:
         return _tune(planned, tuning, pool, on_step_end, on_trial)
-    finally:
-        planned.digests.save()
-        if planned.store.memory is not None:
-            planned.store.memory.close()
 
 
 def _tune(planned: PlannedJob, tuning: Tuning, pool: Pool, on_step_end: OnStepEnd, on_trial: OnTrial) -> Tuned:
@@ -80,7 +75,7 @@ def _tune(planned: PlannedJob, tuning: Tuning, pool: Pool, on_step_end: OnStepEn
     clock = Clock(journal.seconds())
     bench = Bench(planned, pool, on_step_end, frozenset(goal.name for goal in goals), clock)
     search = _Search(bench, tuning, goals, data, planned.job.parameters, journal)
-    with lease(planned.store):
+    with planned.workspace.lease():
         search.run(known, on_trial)
         result, parameters = search.result(held_out, notes)
     refused = {one.scan: str(one.error) for one in planned.refused}

@@ -47,6 +47,7 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
         "image_bytes": Limit(64_000_000, "bytes of an image", "a frame of 640 x 480 has some 30 kB"),
         "image_pixels": Limit(16_000_000, "pixels of an image", "each takes some 40 bytes as stripes are sought"),
         "film_frames": Limit(100_000, "frames of a film", "a scan has some 200"),
+        "film_chunks": Limit(400_000, "chunks of an AVI file", "a frame has one, and sound may lie between"),
     }
 )
 

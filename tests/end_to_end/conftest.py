@@ -4,7 +4,6 @@ A bench is a folder: `workflow.yaml`, `calibration.json`, `capture/`, `archive/P
 in Zarr once it has run) and `results/`.
 """
 
-import fcntl
 import os
 import shutil
 import subprocess
@@ -15,11 +14,17 @@ from typing import Any
 
 import pytest
 from chromium import launched
+from shared_folders import MadeOnce
 
+from footscan.mesh.formats.files import read_mesh
+from footscan.virtual.filming.renderers import Shot, shoot
+from footscan.virtual.optics.scene import SKIN, Mesh
 from pipelines.cli.main import run_command
+from schemas.parameters.simulation import SimulationSettings
 
 Footscan = Callable[..., subprocess.CompletedProcess[str]]
-MadeOnce = Callable[[str, Callable[[Path], None]], Path]
+FILMING_SECONDS = 1200
+"""Longer than a scan is filmed on a machine that has other work to do."""
 FOOTSCAN = Path(sys.executable).with_name("footscan")
 WORKFLOW = """\
 format: footscan.workflow/1
@@ -29,9 +34,9 @@ results: results
 """
 
 
-def _command(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
+def _command(*arguments: object, timeout: float = 300, **options: Any) -> subprocess.CompletedProcess[str]:
     line = [str(part) for part in (FOOTSCAN, *arguments)]
-    return subprocess.run(line, capture_output=True, text=True, timeout=300, check=False, **options)
+    return subprocess.run(line, capture_output=True, text=True, timeout=timeout, check=False, **options)
 
 
 @pytest.fixture(scope="session")
@@ -61,29 +66,26 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture(scope="session")
-def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
-    """A folder by its name, made by the first worker that asks for it; the other workers of the test run share it."""
-
-    def folder(name: str, make: Callable[[Path], None]) -> Path:
-        root = tmp_path_factory.getbasetemp()
-        if "PYTEST_XDIST_WORKER" in os.environ:
-            root = root.parent
-        folder, unfinished = root / name, root / f"{name}-unfinished"
-        with (root / f"{name}.lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            if not folder.exists():
-                shutil.rmtree(unfinished, ignore_errors=True)
-                make(unfinished)
-                unfinished.rename(folder)
-        return folder
-
-    return folder
+def recorded(films: MadeOnce, made_once: MadeOnce) -> Path:
+    """A bench as it is before its first run: 72 frames, 4 mm apart, of the right foot. To be read only."""
+    filmed = films("bench", _film)
+    return made_once("recorded", lambda bench: _calibrate(filmed, bench))
 
 
 @pytest.fixture(scope="session")
-def recorded(made_once: MadeOnce) -> Path:
-    """A bench as it is before its first run: 72 frames, 4 mm apart, of the right foot. To be read only."""
-    return made_once("recorded", _record)
+def laser_off_films(recorded: Path, films: MadeOnce) -> Path:
+    """The pictures of camera 1 of the bench's scan, taken again with the laser off: a JPEG file each."""
+
+    def film(folder: Path) -> None:
+        vertices, faces = read_mesh(recorded / "archive/P0001/small/truth.stl")
+        settings = SimulationSettings(frames=72, step_mm=4.0, laser_exposure=0.0)
+        shots = [Shot(72 + frame, 4.0 * frame, 0) for frame in range(72)]
+        folder.mkdir()
+        for _, part in shoot([Mesh(vertices, faces)], SKIN, [1], shots, settings, workers=1):
+            for picture in part:
+                (folder / f"{len(list(folder.iterdir())):02d}.jpg").write_bytes(picture)
+
+    return films("laser-off", film)
 
 
 @pytest.fixture(scope="session")
@@ -92,15 +94,20 @@ def measured(recorded: Path, made_once: MadeOnce) -> Path:
     return made_once("measured", lambda bench: _measure(recorded, bench))
 
 
-def _record(bench: Path) -> None:
+def _film(bench: Path) -> None:
     scan = bench / "archive" / "P0001" / "small"
     for arguments in (
         ("simulate", "capture", "--out", bench / "capture"),
         ("simulate", "scan", "--foot", "right", "--out", scan, "--frames", "72", "--step-mm", "4"),
-        ("calibrate", "chart", bench / "capture" / "chart.csv", "--out", bench / "calibration.json"),
     ):
-        done = _command(*arguments)
+        done = _command(*arguments, timeout=FILMING_SECONDS)
         assert done.returncode == 0, done.stderr
+
+
+def _calibrate(filmed: Path, bench: Path) -> None:
+    shutil.copytree(filmed, bench)
+    done = _command("calibrate", "chart", bench / "capture" / "chart.csv", "--out", bench / "calibration.json")
+    assert done.returncode == 0, done.stderr
     (bench / "workflow.yaml").write_text(WORKFLOW)
 
 

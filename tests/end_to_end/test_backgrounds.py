@@ -7,11 +7,7 @@ from subprocess import CompletedProcess
 
 import pytest
 
-from footscan.mesh.formats.files import read_mesh
 from footscan.virtual.filming.film import write_film
-from footscan.virtual.filming.renderers import Shot, shoot
-from footscan.virtual.optics.scene import SKIN, Mesh
-from schemas.parameters.simulation import SimulationSettings
 
 Footscan = Callable[..., CompletedProcess[str]]
 Mistake = Callable[[CompletedProcess[str]], str]
@@ -20,14 +16,10 @@ CAMERA = 1
 STEPS_OF_THE_SCAN = 35
 
 
-@pytest.fixture
-def laser_off(bench: Path) -> list[bytes]:
+@pytest.fixture(scope="session")
+def laser_off(laser_off_films: Path) -> list[bytes]:
     """The pictures of one camera of the bench's scan, taken again with the laser off."""
-    vertices, faces = read_mesh(bench / "archive/P0001/small/truth.stl")
-    settings = SimulationSettings(frames=72, step_mm=4.0, laser_exposure=0.0)
-    shots = [Shot(72 + frame, 4.0 * frame, 0) for frame in range(72)]
-    parts = shoot([Mesh(vertices, faces)], SKIN, [CAMERA], shots, settings, workers=1)
-    return [picture for _, part in parts for picture in part]
+    return [picture.read_bytes() for picture in sorted(laser_off_films.iterdir())]
 
 
 def test_scan_with_a_background(footscan: Footscan, mistake: Mistake, bench: Path, laser_off: list[bytes]) -> None:

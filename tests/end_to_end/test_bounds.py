@@ -134,6 +134,22 @@ def test_a_sparse_file_is_not_read(
     refuse(bounded, arguments, tmp_path, told)
 
 
+@pytest.mark.parametrize(("size", "told"), [(3 * 10**9, "image_bytes="), (0, "film_chunks=")])
+def test_an_avi_of_one_huge_frame_or_of_endless_empty_ones(
+    bounded: BoundedCommand, pristine: Path, tmp_path: Path, size: int, told: str
+) -> None:
+    film = bytearray((pristine / "archive/P0001/S1/cam1.avi").read_bytes())
+    movi = film.index(b"movi")
+    total = 3_500_000_000
+    film[4:8] = (total - 8).to_bytes(4, "little")
+    film[movi - 4 : movi] = (total - movi).to_bytes(4, "little")
+    film[movi + 4 : movi + 12] = b"00dc" + size.to_bytes(4, "little")
+    path = tmp_path / "a.avi"
+    path.write_bytes(film[: movi + 12])
+    os.truncate(path, total)
+    refuse(bounded, ["extract", "a.avi"], tmp_path, f"FOOTSCAN_LIMITS={told}")
+
+
 def test_as_many_lists_as_are_allowed_are_read(bounded: BoundedCommand, tmp_path: Path) -> None:
     (tmp_path / "a.ply").write_bytes(ply(b"\0\1\0\0\0\0" * 1_500_000, faces=3_000_000))
     ended = bounded.run(["verify", "sphere", "a.ply", "--diameter", "50"], tmp_path)

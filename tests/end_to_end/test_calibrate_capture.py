@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from PIL import Image
+from shared_folders import MadeOnce
 
 from footscan.calibration.chart.chart import read_chart
 from footscan.calibration.models.maps import is_supported, to_world
@@ -18,18 +19,17 @@ from footscan.virtual.optics.scanner import standard_scanner
 from schemas.calibration import read_calibration
 
 Footscan = Callable[..., CompletedProcess[str]]
-MadeOnce = Callable[[str, Callable[[Path], None]], Path]
 PLACEMENTS = 3
 GRID = np.stack(np.meshgrid(np.linspace(-70, 70, 57), np.linspace(0, 114, 39)), -1).reshape(-1, 2)
 
 
 @pytest.fixture(scope="module")
-def filmed(command: Footscan, made_once: MadeOnce) -> Path:
+def filmed(command: Footscan, films: MadeOnce) -> Path:
     def film(folder: Path) -> None:
         done = command("simulate", "capture", "--out", folder, "--placements", PLACEMENTS, "--scanner-seed", 3)
         assert done.returncode == 0, done.stderr
 
-    return made_once("filmed-capture", film)
+    return films("capture", film)
 
 
 @pytest.fixture
@@ -136,11 +136,13 @@ def test_show_draws_and_tells_what_it_was_made_from(footscan: Footscan, calibrat
 
 
 def test_a_scanner_that_has_not_moved_holds_by_other_placements_too(
-    footscan: Footscan, calibrated: Path, tmp_path: Path
+    footscan: Footscan, calibrated: Path, films: MadeOnce
 ) -> None:
-    again = tmp_path / "again"
-    assert footscan("simulate", "capture", "--out", again, "--placements", 1, "--scanner-seed", 3).returncode == 0
-    done = footscan("calibrate", "check", calibrated, again, "--json")
+    def film(folder: Path) -> None:
+        arguments = ("--out", folder, "--placements", 1, "--scanner-seed", 3)
+        assert footscan("simulate", "capture", *arguments).returncode == 0
+
+    done = footscan("calibrate", "check", calibrated, films("capture-again", film), "--json")
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)
     assert report["verdict"] == "steady"

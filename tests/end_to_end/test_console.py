@@ -18,7 +18,7 @@ from playwright.sync_api import expect
 from pipelines.console.console import Console
 from pipelines.console.server import listen, server_of
 
-pytestmark = needs_chromium
+pytestmark = [needs_chromium, pytest.mark.real_time]  # a browser waits for a server beside a stand-in that films
 
 STAND_IN = Path(__file__).parents[1] / "pipelines" / "console" / "stand_in.py"
 DESKTOP, UPRIGHT, ACROSS = (1280, 800), (768, 1024), (1024, 768)

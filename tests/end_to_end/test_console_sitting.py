@@ -28,6 +28,7 @@ from pipelines.console.pages.results import read_measures
 FOLDER = os.environ.get("FOOTSCAN_SITTING")
 pytestmark = [
     needs_chromium,
+    pytest.mark.real_time,  # a browser films with the virtual scanner
     pytest.mark.skipif(FOLDER is None, reason="FOOTSCAN_SITTING names no folder for its pictures"),
 ]
 

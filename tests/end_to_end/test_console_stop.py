@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "pipelines" / "console"))
 
 from stand_in import deliver_made_up
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.real_time  # a server is to stop heads within 0.3 s
 
 WITHIN_SECONDS = 0.3
 PAGE = "b" * 16

@@ -10,7 +10,7 @@ from chromium import Opened, needs_chromium
 from live_command import COMMANDS, WITHIN_SECONDS, Scanner, order, scanners
 from playwright.sync_api import expect
 
-pytestmark = [needs_chromium, pytest.mark.real_time]
+pytestmark = [needs_chromium, pytest.mark.real_time]  # a server is to stop heads within 0.3 s
 
 TABS = 6
 """As many connections as a browser has for one port of a server; each page follows the state by one of them."""

@@ -12,7 +12,7 @@ import pytest
 from chromium import Opened, needs_chromium
 from playwright.sync_api import expect
 
-pytestmark = needs_chromium
+pytestmark = [needs_chromium, pytest.mark.real_time]  # a server and its clients are processes and threads of their own
 
 RIG = """\
 format: footscan.rig/1

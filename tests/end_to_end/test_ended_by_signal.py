@@ -14,8 +14,10 @@ import pytest
 from live_command import COMMANDS, WITHIN_SECONDS, Scanner, order, scanners
 from waiting import LONG_SECONDS
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.real_time  # a process is to stop within 0.3 s of a signal
 
+MOTION_SECONDS = {"jog": 6.0, "scan": 13.0}
+"""Longer than the motion of a command that is left alone: 380 mm of a jog take 4 s, 400 mm of a scan 11 s."""
 ENDS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129, signal.SIGQUIT: 131}
 
 
@@ -111,7 +113,7 @@ def test_output_that_nobody_reads_leaves_nothing_moving(scanner: Scanner) -> Non
     assert process.stderr is not None
     process.stdout.close()
     process.stderr.close()
-    assert process.wait(LONG_SECONDS) == 1
+    assert process.wait(LONG_SECONDS) in (0, 1)  # 1 where Python hands on each line at once, and notices
     time.sleep(0.3)
     scanner.assert_dark_and_standing(time.monotonic() - 0.3)
 
@@ -122,6 +124,6 @@ def test_a_command_that_is_killed_or_halted_ends_with_its_motion(scanner: Scanne
     process = scanner.started(name)
     signalled = time.monotonic()
     process.send_signal(number)
-    time.sleep(14.0)  # 400 mm take 11 s
-    scanner.assert_dark_and_standing(signalled + 13.0)
+    time.sleep(MOTION_SECONDS[name] + 1.0)
+    scanner.assert_dark_and_standing(signalled + MOTION_SECONDS[name])
     assert 50.0 < scanner.board.position_at(time.monotonic())[0] < 410.1  # as far as heads reach

@@ -9,7 +9,7 @@ import pytest
 from live_command import Scanner, order, scanners
 from waiting import wait_until
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.real_time  # heads move until half a second after a page is gone
 
 GONE_SECONDS = 0.5
 STOP_SECONDS = 0.3

@@ -11,12 +11,14 @@ import pytest
 
 from footscan.capture import frame_positions
 from footscan.frames.travel import read_positions
+from footscan.recordings.scans import read_scan
 from pipelines.live import storing
 from pipelines.live.rig_file import read_rig, write_rig
 from pipelines.live.virtual import rig as virtual_rig
 from pipelines.live.virtual.world import CAMERAS, LATENCIES_S
-from pipelines.recordings.scans import read_scan
 from schemas.rig import RigLatency
+
+pytestmark = pytest.mark.real_time  # cameras stream while heads move
 
 Footscan = Callable[..., subprocess.CompletedProcess[str]]
 

@@ -271,7 +271,7 @@ def archive(measured: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page of four scans of two patients, one of which was refused."""
     folder = tmp_path_factory.mktemp("archive")
     shutil.copytree(measured / "results/P0001/small", folder / "P1/R")
-    from pipelines.recordings.scans import read_scan
+    from footscan.recordings.scans import read_scan
 
     scan = read_scan(measured / "archive/P0001/small").document
     ends = [

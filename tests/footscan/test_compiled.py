@@ -136,6 +136,19 @@ def test_equal_checkouts_share_it_and_others_do_not(checkout: Checkout, tmp_path
     assert checkout.run() == (["6 1"], "")
 
 
+def test_old_machine_code_goes(checkout: Checkout) -> None:
+    assert checkout.run() == (["6 0"], "")
+    [old] = kept_in(checkout.cache)
+    checkout.set_factor(5)
+    assert checkout.run() == (["15 0"], "")
+    assert len(kept_in(checkout.cache)) == 2
+    os.utime(old, (1e9, 1e9))
+    checkout.set_factor(7)
+    assert checkout.run() == (["21 0"], "")
+    assert len(kept_in(checkout.cache)) == 2
+    assert not old.exists()
+
+
 def test_machine_code_calls_that_of_another_folder_and_follows_its_changes(checkout: Checkout) -> None:
     other = checkout.root / "room/other"
     other.mkdir()

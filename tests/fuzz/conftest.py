@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from shared_folders import MadeOnce
 
 from pipelines.cli.main import run_command
 
@@ -14,12 +15,14 @@ CAMERAS = (1, 5)
 
 
 @pytest.fixture(scope="session")
-def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def filmed(films: MadeOnce) -> Path:
     """A capture of three placements by two cameras, and its chart of all eight. To be read only."""
-    folder = tmp_path_factory.mktemp("filmed") / "capture"
+    return films("capture-of-two-cameras", _film)
+
+
+def _film(folder: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
         for module in ("record", "capture"):
-            patch.setattr(f"footscan.virtual.{module}.CAMERAS", CAMERAS)
+            patch.setattr(f"footscan.virtual.filming.{module}.CAMERAS", CAMERAS)
         arguments = ["simulate", "capture", "--out", str(folder), "--placements", "3", "--scanner-seed", "3"]
         assert run_command(arguments) == 0
-    return folder

@@ -57,7 +57,7 @@ def prepare(folder: Path) -> Path:
 def run_graph(folder: Path, *, pause_ms: int = 2, seed: int = 0, after_plan: Callable[[], None] = lambda: None) -> Ran:
     """Plan and run the graph on the store in `folder`."""
     digests, store = FileDigests.load(folder / "files.json"), store_of(folder)
-    memory = store.memory
+    memory = store.verified
     assert memory is not None
     steps = graph(folder, digests, pause_ms=pause_ms, seed=seed)
     plan = make_plan(steps, store)

@@ -20,12 +20,12 @@ from footscan.capture.film_frames import FilmFrames
 from footscan.capture.grbl.settings import BoardSettings
 from footscan.frames.film import encoded_frames, open_film
 from footscan.frames.travel import read_positions
+from footscan.recordings.scans import read_scan
 from footscan.virtual.board.board import Board
 from footscan.virtual.filming.streams import SentFrame, VirtualStreams, free_running
 from pipelines.live.light import light_by_hand
 from pipelines.live.scanner import LiveResult, LiveScanner, ScanOrder
 from pipelines.live.storing import ScanName, next_scan_name
-from pipelines.recordings.scans import read_scan
 from schemas.base.documents import read_json
 from schemas.recording import RecordedCamera, Recording
 from schemas.rig import Rig, RigCamera, RigLatency, RigTravel

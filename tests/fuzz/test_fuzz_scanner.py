@@ -27,6 +27,8 @@ from footscan.capture.board.heads import Heads
 from pipelines.live.scanner import STOPPED, LiveResult
 from schemas.base.errors import Fault, Finding, FootscanError
 
+pytestmark = pytest.mark.real_time  # cameras stream while heads move
+
 CASES = int(os.environ.get("FOOTSCAN_FUZZ", "6"))
 FIRST = int(os.environ.get("FOOTSCAN_FUZZ_FIRST", "0"))
 RECORD = os.environ.get("FOOTSCAN_FUZZ_RECORD")

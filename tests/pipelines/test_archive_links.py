@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from footscan.recordings.scans import read_scan
 from pipelines.cli.main import run_command
-from pipelines.recordings.scans import read_scan
 from schemas.base.errors import RefusedInput
 
 LEAVES = "leaves the archive, expected a path inside it"

@@ -15,11 +15,11 @@ from footscan.frames.film import open_film, pixel_frames
 from footscan.frames.image import encode_png
 from footscan.frames.ingest import chunk_name, ingest_film
 from footscan.mesh.formats.files import read_file
+from footscan.recordings.scans import read_scan
 from footscan.virtual.filming.film import write_film
 from pipelines.archive.ingest import ingest_scans
 from pipelines.arrays import unpack
 from pipelines.engine.files.file_digests import FileDigests
-from pipelines.recordings.scans import read_scan
 from pipelines.scan import CalibrationFile, scan_steps
 from pipelines.steps import extract
 from pipelines.steps.ingest_background import ingest_background

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from footscan.frames.ingest import chunk_name
+from footscan.recordings.scans import read_scan
 from pipelines.engine.actions.step import Output
 from pipelines.engine.files.file_digests import FileDigests
-from pipelines.recordings.scans import read_scan
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps, source_files
 from schemas.base.errors import RefusedInput
 from schemas.calibration import Calibration

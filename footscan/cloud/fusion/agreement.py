@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.fusion.stripes import Floats, Stripes, boxes, meet
+from footscan.cloud.fusion.stripes import Floats, Stripes, Traces, meet, traces_of
 from footscan.cloud.points import stripe_step
 from footscan.compiled import compiled
 from footscan.robust import MAD_TO_SD
@@ -58,15 +58,7 @@ def find_overlaps(stripes: Stripes, yz: Floats, reach_mm: float) -> Overlaps:
         GAP_STEPS * stripe_step(stripes.points),
         count,
         usable,
-        stripes.camera,
-        stripes.plane,
-        stripes.starts,
-        stripes.x,
-        yz,
-        stripes.sigma,
-        stripes.normals,
-        stripes.linked,
-        boxes(yz),
+        traces_of(stripes, yz, stripes.sigma),
     )
     return Overlaps(point, other, distance, variance)
 
@@ -109,16 +101,9 @@ def _compare(
     gap: float,
     cameras: int,
     usable: NDArray[np.bool_],
-    camera: NDArray[np.intp],
-    plane: NDArray[np.intp],
-    starts: NDArray[np.intp],
-    x: Floats,
-    yz: Floats,
-    sigma: Floats,
-    normals: Floats,
-    linked: NDArray[np.bool_],
-    around: Floats,
+    traces: Traces,
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats]:
+    camera, plane, starts, x, yz, sigma, normals, linked, around = traces
     planes = (len(starts) - 1) // max(cameras, 1)
     points, others = np.empty(len(sample) * cameras, np.intp), np.empty(len(sample) * cameras, np.intp)
     distances, variances = np.empty(len(sample) * cameras), np.empty(len(sample) * cameras)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.fusion.stripes import Floats, Stripes, boxes, meet
+from footscan.cloud.fusion.stripes import Floats, Stripes, Traces, meet, traces_of
 from footscan.compiled import compiled
 from schemas.parameters.fusion import FusionParameters
 
@@ -47,15 +47,7 @@ def merge(stripes: Stripes, yz: Floats, reach: Floats, deviations: Floats, param
         reach,
         parameters.contradiction_sigmas,
         deviations,
-        stripes.camera,
-        stripes.plane,
-        stripes.starts,
-        stripes.x,
-        yz,
-        sigma,
-        stripes.normals,
-        stripes.linked,
-        boxes(yz),
+        traces_of(stripes, yz, sigma),
     )
     kept = np.flatnonzero(cameras > 0)
     order = kept[np.lexsort((places[kept, 2], places[kept, 1], stripes.plane[kept]))]
@@ -75,18 +67,11 @@ def _merge(
     reach: Floats,
     sigmas: float,
     deviations: Floats,
-    camera: NDArray[np.intp],
-    plane: NDArray[np.intp],
-    starts: NDArray[np.intp],
-    x: Floats,
-    yz: Floats,
-    sigma: Floats,
-    normals: Floats,
-    linked: NDArray[np.bool_],
-    around: Floats,
+    traces: Traces,
 ) -> tuple[Floats, NDArray[np.intp], NDArray[np.intp], Floats]:
     """Where each point moves to, (N, 3); the surest of those that it is made of; of how many cameras, 0 where it is
     thinned out and -1 where it is contradicted; and its standard deviation."""
+    _, plane, _, x, yz, sigma, normals, _, _ = traces
     count = yz.shape[0]
     cameras = deviations.shape[0]
     places, surest = np.empty((count, 3)), np.arange(count)
@@ -99,7 +84,7 @@ def _merge(
         places[n, 0], places[n, 1], places[n, 2] = x[n], yz[n, 0], yz[n, 1]
         if not _is_free(plane[n], yz[n], spacing, plane, places, table, previous):
             continue
-        seen = _look(n, reach, camera, plane, starts, x, yz, sigma, normals, linked, around, sights, seen_by)
+        seen = _look(n, reach, traces, sights, seen_by)
         agree, weight = _vote(seen, sights, seen_by, sigmas, deviations, agreeing)
         mean = mean_x = most = squares = 0.0
         contradicted = True
@@ -133,15 +118,7 @@ def _merge(
 def _look(
     n: int,
     reach: Floats,
-    camera: NDArray[np.intp],
-    plane: NDArray[np.intp],
-    starts: NDArray[np.intp],
-    x: Floats,
-    yz: Floats,
-    sigma: Floats,
-    normals: Floats,
-    linked: NDArray[np.bool_],
-    around: Floats,
+    traces: Traces,
     sights: Floats,
     seen_by: NDArray[np.intp],
 ) -> int:
@@ -150,6 +127,7 @@ def _look(
     Filled in are, by camera, `sights`, how far along the normal and in X it sees it, mm, and the variance of that,
     mm^2; and `seen_by`, the camera and its nearest point.
     """
+    camera, plane, starts, x, yz, sigma, normals, linked, around = traces
     cameras = len(reach)
     seen = 0
     for b in range(cameras):

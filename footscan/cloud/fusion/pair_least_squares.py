@@ -5,7 +5,7 @@ along it. Since D is linear in the coefficients of its camera, what a pair saw o
 difference of the coefficients of its two cameras, and any choice of terms and stretches is solved from these forms.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,7 @@ PRIOR_MM = 0.3
 """Standard deviation of a coefficient before anything is seen."""
 
 
-@dataclass(frozen=True)
-class Forms:
+class Forms(NamedTuple):
     """By stretch, first and second camera: t' square t - 2 linear . t + constant, where t is how their coefficients
     differ."""
 
@@ -59,12 +58,12 @@ def sum_up(
     stretch : (M,) below `stretches`
     count : C, of the cameras
     """
-    square = np.zeros((stretches, count, count, MOST, MOST))
-    linear = np.zeros((stretches, count, count, MOST))
-    constant = np.zeros((stretches, count, count))
-    weight, expected = np.zeros((stretches, count, count)), np.zeros((stretches, count, count))
-    _sum_up(rows, distances, weights, variances, cameras, stretch, square, linear, constant, weight, expected)
-    return Forms(square, linear, constant, weight, expected)
+    pairs = (stretches, count, count)
+    forms = Forms(
+        np.zeros((*pairs, MOST, MOST)), np.zeros((*pairs, MOST)), np.zeros(pairs), np.zeros(pairs), np.zeros(pairs)
+    )
+    _sum_up(rows, distances, weights, variances, cameras, stretch, forms)
+    return forms
 
 
 def solve(
@@ -112,12 +111,10 @@ def _sum_up(
     variances: Floats,
     cameras: NDArray[np.intp],
     stretch: NDArray[np.intp],
-    square: Floats,
-    linear: Floats,
-    constant: Floats,
-    weight: Floats,
-    expected: Floats,
+    forms: Forms,
 ) -> None:
+    """Adds the comparisons to `forms`."""
+    square, linear, constant, weight, expected = forms
     terms = rows.shape[1]
     for m in range(rows.shape[0]):
         a, b, n, w = cameras[m, 0], cameras[m, 1], stretch[m], weights[m]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,28 @@ class Stripes:
     """(N, 2) unit normals of the stripes in their planes, of any sign; 0 where a point stands alone."""
     bent: NDArray[np.bool_]
     """(N,) whether the stripe turns a corner."""
+
+
+class Traces(NamedTuple):
+    """What compiled loops take of `Stripes`, with the coordinates and sigmas that hold at the time."""
+
+    camera: NDArray[np.intp]
+    plane: NDArray[np.intp]
+    starts: NDArray[np.intp]
+    x: Floats
+    yz: Floats
+    sigma: Floats
+    normals: Floats
+    linked: NDArray[np.bool_]
+    around: Floats
+    """As `boxes` gives it."""
+
+
+def traces_of(stripes: Stripes, yz: Floats, sigma: Floats) -> Traces:
+    """The stripes with points at `yz` (N, 2), mm, of standard deviations `sigma` (N,), mm."""
+    return Traces(
+        stripes.camera, stripes.plane, stripes.starts, stripes.x, yz, sigma, stripes.normals, stripes.linked, boxes(yz)
+    )
 
 
 def sort_stripes(points_by_camera: Iterable[NDArray[np.void]]) -> Stripes:

@@ -41,9 +41,7 @@ class Board:
         heads_at: Triple = (-120.0, -80.0, -200.0),
         mounts: tuple[Mount, Mount, Mount] = MOUNTS,
         gait: Gait | None = None,
-        clock: Callable[[], float] = time.monotonic,
         port: Path | None = None,
-        resets_when_opened: bool = True,
         boot_seconds: float = 0.0,
     ) -> None:
         """A board that was just switched on.
@@ -54,30 +52,26 @@ class Board:
         heads_at : where the heads stand on their rails, mm; 0 is the home switch, the far one at -440.
         mounts : how the rails lie in the world.
         gait : how evenly the motors turn.
-        clock : the world's clock, s.
         port : the name the terminal gets; by default one in a folder of its own.
-        resets_when_opened : whether opening the port restarts the board, as on those with an Arduino's USB.
-        boot_seconds : how long a restart takes in which nothing is heard; 1.5 on those.
+        boot_seconds : how long a restart takes in which nothing is heard; 1.5 on boards with an Arduino's USB.
         """
-        self.clock = clock
         self.mounts = mounts
         self.gait = gait or Gait()
         self.rails = [Rail(), Rail(), Rail()]
         self._folder = tempfile.TemporaryDirectory(prefix="footscan-board-") if port is None else None
         self.line = BoardLine(port or Path(self._folder.name if self._folder else "") / "board")
-        self.resets_when_opened = resets_when_opened
         self.boot_seconds = boot_seconds
         self.frozen = False
         """Whether the firmware hangs: motors go on, nothing is heard and nothing answered."""
         memory = Memory()
         memory.settings.update(settings or {})
         self.memory = memory
-        self.motion = Motion(self.rails, heads_at, self.gait.motion_seconds(clock()))
+        self.motion = Motion(self.rails, heads_at, self.gait.motion_seconds(time.monotonic()))
         self.firmware = Firmware(self.motion, memory, build or Build(), self._say)
         self._lock = threading.RLock()
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, name="virtual board", daemon=True)
-        self.firmware.now = clock()
+        self.firmware.now = time.monotonic()
         self.firmware.power_up()
 
     @property
@@ -139,7 +133,7 @@ class Board:
 
     def pause(self, seconds: float) -> None:
         """The step generator stands still for so long, from now on."""
-        self._now_set(lambda: self.gait.pauses.append((self.clock(), seconds)))
+        self._now_set(lambda: self.gait.pauses.append((time.monotonic(), seconds)))
 
     def restart(self) -> None:
         """A reset button pressed, or power lost for a moment: motors stand, the position is forgotten."""
@@ -165,7 +159,7 @@ class Board:
 
     def _happened(self, seconds: float) -> float:
         """That time on the motion's clock, all that happened until then computed."""
-        seconds = min(seconds, self.clock())
+        seconds = min(seconds, time.monotonic())
         moment = self.gait.motion_seconds(seconds)
         if moment > self.motion.moment:
             self.motion.advance(moment)
@@ -173,29 +167,29 @@ class Board:
 
     def _now_set(self, change: Callable[[], object]) -> None:
         with self._lock:
-            self._happened(self.clock())
+            self._happened(time.monotonic())
             change()
 
     def _power_cycle(self) -> None:
         self.motion.kill()
-        self.firmware.now = self.clock()
+        self.firmware.now = time.monotonic()
         self.firmware.power_up(self.boot_seconds)
 
     def _run(self) -> None:
         while not self._ends.is_set():
-            opened = self.line.wait(max(min(TICK_SECONDS, self.line.next_due() - self.clock()), 0.0))
+            opened = self.line.wait(max(min(TICK_SECONDS, self.line.next_due() - time.monotonic()), 0.0))
             with self._lock:
-                if opened and self.resets_when_opened:
+                if opened:  # as on boards with an Arduino's USB
                     self._power_cycle()
-                heard = self.line.read(self.clock())
-                now = self.clock()  # after what was heard: a query is answered with what is so later
+                heard = self.line.read(time.monotonic())
+                now = time.monotonic()  # after what was heard: a query is answered with what is so later
                 if not self.frozen:
                     self.firmware.receive(heard)
                     self.firmware.tick(now, self.gait.motion_seconds(now))
                 self.line.deliver(now)
 
     def _say(self, text: str) -> None:
-        self.line.write(text, self.clock())
+        self.line.write(text, time.monotonic())
 
 
 def main() -> None:

@@ -6,44 +6,37 @@ import math
 from collections.abc import Callable, Generator
 from dataclasses import replace
 
-from footscan.virtual.board.gcode import IN_PLANE, OFFSETS, WORD, Block, GcodeError, Modes, Offsets, read_block
+from footscan.virtual.board.gcode import Block, GcodeError, Modes, read_block
 from footscan.virtual.board.machine import Machine, Work
 from footscan.virtual.board.motion import Light, Move
 from footscan.virtual.board.rails import Triple
-from footscan.virtual.board.report import counted, probe_report
 
 SEARCH, LOCATE = 1.5, 5.0
 """Homing goes this often the largest travel for a switch, and this often the pull-off to find it again."""
-CHORD = math.radians(5.0)
-"""An arc is followed in steps of this angle: nothing here travels in arcs, they are there for the protocol's sake."""
-PROBES_TOWARD, PROBES_SILENTLY = ("G38.2", "G38.3"), ("G38.3", "G38.5")
 
 
 def execute_gcode(board: Machine, line: str) -> Work:
     """One block; the number of its error, 0 for `ok`."""
     try:
-        block = read_block(line, board.modes, board.where, board.offsets, board.memory)
+        block = read_block(line, board.modes, board.where)
     except GcodeError as error:
         return error.number
     yield from _set_light(board, block)
-    if block.modes.coolant != board.modes.coolant:
-        yield from _all_done(board)
-    if block.action == "G4" and board.state != "Check":
+    if block.dwell is not None:
         yield from _all_done(board)
         yield _until(board, board.now + block.dwell)
-    keeps_feed = block.modes.feed_mode == "G94"
-    board.modes = block.modes if keeps_feed else replace(block.modes, feed=0.0)
-    _set_offsets(board, block)
-    yield from _travel(board, line, block)
-    if block.flow:
-        yield from _end_program(board, block.flow)
+    board.modes = block.modes
+    if block.moves:
+        feed = block.modes.feed
+        light = _light(board, block.modes, feed)
+        yield from _queue(board, block.target, feed / 60.0, light, "Run", rapid=block.modes.motion == "G0")
     return 0
 
 
 def jog(board: Machine, line: str) -> Work:
     """`$J=line`."""
     try:
-        block = read_block(line, board.modes, board.where, board.offsets, board.memory, jog=True)
+        block = read_block(line, board.modes, board.where, jog=True)
     except GcodeError as error:
         return error.number
     if board.memory.flag(20) and _beyond(board, block.target):
@@ -67,7 +60,6 @@ def home(board: Machine) -> Work:
     board.answer_query()  # of all queries since it began, before its own `ok`
     board.where = board.motion.steps
     board.state = "Idle"
-    board.homed()
     return 0
 
 
@@ -113,28 +105,6 @@ def _drive(board: Machine, cycle: tuple[int, ...], speed: float, distance: float
     board.motion.add(_move(board, steps, target, speed * math.sqrt(len(cycle)), Light(), fixed_feed=True))
 
 
-def _travel(board: Machine, line: str, block: Block) -> Work:
-    action, feed = block.action, block.modes.feed
-    if action in ("G28", "G30"):
-        if any(axis in line for axis in "XYZ"):
-            yield from _queue(board, block.target, math.inf, Light(), "Run", rapid=True)
-        yield from _queue(board, board.memory.systems[action], math.inf, Light(), "Run", rapid=True)
-    if not block.moves:
-        return 0
-    motion = block.modes.motion
-    if motion.startswith("G38"):
-        yield from _probe(board, block)
-        return 0
-    begin = board.where
-    for target in _points(line, block, begin):
-        speed = feed / 60.0
-        if block.modes.feed_mode == "G93":
-            speed = math.dist(board.where, target) * feed / 60.0
-        light = _light(board, block.modes, speed * 60.0)
-        yield from _queue(board, target, speed, light, "Run", rapid=motion == "G0")
-    return 0
-
-
 def _queue(
     board: Machine,
     target: Triple,
@@ -147,8 +117,6 @@ def _queue(
 ) -> Work:
     if state != "Jog" and board.memory.flag(20) and _beyond(board, target):
         yield from _refuse_target(board)
-    if board.state == "Check":
-        return 0
     yield board.plan_has_room
     if target != board.where:
         move = _move(board, board.where, target, speed, light, rapid=rapid, fixed_feed=fixed_feed)
@@ -190,32 +158,12 @@ def _refuse_target(board: Machine) -> Work:
     return 0
 
 
-def _probe(board: Machine, block: Block) -> Work:
-    yield from _all_done(board)
-    kind = block.modes.motion
-    away = kind not in PROBES_TOWARD
-    if board.pins.probe != away:
-        board.alarm(4)
-        return 0
-    yield from _queue(board, block.target, block.modes.feed / 60.0, Light(), "Run", fixed_feed=True)
-    yield lambda: board.is_still() or board.pins.probe != away
-    touched = board.pins.probe != away
-    board.motion.flush()
-    board.where = board.motion.steps
-    board.probed = (counted(board), touched)
-    board.state = "Idle"
-    if not touched and kind not in PROBES_SILENTLY:
-        board.alarm(5)
-    board.say(probe_report(board))
-    return 0
-
-
 def _set_light(board: Machine, block: Block) -> Work:
     """S, M3, M4 and M5. In laser mode a change of S that comes with a motion goes with it, without a stop."""
     laser = board.memory.flag(32)
     old, new = board.modes, block.modes
-    dark = laser and new.motion not in ("G1", "G2", "G3")
-    turned_dark = laser and old.spindle == "M3" and dark != (old.motion not in ("G1", "G2", "G3"))
+    dark = laser and new.motion == "G0"
+    turned_dark = laser and old.spindle == "M3" and dark != (old.motion == "G0")
     if (new.power != old.power or turned_dark) and old.spindle != "M5" and not (laser and block.moves):
         yield from _all_done(board)
         _shine(board, old.spindle, 0.0 if dark else new.power)
@@ -230,7 +178,7 @@ def _set_light(board: Machine, block: Block) -> Work:
 
 def _shine(board: Machine, spindle: str, power: float) -> None:
     """Light on heads that stand: under M4 there is none in laser mode."""
-    off = board.state == "Check" or spindle == "M5" or (board.memory.flag(32) and spindle == "M4")
+    off = spindle == "M5" or (board.memory.flag(32) and spindle == "M4")
     board.motion.stand_in_light(Light() if off else Light(_level(board, power)))
     board.counters.overrides = 0
 
@@ -241,7 +189,7 @@ def _light(board: Machine, modes: Modes, feed: float) -> Light:
         return Light()
     if not board.memory.flag(32):
         return Light(_level(board, modes.power))
-    if modes.motion not in ("G1", "G2", "G3"):
+    if modes.motion == "G0":
         return Light()
     return Light(_level(board, modes.power), feed / 60.0 if modes.spindle == "M4" else None)
 
@@ -254,45 +202,10 @@ def _level(board: Machine, power: float) -> float:
     return 1.0 if least >= most else min(max(power, least), most) / most
 
 
-def _set_offsets(board: Machine, block: Block) -> None:
-    memory, offsets = board.memory, board.offsets
-    if block.action == "G10":
-        memory.systems[block.stored_system] = block.target
-    elif block.action in ("G28.1", "G30.1"):
-        memory.systems[block.action[:3]] = board.where
-    elif block.action == "G92":
-        offsets = replace(offsets, shifted=block.target)
-    elif block.action == "G92.1":
-        offsets = replace(offsets, shifted=(0.0, 0.0, 0.0))
-    if block.tool_length is not None:
-        offsets = replace(offsets, tool=block.tool_length)
-    offsets = replace(offsets, system=memory.systems[board.modes.system])
-    if offsets != board.offsets:
-        board.counters.offsets = 0
-    board.offsets = offsets
-
-
-def _end_program(board: Machine, flow: str) -> Work:
-    yield from _all_done(board)
-    if flow == "M0" and board.state != "Check":
-        board.motion.holding = True
-        board.state = "Hold"
-        yield lambda: board.state != "Hold"
-    elif flow in ("M2", "M30"):
-        old = board.modes
-        board.modes = Modes(motion="G1", units=old.units, tool=old.tool, feed=old.feed, power=old.power)
-        board.offsets = Offsets(board.memory.systems["G54"], board.offsets.shifted, board.offsets.tool)
-        board.counters.offsets = 0
-        _shine(board, "M5", 0.0)
-        board.say("[MSG:Pgm End]")
-    return 0
-
-
 def _all_done(board: Machine) -> Work:
-    if board.state != "Check":
-        yield board.is_still
-        if board.state == "Run":
-            board.state = "Idle"
+    yield board.is_still
+    if board.state == "Run":
+        board.state = "Idle"
     return 0
 
 
@@ -302,26 +215,3 @@ def _until(board: Machine, seconds: float) -> Callable[[], bool]:
 
 def _beyond(board: Machine, target: Triple) -> bool:
     return any(at > 0.0 or at < -travel for at, travel in zip(target, board.memory.axes(130), strict=True))
-
-
-def _points(line: str, block: Block, begin: Triple) -> list[Triple]:
-    """Where a motion goes: one point, or those along an arc given by its centre."""
-    motion, target = block.modes.motion, block.target
-    words = {letter: float(number) for letter, number in WORD.findall(line) if letter in OFFSETS and number}
-    if motion not in ("G2", "G3") or not words:
-        return [target]
-    first, second = IN_PLANE[block.modes.plane]
-    x, y = -words.get(OFFSETS[first], 0.0), -words.get(OFFSETS[second], 0.0)
-    centre = (begin[first] - x, begin[second] - y)
-    turn = math.atan2(target[second] - centre[1], target[first] - centre[0]) - math.atan2(y, x)
-    turn = turn % math.tau or math.tau
-    turn = turn - math.tau if motion == "G2" and turn < math.tau else -turn if motion == "G2" else turn
-    count = max(round(abs(turn) / CHORD), 1)
-    points = []
-    for k in range(1, count):
-        part = k / count
-        point = [a + (b - a) * part for a, b in zip(begin, target, strict=True)]
-        point[first] = centre[0] + x * math.cos(turn * part) - y * math.sin(turn * part)
-        point[second] = centre[1] + x * math.sin(turn * part) + y * math.cos(turn * part)
-        points.append((point[0], point[1], point[2]))
-    return [*points, target]

@@ -7,9 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from footscan.virtual.board.execute import execute_gcode
-from footscan.virtual.board.gcode import Modes, Offsets
+from footscan.virtual.board.gcode import Modes
 from footscan.virtual.board.machine import Counters, Machine, Overrides, State, Work
-from footscan.virtual.board.memory import Memory
 from footscan.virtual.board.motion import Light
 from footscan.virtual.board.report import status_report
 from footscan.virtual.board.system import execute_system
@@ -37,12 +36,6 @@ class Firmware(Machine):
     _door_seen: bool = False
     _door_resuming: bool = False
     _boots_at: float | None = None
-    _startup: bool = False
-    _homed: bool = False
-
-    def homed(self) -> None:
-        """Homing went well: the start-up lines run behind its answer."""
-        self._homed = True
 
     def power_up(self, boot_seconds: float = 0.0) -> None:
         """Begins as after its power was switched on: motors at 0 wherever they stand, locked until homed.
@@ -50,16 +43,9 @@ class Firmware(Machine):
         Nothing is heard while it boots.
         """
         self._work = self._waits_for = None
-        self._startup = self._homed = False
         self.motion.steps = (0.0, 0.0, 0.0)
         self.motion.stand_in_light(Light())
         self.state = "Alarm" if self.memory.flag(22) else "Idle"
-        if "settings" in self.memory.damaged:
-            self.memory.damaged.discard("settings")
-            self.say("error:7")
-            self.memory.settings = dict(Memory().settings)
-            for line in self.memory.printed():
-                self.say(line)
         if boot_seconds:
             self._boots_at = self.now + boot_seconds
         else:
@@ -114,7 +100,7 @@ class Firmware(Machine):
 
     def restart(self, *, after_alarm: bool) -> None:
         """Begins anew with its motors' position kept, as after a reset; the line under way is answered with `ok`."""
-        if self._work is not None and not self._startup:
+        if self._work is not None:
             self.say("ok")
         self._work = self._waits_for = None
         self._boots_at = self.now + (ALARM_SECONDS if after_alarm else 0.0)
@@ -165,7 +151,6 @@ class Firmware(Machine):
         self.critical = self._report_wanted = self._door_resuming = False
         self.received.clear()
         self.modes = Modes()
-        self.offsets = Offsets(system=self.memory.recall("G54") or (0.0, 0.0, 0.0))
         self.overrides = Overrides()
         self.counters = Counters()
         self.apply_overrides()
@@ -177,29 +162,12 @@ class Firmware(Machine):
         if self.memory.flag(21) and any(self.motion.pressed()):
             self.state = "Alarm"
             self.say("[MSG:Check Limits]")
-        if self.state in ("Alarm", "Sleep"):
-            self.state = "Alarm"
+        if self.state == "Alarm":
             self.say("[MSG:'$H'|'$X' to unlock]")
             return
         self.state = "Idle"
         self._door_seen = False
         self._heed_door()
-        self.run_start_up()
-
-    def run_start_up(self) -> None:
-        """Executes the stored lines, as after a reset or a homing."""
-        self._startup = True
-        self._work = self._start_up_lines()
-
-    def _start_up_lines(self) -> Work:
-        for line in self.memory.start_up:
-            if "start-up" in self.memory.damaged:
-                self.say(">:error:7")
-            elif line:
-                code = yield from execute_gcode(self, line)
-                self.say(f">{line}:{f'error:{code}' if code else 'ok'}")
-        self.memory.damaged.discard("start-up")
-        return 0
 
     def _heed_motion(self) -> None:
         if self.state in ("Run", "Jog") and not self.motion.queue:
@@ -220,7 +188,7 @@ class Firmware(Machine):
         if self.state == "Home":
             self.alarm(7)
             self.restart(after_alarm=True)
-        elif self.state not in ("Alarm", "Check", "Sleep"):
+        elif self.state != "Alarm":
             self.say("[MSG:Check Door]")
             if self.state == "Jog":
                 self.motion.flush()
@@ -289,14 +257,13 @@ class Firmware(Machine):
 
     def _pump(self) -> None:
         """Goes on with the line under way, then with the next ones, as far as nothing is waited for."""
-        while self.state not in ("Hold", "Door", "Sleep") and not self.critical and self._boots_at is None:
+        while self.state not in ("Hold", "Door") and not self.critical and self._boots_at is None:
             if self._work is None:
                 end = next((at for at, byte in enumerate(self.received) if byte in b"\r\n"), None)
                 if end is None:
                     return
                 line = bytes(self.received[:end]).decode("ascii")
                 del self.received[: end + 1]
-                self._startup = False
                 self._work = self._execute(line)
             if self._waits_for is not None and not self._waits_for():
                 return
@@ -310,12 +277,7 @@ class Firmware(Machine):
         except StopIteration as done:
             if self._work is work:  # a line that restarts the board is answered by that
                 self._work = None
-                if not self._startup:
-                    self.say(f"error:{done.value}" if done.value else "ok")
-                self._startup = False
-                if self._homed:
-                    self._homed = False
-                    self.run_start_up()
+                self.say(f"error:{done.value}" if done.value else "ok")
         else:
             if self._work is work:
                 self._waits_for = waits_for

@@ -5,11 +5,11 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from typing import Literal
 
-from footscan.virtual.board.gcode import Modes, Offsets
+from footscan.virtual.board.gcode import Modes
 from footscan.virtual.board.memory import Build, Memory
 from footscan.virtual.board.motion import Motion
 
-State = Literal["Idle", "Run", "Hold", "Jog", "Alarm", "Door", "Check", "Home", "Sleep"]
+State = Literal["Idle", "Run", "Hold", "Jog", "Alarm", "Door", "Home"]
 Work = Generator[Callable[[], bool], None, int]
 """A line under way: yields what it waits for, returns the number of its error, 0 for `ok`."""
 
@@ -36,7 +36,6 @@ class Pins:
     """Inputs other than limit switches."""
 
     door_open: bool = False
-    probe: bool = False
 
 
 @dataclass
@@ -52,20 +51,14 @@ class Machine(ABC):
     pins: Pins = field(default_factory=Pins)
     state: State = "Idle"
     modes: Modes = field(default_factory=Modes)
-    offsets: Offsets = field(default_factory=Offsets)
     where: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the heads stand when all that is queued is done, machine coordinates."""
     overrides: Overrides = field(default_factory=Overrides)
     counters: Counters = field(default_factory=Counters)
-    probed: tuple[tuple[float, float, float], bool] = ((0.0, 0.0, 0.0), False)
     critical: bool = False
     received: bytearray = field(default_factory=bytearray)
     second_switch_missing: bool = False
     """Whether the second motor of an axis with two never finds its switch."""
-
-    @abstractmethod
-    def homed(self) -> None:
-        """Homing went well: the start-up lines run behind its answer."""
 
     @abstractmethod
     def alarm(self, number: int) -> None:

@@ -1,4 +1,4 @@
-"""What the virtual board keeps when its power is off: settings, coordinate systems, start-up lines, its name."""
+"""What the virtual board keeps when its power is off: its settings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,7 +23,6 @@ SET_UP: Mapping[int, float] = {
 
 WHOLE = {0, 1, 2, 3, 4, 5, 6, 10, 13, 20, 21, 22, 23, 26, 30, 31, 32}
 """Settings that are printed without decimals."""
-SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G28", "G30")
 
 
 @dataclass(frozen=True)
@@ -34,10 +33,7 @@ class Build:
     built: str = "20190830"
     variable_spindle: bool = True
     door_pin: bool = True
-    most_steps_per_second: float | None = None
     line_length: int = 80
-    stored_line_length: int = 80
-    """Of a start-up line or the board's name; boards with more memory take longer lines than they can store."""
     homing_cycles: tuple[tuple[int, ...], ...] = ((2,), (0, 1))
     """Axes that are homed together, one cycle after the other."""
     second_motor: bool = False
@@ -54,11 +50,6 @@ class Memory:
     """The EEPROM."""
 
     settings: dict[int, float] = field(default_factory=lambda: dict(SET_UP))
-    systems: dict[str, Triple] = field(default_factory=lambda: dict.fromkeys(SYSTEMS, (0.0, 0.0, 0.0)))
-    start_up: list[str] = field(default_factory=lambda: ["", ""])
-    name: str = ""
-    damaged: set[str] = field(default_factory=set)
-    """What cannot be read: "settings", "start-up", "name", or a coordinate system."""
 
     def __getitem__(self, number: int) -> float:
         return self.settings[number]
@@ -80,7 +71,6 @@ class Memory:
             (6, number == 0 and whole < 3),
             (10, number == 20 and whole and not self.flag(22)),
             (17, number == 32 and not build.variable_spindle),
-            (12, self._steps_too_fast(number, value, build.most_steps_per_second)),
         )
         error = next((error for error, made in mistakes if made), 0)
         if not error:
@@ -91,14 +81,6 @@ class Memory:
         """The lines of `$$`."""
         return [f"${n}={v:.0f}" if n in WHOLE else f"${n}={v:.3f}" for n, v in sorted(self.settings.items())]
 
-    def recall(self, system: str) -> Triple | None:
-        """A coordinate system; None, and zeroes from now on, where it cannot be read."""
-        if system in self.damaged:
-            self.damaged.discard(system)
-            self.systems[system] = (0.0, 0.0, 0.0)
-            return None
-        return self.systems[system]
-
     def _write(self, number: int, value: float, whole: int) -> None:
         if number in (4, 5, 6, 13, 20, 21, 22, 32):
             self.settings[number] = int(whole != 0)
@@ -106,8 +88,3 @@ class Memory:
             self.settings[number] = whole if number in WHOLE - {30, 31} else value
         if number == 22 and not whole:
             self.settings[20] = 0  # soft limits mean nothing without a home
-
-    def _steps_too_fast(self, number: int, value: float, most: float | None) -> bool:
-        if most is None or not (100 <= number <= 102 or 110 <= number <= 112):
-            return False
-        return value * self.settings[number + 10 if number < 110 else number - 10] > most * 60.0

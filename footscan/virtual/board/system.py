@@ -1,13 +1,12 @@
-"""The virtual board's `$` commands."""
+"""The virtual board's `$` commands: help, settings, build, jogs, homing, unlocking. All others are error 3."""
 
 from __future__ import annotations
 
 import re
 
-from footscan.virtual.board.execute import execute_gcode, home, jog
+from footscan.virtual.board.execute import home, jog
 from footscan.virtual.board.machine import Machine, Work
-from footscan.virtual.board.memory import FACTORY, SYSTEMS
-from footscan.virtual.board.report import HELP, build_report, modes_report, parameters_report
+from footscan.virtual.board.report import HELP, build_report
 
 NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
@@ -17,15 +16,15 @@ def execute_system(board: Machine, line: str) -> Work:
     command = line[1:2]
     if command == "J":
         return (yield from _jog(board, line))
-    if command in "$GCX":
+    if command in "$X":
         return _at_any_time(board, line)
     if board.state not in ("Idle", "Alarm"):
         return 8
     if command == "H":
         return (yield from _home(board, line))
-    if command == "N" and len(line) > 2:
-        return (yield from _store_start_up(board, line))
-    return _when_still(board, line)
+    if line == "$I":
+        return _say_all(board, build_report(board))
+    return 3 if command.isalpha() or command == "#" else _store(board, line)
 
 
 def _jog(board: Machine, line: str) -> Work:
@@ -39,33 +38,15 @@ def _jog(board: Machine, line: str) -> Work:
 def _at_any_time(board: Machine, line: str) -> int:
     match line:
         case "$":
-            lines = [HELP]
+            return _say_all(board, [HELP])
         case "$$" if board.state in ("Run", "Hold"):
             return 8
         case "$$":
-            lines = board.memory.printed()
-        case "$G":
-            lines = [modes_report(board)]
-        case "$C":
-            return _check_mode(board)
+            return _say_all(board, board.memory.printed())
         case "$X":
             return _unlock(board)
         case _:
             return 3
-    return _say_all(board, lines)
-
-
-def _check_mode(board: Machine) -> int:
-    if board.state == "Check":
-        board.say("[MSG:Disabled]")
-        board.state = "Idle"
-        board.restart(after_alarm=False)
-    elif board.state == "Idle":
-        board.state = "Check"
-        board.say("[MSG:Enabled]")
-    else:
-        return 8
-    return 0
 
 
 def _unlock(board: Machine) -> int:
@@ -87,89 +68,25 @@ def _home(board: Machine, line: str) -> Work:
     return (yield from home(board))
 
 
-def _when_still(board: Machine, line: str) -> int:
-    match line:
-        case "$#":
-            return _say_all(board, parameters_report(board))
-        case "$I":
-            if "name" in board.memory.damaged:
-                board.memory.damaged.discard("name")
-                board.memory.name = ""
-                board.say("error:7")
-            return _say_all(board, build_report(board))
-        case "$N":
-            return _say_all(board, [f"$N{number}={text}" for number, text in enumerate(board.memory.start_up)])
-        case "$SLP":
-            board.state = "Sleep"
-            board.motion.flush()
-            board.say("[MSG:Sleeping]")
-            return 0
-        case "$RST=$" | "$RST=#" | "$RST=*":
-            return _restore(board, line[-1])
-        case _:
-            return _name(board, line[3:]) if line.startswith("$I=") else _store(board, line)
-
-
-def _say_all(board: Machine, lines: list[str] | None) -> int:
-    for line in lines or []:
+def _say_all(board: Machine, lines: list[str]) -> int:
+    for line in lines:
         board.say(line)
-    return 7 if lines is None else 0
-
-
-def _name(board: Machine, name: str) -> int:
-    if len(name) > board.build.stored_line_length:
-        return 14
-    board.memory.name = name
-    return 0
-
-
-def _restore(board: Machine, what: str) -> int:
-    if what in "$*":
-        board.memory.settings = dict(FACTORY)
-    if what in "#*":
-        board.memory.systems = dict.fromkeys(SYSTEMS, (0.0, 0.0, 0.0))
-    if what == "*":
-        board.memory.start_up = ["", ""]
-        board.memory.name = ""
-    board.say("[MSG:Restoring defaults]")
-    board.restart(after_alarm=False)
     return 0
 
 
 def _store(board: Machine, line: str) -> int:
     """`$x=val`."""
-    number, rest, error = _assignment(line[1:])
-    if error:
-        return error
-    value = NUMBER.match(rest)
+    name = NUMBER.match(line, 1)
+    if name is None:
+        return 2
+    if line[name.end() : name.end() + 1] != "=":
+        return 3
+    number, text = int(float(name[0])), line[name.end() + 1 :]
+    value = NUMBER.match(text)
     if value is None:
         return 2
-    if value.end() != len(rest) or not 0 <= number <= 255:
+    if value.end() != len(text) or not 0 <= number <= 255:
         return 3
     if number == 13:
         board.counters.offsets = 0
     return board.memory.store(number, float(value[0]), board.build)
-
-
-def _store_start_up(board: Machine, line: str) -> Work:
-    """`$Nx=line`: kept where it is valid, for which it is executed."""
-    if board.state != "Idle":
-        return 8
-    number, text, error = _assignment(line[2:])
-    if error or number >= len(board.memory.start_up):
-        return error or 3
-    if len(text) > board.build.stored_line_length:
-        return 14
-    code = yield from execute_gcode(board, text)
-    if not code:
-        board.memory.start_up[number] = text
-    return code
-
-
-def _assignment(text: str) -> tuple[int, str, int]:
-    """Number, what stands behind `=`, and the error in `number=...`, 0 where there is none."""
-    number = NUMBER.match(text)
-    if number is None:
-        return 0, "", 2
-    head, equals, rest = text[: number.end()], text[number.end() : number.end() + 1], text[number.end() + 1 :]
-    return int(float(head)), rest, 0 if equals == "=" else 3

@@ -83,12 +83,8 @@ def light_on_sensor(
     room_flicker, white_flicker, red_flicker = 1.0 + settings.flicker * random.normal(0.0, (0.02, 0.15, 0.15))
     albedo = np.array(surface.albedo, dtype=np.float32)
     flickers = np.maximum(np.array([room_flicker, white_flicker, red_flicker]), 0.0).astype(np.float32)
-    return np.asarray(
-        _compose(
-            line, glow, veil, brightness, coverage, behind.room, behind.white_glints, behind.red_glints,
-            albedo, laser_colour(settings), flickers,
-        )
-    )  # fmt: skip
+    colour = laser_colour(settings)
+    return np.asarray(_compose(line, glow, veil, brightness, coverage, behind, albedo, colour, flickers))
 
 
 def laser_colour(settings: SimulationSettings) -> Singles:
@@ -138,15 +134,14 @@ def _compose(
     veil: Singles,
     brightness: Singles,
     coverage: Singles,
-    room: Singles,
-    white_glints: Singles,
-    red_glints: Singles,
+    behind: Backdrop,
     albedo: Singles,
     colour: Singles,
     flickers: Singles,
 ) -> Singles:
     """The sum of all light, the coarse parts interpolated."""
     height, width = line.shape
+    room, white_glints, red_glints = behind
     light = np.empty((height, width, 3), dtype=np.float32)
     one = np.float32(1.0)
     for j in range(height):

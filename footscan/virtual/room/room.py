@@ -1,6 +1,7 @@
 """What a camera sees besides the stripe: the object in the light of the room, the hardware behind it, its glints."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,7 @@ LEVELS = {"dark": 0.004, "ambient": 0.25, "bright": 2.2}
 _LAMPS = np.array([0.25, 0.35, 0.90])
 
 
-@dataclass(frozen=True)
-class Backdrop:
+class Backdrop(NamedTuple):
     """The static picture of hardware and room around one camera, as it travels along."""
 
     room: Singles

@@ -25,7 +25,7 @@ cache = typer.Typer(help="The store of all results: its size, what can go, wheth
 HOUR_S = 3600.0
 
 Place = Annotated[str | None, typer.Option("--cache", help="The store: a folder or a URL, without a workflow.")]
-OfWorkflow = Annotated[Path | None, typer.Option("--workflow", help="The workflow; workflow.yaml where absent.")]
+OfWorkflow = Annotated[Path | None, typer.Option("--workflow", help="The workflow; default: workflow.yaml.")]
 ScanName = Annotated[str, typer.Argument(help="A scan: its folder, or patient/scan.")]
 TakeOver = Annotated[
     bool, typer.Option("--take-over", help="Remove the leases of runs elsewhere, or with a wrong clock, that are gone.")
@@ -269,7 +269,7 @@ def _place(store: "Store") -> str:
 
 def _scan_name(scan: str) -> str:
     """`patient/scan` of a scan that is named so, or by its folder."""
-    from pipelines.recordings.scans import SCAN_FILE, read_scan
+    from footscan.recordings.scans import SCAN_FILE, read_scan
 
     folder = Path(scan)
     return read_scan(folder).name if (folder / SCAN_FILE).is_file() else scan
@@ -292,8 +292,9 @@ def _recompute(workflow: Path, share: float, seed: int) -> "tuple[int, list[Diff
     from pipelines.engine import audit
 
     planned = plan_job(job_of_workflow(workflow))
+    store = planned.workspace.store
     chosen = audit.sample(
-        (key for scan in planned.scans for key in audit.repeatable(plan_of_scan(scan, planned), planned.store)),
+        (key for scan in planned.scans for key in audit.repeatable(plan_of_scan(scan, planned), store)),
         share,
         seed,
     )
@@ -303,10 +304,10 @@ def _recompute(workflow: Path, share: float, seed: int) -> "tuple[int, list[Diff
 
     with ThreadPoolExecutor(planned.job.threads) as pool:
         for scan in planned.scans:  # one at a time: the graphs of all would be too much
-            actions = audit.repeatable(plan_of_scan(scan, planned), planned.store)
+            actions = audit.repeatable(plan_of_scan(scan, planned), store)
             mine = {key: action for key, action in actions.items() if key in chosen - done}
             done |= mine.keys()
-            for ended in [pool.submit(audit.repeat, action, planned.store) for action in mine.values()]:
+            for ended in [pool.submit(audit.repeat, action, store) for action in mine.values()]:
                 try:
                     difference = ended.result()
                 except Fault as error:

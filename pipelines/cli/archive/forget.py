@@ -25,7 +25,7 @@ OUT_OF_REACH = (
 def forget(
     patient: Annotated[str, typer.Argument(help="Whom to forget: the pseudonym.")],
     scan: Annotated[str | None, typer.Option("--scan", help="One scan of theirs alone.")] = None,
-    workflow: Annotated[Path | None, typer.Option(help="The workflow; workflow.yaml where absent.")] = None,
+    workflow: Annotated[Path | None, typer.Option(help="The workflow; default: workflow.yaml.")] = None,
     suite: Annotated[list[Path] | None, typer.Option(help="A suite that runs scans of theirs; repeatable.")] = None,
     log: Annotated[list[Path] | None, typer.Option(help="A log that lies elsewhere; repeatable.")] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,

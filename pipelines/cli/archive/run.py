@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 WORKFLOW = Path("workflow.yaml")
 
 WorkflowFile = Annotated[
-    Path | None, typer.Argument(help="The workflow; workflow.yaml where absent.", metavar="[WORKFLOW]")
+    Path | None, typer.Argument(help="The workflow; default: workflow.yaml.", metavar="[WORKFLOW]")
 ]
 ScanFolder = Annotated[Path | None, typer.Option("--scan", help="One scan folder, without a workflow.")]
 CalibrationFile = Annotated[
-    Path | None, typer.Option("--calibration", help="Calibration for --scan; the one that the scan names where absent.")
+    Path | None, typer.Option("--calibration", help="Calibration for --scan; default: the one that the scan names.")
 ]
 ResultsFolder = Annotated[Path | None, typer.Option("--out", help="Folder of the results, for --scan.")]
 JsonLog = Annotated[Path | None, typer.Option("--log-json", help="Write what happens here, a JSON object a line.")]

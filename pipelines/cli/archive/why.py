@@ -43,9 +43,9 @@ class Explanation:
 def why(
     scan: Annotated[str, typer.Argument(help="A scan: its folder, or patient/scan.")],
     step: Annotated[
-        str | None, typer.Argument(help="A step: extract, extract-3; all that would run where absent.")
+        str | None, typer.Argument(help="A step, such as extract or extract-3; default: all steps that would run.")
     ] = None,
-    workflow: Annotated[Path | None, typer.Option(help="The workflow; workflow.yaml where absent.")] = None,
+    workflow: Annotated[Path | None, typer.Option(help="The workflow; default: workflow.yaml.")] = None,
     calibration: Annotated[Path | None, typer.Option(help="Calibration, for a scan folder without a workflow.")] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the results, for a scan folder without a workflow.")
@@ -61,7 +61,7 @@ def why(
         raise refused.error
     [found] = planned.scans
     plan = plan_of_scan(found, planned)
-    every = [_explain(one, plan, planned.store) for one in plan.steps]
+    every = [_explain(one, plan, planned.workspace.store) for one in plan.steps]
     chosen = _named(step, every) if step is not None else [one for one in every if one.state != "hit"]
     if as_json:
         print_json(_json(found.scan.name, every, chosen))
@@ -75,9 +75,8 @@ def why(
 def plan_of_scan(found: "PlannedScan", planned: "PlannedJob") -> "Plan":
     """The plan of one scan of a job, with all its steps."""
     from pipelines.archive.job import draw_steps
-    from pipelines.engine.plan import make_plan
 
-    return make_plan(draw_steps(found.scan, planned), planned.store)
+    return planned.workspace.plan(draw_steps(found.scan, planned))
 
 
 def local_time(seconds: float | None) -> str:
@@ -106,7 +105,7 @@ def _job(scan: str, workflow: Path | None, calibration: Path | None, out: Path |
 
 def _folder(scan: str, job: "Job") -> Path:
     """The folder of a scan that is named by its folder, or as `patient/scan`."""
-    from pipelines.recordings.scans import read_scan
+    from footscan.recordings.scans import read_scan
 
     named = Path(scan).resolve()
     for folder in job.folders:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pipelines.engine.pool import Cluster, OnStepEnd, Pool, RunTask, Task
 
 Threads = Annotated[
-    int | None, typer.Option("--threads", min=1, help="Steps that run at once; as many as cores where absent.")
+    int | None, typer.Option("--threads", min=1, help="Steps that run at once; default: as many as cores.")
 ]
 Workers = Annotated[
     int | None, typer.Option("--workers", min=1, help="Run the steps in so many processes of this machine instead.")

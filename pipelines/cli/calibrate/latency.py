@@ -18,7 +18,7 @@ from pipelines.cli.terminal.output import AsJson, message, print_json, print_tab
 
 def latency(
     rig: RigFile = None,
-    from_mm: Annotated[float | None, typer.Option(help="Begin of the passes; the rig's travel where absent.")] = None,
+    from_mm: Annotated[float | None, typer.Option(help="Begin of the passes; default: the rig's travel.")] = None,
     to_mm: Annotated[float | None, typer.Option(help="Their end.")] = None,
     power: Annotated[float, typer.Option(min=0.01, max=1, help="Of the lasers.")] = 1.0,
     exposure_ms: Annotated[

@@ -28,7 +28,8 @@ def measure(
         Literal["toe2", "ball_center", "brannock"], typer.Option(help="The axis that lengths run along.")
     ] = "toe2",
     unit: Annotated[
-        Literal["mm", "cm", "m", "in"] | None, typer.Option(help="Of the mesh; told by the foot's size where absent.")
+        Literal["mm", "cm", "m", "in"] | None,
+        typer.Option(help="Unit of the mesh; default: the one that fits the size of a foot."),
     ] = None,
     landmarks: Annotated[
         Path | None, typer.Option(help="Landmarks that were set by hand (YAML), in the mesh's own frame, mm.")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from footscan.capture.board.termination import EndedBySignal
-from pipelines.cli.live.options import VIRTUAL_FOLDER, RigFile, Virtual, VirtualFolder, opened_rig, plain_world
+from pipelines.cli.live.options import VIRTUAL_FOLDER, GridMm, RigFile, Virtual, VirtualFolder, opened_rig, plain_world
 from pipelines.cli.terminal.output import message
 from schemas.base.errors import RefusedInput
 
@@ -27,8 +27,8 @@ def console(
     rig: RigFile = None,
     out: Annotated[Path, typer.Option(help="The archive.")] = Path("archive"),
     results: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
-    calibration: Annotated[Path | None, typer.Option(help="The rig's where absent.")] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any that is free.")] = 8760,
+    calibration: Annotated[Path | None, typer.Option(help="Calibration file; default: the rig's.")] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0: any free port.")] = 8760,
     host: Annotated[
         str, typer.Option(help="Address to listen on. Other than loopback, the page is opened with a token.")
     ] = LOOPBACK,
@@ -41,9 +41,7 @@ def console(
     ] = None,
     virtual: Virtual = False,
     virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
-    grid_mm: Annotated[
-        float, typer.Option(min=0.05, max=10, help="Between two places that the virtual cameras have pictures of.")
-    ] = 0.5,
+    grid_mm: GridMm = 0.5,
 ) -> None:
     """Run the scanner from a web page; Ctrl-C ends it, with the lasers off."""
     from pipelines.console.console import Console

@@ -19,10 +19,21 @@ if TYPE_CHECKING:
 
 RIG = Path("rig.yaml")
 
-RigFile = Annotated[Path | None, typer.Option("--rig", help="What the scanner consists of; rig.yaml where absent.")]
-Virtual = Annotated[bool, typer.Option("--virtual", help="A virtual scanner, without any hardware.")]
+RigFile = Annotated[Path | None, typer.Option("--rig", help="What the scanner consists of; default: rig.yaml.")]
+OF_VIRTUAL = "Virtual scanner"
+"""The group of options that a real scanner does not have."""
+Virtual = Annotated[
+    bool, typer.Option("--virtual", rich_help_panel=OF_VIRTUAL, help="Use a virtual scanner, without any hardware.")
+]
 VirtualFolder = Annotated[
-    Path, typer.Option("--virtual-folder", help="Where the virtual scanner keeps its rig, calibration and pictures.")
+    Path,
+    typer.Option("--virtual-folder", rich_help_panel=OF_VIRTUAL, help="Folder of its rig, calibration and pictures."),
+]
+GridMm = Annotated[
+    float,
+    typer.Option(
+        "--grid-mm", min=0.05, max=10, rich_help_panel=OF_VIRTUAL, help="Distance between its rendered pictures, mm."
+    ),
 ]
 VIRTUAL_FOLDER = Path("virtual")
 

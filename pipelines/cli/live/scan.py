@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from pipelines.cli.live.options import (
+    OF_VIRTUAL,
     VIRTUAL_FOLDER,
+    GridMm,
     RigFile,
     StateTeller,
     Virtual,
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 DARK_GRID_MM = 100.0
 """Nothing of a virtual foot is looked at in the dark, unless for its colours."""
 
-Speed = Annotated[float | None, typer.Option("--speed", min=0.1, help="mm/s; the rig's where absent.")]
+Speed = Annotated[float | None, typer.Option("--speed", min=0.1, help="Speed of the heads, mm/s; default: the rig's.")]
 
 
 def scan(
@@ -39,16 +41,17 @@ def scan(
     rig: RigFile = None,
     out: Annotated[Path, typer.Option(help="The archive.")] = Path("archive"),
     results: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
-    name: Annotated[str | None, typer.Option(help="Of the scan; day and side where absent.")] = None,
-    calibration: Annotated[Path | None, typer.Option(help="The rig's where absent.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the scan; default: day and side.")] = None,
+    calibration: Annotated[Path | None, typer.Option(help="Calibration file; default: the rig's.")] = None,
     speed: Speed = None,
-    from_mm: Annotated[float | None, typer.Option(help="X of the first frame; the rig's where absent.")] = None,
-    to_mm: Annotated[float | None, typer.Option(help="X of the last frame; the rig's where absent.")] = None,
+    from_mm: Annotated[float | None, typer.Option(help="X of the first frame; default: the rig's.")] = None,
+    to_mm: Annotated[float | None, typer.Option(help="X of the last frame; default: the rig's.")] = None,
     power: Annotated[
-        float | None, typer.Option(min=0.01, max=1, help="Of the lasers; chosen by what the cameras see where absent.")
+        float | None,
+        typer.Option(min=0.01, max=1, help="Power of the lasers; default: chosen by what the cameras see."),
     ] = None,
     exposure_ms: Annotated[
-        float | None, typer.Option(min=0.05, max=1000, help="Of all cameras; goes with --power.")
+        float | None, typer.Option(min=0.05, max=1000, help="Exposure of all cameras; needs --power.")
     ] = None,
     texture: Annotated[
         bool, typer.Option("--texture", help="Film the way back in the dark, for the colours of the skin.")
@@ -60,20 +63,26 @@ def scan(
     virtual: Virtual = False,
     virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
     foot_seed: Annotated[
-        int | None, typer.Option(min=0, help="A virtual foot of the population instead of the mean man's.")
+        int | None,
+        typer.Option(min=0, rich_help_panel=OF_VIRTUAL, help="Draw a foot of the population; default: the mean man's."),
     ] = None,
-    light: Annotated[Literal["dark", "ambient", "bright"], typer.Option(help="Light in the virtual room.")] = "ambient",
+    light: Annotated[
+        Literal["dark", "ambient", "bright"], typer.Option(rich_help_panel=OF_VIRTUAL, help="Light in its room.")
+    ] = "ambient",
     ripple: Annotated[
-        float, typer.Option(min=0, max=0.5, help="Part of the virtual heads' speed that swings once a second.")
+        float,
+        typer.Option(
+            min=0, max=0.5, rich_help_panel=OF_VIRTUAL, help="Share of its heads' speed that varies, once a second."
+        ),
     ] = 0.0,
     pause: Annotated[
-        float, typer.Option(min=0, max=60, help="How long the virtual heads stand in the middle, s.")
-    ] = 0.0,
-    jitter_ms: Annotated[float, typer.Option(min=0, max=25, help="How unevenly the virtual cameras expose.")] = 10.0,
-    grid_mm: Annotated[
         float,
-        typer.Option(min=0.05, max=10, help="Between two places that the virtual cameras have pictures of."),
-    ] = 0.5,
+        typer.Option(min=0, max=60, rich_help_panel=OF_VIRTUAL, help="How long its heads stop halfway, s."),
+    ] = 0.0,
+    jitter_ms: Annotated[
+        float, typer.Option(min=0, max=25, rich_help_panel=OF_VIRTUAL, help="Jitter of its cameras' exposures, ms.")
+    ] = 10.0,
+    grid_mm: GridMm = 0.5,
     as_json: AsJson = False,
 ) -> int:
     """Scan a foot: home, film, store, reconstruct and measure."""

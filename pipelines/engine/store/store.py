@@ -2,7 +2,7 @@
 
 Every write is atomic; an action's row is written after its blob. Nothing in here is trusted: a row bears a seal, a blob
 is checked against its digest whenever it is read, and what is damaged counts as missing. What has not been touched
-since it was checked is not read again (`memory`).
+since it was checked is not read again (`verified`).
 """
 
 import contextlib
@@ -17,7 +17,7 @@ from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.places import Files, open_files
 from pipelines.engine.files.seal import BROKEN, UnsealedError, sealed, unsealed
 from pipelines.engine.files.secret import secret_of
-from pipelines.engine.store.verified_index import Known, Memory
+from pipelines.engine.store.verified_index import Known, VerifiedIndex
 from schemas.base.errors import Fault
 
 log = logging.getLogger("footscan.store")
@@ -53,7 +53,7 @@ class Store:
     """A content store and an action cache in one place."""
 
     files: Files
-    memory: Memory | None = None
+    verified: VerifiedIndex | None = None
     secret: bytes | None = field(default=None, repr=False)
     """Of the store's owner, if it is sealed."""
 
@@ -90,7 +90,7 @@ class Store:
         row_state = self.files.state(row_name(key))
         if row_state is None:
             return None
-        known = None if self.memory is None else self.memory.get(key)
+        known = None if self.verified is None else self.verified.get(key)
         if known is None or known.row != row_state:
             row = self.row(key)
             if row is None:
@@ -117,9 +117,9 @@ class Store:
         )
         self.note_latest(step_name, key, sources or {})
         state = self.files.state(row_name(key))
-        if self.memory is not None and state is not None:
+        if self.verified is not None and state is not None:
             blob = None if row.digest is None else self.files.state(blob_name(row.digest))
-            self.memory.put(key, _known(state, row, blob))
+            self.verified.put(key, _known(state, row, blob))
 
     def note_latest(self, step_name: str, key: str, sources: dict[str, str]) -> None:
         """Remember an action as the last one of a step."""
@@ -170,8 +170,8 @@ class Store:
         return False
 
     def _remember(self, key: str, known: Known) -> None:
-        if self.memory is not None:
-            self.memory.put(key, known)
+        if self.verified is not None:
+            self.verified.put(key, known)
 
     def _read_sealed(self, name: str) -> dict[str, Any] | None:
         """The content of a small file, if its seal is right."""
@@ -187,11 +187,11 @@ class Store:
             return None
 
 
-def open_store(place: Path | str, memory: Path | None = None) -> Store:
-    """The store at a path or URL, with what the file `memory` remembers of it."""
+def open_store(place: Path | str, verified: Path | None = None) -> Store:
+    """The store at a path or URL, with what the file `verified` remembers of it."""
     files = open_files(place)
     secret = secret_of(files)
-    return Store(files, None if memory is None else Memory(memory, secret), secret)
+    return Store(files, None if verified is None else VerifiedIndex(verified, secret), secret)
 
 
 def _reopened(files: Files) -> Store:

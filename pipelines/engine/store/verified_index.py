@@ -47,7 +47,7 @@ class Known(NamedTuple):
 
 
 @dataclass
-class Memory:
+class VerifiedIndex:
     """Rows of one store, by key, in a file of this machine."""
 
     file: Path

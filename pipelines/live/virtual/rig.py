@@ -10,20 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipelines.archive.job import CACHE
-from pipelines.engine.deliver import deliver
-from pipelines.engine.files.file_digests import FileDigests
-from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import Threads
-from pipelines.engine.run import run_plan
-from pipelines.engine.store.lease import lease
-from pipelines.engine.store.store import open_store
+from pipelines.engine.workspace import Workspace, digests_by_kind
 from pipelines.live.latencies import measure_latencies, rig_with
 from pipelines.live.light import light_by_hand
 from pipelines.live.rig_file import read_rig, write_rig
 from pipelines.live.scanner import LiveScanner
 from pipelines.live.virtual.process import WorldProcess
 from pipelines.live.virtual.world import CAMERAS, EXPOSURE_MS, World, block_range_mm
-from pipelines.simulate import digests_of, filmed_calibration_steps
+from pipelines.simulate import filmed_calibration_steps
 from schemas.base.errors import Fault
 from schemas.parameters.simulation import SimulationSettings
 from schemas.rig import Rig, RigCamera
@@ -112,16 +107,11 @@ def _with_latencies(rig: Rig, world: World, on_progress: OnProgress) -> Rig:
 
 def _calibrate(folder: Path, file: Path, scanner_seed: int) -> None:
     """The scanner's calibration, from a capture of the reference object."""
-    store = open_store(folder / CACHE)
     steps = filmed_calibration_steps(
         f"virtual-{scanner_seed}", folder / f"capture-{scanner_seed}", SimulationSettings(scanner_seed=scanner_seed)
     )
-    plan = make_plan(steps, store)
-    with lease(store):
-        outcomes = run_plan(plan, store, pool=Threads(1), on_step_end=lambda _: None)
-    digests = digests_of(steps, outcomes)
-    files = FileDigests.load(folder / CACHE / "files.json", store.secret)
-    if problem := deliver({file.name: digests["calibrate"]}, store, files, folder):
-        raise Fault(problem)
-    if store.memory is not None:
-        store.memory.close()
+    with Workspace(folder / CACHE) as workspace, workspace.lease():
+        outcomes = workspace.run(steps, Threads(1), lambda _: None)
+        digests = digests_by_kind(steps, outcomes)
+        if problem := workspace.deliver({file.name: digests["calibrate"]}, folder):
+            raise Fault(problem)

@@ -10,6 +10,7 @@ come on standard input, a JSON document a line, and their end is its own.
 import json
 import sys
 import threading
+import time
 from collections.abc import Iterator, Mapping
 from math import ceil, floor
 from pathlib import Path
@@ -63,7 +64,7 @@ class World(Document):
     subject: SubjectName = "nothing"
     """What stands on the glass."""
     foot_seed: Seed | None = None
-    """Of the population that the feet are drawn from; the mean man's where absent."""
+    """Of the population that the feet are drawn from; default: the mean man's."""
     light: Literal["dark", "ambient", "bright"] = "ambient"
     scanner_seed: Seed = 1
     """Of mounting and lenses, and of the latencies of its cameras, which nobody is told."""
@@ -199,7 +200,7 @@ class VirtualWorld:
         middle_mm = (self._world.start_mm + self._world.end_mm) / 2
         before: float | None = None
         while self._world.pause_s and not self._ends.wait(WATCHED_EVERY_S):
-            now = self.board.clock()
+            now = time.monotonic()
             x = self.board.position_at(now)[0]
             if self.board.laser_at(now) and before is not None and (before < middle_mm) != (x < middle_mm):
                 self.board.pause(self._world.pause_s)

@@ -19,14 +19,11 @@ from pathlib import Path
 from statistics import fmean
 from tempfile import TemporaryDirectory
 
+from footscan.recordings.scans import RecordedScan, read_scan
 from pipelines.archive.job import Job, PlannedJob, draw_steps
 from pipelines.engine.actions.step import Success
-from pipelines.engine.files.file_digests import FileDigests
-from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import StepEnd, Threads
-from pipelines.engine.run import run_plan
-from pipelines.engine.store.store import open_store
-from pipelines.recordings.scans import RecordedScan, read_scan
+from pipelines.engine.workspace import Workspace
 from pipelines.regression.figures.process_memory import forget_peak, held_mb, peak_mb
 from pipelines.regression.figures.reference_computation import reference_seconds
 from schemas.base.errors import Fault
@@ -121,14 +118,13 @@ def _end_with_parent() -> None:
 
 def _one_pass(job: Job, empty: Path) -> Pass:
     gc.collect()
-    planned = PlannedJob(
-        replace(job, cache=empty / "cache"), open_store(empty / "cache"), FileDigests(empty / "files.json")
-    )
+    planned = PlannedJob(replace(job, cache=empty / "cache"), Workspace(empty / "cache"))
     [folder] = job.folders
     scan = read_scan(folder, job.archive_of(folder))
     steps = draw_steps(_Elsewhere(scan.folder, scan.archive, scan.document, frames=empty / "frames.zarr"), planned)
     watch = _Watch()
-    outcomes = run_plan(make_plan(steps, planned.store), planned.store, pool=Threads(1), on_step_end=watch.on_step_end)
+    outcomes = planned.workspace.run(steps, Threads(1), watch.on_step_end)
+    planned.workspace.close()
     results = {
         step.name.removeprefix(f"{step.scan}/"): outcome.digest
         for step in steps

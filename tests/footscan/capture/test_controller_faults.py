@@ -24,6 +24,8 @@ from footscan.capture.grbl.settings import BoardSettings
 from footscan.virtual.board.board import Board
 from schemas.base.errors import FootscanError
 
+pytestmark = pytest.mark.real_time  # the board answers on a terminal of the system
+
 CASES = int(os.environ.get("FOOTSCAN_FUZZ", "25"))
 FIRST = int(os.environ.get("FOOTSCAN_FUZZ_FIRST", "0"))
 RECORD = os.environ.get("FOOTSCAN_FUZZ_RECORD")

@@ -28,6 +28,8 @@ from footscan.virtual.filming.stream_faults import StreamFault
 from footscan.virtual.filming.streams import SentFrame, VirtualStreams, free_running
 from schemas.base.errors import Fault
 
+pytestmark = pytest.mark.real_time  # cameras stream while heads move
+
 QUICK = {24: 1200, 25: 12000, 26: 5, 110: 12000, 111: 12000, 112: 12000, 120: 2000, 121: 2000, 122: 2000}
 SETTINGS = BoardSettings(
     homing_mm_per_s=200.0, homing_slow_mm_per_s=20.0, max_mm_per_s=(200.0,) * 3, mm_per_s2=(2000.0,) * 3

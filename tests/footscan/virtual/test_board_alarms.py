@@ -1,6 +1,4 @@
-"""Every alarm of Grbl 1.1 on the virtual board, and what it takes to get out of it."""
-
-import math
+"""Every alarm of Grbl 1.1 on the virtual board but those of probing, and what it takes to get out of it."""
 
 import pytest
 from board_bench import LOCKED, WELCOME, Bench
@@ -55,26 +53,6 @@ def test_no_alarm_3_in_a_hold_that_is_complete(homed: Bench) -> None:
     assert homed.state == "Idle"
 
 
-def test_alarm_4_probe_pressed_before(homed: Bench) -> None:
-    homed.firmware.pins.probe = True
-    assert homed.send("G38.2 X-5 F100\n") == ["ALARM:4", "ok"]
-    assert homed.state == "Alarm"
-
-
-def test_alarm_5_probe_touched_nothing(homed: Bench) -> None:
-    assert homed.send("G38.2 X-5 F600\n", 1.0) == ["ALARM:5", "[PRB:-5.000,-2.000,-2.000:0]", "ok"]
-
-
-def test_probe_touches(homed: Bench) -> None:
-    homed.send("G38.3 X-50 F600\n", 0.5)
-    homed.firmware.pins.probe = True
-    [report, answer] = homed.send("", 0.1)
-    assert float(report[5:].split(",")[0]) == pytest.approx(-7.0, abs=0.1)
-    assert report.endswith(":1]")
-    assert answer == "ok"
-    assert homed.state == "Idle"
-
-
 def test_alarm_6_reset_while_homing(bench: Bench) -> None:
     bench.send("$H\n", 0.1)
     assert bench.send("\x18", 1.0) == ["ALARM:6", "ok", *WELCOME, LOCKED]
@@ -119,11 +97,3 @@ def test_lost_power_forgets_the_position(homed: Bench) -> None:
     assert homed.motion.steps == (0.0, 0.0, 0.0)
     assert homed.motion.rail_at(homed.now)[0] == pytest.approx(-50.0)
     assert homed.state == "Alarm"
-
-
-def test_arc_is_followed_to_its_end(homed: Bench) -> None:
-    homed.send("G0 X-20 Y-20\n", 1.0)
-    homed.send("G3 X-40 Y-20 I-10 F6000\n", 0.15)
-    assert math.hypot(homed.motion.steps[0] + 30.0, homed.motion.steps[1] + 20.0) == pytest.approx(10.0, abs=0.05)
-    homed.wait(1.0)
-    assert homed.motion.steps[:2] == (-40.0, -20.0)

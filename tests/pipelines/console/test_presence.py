@@ -10,6 +10,8 @@ from starlette.testclient import TestClient
 from pipelines.console.presence import GONE_SECONDS, Presence
 from schemas.base.errors import Fault
 
+pytestmark = pytest.mark.real_time  # a connection counts as gone after half a second
+
 PAGE, OTHER = "a" * 16, "b" * 16
 
 

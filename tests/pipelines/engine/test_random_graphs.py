@@ -306,6 +306,6 @@ def run(steps: list[Step], store: Store, workers: int) -> tuple[dict[str, Outcom
             content = store.get(outcome.digest)
             assert content is not None
             found[name] = content
-    if store.memory is not None:
-        store.memory.close()
+    if store.verified is not None:
+        store.verified.close()
     return found, ran

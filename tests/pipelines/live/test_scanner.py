@@ -17,6 +17,7 @@ from waiting import wait_until
 from footscan.capture import frame_positions, latency
 from footscan.frames.film import encoded_frames, open_film
 from footscan.frames.travel import read_positions
+from footscan.recordings.scans import read_scan
 from footscan.virtual.board.board import Board
 from footscan.virtual.filming.streams import VirtualStreams, free_running
 from pipelines.live import storing
@@ -24,11 +25,12 @@ from pipelines.live.light import light_by_hand
 from pipelines.live.scanner import LiveScanner, ScanOrder
 from pipelines.live.state import ScannerState
 from pipelines.live.storing import ScanName, next_scan_name
-from pipelines.recordings.scans import read_scan
 from schemas.base.documents import read_json
 from schemas.base.errors import Fault, Finding, RefusedInput
 from schemas.recording import Recording
 from schemas.rig import Rig, RigCamera, RigLatency, RigTravel
+
+pytestmark = pytest.mark.real_time  # cameras stream while heads move
 
 DARK = bytes(simplejpeg.encode_jpeg(np.full((480, 640, 3), 20, np.uint8), 90, "RGB", "420"))
 DAY = datetime.date(2026, 11, 20)

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from footscan.recordings.scans import RecordedScan
 from pipelines.recordings.calibration_choice import calibration_places, choose_calibration
-from pipelines.recordings.scans import RecordedScan
 from schemas.base.documents import validate
 from schemas.base.errors import RefusedInput
 from schemas.scan import Scan

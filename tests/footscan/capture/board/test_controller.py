@@ -15,6 +15,8 @@ from footscan.virtual.board.board import Board
 from footscan.virtual.board.memory import FACTORY, Build
 from schemas.base.errors import Fault, RefusedInput
 
+pytestmark = pytest.mark.real_time  # the board answers on a terminal of the system
+
 HOMING_SECONDS = 60.0
 SETTINGS = BoardSettings(
     max_mm_per_s=(400.0, 400.0, 400.0),

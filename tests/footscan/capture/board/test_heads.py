@@ -18,6 +18,8 @@ from footscan.virtual.board.board import Board
 from footscan.virtual.board.rails import Gait, Mount
 from schemas.base.errors import Fault, RefusedInput
 
+pytestmark = pytest.mark.real_time  # the board answers on a terminal of the system
+
 SETTINGS = BoardSettings(
     max_mm_per_s=(400.0, 400.0, 400.0),
     mm_per_s2=(4000.0, 4000.0, 4000.0),

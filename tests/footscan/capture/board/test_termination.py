@@ -18,6 +18,8 @@ from footscan.capture.grbl.settings import BoardSettings
 from footscan.virtual.board.board import Board
 from schemas.base.errors import Fault
 
+pytestmark = pytest.mark.real_time  # a process is to stop the board within a moment of a signal
+
 ROOT = Path(__file__).parents[4]
 WITHIN_SECONDS = 0.3
 SETTINGS = BoardSettings(

@@ -20,6 +20,8 @@ from footscan.virtual.filming.stream_faults import StreamFault, random_faults
 from footscan.virtual.filming.streams import SentFrame, VirtualStreams, free_running
 from schemas.base.errors import Fault, RefusedInput
 
+pytestmark = pytest.mark.real_time  # frames are told by when they come over a socket
+
 LIMIT_S = 60.0
 """Of every wait: generous, for a machine with much else to do."""
 RATE = 200 / 11

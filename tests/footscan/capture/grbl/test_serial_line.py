@@ -12,6 +12,8 @@ from waiting import wait_until
 from footscan.capture.grbl.serial_line import SerialLine
 from schemas.base.errors import Fault, RefusedInput
 
+pytestmark = pytest.mark.real_time  # a kernel's terminal carries the bytes
+
 
 class Ends:
     """Both ends of a line, and what was heard at ours."""

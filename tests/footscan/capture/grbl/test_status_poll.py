@@ -11,6 +11,8 @@ from waiting import wait_until
 from footscan.capture.grbl.report import Report
 from footscan.capture.grbl.status_poll import StatusPoll, TimedReport
 
+pytestmark = pytest.mark.real_time  # reports are asked for ten times a second
+
 ANSWER = b"<Run|MPos:0.000,0.000,0.000>"
 SECONDS = 3.0
 

@@ -20,6 +20,8 @@ from footscan.virtual.board.line import Harm
 from footscan.virtual.board.motion import Light, Motion, Move
 from footscan.virtual.board.rails import Gait, Mount, Rail
 
+pytestmark = pytest.mark.real_time  # the board answers on a terminal of the system
+
 QUICK = {24: 600.0, 25: 6000.0, 26: 5, 110: 6000.0, 111: 6000.0, 112: 6000.0, 120: 5000.0, 121: 5000.0, 122: 5000.0}
 
 

@@ -15,6 +15,8 @@ import pytest
 from footscan.virtual.filming.stream_faults import KINDS, StreamFault, random_faults, torn
 from footscan.virtual.filming.streams import SentFrame, VirtualStreams, free_running
 
+pytestmark = pytest.mark.real_time  # frames are sent over a socket when they are due
+
 JPEG = b"\xff\xd8" + bytes(range(1, 200)) * 10 + b"\xff\xd9"
 LIMIT_S = 30.0
 

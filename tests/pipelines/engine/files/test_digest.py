@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.engine.files import digest
+from pipelines.engine.files import digest, file_digests
 from pipelines.engine.files.digest import SETTLED_NS, FileState, file_state, sha256
 from pipelines.engine.files.file_digests import FileDigests
 from schemas.base.errors import RefusedInput
@@ -106,7 +106,7 @@ def test_damaged_memory_is_forgotten(film: Path, tmp_path: Path, memory: bytes) 
 
 
 def test_file_that_is_being_written_is_refused(film: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(digest, "file_state", lambda _: FileState(3, 0, 0, 0))
+    monkeypatch.setattr(file_digests, "file_state", lambda _: FileState(3, 0, 0, 0))
     with pytest.raises(RefusedInput, match=r"film\.avi: is being written to, expected a finished file$"):
         FileDigests(tmp_path / "files.json").of(film)
 

@@ -205,8 +205,8 @@ def test_plan_and_run_on_a_store_anywhere(place: Path | str, package: Any, tmp_p
         plan = make_plan(steps, store)
         outcome = run_plan(plan, store, pool=Threads(2), on_step_end=ends.append)["P/S/second"]
         assert isinstance(outcome, Success)
-        assert store.memory is not None
-        store.memory.close()
+        assert store.verified is not None
+        store.verified.close()
         return [p.state for p in plan.steps], [end.step.kind for end in ends if end.ran], store.get(outcome.digest)
 
     nothing, everything = [State.MISS, State.WAITS], [State.HIT, State.HIT]

@@ -102,12 +102,12 @@ def test_what_a_machine_remembers_is_no_way_in(tmp_path: Path) -> None:
     store = opened(tmp_path)
     seal_store(store)
     key = poison(tmp_path, b"poison")
-    plain = Store(store.files, opened(tmp_path).memory)
-    assert plain.memory is not None
-    plain.memory.secret = None
+    plain = Store(store.files, opened(tmp_path).verified)
+    assert plain.verified is not None
+    plain.verified.secret = None
     state, blob = (store.files.state(name) for name in (row_name(key), blob_name(sha256(b"poison"))))
-    plain.memory.put(key, Known(str(state), sha256(b"poison"), None, None, blob))
-    plain.memory.close()
+    plain.verified.put(key, Known(str(state), sha256(b"poison"), None, None, blob))
+    plain.verified.close()
     assert plain.lookup(key) is not None
     assert opened(tmp_path).lookup(key) is None
     with sqlite3.connect(tmp_path / "store/known.sqlite") as connection:

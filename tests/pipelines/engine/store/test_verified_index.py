@@ -17,7 +17,7 @@ import pytest
 from pipelines.engine.actions.key import key_of
 from pipelines.engine.store import verified_index as memory_module
 from pipelines.engine.store.store import Row, Store, blob_name, open_store, row_name
-from pipelines.engine.store.verified_index import Known, Memory
+from pipelines.engine.store.verified_index import Known, VerifiedIndex
 
 FLIPS = 150 if (asked := os.environ.get("FOOTSCAN_FUZZ")) is None else 20 * int(asked)
 IMAGES = [{"step": "clean", "code": "d" * 64, "parameters": None, "inputs": {"n": ["value", c * 64]}} for c in "abcdef"]
@@ -61,8 +61,8 @@ def told(store: Store) -> dict[str, tuple[str | None, str | None, str | None] | 
 
 
 def close(store: Store) -> None:
-    assert store.memory is not None
-    store.memory.close()
+    assert store.verified is not None
+    store.verified.close()
 
 
 def reads_of(store: Store, monkeypatch: pytest.MonkeyPatch) -> list[str]:
@@ -234,7 +234,7 @@ def test_busy_with_another_run(file: Path, truth: Truth, monkeypatch: pytest.Mon
 
 
 def test_threads_use_it_at_once(file: Path) -> None:
-    memory = Memory(file)
+    memory = VerifiedIndex(file)
     wrong: list[Known] = []
 
     def use(thread: int) -> None:
@@ -254,7 +254,7 @@ def test_threads_use_it_at_once(file: Path) -> None:
         thread.join()
     memory.close()
     assert wrong == []
-    again = Memory(file)
+    again = VerifiedIndex(file)
     assert again.get("3 49") == Known("row", "3 49", None, None, "blob")
     assert again.get("4 0") is None
     again.close()
@@ -263,9 +263,9 @@ def test_threads_use_it_at_once(file: Path) -> None:
 USE = """
 import sys
 from pathlib import Path
-from pipelines.engine.store.verified_index import Known, Memory
+from pipelines.engine.store.verified_index import Known, VerifiedIndex
 
-memory, name = Memory(Path(sys.argv[1])), sys.argv[2]
+memory, name = VerifiedIndex(Path(sys.argv[1])), sys.argv[2]
 for number in range(60):
     for key in ("both", f"{name} {number}"):
         memory.put(key, Known("row", key, None, None, "blob"))
@@ -279,7 +279,7 @@ memory.close()
 def test_processes_use_it_at_once(file: Path) -> None:
     users = [subprocess.Popen([sys.executable, "-W", "error", "-c", USE, file, name]) for name in ("one", "two")]
     assert [user.wait() for user in users] == [0, 0]
-    memory = Memory(file)
+    memory = VerifiedIndex(file)
     for key in ("both", *(f"{name} {number}" for name in ("one", "two") for number in range(60))):
         assert memory.get(key) == Known("row", key, None, None, "blob")
     memory.close()

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.recordings.scans import read_scan, scan_folders
+from footscan.recordings.scans import read_scan, scan_folders
 from schemas.base.errors import RefusedInput
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.recordings.film_paths import film_inside
+from footscan.recordings.film_paths import film_inside
 from schemas.base.documents import inside, read_yaml
 from schemas.base.errors import RefusedInput
 from schemas.frames import GROUP

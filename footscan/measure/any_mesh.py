@@ -1,0 +1,52 @@
+"""The measures of any foot's mesh: what `footscan.measure(mesh)` calls."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.measure.measures import measure_foot
+from footscan.measure.raw_mesh import take_in
+from footscan.mesh.formats.files import read_mesh
+from footscan.mesh.mesh import Mesh
+from schemas.base.documents import Side
+from schemas.measures import Axis, Measures
+
+
+def measure(
+    mesh: Path | str | Mesh | tuple[NDArray[np.floating], NDArray[np.integer]],
+    side: Side = "unknown",
+    axis: Axis = "toe2",
+) -> Measures:
+    """The measures of a foot's mesh, of this scanner or of any other, in any pose.
+
+    Parameters
+    ----------
+    mesh : an STL, PLY or OBJ file, a `Mesh`, or (V, 3) vertices and (F, 3) faces; the unit is
+        found by the size of a foot
+    side : which foot it is; default: found by its form
+    axis : the axis that lengths run along
+
+    Raises
+    ------
+    RefusedInput
+        The file is missing or broken.
+    Finding
+        The mesh is no foot.
+
+    Examples
+    --------
+    >>> from footscan.virtual.foot.foot import make_foot
+    >>> foot = make_foot()
+    >>> measures = measure((foot.vertices, foot.faces), side="right")
+    >>> measures.measures["foot_length"].status
+    'ok'
+    """
+    if isinstance(mesh, Mesh):
+        vertices, faces = mesh.vertices, mesh.faces
+    elif isinstance(mesh, tuple):
+        vertices, faces = np.asarray(mesh[0], np.float64), np.asarray(mesh[1], np.int32)
+    else:
+        vertices, faces = read_mesh(Path(mesh))
+    whole = take_in(vertices, faces, None)
+    return measure_foot(whole.vertices, whole.faces, side, axis=axis)

@@ -1,0 +1,157 @@
+"""A recorded scan as arrays: for notebooks and scripts, without the command, the store or Dask.
+
+Every property is computed when it is first asked for, by the functions that the steps of a run call, and is kept.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from itertools import repeat
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.cloud.fusion.fuse import fuse
+from footscan.cloud.mapping import map_stripe
+from footscan.cloud.normals import estimate_normals
+from footscan.cloud.outliers import remove_outliers
+from footscan.cloud.views import views_of
+from footscan.frames.film import open_background, open_film, pixel_frames
+from footscan.frames.image import Rgb
+from footscan.frames.travel import read_positions, travelled
+from footscan.measure.scanned_foot import measure_scanned_foot
+from footscan.mesh.mesh import Mesh
+from footscan.recordings.scans import RecordedScan, read_scan
+from footscan.stripe.film import extract_film
+from footscan.stripe.points import StripePoints
+from footscan.surface.surface_of_cloud import surface_of_cloud
+from schemas.base.errors import Finding, RefusedInput
+from schemas.calibration import Calibration, read_calibration
+from schemas.measures import Measures
+from schemas.parameters.scan import ScanParameters
+from schemas.scan import CameraFilm, Travel
+
+
+class OpenScan:
+    """A recorded scan; see `open_scan`."""
+
+    def __init__(self, recorded: RecordedScan, calibration: Calibration, parameters: ScanParameters) -> None:
+        self.recorded = recorded
+        """The folder and the content of scan.yaml."""
+        self.calibration = calibration
+        self.parameters = parameters
+        self._films = {camera.id: camera for camera in recorded.document.cameras}
+
+    @property
+    def cameras(self) -> tuple[int, ...]:
+        """Numbers of the cameras that filmed it."""
+        return tuple(sorted(self._films))
+
+    def frames(self, camera: int) -> Iterator[Rgb | None]:
+        """The frames of a camera in order, each (rows, columns, 3) uint8, RGB; None for one that is lost or torn.
+
+        Each array is valid until the next is asked for: copy what you keep. RefusedInput where the film is missing or
+        of another kind.
+        """
+        return pixel_frames(open_film(self.recorded.film(self._film(camera))))
+
+    @cached_property
+    def stripes(self) -> Mapping[int, StripePoints]:
+        """By camera, the (N,) stripe points of `footscan.stripe.points.STRIPE_DTYPE`: frame, i and j in px..."""
+        return {camera: self._stripe(camera) for camera in self.cameras}
+
+    @cached_property
+    def points(self) -> Mapping[int, NDArray[np.void]]:
+        """By camera, the (N,) world points of `footscan.cloud.points.POINT_DTYPE`: x, y, z in mm, scanner frame..."""
+        return {camera: self._points(camera) for camera in self.cameras}
+
+    @cached_property
+    def cloud(self) -> NDArray[np.void]:
+        """(N,) points of all cameras, cleaned and fused, as `points`; Finding where none is left."""
+        together = np.concatenate(list(self.points.values()))
+        if not len(together):
+            raise Finding("no stripe in any camera, expected a foot in the films")
+        kept, _ = remove_outliers(together, views_of(self._used.cameras), self.parameters.outliers)
+        if not len(kept):
+            raise Finding("every point is an outlier, expected a foot in the control volume")
+        return fuse(kept, self.parameters.fusion).cloud
+
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """(N, 3) outward unit normals of the points of `cloud`."""
+        return np.asarray(
+            estimate_normals(self.cloud, views_of(self._used.cameras), self.parameters.normals), np.float64
+        )
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The surface: vertices (V, 3) mm, faces (F, 3), normals (V, 3), camera (V,), filled (V,)."""
+        return surface_of_cloud(self.cloud, self.normals, self.parameters.surface)
+
+    @cached_property
+    def measures(self) -> Measures:
+        """The measures of the foot; Finding where the surface is no foot."""
+        return measure_scanned_foot(self.mesh, self.recorded.document.side)
+
+    @cached_property
+    def _used(self) -> Calibration:
+        """The calibration of the cameras that filmed it."""
+        cameras = [self.calibration.camera(camera, self.recorded.file) for camera in self.cameras]
+        return self.calibration.model_copy(update={"cameras": cameras})
+
+    def _film(self, camera: int) -> CameraFilm:
+        if camera not in self._films:
+            known = ", ".join(map(str, self.cameras))
+            raise RefusedInput(self.recorded.file, f"has no camera {camera}, expected one of {known}", field="cameras")
+        return self._films[camera]
+
+    def _stripe(self, camera: int) -> StripePoints:
+        film = open_film(self.recorded.film(self._film(camera)))
+        backgrounds: Iterator[Rgb | None] | None = None
+        if (place := self.recorded.background(self._film(camera))) is not None:
+            background = open_background(place, (film.height, film.width), film.frames)
+            backgrounds = pixel_frames(background)
+            if background.frames < film.frames:
+                backgrounds = repeat(next(backgrounds), film.frames)
+        return extract_film(pixel_frames(film), self.parameters.extraction, backgrounds)
+
+    def _points(self, camera: int) -> NDArray[np.void]:
+        film = self._film(camera)
+        count = open_film(self.recorded.film(film)).frames
+        positions = self.recorded.positions(film)
+        if positions is not None:
+            x_of_frame = read_positions(positions)
+        else:
+            x_of_frame = travelled(cast(Travel, film.travel or self.recorded.document.travel), count)
+        model = self.calibration.camera(camera, self.recorded.file)
+        return map_stripe(self.stripes[camera], model, x_of_frame, self.parameters.mapping)
+
+
+def open_scan(
+    folder: Path | str, calibration: Path | str | None = None, parameters: ScanParameters | None = None
+) -> OpenScan:
+    """Open a recorded scan.
+
+    Parameters
+    ----------
+    folder : the folder with scan.yaml
+    calibration : calibration file; default: the one that scan.yaml names
+    parameters : of the steps; default: those of a workflow without `parameters`
+
+    Raises
+    ------
+    RefusedInput
+        There is no scan.yaml, it breaks its format, or there is no calibration.
+
+    Examples
+    --------
+    docs/python.md has them, and its tests run them.
+    """
+    recorded = read_scan(Path(folder))
+    path = Path(calibration) if calibration is not None else recorded.calibration
+    if path is None:
+        raise RefusedInput(
+            recorded.file, "names no calibration, expected one here or as an argument", field="calibration"
+        )
+    return OpenScan(recorded, read_calibration(path), parameters or ScanParameters())
