@@ -1,7 +1,7 @@
 """What the key of each step stands for: `keys.txt` beside this file, one line a step.
 
-Where a change is meant, `FOOTSCAN_WRITE_KEYS=1 pytest tests/pipelines/steps/test_keys.py` writes the file anew. Its diff
-says what the change costs: a step whose lines change loses all hits once.
+Where a change is meant, `FOOTSCAN_WRITE_KEYS=1 pytest tests/pipelines/steps/test_keys.py` writes the file anew. Its
+diff says what the change costs: a step whose lines change loses all hits once.
 """
 
 import difflib
