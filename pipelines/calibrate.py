@@ -12,8 +12,8 @@ from pipelines.engine.files.file_digests import FileDigests
 from pipelines.recordings.captures import RecordedCapture
 from pipelines.scan import STEPS, source_files
 from pipelines.version import SOFTWARE
-from schemas.base.documents import canonical_json
 from schemas.base.errors import RefusedInput
+from schemas.base.model import canonical_json
 from schemas.mounting import CaptureCamera, mounting_of
 from schemas.parameters.calibration import CaptureCalibrationParameters
 from schemas.reference import Capture, ReferenceObject

@@ -15,7 +15,7 @@ from pipelines.engine.actions.key import parameters_text
 from pipelines.engine.actions.step import Input, Output, SourceFile, Step, Value
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
-from schemas.base.documents import Document, canonical_json
+from schemas.base.model import Document, canonical_json
 from schemas.calibration import Calibration, Source
 from schemas.parameters.foot import FootParameters
 from schemas.parameters.scan import ScanParameters

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from footscan.mesh.formats.files import read_mesh
 from footscan.virtual.foot.foot import make_foot
 from footscan.virtual.stage.block import make_block
-from schemas.base.documents import Side
 from schemas.base.errors import RefusedInput
+from schemas.base.model import Side
 
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
-from schemas.base.documents import Document, Pseudonym
+from schemas.base.model import Document, Pseudonym
 from schemas.parameters.scan import ScanParameters
 from schemas.tuning import Tuning
 

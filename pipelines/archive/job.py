@@ -23,8 +23,8 @@ from pipelines.engine.workspace import Workspace
 from pipelines.recordings.calibration_choice import CalibrationPlace, calibration_places, choose_calibration
 from pipelines.recordings.captures import read_capture
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
-from schemas.base.documents import read_text
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import read_text
 from schemas.calibration import calibration_from_json
 from schemas.frames import GROUP
 from schemas.measures import Measures

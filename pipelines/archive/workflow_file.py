@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from schemas.base.documents import read_text, read_yaml_text, validate
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import read_text, validate
 from schemas.base.mistakes import Mistake, mistakes
+from schemas.base.yaml_files import read_yaml_text
 from schemas.base.yaml_text import place_in_yaml
 from schemas.workflow import Workflow
 

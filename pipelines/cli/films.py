@@ -46,7 +46,7 @@ def simulate_scan(
     from footscan.virtual.stage.standing import BLOCK_TURN_DEG, stand_in_the_middle
     from pipelines.cli.terminal.progress import frame_progress
     from pipelines.virtual_objects import virtual_object
-    from schemas.base.documents import pseudonym
+    from schemas.base.model import pseudonym
 
     if [mesh is not None, foot is not None, block].count(True) != 1:
         raise RefusedInput("simulate scan", "expected one of MESH, --foot and --block")

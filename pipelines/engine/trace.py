@@ -7,8 +7,8 @@ from typing import Any
 
 from pipelines.engine.explain import code_of, inputs_of, kind_of
 from pipelines.engine.store.store import Latest, Row, Store
-from schemas.base.documents import parse_json
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import parse_json
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,9 @@ from pipelines.engine.workspace import Workspace, digests_by_kind
 from pipelines.recordings.calibration_choice import CalibrationPlace
 from pipelines.regression.film import PATIENT
 from pipelines.simulate import filmed_calibration_steps
-from schemas.base.documents import canonical_json, validate
 from schemas.base.errors import Fault, RefusedInput
+from schemas.base.json_files import validate
+from schemas.base.model import canonical_json
 from schemas.parameters.scan import ScanParameters
 from schemas.parameters.simulation import SimulationSettings
 from schemas.parameters.virtual_scan import VirtualScan

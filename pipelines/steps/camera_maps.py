@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 from schemas.calibration import Calibration
 
 

@@ -11,7 +11,7 @@ from footscan.calibration.capture.as_arrays import points_arrays, seen_by
 from footscan.calibration.capture.from_capture import calibrate_view
 from footscan.calibration.capture.reference import edges_of
 from pipelines.arrays import pack, unpack
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 from schemas.parameters.calibration import CalibrationParameters
 from schemas.reference import ReferenceObject
 

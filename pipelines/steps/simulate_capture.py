@@ -6,7 +6,7 @@ from pathlib import Path
 
 from footscan.virtual.filming.capture import record_capture
 from footscan.virtual.stage.reference import standard_reference
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 from schemas.parameters.simulation import SimulationSettings
 from schemas.reference import ReferenceObject
 

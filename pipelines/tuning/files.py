@@ -11,7 +11,7 @@ import yaml
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.tuning.report.page import tune_page
 from pipelines.tuning.report.result import Trial, TuneResult
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 from schemas.parameters.scan import ScanParameters
 from schemas.tables import Cell, csv_text
 from schemas.workflow import Workflow

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 from schemas.parameters.extraction import ExtractionParameters
 
 Order = Annotated[int, Field(ge=1, le=5)]

@@ -146,7 +146,7 @@ def _grow(tree: "Tree", taken_as: str, key: str, found: "Trace", shown: set[str]
 
 def _facts(action: "TracedAction") -> list[str]:
     values = action.parameters.get("values") if isinstance(action.parameters, dict) else None
-    from schemas.base.documents import canonical_json
+    from schemas.base.model import canonical_json
 
     given = [f"{name} {canonical_json(value)}" for name, value in values.items()] if isinstance(values, dict) else []
     libraries = ", ".join(f"{name} {version}" for name, version in action.libraries.items())

@@ -21,8 +21,8 @@ from pipelines.engine.actions.libraries import versions_that_count
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import file_state, is_settled, sha256
 from pipelines.engine.files.seal import BROKEN, sealed, unsealed
-from schemas.base.documents import canonical_json
 from schemas.base.errors import Fault
+from schemas.base.model import canonical_json
 
 OWN = ROOMS = ("schemas", "footscan", "pipelines")
 """The project's own packages."""

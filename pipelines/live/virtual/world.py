@@ -30,7 +30,7 @@ from footscan.virtual.stage.pictures import Light, Progress, StagePictures, Subj
 from footscan.virtual.stage.reference_stage import NOTHING, block_subject
 from footscan.virtual.stage.stage import Positions, Stage, indices_of_travel
 from footscan.virtual.stage.standing import stand_in_the_middle
-from schemas.base.documents import Document
+from schemas.base.model import Document
 from schemas.parameters.simulation import Scale, Seed, SimulationSettings
 
 CAMERAS = range(1, 9)

@@ -6,8 +6,8 @@ import pytest
 
 from footscan.recordings.scans import RecordedScan
 from pipelines.recordings.calibration_choice import calibration_places, choose_calibration
-from schemas.base.documents import validate
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import validate
 from schemas.scan import Scan
 from schemas.workflow import Workflow
 

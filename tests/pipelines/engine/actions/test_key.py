@@ -12,7 +12,7 @@ import pytest
 from pipelines.engine.actions import libraries
 from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Output, SourceFile, Step, Value
-from schemas.base.documents import Document, canonical_json
+from schemas.base.model import Document, canonical_json
 from schemas.parameters.normals import NormalParameters
 from schemas.parameters.outliers import OutlierParameters
 
