@@ -6,6 +6,7 @@ An array is written beside its place and renamed when it is whole: what has its 
 import os
 import re
 import shutil
+import stat
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -153,13 +154,14 @@ def _expect_own(array: Path) -> None:
 
     No RefusedInput: that would be remembered of the film, which is not at fault.
     """
-    if not os.path.lexists(array):
-        return
     expected = "expected nothing but an array of frames there; move it elsewhere"
-    if array.is_symlink() or not array.is_dir():
-        raise Fault(f"{array}: was not written by footscan, {expected}")
-    with os.scandir(array) as entries:
-        foreign = [one.name for one in entries if not (_IS_OURS(one.name) and (one.is_symlink() or one.is_file()))]
+    try:
+        if not stat.S_ISDIR(array.lstat().st_mode):
+            raise Fault(f"{array}: was not written by footscan, {expected}")
+        with os.scandir(array) as entries:
+            foreign = [one.name for one in entries if not _IS_OURS(one.name) or one.is_dir(follow_symlinks=False)]
+    except (FileNotFoundError, NotADirectoryError):  # perhaps only now: another thread replaces the array
+        return
     if foreign:
         raise Fault(f"{array}: holds {min(foreign)}, which footscan did not write; {expected}")
 

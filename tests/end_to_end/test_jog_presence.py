@@ -58,21 +58,21 @@ def hang(page: Any) -> None:
 
 @pytest.mark.parametrize("go", [close, cut_off, leave, hang])
 def test_heads_stop_when_the_page_is_gone(go: Callable[[Any], None], scanner: Scanner, page: Any) -> None:
-    begin = scanner.board.position_at(scanner.board.clock())[0]
+    begin = scanner.board.position_at(time.monotonic())[0]
     page.locator(f'[data-jog="{FAR_MM:g}"]').click()
-    wait_until(lambda: scanner.board.position_at(scanner.board.clock())[0] > begin + 40.0)  # two seconds: it is present
+    wait_until(lambda: scanner.board.position_at(time.monotonic())[0] > begin + 40.0)  # two seconds: it is present
     began = time.monotonic()
     go(page)
     gone = time.monotonic()
     time.sleep(GONE_SECONDS + STOP_SECONDS + 1.0)
     scanner.assert_dark_and_standing(gone + GONE_SECONDS + STOP_SECONDS)
-    assert scanner.board.position_at(began)[0] < scanner.board.position_at(scanner.board.clock())[0] < FAR_MM
+    assert scanner.board.position_at(began)[0] < scanner.board.position_at(time.monotonic())[0] < FAR_MM
 
 
 def test_heads_go_all_the_way_while_the_page_is_there(scanner: Scanner, page: Any) -> None:
-    begin = scanner.board.position_at(scanner.board.clock())[0]
+    begin = scanner.board.position_at(time.monotonic())[0]
     page.locator('[data-jog="-50"]').evaluate("button => { button.dataset.jog = 100; button.click(); }")
-    wait_until(lambda: scanner.board.position_at(scanner.board.clock())[0] > begin + 99.9)
+    wait_until(lambda: scanner.board.position_at(time.monotonic())[0] > begin + 99.9)
     page.locator("#home[aria-disabled=false]").wait_for()
     assert page.locator("#told").is_hidden()
 

@@ -67,10 +67,10 @@ class Scanner:
     def wait_until_busy(self, name: str, process: "subprocess.Popen[str]") -> None:
         """Waits until heads move: lit, in the midst of a jog, or on their way to the switches."""
         is_so: dict[str, Callable[[], object]] = {
-            "home": lambda: self.board.position_at(self.board.clock())[0] < 150.0,
-            "jog": lambda: self.board.position_at(self.board.clock())[0] > 60.0,
+            "home": lambda: self.board.position_at(time.monotonic())[0] < 150.0,
+            "jog": lambda: self.board.position_at(time.monotonic())[0] > 60.0,
         }
-        busy = is_so.get(name, lambda: self.board.laser_at(self.board.clock()) > 0.9)
+        busy = is_so.get(name, lambda: self.board.laser_at(time.monotonic()) > 0.9)
 
         def holds() -> object:
             assert process.poll() is None, process.communicate()
