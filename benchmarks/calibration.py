@@ -22,7 +22,7 @@ from footscan.calibration.models.maps import is_supported, to_world
 from footscan.virtual.filming.capture import record_capture
 from footscan.virtual.optics.scanner import VOLUME_MM, Camera, standard_scanner
 from footscan.virtual.stage.reference import standard_reference
-from pipelines.calibrate import CaptureCalibration, calibrate_capture
+from pipelines.capture_job import CaptureCalibration, calibrate_capture
 from pipelines.recordings.captures import read_capture
 from schemas.calibration import Calibration, CameraCalibration, Source
 from schemas.parameters.calibration import CalibrationParameters, CaptureCalibrationParameters

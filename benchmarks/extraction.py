@@ -22,8 +22,8 @@ from scipy.ndimage import grey_closing
 from skimage.measure import label
 
 from benchmarks.compare import interleave, print_ratios
-from footscan.frames.film import decode_or_none, encoded_frames, open_film
-from footscan.frames.image import Rgb, pixel_buffer
+from footscan.frames.film import encoded_frames, open_film
+from footscan.frames.image import Rgb, decode_or_none, pixel_buffer
 from footscan.frames.ingest import ingest_film
 from footscan.frames.reader import read_frames
 from footscan.recordings.scans import RecordedScan, read_scan

@@ -14,7 +14,7 @@ from typing import Any
 from parameters import sentences  # the script beside this one
 
 import schemas
-from schemas.base.documents import Document
+from schemas.base.model import Document
 
 FOLDER = Path(__file__).resolve().parent / "formats"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -1,220 +1,190 @@
-"""From a capture: a calibration, or how far the scanner has drifted since its last one."""
+"""A calibration from a capture as the list of its steps."""
 
-from dataclasses import dataclass, replace
-from itertools import islice
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
-import dask
-import numpy as np
-from numpy.typing import NDArray
+from pydantic import BaseModel
 
-from footscan.calibration.capture.found_corners import FoundCorner
-from footscan.calibration.capture.from_capture import (
-    CalibratedView,
-    CameraView,
-    Recognised,
-    assemble,
-    calibrate_view,
-    object_poses,
-    recognise_view,
-)
-from footscan.calibration.capture.reference import Edges, doubts_about, edges_of
-from footscan.calibration.capture.refused_capture import (
-    RefusedCapture,
-    check_placements,
-    refuse_contradictions,
-    refuse_unrecognised,
-)
-from footscan.calibration.checks.drift import Drift, drift_of
-from footscan.calibration.models.selection import ModelTrial
-from footscan.frames.film import film_files, open_film, pixel_frames
-from footscan.report.calibration.capture_figure import capture_figure
-from footscan.stripe.extract import extract_stripe
-from pipelines.engine.files.digest import sha256
+from footscan.frames.film import film_files
+from pipelines.engine.actions.step import Input, Output, Step, Value
+from pipelines.engine.files.file_digests import FileDigests
 from pipelines.recordings.captures import RecordedCapture
+from pipelines.scan import STEPS, source_files
 from pipelines.version import SOFTWARE
 from schemas.base.errors import RefusedInput
-from schemas.calibration import Calibration, Source
+from schemas.base.model import canonical_json
 from schemas.mounting import CaptureCamera, mounting_of
 from schemas.parameters.calibration import CaptureCalibrationParameters
-
-Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class CaptureCalibration:
-    """A calibration from a capture, and how it came about."""
-
-    calibration: Calibration
-    trials: list[ModelTrial]
-    corners: list[FoundCorner]
-    x_mm: float
-    """Of all corners: where the laser's plane stood."""
-    departures_mm: Floats
-    """(K, 2) how far, in Y and Z, the object stood from where it was said, as the cameras agree; zeros where that does
-    not help."""
-
-
-def calibrate_capture(
-    capture: RecordedCapture, parameters: CaptureCalibrationParameters, workers: int, *, keep_going: bool = False
-) -> CaptureCalibration:
-    """The calibration of all cameras of a capture, with so many threads.
-
-    With `keep_going` cameras that see the object from another side than they stand on are calibrated all the same.
-
-    Raises
-    ------
-    RefusedInput
-        Two cameras have one film; or the object is not recognised or stood elsewhere than said, as `RefusedCapture`.
-    """
-    sources = _sources(capture)
-    with dask.config.set(scheduler="threads", num_workers=workers):
-        seen = _see(capture, parameters)
-        seen.check(parameters.placement_tolerance_mm)
-        refuse_unrecognised(seen.views, seen.unrecognised, seen.source)
-        if not keep_going:
-            refuse_contradictions(seen.recognised, seen.source)
-        poses, calibrated = seen.calibrate(parameters)
-    return CaptureCalibration(
-        assemble(calibrated, sources, SOFTWARE, _doubts(capture, seen)),
-        [trial for view in calibrated for trial in view.trials],
-        [corner for view in calibrated for corner in view.corners],
-        capture.document.x_mm,
-        poses[:, :2] - seen.placements,
-    )
-
-
-def check_calibration(
-    calibration: Calibration,
-    capture: RecordedCapture,
-    parameters: CaptureCalibrationParameters,
-    tolerance_mm: float,
-    workers: int,
-) -> list[Drift]:
-    """How far each camera of a scanner has drifted since its calibration, by a capture of today.
-
-    A camera that does not recognise the object, or is in the capture or the calibration alone, is part of the result.
-
-    Raises
-    ------
-    RefusedInput
-        The object stood elsewhere than said or is recognised by no camera, as `RefusedCapture`.
-    """
-    filmed = [camera.id for camera in capture.document.cameras]
-    with dask.config.set(scheduler="threads", num_workers=workers):
-        seen = _see(capture, parameters)
-        seen.check(parameters.placement_tolerance_mm)
-        if not seen.recognised:
-            refuse_unrecognised(seen.views, seen.unrecognised, seen.source)
-        _, calibrated = seen.calibrate(parameters)
-    today = {view.calibration.camera: view for view in calibrated}
-    drifts = []
-    for known in sorted(calibration.cameras, key=lambda camera: camera.camera):
-        if known.camera in today:
-            drift = drift_of(known, today[known.camera], tolerance_mm)
-            drifts.append(replace(drift, remark=seen.recognised[known.camera].contradiction or drift.remark))
-        elif known.camera in filmed:
-            drifts.append(Drift(known.camera, "not recognised", remark=seen.unrecognised[known.camera]))
-        else:
-            drifts.append(Drift(known.camera, "not in the capture"))
-    known_ids = {known.camera for known in calibration.cameras}
-    return drifts + [Drift(camera, "not in the calibration") for camera in sorted(set(filmed) - known_ids)]
-
-
-def picture_of(capture: RecordedCapture, refused: RefusedCapture) -> bytes:
-    """A PNG of what a capture was refused for."""
-    films = {camera.id: capture.film(camera) for camera in capture.document.cameras}
-    shown = [
-        (evidence, next(islice(pixel_frames(open_film(films[evidence.camera])), evidence.frame, None), None))
-        for evidence in refused.evidence
-    ]
-    return capture_figure(str(refused), shown)
+from schemas.reference import Capture, ReferenceObject
 
 
 @dataclass(frozen=True)
-class _Seen:
-    """What all cameras of a capture see of the reference object."""
+class CaptureInputs:
+    """What the steps of a calibration take of a capture, recorded or yet to be filmed."""
 
-    source: str
-    edges: Edges
-    placements: Floats
-    views: dict[int, CameraView]
-    recognised: dict[int, Recognised]
-    unrecognised: dict[int, str]
-
-    def check(self, tolerance_mm: float) -> None:
-        check_placements(self.views, self.recognised, self.edges, self.placements, tolerance_mm, self.source)
-
-    def calibrate(self, parameters: CaptureCalibrationParameters) -> tuple[Floats, list[CalibratedView]]:
-        """The poses of the object, and the calibration of each camera that recognises it."""
-        poses = object_poses(self.recognised, self.edges, self.placements)
-        calibrated = dask.compute(
-            *(
-                dask.delayed(calibrate_view)(self.recognised[camera], self.edges, poses, parameters, self.source)
-                for camera in sorted(self.recognised)
-            )
-        )
-        return poses, list(calibrated)
+    file: Path
+    """Its capture.yaml."""
+    document: Capture
+    reference: ReferenceObject
+    paths: Mapping[int, Path]
+    """The film of each camera."""
+    films: Mapping[int, Input]
+    """Its digest, or those of all that another step filmed."""
+    names: list[str]
+    """All files within the capture's folder: capture.yaml, the reference object, the films."""
+    digests: Input
+    """Theirs, by name."""
 
 
-def _doubts(capture: RecordedCapture, seen: _Seen) -> list[str]:
-    places = doubts_about(capture.reference.profile_mm, capture.reference.placements_mm)
-    views = [doubt for known in seen.recognised.values() for doubt in known.doubts]
-    return [f"{capture.reference_file.name}: {doubt}" for doubt in places] + views
-
-
-def _see(capture: RecordedCapture, parameters: CaptureCalibrationParameters) -> _Seen:
-    edges = edges_of(capture.reference.profile_mm)
-    placements = np.array(capture.reference.placements_mm, np.float64)
-
-    def seen(camera: CaptureCamera) -> tuple[CameraView, Recognised | str]:
-        view = _view(capture, camera, parameters)
-        return view, recognise_view(view, edges, placements)
-
-    every = dask.compute(*(dask.delayed(seen)(camera) for camera in capture.document.cameras))
-    return _Seen(
-        str(capture.file),
-        edges,
-        placements,
-        {view.camera: view for view, _ in every},
-        {view.camera: found for view, found in every if isinstance(found, Recognised)},
-        {view.camera: found for view, found in every if isinstance(found, str)},
-    )
-
-
-def _view(capture: RecordedCapture, camera: CaptureCamera, parameters: CaptureCalibrationParameters) -> CameraView:
-    film = open_film(capture.film(camera))
-    stripes: list[Floats] = []
-    lost: list[int] = []
-    for number, frame in enumerate(pixel_frames(film)):
-        if frame is None:
-            lost.append(number)
-            stripes.append(np.empty((0, 2)))
-            continue
-        points = extract_stripe(frame, parameters.extraction)
-        stripes.append(np.column_stack([points["i"], points["j"]]))
-    return CameraView(camera.id, (film.width, film.height), stripes, mounting_of(camera), tuple(lost))
-
-
-def _sources(capture: RecordedCapture) -> list[Source]:
-    """What the calibration rests on: the two documents, and each film or the frames of one.
+def recorded_inputs(capture: RecordedCapture, digests: FileDigests) -> CaptureInputs:
+    """What the steps take of a capture that was recorded.
 
     Raises
     ------
     RefusedInput
         Two cameras have one and the same film.
     """
-    sources = [_source(file, capture.folder) for file in (capture.file, capture.reference_file)]
+    paths = {camera.id: capture.film(camera) for camera in capture.document.cameras}
+    films: dict[int, Input] = {}
     cameras: dict[tuple[str, ...], int] = {}
-    for camera in capture.document.cameras:
-        film = [_source(file, capture.folder) for file in film_files(capture.film(camera))]
-        other = cameras.setdefault(tuple(frame.sha256 for frame in film), camera.id)
-        if other != camera.id:
+    for camera, path in paths.items():
+        frames = tuple(digests.of(file)[0] for file in film_files(path))
+        other = cameras.setdefault(frames, camera)
+        if other != camera:
             problem = f"has the same film as camera {other}, expected its own"
-            raise RefusedInput(capture.file, problem, field=f"camera {camera.id}")
-        sources += film
-    return sources
+            raise RefusedInput(capture.file, problem, field=f"camera {camera}")
+        films[camera] = source_files(path, digests)
+    named = {file.relative_to(capture.folder).as_posix(): digests.of(file)[0] for file in capture.files}
+    listed = Value(canonical_json(named).encode())
+    return CaptureInputs(capture.file, capture.document, capture.reference, paths, films, list(named), listed)
 
 
-def _source(file: Path, folder: Path) -> Source:
-    return Source(name=file.relative_to(folder).as_posix(), sha256=sha256(file.read_bytes()))
+def camera_steps(name: str, capture: CaptureInputs, parameters: CaptureCalibrationParameters) -> list[Step]:
+    """The steps that each camera of a capture takes by itself, and where the object stood, as all of them tell.
+
+    `name` is that of the graph's scan; the kinds are `stripe`, `recognise` and `place`.
+    """
+    steps: list[Step] = []
+    document = {"capture": capture.file}
+    for camera in capture.document.cameras:
+        film = {"film": capture.paths[camera.id], **document}
+        taken = {"film": capture.films[camera.id]}
+        stripe = _step(name, "stripe", "capture_stripe", parameters.extraction, taken, camera.id, places=film)
+        seen: dict[str, Input] = {
+            "stripe": Output(stripe.name), "reference": _reference(capture), "camera": _camera(camera)
+        }  # fmt: skip
+        steps += [stripe, _step(name, "recognise", "recognise", None, seen, camera.id)]
+    told = {"reference": _reference(capture), **_seen(name, capture)}
+    return [*steps, _step(name, "place", "place", parameters.placement, told, places=document)]
+
+
+def fit_steps(name: str, capture: CaptureInputs, parameters: CaptureCalibrationParameters, poses: str) -> list[Step]:
+    """The calibration of each camera by itself, with the object in the `poses` that the step of this kind tells."""
+    return [
+        _step(
+            name, "fit", "fit", parameters.fit,
+            {
+                "poses": Output(f"{name}/{poses}"), "reference": _reference(capture), "camera": _camera(camera),
+                "stripe": Output(f"{name}/stripe-{camera.id}"), "recognised": Output(f"{name}/recognise-{camera.id}"),
+            },
+            camera.id, places={"capture": capture.file},
+        )
+        for camera in capture.document.cameras
+    ]  # fmt: skip
+
+
+def calibration_steps(
+    name: str, capture: CaptureInputs, parameters: CaptureCalibrationParameters, *, keep_going: bool = False
+) -> list[Step]:
+    """The steps from a capture's films to its calibration, the result of the last one, of kind `calibrate`.
+
+    With `keep_going` cameras that see the object from another side than they stand on are calibrated all the same.
+    """
+    steps = camera_steps(name, capture, parameters)
+    document = {"capture": capture.file}
+    seen = _seen(name, capture)
+    poses = "place"
+    for kind in ("all-recognise", *(() if keep_going else ("own-side",))):
+        told = {"poses": Output(f"{name}/{poses}"), **seen}
+        steps.append(_step(name, kind, kind.replace("-", "_"), None, told, places=document))
+        poses = kind
+    steps += fit_steps(name, capture, parameters, poses)
+    about = {"files": capture.names, "reference": Path(capture.document.reference).name, "software": SOFTWARE}
+    known: dict[str, Input] = {
+        **{f"fit-{camera.id}": Output(f"{name}/fit-{camera.id}") for camera in capture.document.cameras},
+        **seen,
+        "reference": _reference(capture),
+        "digests": capture.digests,
+        "about": Value(canonical_json(about).encode()),
+    }
+    return [*steps, _step(name, "calibrate", "calibrate", None, known)]
+
+
+@dataclass
+class CaptureOfScan:
+    """The calibration of a scan, made from a capture by steps of the scan's own graph."""
+
+    name: str
+    """Of the graph's scan."""
+    capture: CaptureInputs
+    steps: list[Step]
+    """From the capture's films to what the scan takes of its calibration."""
+
+    @classmethod
+    def drawn(cls, name: str, capture: CaptureInputs) -> "CaptureOfScan":
+        """The calibration of the scan `name`; what is taken of it is added to its steps."""
+        return cls(name, capture, calibration_steps(name, capture, CaptureCalibrationParameters()))
+
+    @property
+    def source(self) -> Output:
+        """Its name and digest."""
+        named = {"name": Value(canonical_json(self.capture.file.parent.name).encode())}
+        return self._taken("calibration-source", "calibration_source", named)
+
+    def camera(self, camera: int) -> Output:
+        """The map of one camera; RefusedInput where the capture lacks it."""
+        if camera not in self.capture.paths:
+            known = ", ".join(map(str, self.capture.paths))
+            raise RefusedInput(self.capture.file, f"has no camera {camera}, expected one of {known}", field="cameras")
+        return self._taken("camera-map", "camera_map", {"camera": Value(canonical_json(camera).encode())}, camera)
+
+    def cameras(self, ids: frozenset[int]) -> Output:
+        """All of it, with the maps of these cameras alone."""
+        return self._taken("camera-maps", "camera_maps", {"cameras": Value(canonical_json(sorted(ids)).encode())})
+
+    def _taken(self, kind: str, module: str, told: Mapping[str, Input], camera: int | None = None) -> Output:
+        calibration = {"calibration": Output(f"{self.name}/calibrate")}
+        step = _step(self.name, kind, module, None, {**calibration, **told}, camera)
+        self.steps.append(step)
+        return Output(step.name)
+
+
+def _step(
+    name: str,
+    kind: str,
+    module: str,
+    parameters: BaseModel | None,
+    inputs: Mapping[str, Input],
+    camera: int | None = None,
+    *,
+    places: Mapping[str, Path] | None = None,
+) -> Step:
+    return Step(name, kind, f"{STEPS}.{module}", parameters, inputs, camera, places or {})
+
+
+def _seen(name: str, capture: CaptureInputs) -> dict[str, Input]:
+    seen: dict[str, Input] = {}
+    for camera in capture.document.cameras:
+        seen[f"stripe-{camera.id}"] = Output(f"{name}/stripe-{camera.id}")
+        seen[f"recognised-{camera.id}"] = Output(f"{name}/recognise-{camera.id}")
+    return seen
+
+
+def _reference(capture: CaptureInputs) -> Value:
+    return Value(canonical_json(capture.reference.model_dump(mode="json")).encode())
+
+
+def _camera(camera: CaptureCamera) -> Value:
+    mounting = mounting_of(camera)
+    return Value(canonical_json({"id": camera.id, "mounting": [mounting.x, mounting.y, mounting.z]}).encode())

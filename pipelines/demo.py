@@ -14,7 +14,7 @@ from pipelines.engine.pool import OnStepEnd, Threads, cores
 from pipelines.engine.workspace import Workspace, digests_by_kind
 from pipelines.recordings.calibration_choice import CalibrationPlace
 from pipelines.scan import STEPS
-from pipelines.simulate import calibration_steps
+from pipelines.simulate import filmed_calibration_steps
 from schemas.base.errors import Fault
 from schemas.parameters.demo import FilmedFoot
 from schemas.parameters.scan import ScanParameters
@@ -78,7 +78,7 @@ def _filming(folder: Path, foot: FilmedFoot) -> list[Step]:
     capture = folder / "capture"
     film = Step("demo", "film", f"{STEPS}.simulate_scan", foot, places={"folder": scan}, writes=scan / SCAN_FILE)
     ordinary_light = foot.settings.model_copy(update={"ambient": "ambient"})  # a scanner is calibrated once
-    return [film, *calibration_steps("demo", capture, ordinary_light)]
+    return [film, *filmed_calibration_steps("demo", capture, ordinary_light)]
 
 
 def _job(folder: Path, results: Path) -> Job:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
+from typing import Protocol
 
 from footscan.frames.film import film_files
 from footscan.frames.travel import read_positions
@@ -14,7 +15,7 @@ from pipelines.engine.actions.key import parameters_text
 from pipelines.engine.actions.step import Input, Output, SourceFile, Step, Value
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
-from schemas.base.documents import Document, canonical_json
+from schemas.base.model import Document, canonical_json
 from schemas.calibration import Calibration, Source
 from schemas.parameters.foot import FootParameters
 from schemas.parameters.scan import ScanParameters
@@ -31,6 +32,20 @@ DELIVERED = {
     "report.html": "report",
 }
 """What lies in a scan's results, and the step that makes it."""
+
+
+class ScanCalibration(Protocol):
+    """What the steps of a scan take of its calibration."""
+
+    @property
+    def source(self) -> Input:
+        """Its name and digest."""
+
+    def camera(self, camera: int) -> Input:
+        """The map of one camera; RefusedInput where it has none."""
+
+    def cameras(self, ids: frozenset[int]) -> Input:
+        """All of it, with the maps of these cameras alone."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +79,7 @@ class CalibrationFile:
 
 
 def scan_steps(
-    scan: RecordedScan, calibration: CalibrationFile, parameters: ScanParameters, digests: FileDigests
+    scan: RecordedScan, calibration: ScanCalibration, parameters: ScanParameters, digests: FileDigests
 ) -> list[Step]:
     """The steps from a scan's films to its results, each after those whose results it takes.
 
@@ -141,7 +156,7 @@ class _Camera:
 def _camera_steps(
     scan: RecordedScan,
     camera: CameraFilm,
-    calibration: CalibrationFile,
+    calibration: ScanCalibration,
     parameters: ScanParameters,
     digests: FileDigests,
     add: Callable[[Step], Output],

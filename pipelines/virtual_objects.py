@@ -9,10 +9,8 @@ from numpy.typing import NDArray
 from footscan.mesh.formats.files import read_mesh
 from footscan.virtual.foot.foot import make_foot
 from footscan.virtual.stage.block import make_block
-from footscan.virtual.stage.standing import stand_on_glass
-from schemas.base.documents import Side
 from schemas.base.errors import RefusedInput
-from schemas.parameters.simulation import SimulationSettings
+from schemas.base.model import Side
 
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -38,9 +36,3 @@ def virtual_object(
         return made.vertices, made.faces.astype(np.int64), foot
     vertices, faces = make_block()
     return vertices, faces.astype(np.int64), "unknown"
-
-
-def stand_in_the_middle(vertices: Vertices, settings: SimulationSettings, turn_deg: float = 0.0) -> Vertices:
-    """`vertices` turned about Z and shifted onto the glass (Z = 0), to the middle of the travel and to Y = 0."""
-    travel_middle = settings.start_mm + settings.step_mm * (settings.frames - 1) / 2
-    return stand_on_glass(vertices, travel_middle, turn_deg)

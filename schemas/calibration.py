@@ -13,8 +13,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AwareDatetime, Field, model_validator
 
-from schemas.base.documents import Document, parse_json, read_text, validate
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import parse_json, read_text, validate
+from schemas.base.model import Document
 from schemas.base.units import Point
 from schemas.calibration_history import CalibrationV1, CalibrationV2, migrate_v1, migrate_v2
 

@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.base.documents import Document, validate
+from schemas.base.json_files import validate
+from schemas.base.model import Document
 from schemas.base.units import MILLIMETRES, LengthUnit, Point
 
 Six = Annotated[list[float], Field(min_length=6, max_length=6)]

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
-from schemas.base.documents import Document, Side
 from schemas.base.limits import beyond, limit
+from schemas.base.model import Document, Side
 from schemas.measures import Status
 
 AS_TOLD = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 
 Count = Annotated[int, Field(ge=0)]
 Length = Annotated[float, Field(ge=0)]

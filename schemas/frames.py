@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 
 GROUP = "frames.zarr"
 """Name of the Zarr group of arrays beside a scan's films."""

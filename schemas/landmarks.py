@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 
 Coordinate = Annotated[float, Field(ge=-1e4, le=1e4)]
 Place = tuple[Coordinate, Coordinate, Coordinate]

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.base.documents import Document, Side
+from schemas.base.model import Document, Side
 
 LastMeasure = Literal["length", "ball_length", "ball_girth", "waist_girth", "instep_girth", "heel_girth"]
 """`length` is the functional one, without what the style adds at the toes."""

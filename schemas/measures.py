@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.base.documents import Document, Side
+from schemas.base.model import Document, Side
 
 Unit = Literal["mm", "mm2", "mm3", "deg", "1"]
 Status = Literal["ok", "uncertain", "incomplete"]

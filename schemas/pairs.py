@@ -2,7 +2,7 @@
 
 from datetime import date
 
-from schemas.base.documents import Document, Side
+from schemas.base.model import Document, Side
 from schemas.sizes import Sizes
 
 

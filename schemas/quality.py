@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 from schemas.calibration import Source
 from schemas.fusion import FusionReport
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AwareDatetime, Field, model_validator
 
-from schemas.base.documents import Document, Pseudonym
+from schemas.base.model import Document, Pseudonym
 from schemas.frames import Sha256
 from schemas.rig import HeadNumber, Millimetres, Milliseconds, RigLatency, Share
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from schemas.base.documents import Document, RelativePath
+from schemas.base.model import Document, RelativePath
 from schemas.mounting import CaptureCamera
 from schemas.scan import unique_ids
 

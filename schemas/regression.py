@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, AwareDatetime, BeforeValidator, Field, model_validator
 
-from schemas.base.documents import Document, Pseudonym
+from schemas.base.model import Document, Pseudonym
 from schemas.parameters.scan import ScanParameters
 from schemas.parameters.virtual_scan import VirtualScan
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from schemas.base.documents import Document, Pseudonym, RelativePath
+from schemas.base.model import Document, Pseudonym, RelativePath
 
 HeadNumber = Annotated[int, Field(ge=1, le=3)]
 Millimetres = Annotated[float, Field(ge=-1e4, le=1e4)]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.base.documents import Document, Pseudonym, RelativePath, Side
+from schemas.base.model import Document, Pseudonym, RelativePath, Side
 
 
 class Travel(Document):

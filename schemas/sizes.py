@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 from schemas.lasts import LastRules
 
 People = Literal["men", "women", "children"]

@@ -17,7 +17,7 @@ from pydantic import (
     model_validator,
 )
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 from schemas.parameters.scan import ScanParameters
 
 Objective = Literal["accuracy", "accuracy_p99", "repeatability", "completeness", "disagreement", "false_points", "time"]

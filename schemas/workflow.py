@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
-from schemas.base.documents import Document, Pseudonym
+from schemas.base.model import Document, Pseudonym
 from schemas.parameters.scan import ScanParameters
 from schemas.tuning import Tuning
 
@@ -46,13 +46,23 @@ Folders = Annotated[
 
 
 class ChosenCalibration(Document):
-    """A calibration, and for which scans it is meant."""
+    """A calibration, and for which scans it is meant: either its file, or the capture that it is made from."""
 
-    file: AnyPath
+    file: AnyPath | None = None
+    """The calibration file."""
+    capture: AnyPath | None = None
+    """Folder of a capture of the reference object."""
     scanner: Pseudonym | None = None
     """For scans of this scanner; default: of any."""
     since: datetime.date | None = None
     """For scans of this day and later, until the next one takes over; default: from the start."""
+
+    @model_validator(mode="after")
+    def _file_or_capture(self) -> Self:
+        if (self.file is None) == (self.capture is None):
+            found = "neither" if self.file is None else "both"
+            raise ValueError(f"expected exactly one of file and capture, found {found}")
+        return self
 
 
 class Workflow(Document):

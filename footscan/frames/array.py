@@ -67,6 +67,11 @@ def damage(array: Path, frame: int) -> Fault:
     return DamagedError(f"{array}: frame {frame} is damaged, expected the frame that was ingested")
 
 
+def discard(array: Path) -> None:
+    """Take back the completeness of an array that was found damaged."""
+    (array / METADATA).unlink(missing_ok=True)
+
+
 _BROKEN = (ValueError, KeyError, TypeError, RecursionError)
 
 

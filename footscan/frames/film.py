@@ -3,7 +3,6 @@
 The packets are taken out of the AVI untouched. A frame that is lost or torn keeps its number, for its number is its X.
 """
 
-import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, BinaryIO, TypeVar
 import numpy as np
 
 from footscan.frames.array import damage, is_complete, read_manifest, stored_bytes
-from footscan.frames.image import SUFFIXES, Rgb, decode_image, image_size, pixel_buffer, refused_image
+from footscan.frames.image import SUFFIXES, Rgb, decode_or_none, frame_digest, image_size, pixel_buffer, refused_image
 from schemas.base.errors import Fault, RefusedInput
 from schemas.base.limits import read_bounded, refuse_beyond
 
@@ -101,15 +100,6 @@ def pixel_frames(film: Film) -> Iterator[Rgb | None]:
         yield decode_or_none(data, buffer)
 
 
-def decode_or_none(data: bytes | None, buffer: Rgb) -> Rgb | None:
-    """The frame `data` decoded into `buffer`; None where it is lost, torn or of another size."""
-    try:
-        pixels = None if data is None else decode_image(data, buffer)
-    except ValueError:
-        return None
-    return pixels if pixels is not None and pixels.shape == buffer.shape else None
-
-
 def image_files(path: Path) -> list[Path]:
     """The images in a folder in name order, or the one image that `path` is."""
     if not path.is_dir():
@@ -134,11 +124,6 @@ def film_files(path: Path) -> list[Path]:
     except OSError as error:
         raise RefusedInput(path, error.strerror or "cannot be read") from None
     raise RefusedInput(path, "no PNG or JPEG images in this folder" if path.is_dir() else "no such film")
-
-
-def frame_digest(frame: bytes | Rgb) -> str:
-    """SHA-256 of a frame's bytes."""
-    return hashlib.sha256(frame if isinstance(frame, bytes) else np.ascontiguousarray(frame).data).hexdigest()
 
 
 def _open_film(path: Path) -> Film:

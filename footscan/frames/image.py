@@ -4,6 +4,7 @@ How chroma is brought up to full size decides the accuracy of a red stripe: libj
 upsampling"), where ffmpeg, and so the video readers built on it, repeats samples.
 """
 
+import hashlib
 import io
 from pathlib import Path
 
@@ -137,3 +138,17 @@ def _eight_bit(image: Image.Image) -> Image.Image:
     if image.mode in {"I", "I;16", "I;16B"}:
         return Image.fromarray((np.asarray(image).astype(np.uint32) >> 8).astype(np.uint8))
     return image
+
+
+def decode_or_none(data: bytes | None, buffer: Rgb) -> Rgb | None:
+    """The frame `data` decoded into `buffer`; None where it is lost, torn or of another size."""
+    try:
+        pixels = None if data is None else decode_image(data, buffer)
+    except ValueError:
+        return None
+    return pixels if pixels is not None and pixels.shape == buffer.shape else None
+
+
+def frame_digest(frame: bytes | Rgb) -> str:
+    """SHA-256 of a frame's bytes."""
+    return hashlib.sha256(frame if isinstance(frame, bytes) else np.ascontiguousarray(frame).data).hexdigest()

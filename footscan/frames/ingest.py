@@ -18,7 +18,8 @@ from zarr.errors import ContainsGroupError
 
 from footscan.frames.array import METADATA, chunk_name, is_recorded
 from footscan.frames.codec import ImageCodec
-from footscan.frames.film import Film, encoded_frames, frame_digest, open_background, open_film, pixel_frames
+from footscan.frames.film import Film, encoded_frames, open_background, open_film, pixel_frames
+from footscan.frames.image import frame_digest
 from footscan.frames.partial import make_partial, move_into_place, partial_folder, sweep
 from schemas.base.errors import Fault, RefusedInput
 from schemas.base.limits import read_bounded
@@ -146,11 +147,6 @@ def _check_group(folder: Path) -> None:
     """Refuses metadata of a group that are too large to be any, before Zarr reads them."""
     if (folder / METADATA).exists():
         read_bounded(folder / METADATA, "json_bytes")
-
-
-def discard(array: Path) -> None:
-    """Take back the completeness of an array that was found damaged."""
-    (array / "zarr.json").unlink(missing_ok=True)
 
 
 def _expect_own(array: Path) -> None:

@@ -9,8 +9,7 @@ import numpy as np
 import zarr
 
 from footscan.frames.array import METADATA, chunk_name, damage, stored_bytes
-from footscan.frames.film import decode_or_none, frame_digest
-from footscan.frames.image import Rgb, pixel_buffer
+from footscan.frames.image import Rgb, decode_or_none, frame_digest, pixel_buffer
 from schemas.base.errors import DamagedError
 from schemas.base.limits import read_bounded
 from schemas.frames import FrameManifest

@@ -9,7 +9,7 @@ from footscan.measure.measures import measure_foot
 from footscan.measure.raw_mesh import take_in
 from footscan.mesh.formats.files import read_mesh
 from footscan.mesh.mesh import Mesh
-from schemas.base.documents import Side
+from schemas.base.model import Side
 from schemas.measures import Axis, Measures
 
 

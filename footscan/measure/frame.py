@@ -12,8 +12,8 @@ from footscan.measure.landmarks.toes import FOREFOOT, STRIP_MM
 from footscan.measure.pose import Pose, find_pose
 from footscan.mesh.rigid_transform import apply, low_height
 from footscan.mesh.topology import keep_large_components, used_vertices
-from schemas.base.documents import Side
 from schemas.base.errors import Finding
+from schemas.base.model import Side
 from schemas.measures import Axis
 
 Floor = Literal["glass", "sole", "resting"]

@@ -15,7 +15,7 @@ from footscan.measure.frame import FootFrame, foot_frame
 from footscan.measure.quantity import NotThere, Quantity
 from footscan.mesh.rigid_transform import apply
 from footscan.rows import distinct_rows
-from schemas.base.documents import Side
+from schemas.base.model import Side
 from schemas.measures import Axis, Measure, MeasuredLandmark, Measures, Place, Status, Unit
 
 Floats = NDArray[np.float64]

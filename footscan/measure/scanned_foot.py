@@ -6,7 +6,7 @@ from scipy.spatial import KDTree
 
 from footscan.measure.measures import measure_foot
 from footscan.mesh.mesh import Mesh
-from schemas.base.documents import Side
+from schemas.base.model import Side
 from schemas.measures import Measures
 
 ERROR_MM, ERROR_GROWS, REACH_MM = 0.03, 0.04, 10.0

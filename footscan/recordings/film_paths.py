@@ -3,8 +3,8 @@
 import os
 from pathlib import Path
 
-from schemas.base.documents import inside
 from schemas.base.errors import RefusedInput
+from schemas.base.paths import inside
 
 
 def film_inside(archive: Path, document: Path, relative: str, field: str) -> Path:

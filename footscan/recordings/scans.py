@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from footscan.recordings.film_paths import film_inside
-from schemas.base.documents import inside, read_yaml
 from schemas.base.errors import RefusedInput
+from schemas.base.paths import inside
+from schemas.base.yaml_files import read_yaml
 from schemas.frames import GROUP
 from schemas.scan import CameraFilm, Scan
 

@@ -12,8 +12,8 @@ from footscan.report.render import png_bytes
 from footscan.report.surface_views import PIXELS_PER_MM, render_view, upright, views_of
 from footscan.verify.distances import Distances
 from footscan.verify.regions import FootRegions
-from schemas.base.documents import Side
 from schemas.base.errors import RefusedInput
+from schemas.base.model import Side
 
 SEEN_MM = (1.0, 2000.0)
 """How large a thing may be that is drawn three pixels a mm."""

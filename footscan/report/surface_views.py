@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from footscan.mesh.topology import vertex_normals
 from footscan.report.markup import data_uri, number, text
 from footscan.report.render import png_bytes, render_mesh
-from schemas.base.documents import Side
+from schemas.base.model import Side
 
 PIXELS_PER_MM = 3.0
 _MARGIN_MM = 8.0

@@ -4,7 +4,7 @@ from footscan.sizing.differences import difference, measures_of, unit_of
 from footscan.sizing.identity import doubts, refuse_sides, sighting
 from footscan.sizing.readings import Known, known, notes
 from footscan.sizing.sizes import NEEDED, sizes_of
-from schemas.base.documents import Side
+from schemas.base.model import Side
 from schemas.feet import Foot
 from schemas.pairs import Pair, PairRow
 from schemas.sizes import Asymmetry, People, SizeTable

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from schemas.base.documents import read_yaml
+from schemas.base.yaml_files import read_yaml
 from schemas.sizes import SizeTable
 
 TABLE = Path(__file__).with_name("sizes.yaml")

@@ -10,8 +10,8 @@ from footscan.mesh.formats.files import Shape
 from footscan.mesh.rigid_transform import apply
 from footscan.mesh.sampling import surface_area
 from footscan.verify.distances import by_blocks
-from schemas.base.documents import Side
 from schemas.base.errors import Finding
+from schemas.base.model import Side
 
 TOES = 0.80
 """The longest toe begins about here; its ball, at 0.56 to 0.80 of the length, is behind."""

@@ -14,8 +14,8 @@ from footscan.verify.ambiguity import evidence, patches_of, stiffness
 from footscan.verify.coarse import candidates, distinct, sketch, start_poses
 from footscan.verify.icp import SETTLED_MM, Poses, capped_squares, fit_of, settle
 from footscan.verify.nearest import CloudSurface, Floats, MeshSurface, Surface
-from schemas.base.documents import Document
 from schemas.base.errors import Finding
+from schemas.base.model import Document
 from schemas.parameters.registration import RegistrationParameters
 
 DEFAULTS = RegistrationParameters()

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from footscan.recordings.scans import RecordedScan, read_scan, scan_folders
 from pipelines.archive.workflow_file import check_archives, read_workflow
+from pipelines.calibrate import CaptureInputs, CaptureOfScan, recorded_inputs
 from pipelines.engine.actions.step import Failure, Outcome, Step, Success
 from pipelines.engine.files.access import group_number, share
 from pipelines.engine.files.digest import sha256
@@ -20,9 +21,10 @@ from pipelines.engine.store.erasure_notes import cut_off
 from pipelines.engine.store.permissions import warn_if_others_can_write
 from pipelines.engine.workspace import Workspace
 from pipelines.recordings.calibration_choice import CalibrationPlace, calibration_places, choose_calibration
+from pipelines.recordings.captures import read_capture
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
-from schemas.base.documents import read_text
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import read_text
 from schemas.calibration import calibration_from_json
 from schemas.frames import GROUP
 from schemas.measures import Measures
@@ -102,6 +104,8 @@ class PlannedJob:
     job: Job
     workspace: Workspace
     calibrations: dict[Path, CalibrationFile] = field(default_factory=dict)
+    captures: dict[Path, CaptureInputs] = field(default_factory=dict)
+    """By their folders, as `calibrations` by their files."""
     refused: list[Refused] = field(default_factory=list)
     scans: list[PlannedScan] = field(default_factory=list)
     waiting: list[Waiting] = field(default_factory=list)
@@ -224,9 +228,16 @@ def workspace_of(job: Job) -> Workspace:
 
 
 def draw_steps(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
-    """The steps of one scan of a job; RefusedInput as in `scan_steps`, or where it has no calibration."""
-    calibration = _calibration(scan, planned.job, planned.calibrations)
-    return scan_steps(scan, calibration, planned.job.parameters, planned.workspace.digests)
+    """The steps of one scan of a job, and those of the capture that it is calibrated from.
+
+    Raises
+    ------
+    RefusedInput
+        As in `scan_steps` and `recorded_inputs`, or the scan has no calibration.
+    """
+    calibration = _calibration(scan, planned)
+    steps = scan_steps(scan, calibration, planned.job.parameters, planned.workspace.digests)
+    return [*calibration.steps, *steps] if isinstance(calibration, CaptureOfScan) else steps
 
 
 def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
@@ -327,10 +338,17 @@ def _what_stays(target: Path) -> str:
     return f" ({target} still holds the results of an earlier run)" if target.exists() else ""
 
 
-def _calibration(scan: RecordedScan, job: Job, known: dict[Path, CalibrationFile]) -> CalibrationFile:
+def _calibration(scan: RecordedScan, planned: PlannedJob) -> CalibrationFile | CaptureOfScan:
+    job = planned.job
     own = None if job.calibration_wins and job.calibrations else scan.calibration
-    path = own or choose_calibration(scan, job.calibrations)
-    if path not in known:
+    place = choose_calibration(scan, job.calibrations) if own is None else CalibrationPlace(own)
+    path = place.file
+    if place.is_capture:
+        if path not in planned.captures:
+            planned.captures[path] = recorded_inputs(read_capture(path), planned.workspace.digests)
+        return CaptureOfScan.drawn(scan.name, planned.captures[path])
+    if path not in planned.calibrations:
         text = read_text(path, "json_bytes")
-        known[path] = CalibrationFile(path, calibration_from_json(text, path), sha256(text.encode()))
-    return known[path]
+        digest = sha256(text.encode())
+        planned.calibrations[path] = CalibrationFile(path, calibration_from_json(text, path), digest)
+    return planned.calibrations[path]

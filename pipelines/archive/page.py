@@ -12,8 +12,8 @@ from pipelines.archive.job import ScanEnd
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import sha256
 from pipelines.version import SOFTWARE
-from schemas.base.documents import canonical_json
 from schemas.base.errors import FootscanError
+from schemas.base.model import canonical_json
 from schemas.measures import Measures
 from schemas.quality import Quality
 

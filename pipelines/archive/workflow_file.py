@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from schemas.base.documents import read_text, read_yaml_text, validate
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import read_text, validate
 from schemas.base.mistakes import Mistake, mistakes
+from schemas.base.yaml_files import read_yaml_text
 from schemas.base.yaml_text import place_in_yaml
 from schemas.workflow import Workflow
 
@@ -81,13 +82,17 @@ def _not_there(path: Path, document: Workflow) -> Iterator[tuple[tuple[str | int
         if not (base / archive).is_dir():
             yield ("archive", number), f"no such folder, expected one with scans, found {archive[:80]!r}"
     files: list[tuple[tuple[str | int, ...], str]] = [
-        (("calibrations", n, "file"), c.file) for n, c in enumerate(document.calibrations)
+        (("calibrations", n, "file"), c.file) for n, c in enumerate(document.calibrations) if c.file is not None
     ]
     if document.calibration is not None:
         files.append((("calibration",), document.calibration))
     for names, file in files:
         if not (base / file).is_file():
             yield names, f"no such file, expected a calibration, found {file[:80]!r}"
+    for number, chosen in enumerate(document.calibrations):
+        if chosen.capture is not None and not (base / chosen.capture).is_dir():
+            problem = f"no such folder, expected a capture, found {chosen.capture[:80]!r}"
+            yield ("calibrations", number, "capture"), problem
 
 
 def _placed(text: str, found: Sequence[Mistake]) -> list[PlacedMistake]:

@@ -48,7 +48,7 @@ def export(
     from footscan.surface.quality import mesh_quality
     from pipelines.engine.files.atomic import write_atomically
     from pipelines.version import SOFTWARE
-    from schemas.base.documents import pseudonym
+    from schemas.base.model import pseudonym
 
     suffix = out.suffix.lower()
     if suffix not in WRITERS:

@@ -43,10 +43,10 @@ def simulate_scan(
 ) -> None:
     """Film a mesh that stands on the glass, in the middle of the travel."""
     from footscan.virtual.filming.record import record_scan
-    from footscan.virtual.stage.standing import BLOCK_TURN_DEG
+    from footscan.virtual.stage.standing import BLOCK_TURN_DEG, stand_in_the_middle
     from pipelines.cli.terminal.progress import frame_progress
-    from pipelines.virtual_objects import stand_in_the_middle, virtual_object
-    from schemas.base.documents import pseudonym
+    from pipelines.virtual_objects import virtual_object
+    from schemas.base.model import pseudonym
 
     if [mesh is not None, foot is not None, block].count(True) != 1:
         raise RefusedInput("simulate scan", "expected one of MESH, --foot and --block")

@@ -9,7 +9,7 @@ import typer
 
 from footscan.capture.board.termination import EndedBySignal
 from pipelines.cli import compare, demo, export, extract, films, regress, tune, verify
-from pipelines.cli.archive import cache, config, forget, run, trace, why
+from pipelines.cli.archive import cache, config, forget, run, trace, upgrade, why
 from pipelines.cli.calibrate import app as calibration
 from pipelines.cli.foot import lasts, measure, pairs, sizes
 from pipelines.cli.live import console, devices, scan
@@ -44,6 +44,7 @@ app.add_typer(config.config, name="config")
 app.command("tune")(tune.tune)
 app.command("why")(why.why)
 app.command("trace")(trace.trace)
+cache.cache.command("upgrade")(upgrade.upgrade)
 app.add_typer(cache.cache, name="cache")
 app.command("forget")(forget.forget)
 app.command("regress")(regress.regress)

@@ -78,7 +78,7 @@ def _check(out: Path, age: str, *, as_json: bool) -> int:
 
 def _acceptance(reason: str, accepted_by: str | None) -> "Acceptance":
     from pipelines.version import SOFTWARE
-    from schemas.base.documents import validate
+    from schemas.base.json_files import validate
     from schemas.regression import Acceptance
 
     if not reason.strip():

@@ -12,8 +12,8 @@ from pipelines.console.operator_lock import Charge
 from pipelines.console.presence import Presence
 from pipelines.console.scanner import Scanner, Side
 from pipelines.console.sitting import ScannedFoot, Sitting, judged
-from schemas.base.documents import pseudonym
 from schemas.base.errors import FootscanError, RefusedInput
+from schemas.base.model import pseudonym
 
 log = logging.getLogger("footscan.console")
 

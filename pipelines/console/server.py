@@ -37,8 +37,8 @@ from pipelines.console.pages.results import KINDS, open_result, shown, version_o
 from pipelines.console.pages.sitting import sitting_page
 from pipelines.console.scanner import Side
 from pipelines.console.stopping import stop_asked
-from schemas.base.documents import Document, Pseudonym
 from schemas.base.errors import Fault, FootscanError, RefusedInput
+from schemas.base.model import Document, Pseudonym
 
 _Made = TypeVar("_Made")
 

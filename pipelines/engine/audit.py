@@ -5,7 +5,7 @@ import logging
 import random
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
 
@@ -64,6 +64,8 @@ class Difference:
     recorded: str
     """Digest of the result, or the failure."""
     found: str
+    result: bytes | None = field(default=None, repr=False, compare=False)
+    """What came out this time; None for a failure."""
 
 
 def verify(store: Store) -> Audit:
@@ -136,12 +138,13 @@ def repeat(action: Repeatable, store: Store) -> Difference | None:
         step = _elsewhere(action.step, Path(folder))
         inputs = {name: content_of(step, source, action.inputs[name], store) for name, source in step.inputs.items()}
         try:
-            found = sha256(importlib.import_module(step.module).run(inputs, step.parameters, step.places))
+            result = importlib.import_module(step.module).run(inputs, step.parameters, step.places)
+            found = sha256(result)
         except (RefusedInput, Finding) as error:
-            found = without_places(str(error), step.places)
+            result, found = None, without_places(str(error), step.places)
     recorded = action.outcome
     known = recorded.digest if isinstance(recorded, Success) else without_places(recorded.problem, action.step.places)
-    return None if found == known else Difference(step.name, known, found)
+    return None if found == known else Difference(step.name, known, found, result)
 
 
 def input_digests(step: Step, outcomes: Mapping[str, Outcome | None]) -> dict[str, str]:

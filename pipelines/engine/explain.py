@@ -36,6 +36,13 @@ class Change:
         noun = {"code": "code of ", "library": ""}.get(self.what, f"{self.what} ")
         return f"{noun}{self.name} changed"
 
+    @property
+    def with_versions(self) -> str:
+        """The change in words, with both versions of a library."""
+        if self.what != "library" or self.old is None or self.new is None:
+            return str(self)
+        return f"{self.name} {self.old} -> {self.new}"
+
 
 def changes(step: Step, old: PreImage, new: PreImage, store: Store) -> list[Change]:
     """What differs between two pre-images of one step."""

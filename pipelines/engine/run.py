@@ -19,7 +19,7 @@ from pipelines.engine.files.digest import file_state
 from pipelines.engine.files.places import Files
 from pipelines.engine.plan import Plan, cached_outcome, without_places
 from pipelines.engine.pool import OnStepEnd, Pool, StepEnd, Task
-from pipelines.engine.store.store import Row, Store
+from pipelines.engine.store.store import Acceptance, Row, Store
 from schemas.base.errors import DamagedError, Fault, Finding, RefusedInput, one_line
 from schemas.base.limits import BeyondLimitError
 
@@ -130,24 +130,43 @@ def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tup
         if isinstance(error, BeyondLimitError):  # the user may raise the limit, which is no input of the step
             return Failure(problem, kind, step.name), None
         failure = kind, without_places(problem, step.places)
-        return Failure(problem, kind, step.name), _record(step, image, None, failure, store)
+        return Failure(problem, kind, step.name), record_outcome(step, image, (None, failure), store)
     _check_sources(step)
     digest = store.put(result)
-    return Success(digest), _record(step, image, digest, None, store)
+    return Success(digest), record_outcome(step, image, (digest, None), store)
 
 
-def _record(step: Step, image: str, digest: str | None, failure: tuple[str, str] | None, store: Store) -> str | None:
+def record_outcome(
+    step: Step,
+    image: str,
+    outcome: tuple[str | None, tuple[str, str] | None],
+    store: Store,
+    accepted: Acceptance | None = None,
+) -> str | None:
     """Write an action's row, after all that it names: its code and the values that it took.
 
-    Returns what another row of the same action said: of a run beside this one, or of one whose result was lost.
+    Parameters
+    ----------
+    step : Step
+    image : pre-image of the action's key, as `image_text` gives it
+    outcome : (digest, failure)
+        As in `Row`, one of them None.
+    store : Store
+    accepted : Acceptance, optional
+        Of an outcome that is an earlier version's.
+
+    Returns
+    -------
+    before : str or None
+        Another outcome that a row of the same action had: of a run beside this one, or of one whose result was lost.
     """
     _keep_code(code_identity(step.module), store)
     for source in step.inputs.values():
         if isinstance(source, Value):
             store.put(source.content)
-    row, before = Row(json.loads(image), digest, failure), store.row(key_of(image))
+    row, before = Row(json.loads(image), *outcome, accepted), store.row(key_of(image))
     store.record(step.name, row, _sources(step))
-    is_same = before is None or (before.digest, before.failure) == (digest, failure)
+    is_same = before is None or (before.digest, before.failure) == outcome
     return None if before is None or is_same else before.digest or str(before.failure)
 
 

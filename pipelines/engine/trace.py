@@ -6,9 +6,9 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from pipelines.engine.explain import code_of, inputs_of, kind_of
-from pipelines.engine.store.store import Latest, Row, Store
-from schemas.base.documents import parse_json
+from pipelines.engine.store.store import Acceptance, Latest, Row, Store
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import parse_json
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,8 @@ class TracedAction:
     """Empty where the store has the code no more."""
     result: str | None
     inputs: list[TracedInput] = field(default_factory=list)
+    accepted: Acceptance | None = None
+    """Where the result is an earlier version's: which, and why it stands."""
 
 
 @dataclass(frozen=True)
@@ -146,6 +148,7 @@ def _follow(
         {} if identity is None else identity.libraries,
         row.digest,
         inputs,
+        row.accepted,
     )
 
 

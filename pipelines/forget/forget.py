@@ -19,8 +19,9 @@ from pipelines.forget.subject import Belongings, Subject, find_belongings
 from pipelines.forget.tables import erase_from_text, rewrite_tables, texts_that_name
 from pipelines.regression.night import Regression
 from pipelines.scan import DELIVERED
-from schemas.base.documents import canonical_json, parse_json
 from schemas.base.errors import Fault
+from schemas.base.json_files import parse_json
+from schemas.base.model import canonical_json
 
 CHECK_EVERY = 50
 """Files that are erased between two looks for runs that have begun meanwhile."""

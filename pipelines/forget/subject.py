@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from footscan.recordings.scans import read_scan, scan_folders
-from schemas.base.documents import pseudonym
 from schemas.base.errors import FootscanError, RefusedInput
+from schemas.base.model import pseudonym
 from schemas.frames import GROUP
 
 CHUNK = re.compile(r"\d+\.0\.0\.0").fullmatch

@@ -14,8 +14,7 @@ from footscan.capture.latency import Pass as LatencyPass
 from footscan.capture.passes import FilmedPass, PassPlan, film_name
 from footscan.capture.recording import ScanRecording
 from footscan.frames.array import stored_bytes
-from footscan.frames.film import decode_or_none
-from footscan.frames.image import Rgb, pixel_buffer
+from footscan.frames.image import Rgb, decode_or_none, pixel_buffer
 from footscan.frames.ingest import FRAME_SIZE
 from footscan.stripe.film import extract_film
 from pipelines.live.devices import passes_of

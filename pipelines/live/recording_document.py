@@ -16,7 +16,7 @@ from pipelines.engine.files.digest import sha256
 from pipelines.live.devices import timing_of
 from pipelines.live.light import ScanLight
 from pipelines.version import SOFTWARE
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 from schemas.recording import LeftOut, RecordedBoard, RecordedCamera, RecordedLight, RecordedPass, Recording
 from schemas.rig import Rig, RigCamera
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import yaml
 
 from pipelines.engine.files.atomic import write_atomically
-from schemas.base.documents import read_yaml
+from schemas.base.yaml_files import read_yaml
 from schemas.rig import Rig
 
 

@@ -11,21 +11,26 @@ from schemas.workflow import Workflow
 
 
 class CalibrationPlace(NamedTuple):
-    """A calibration file, and for which scans it is meant, see `ChosenCalibration`."""
+    """A calibration, and for which scans it is meant, see `ChosenCalibration`."""
 
     file: Path
+    """The calibration file, or the folder of a capture."""
     scanner: str | None = None
     since: datetime.date | None = None
+    is_capture: bool = False
 
 
 def calibration_places(workflow: Workflow, base: Path) -> tuple[CalibrationPlace, ...]:
     """The calibrations that a workflow names, relative to `base`."""
     if workflow.calibration is not None:
         return (CalibrationPlace(base / workflow.calibration),)
-    return tuple(CalibrationPlace(base / one.file, one.scanner, one.since) for one in workflow.calibrations)
+    return tuple(
+        CalibrationPlace(base / (one.file or one.capture or ""), one.scanner, one.since, one.capture is not None)
+        for one in workflow.calibrations
+    )
 
 
-def choose_calibration(scan: RecordedScan, places: Sequence[CalibrationPlace]) -> Path:
+def choose_calibration(scan: RecordedScan, places: Sequence[CalibrationPlace]) -> CalibrationPlace:
     """Of those for the scan's scanner, or else of those for any, the last one that began before the scan's day ended.
 
     Raises
@@ -48,7 +53,7 @@ def choose_calibration(scan: RecordedScan, places: Sequence[CalibrationPlace]) -
     begun = [place for place in fitting if place.since is None or (day is not None and place.since <= day)]
     if not begun:
         raise _refusal(scan, f"{day}, expected a day that the workflow has a calibration for", "date")
-    return max(begun, key=lambda place: place.since or datetime.date.min).file
+    return max(begun, key=lambda place: place.since or datetime.date.min)
 
 
 def _refusal(scan: RecordedScan, problem: str, field: str) -> RefusedInput:

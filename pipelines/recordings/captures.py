@@ -7,8 +7,9 @@ from footscan.frames.film import film_files, open_film
 from footscan.frames.ingest import FRAME_SIZE
 from footscan.recordings.film_paths import film_inside
 from footscan.recordings.scans import recorded_folder
-from schemas.base.documents import inside, read_yaml
 from schemas.base.errors import RefusedInput
+from schemas.base.paths import inside
+from schemas.base.yaml_files import read_yaml
 from schemas.mounting import CaptureCamera
 from schemas.reference import Capture, ReferenceObject
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.regression.figures.of_scan import rounded
-from schemas.base.documents import read_yaml
 from schemas.base.errors import RefusedInput
+from schemas.base.yaml_files import read_yaml
 from schemas.regression import Acceptance, AcceptedStep, AcceptedSteps, Baseline
 
 HEAD = (

@@ -8,8 +8,8 @@ import numpy as np
 
 from footscan.virtual.filming.record import record_scan
 from footscan.virtual.foot.foot import make_foot
+from footscan.virtual.stage.standing import stand_in_the_middle
 from pipelines.engine.files.digest import sha256
-from pipelines.virtual_objects import stand_in_the_middle
 from schemas.parameters.virtual_scan import VirtualScan
 
 PATIENT = "virtual"

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from schemas.base.documents import canonical_json
 from schemas.base.errors import Fault
+from schemas.base.model import canonical_json
 from schemas.regression import NightBegun, NightEnded
 
 FILE, LOCK = "history.jsonl", "night.lock"

@@ -27,8 +27,8 @@ from pipelines.regression.report.result import Accepted, JudgedSet, NightResult,
 from pipelines.regression.run_set import SetRun, run_set
 from pipelines.regression.sets import parameters_of, prepare, workspace_of
 from pipelines.version import SOFTWARE
-from schemas.base.documents import read_yaml
 from schemas.base.errors import Fault, FootscanError, RefusedInput
+from schemas.base.yaml_files import read_yaml
 from schemas.regression import Acceptance, AcceptedStep, Baseline, NightBegun, NightEnded, Suite
 
 PAGE = "index.html"

@@ -14,9 +14,10 @@ from pipelines.engine.pool import OnStepEnd, Threads, cores
 from pipelines.engine.workspace import Workspace, digests_by_kind
 from pipelines.recordings.calibration_choice import CalibrationPlace
 from pipelines.regression.film import PATIENT
-from pipelines.simulate import calibration_steps
-from schemas.base.documents import canonical_json, validate
+from pipelines.simulate import filmed_calibration_steps
 from schemas.base.errors import Fault, RefusedInput
+from schemas.base.json_files import validate
+from schemas.base.model import canonical_json
 from schemas.parameters.scan import ScanParameters
 from schemas.parameters.simulation import SimulationSettings
 from schemas.parameters.virtual_scan import VirtualScan
@@ -88,7 +89,7 @@ def _virtual(
     film = Step(
         name, "film", "pipelines.regression.film", virtual, places={"folder": scan}, writes=scan / SCAN_FILE
     )  # fmt: skip
-    filming = [film, *calibration_steps(name, capture, once)]
+    filming = [film, *filmed_calibration_steps(name, capture, once)]
     with workspace_of(out) as workspace:
         outcomes = workspace.run(filming, Threads(1), on_step_end)
         digests = digests_by_kind(filming, outcomes)

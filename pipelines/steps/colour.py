@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from footscan.cloud.colour import point_colours
+from footscan.frames.array import discard
 from footscan.frames.image import Rgb
-from footscan.frames.ingest import discard
 from footscan.frames.reader import read_frame
 from pipelines.arrays import pack, unpack
 from schemas.base.errors import DamagedError

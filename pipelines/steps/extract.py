@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from footscan.frames.array import discard
 from footscan.frames.image import Rgb
-from footscan.frames.ingest import discard
 from footscan.frames.reader import read_frames
 from footscan.stripe.film import extract_film
 from pipelines.arrays import pack

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from footscan.frames.ingest import ingest_film
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:

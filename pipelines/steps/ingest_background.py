@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from footscan.frames.ingest import ingest_background
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 from schemas.frames import FrameManifest
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.frames.ingest import discard
+from footscan.frames.array import discard
 from footscan.frames.reader import read_frame
 from footscan.report.sample_frames import FrameSample
 from footscan.report.scan.page import scan_page

@@ -1,13 +1,14 @@
 """The reference object, filmed by the virtual scanner; the result are the digests of the capture's files."""
 
+import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
 from footscan.virtual.filming.capture import record_capture
 from footscan.virtual.stage.reference import standard_reference
-from pipelines.engine.files.digest import sha256
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 from schemas.parameters.simulation import SimulationSettings
+from schemas.reference import ReferenceObject
 
 PLACEMENTS = 5
 """They fill the volume."""
@@ -17,7 +18,13 @@ def run(inputs: Mapping[str, bytes], parameters: SimulationSettings, places: Map
     """`places`: the `folder` of the capture."""
     del inputs
     folder = places["folder"]
+    record_capture(folder, filmed_reference(), settings=parameters)
+    return canonical_json(
+        {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in sorted(folder.iterdir())}
+    ).encode()
+
+
+def filmed_reference() -> ReferenceObject:
+    """The reference object in the placements that are filmed."""
     reference = standard_reference()
-    reference = reference.model_copy(update={"placements_mm": reference.placements_mm[:PLACEMENTS]})
-    record_capture(folder, reference, settings=parameters)
-    return canonical_json({file.name: sha256(file.read_bytes()) for file in sorted(folder.iterdir())}).encode()
+    return reference.model_copy(update={"placements_mm": reference.placements_mm[:PLACEMENTS]})

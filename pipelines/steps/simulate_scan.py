@@ -8,7 +8,7 @@ import numpy as np
 
 from footscan.virtual.filming.record import record_scan
 from footscan.virtual.foot.foot import make_foot
-from pipelines.virtual_objects import stand_in_the_middle
+from footscan.virtual.stage.standing import stand_in_the_middle
 from schemas.parameters.demo import FilmedFoot
 
 

@@ -11,7 +11,7 @@ import yaml
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.tuning.report.page import tune_page
 from pipelines.tuning.report.result import Trial, TuneResult
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 from schemas.parameters.scan import ScanParameters
 from schemas.tables import Cell, csv_text
 from schemas.workflow import Workflow
@@ -43,7 +43,8 @@ def best_yaml(folder: Path, workflow: Path, document: Workflow, result: TuneResu
     for name in {"calibration", "cache"} & values.keys():
         values[name] = None if values[name] is None else moved(values[name])
     for calibration in values.get("calibrations", []):
-        calibration["file"] = moved(calibration["file"])
+        for name in {"file", "capture"} & calibration.keys():
+            calibration[name] = None if calibration[name] is None else moved(calibration[name])
     values["parameters"] = parameters.model_dump(mode="json", exclude_unset=True)
     trial = f"trial {result.winner.number} of {len(result.trials) - 1}" if result.winner.number else "as it was before"
     head = f"# Found by footscan tune: {trial}. Paths are relative to this file's folder.\n"

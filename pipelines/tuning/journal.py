@@ -9,8 +9,8 @@ from pydantic import ValidationError
 
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import sha256
-from schemas.base.documents import canonical_json
 from schemas.base.errors import Fault
+from schemas.base.model import canonical_json
 from schemas.tuning import TriedPoint, TuneJournal, Tuning
 
 

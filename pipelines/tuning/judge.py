@@ -11,7 +11,7 @@ from footscan.mesh.sampling import sample_surface
 from footscan.verify.compare import SAMPLES, WITHIN_MM
 from footscan.verify.distances import distances_to_mesh
 from pipelines.arrays import unpack
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from pipelines.engine.files.digest import sha256
 from pipelines.tuning.space import Point, grid, grid_values, plain
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 from schemas.tuning import SearchRange, Tuning, is_whole
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from pipelines.tuning.pareto_front import best_compromise, on_front
 from pipelines.tuning.report.result import Gain, Goal, Trial, TuneResult
 from pipelines.tuning.sampling import proposals_of
 from pipelines.tuning.space import Point, present_point, with_point
-from schemas.base.documents import canonical_json
 from schemas.base.errors import RefusedInput
+from schemas.base.model import canonical_json
 from schemas.parameters.scan import ScanParameters
 from schemas.tuning import TriedPoint, Tuning
 

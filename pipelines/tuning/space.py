@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 from itertools import product
 from typing import Any
 
-from schemas.base.documents import canonical_json
 from schemas.base.errors import RefusedInput
+from schemas.base.model import canonical_json
 from schemas.base.overrides import overridden
 from schemas.parameters.scan import ScanParameters
 from schemas.tuning import SearchRange, Tuning, is_whole

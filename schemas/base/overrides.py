@@ -3,8 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from schemas.base.documents import AnyDocument, validate
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import validate
+from schemas.base.model import AnyDocument
 from schemas.base.yaml_text import parse_yaml
 
 OPTION = "--set"

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 from schemas.parameters.extraction import ExtractionParameters
 
 Order = Annotated[int, Field(ge=1, le=5)]
@@ -33,14 +33,19 @@ class CalibrationParameters(Document):
         return self
 
 
-class CaptureCalibrationParameters(CalibrationParameters):
-    """How a capture of the reference object becomes a calibration."""
+class PlacementParameters(Document):
+    """Where the reference object may have stood."""
 
     placement_tolerance_mm: Annotated[float, Field(gt=0, le=50)] = Field(
         default=1.0,
         description="distance in mm from where it should stand beyond which the object is wrongly placed; what is less "
         "is put right where the cameras agree on it",
     )
+
+
+class CaptureCalibrationParameters(CalibrationParameters, PlacementParameters):
+    """How a capture of the reference object becomes a calibration."""
+
     extraction: ExtractionParameters = Field(
         default=ExtractionParameters(largest_width_px=14.0),
         description="how the stripe is found on the object: it is matt, so its stripe is narrow",
@@ -51,3 +56,13 @@ class CaptureCalibrationParameters(CalibrationParameters):
         if self.model == "quadratic":
             raise ValueError("quadratic is for charts, expected polynomial with order 2")
         return self
+
+    @property
+    def placement(self) -> PlacementParameters:
+        """What judges the placements."""
+        return PlacementParameters(placement_tolerance_mm=self.placement_tolerance_mm)
+
+    @property
+    def fit(self) -> CalibrationParameters:
+        """What chooses the model of a camera."""
+        return CalibrationParameters(model=self.model, order=self.order)

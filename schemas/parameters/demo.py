@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from schemas.base.documents import Document, Pseudonym
+from schemas.base.model import Document, Pseudonym
 from schemas.parameters.simulation import SimulationSettings
 
 

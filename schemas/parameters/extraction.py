@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 
 
 class ExtractionParameters(Document):

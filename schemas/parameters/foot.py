@@ -1,6 +1,6 @@
 """What is known of a foot before it is measured."""
 
-from schemas.base.documents import Document, Side
+from schemas.base.model import Document, Side
 
 
 class FootParameters(Document):

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 
 
 class MappingParameters(Document):

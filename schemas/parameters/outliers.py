@@ -4,7 +4,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 
 Range = tuple[float, float]
 Share = Annotated[float, Field(ge=0, le=1)]

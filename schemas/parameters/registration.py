@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 
 
 class RegistrationParameters(Document):

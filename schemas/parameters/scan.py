@@ -1,6 +1,6 @@
 """The parameters of a scan: those of its steps, section by section."""
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.parameters.fusion import FusionParameters
 from schemas.parameters.mapping import MappingParameters

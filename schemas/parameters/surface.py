@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 
 Radius = Annotated[float, Field(gt=0, le=50)]
 

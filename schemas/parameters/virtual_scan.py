@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from schemas.base.documents import Document
+from schemas.base.model import Document
 from schemas.parameters.simulation import SimulationSettings
 
 

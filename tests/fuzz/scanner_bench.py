@@ -26,7 +26,7 @@ from footscan.virtual.filming.streams import SentFrame, VirtualStreams, free_run
 from pipelines.live.light import light_by_hand
 from pipelines.live.scanner import LiveResult, LiveScanner, ScanOrder
 from pipelines.live.storing import ScanName, next_scan_name
-from schemas.base.documents import read_json
+from schemas.base.json_files import read_json
 from schemas.recording import RecordedCamera, Recording
 from schemas.rig import Rig, RigCamera, RigLatency, RigTravel
 

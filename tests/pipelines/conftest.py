@@ -4,9 +4,13 @@ import shutil
 from pathlib import Path
 
 import pytest
+import yaml
 
+from footscan.virtual.filming.capture import record_capture
+from footscan.virtual.stage.reference import standard_reference
 from pipelines.archive.job import Job, ScanEnd, job_of_workflow, plan_job, run_job
 from pipelines.engine.pool import StepEnd, Threads
+from schemas.parameters.simulation import SimulationSettings
 
 
 class Archive:
@@ -58,3 +62,22 @@ def archive(pristine: Path, tmp_path: Path) -> Archive:
 def done(finished: Path, tmp_path: Path) -> Archive:
     """The same after a run; moved, for nothing depends on where it lies."""
     return Archive(Path(shutil.copytree(finished, tmp_path / "done")))
+
+
+@pytest.fixture(scope="session")
+def filmed_capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A capture of three placements by cameras 1, 2 and 5; the films of the others lie beside it. To be read only."""
+    folder = tmp_path_factory.mktemp("filmed") / "capture"
+    reference = standard_reference()
+    reference = reference.model_copy(update={"placements_mm": reference.placements_mm[:3]})
+    record_capture(folder, reference, settings=SimulationSettings(scanner_seed=3))
+    document = yaml.safe_load((folder / "capture.yaml").read_text())
+    document["cameras"] = [camera for camera in document["cameras"] if camera["id"] in (1, 2, 5)]
+    (folder / "capture.yaml").write_text(yaml.safe_dump(document))
+    return folder
+
+
+@pytest.fixture
+def capture(filmed_capture: Path, tmp_path: Path) -> Path:
+    """A copy of it to change."""
+    return Path(shutil.copytree(filmed_capture, tmp_path / "capture"))

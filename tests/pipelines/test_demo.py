@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from schemas.base.documents import read_yaml
+from schemas.base.yaml_files import read_yaml
 from schemas.parameters.scan import ScanParameters
 from schemas.workflow import Workflow
 

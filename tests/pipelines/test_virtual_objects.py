@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pipelines.virtual_objects import stand_in_the_middle, virtual_object
+from footscan.virtual.stage.standing import stand_in_the_middle
+from pipelines.virtual_objects import virtual_object
 from schemas.parameters.simulation import SimulationSettings
 
 

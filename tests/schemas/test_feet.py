@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from schemas.base.documents import read_json
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import read_json
 from schemas.feet import Foot
 from schemas.measures import Measure, Measures
 

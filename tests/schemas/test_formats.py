@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from schemas.base.documents import read_yaml
 from schemas.base.errors import RefusedInput
+from schemas.base.yaml_files import read_yaml
 from schemas.reference import Capture, ReferenceObject
 from schemas.scan import Scan, Travel
 from schemas.workflow import Workflow

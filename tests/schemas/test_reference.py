@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.base.documents import read_yaml, validate
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import validate
+from schemas.base.yaml_files import read_yaml
 from schemas.reference import ReferenceObject
 
 Corners = list[list[float]]

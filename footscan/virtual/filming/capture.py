@@ -11,8 +11,9 @@ from footscan.virtual.filming.renderers import Shot
 from footscan.virtual.filming.stripe_truth import is_lit, is_seen
 from footscan.virtual.optics.scanner import VirtualScanner, standard_scanner
 from footscan.virtual.optics.scene import MATT_GREY, Mesh, Scene
+from schemas.mounting import CaptureCamera
 from schemas.parameters.simulation import SimulationSettings
-from schemas.reference import ReferenceObject
+from schemas.reference import Capture, ReferenceObject
 
 Floats = NDArray[np.float64]
 
@@ -45,9 +46,13 @@ def record_capture(
     film_cameras(meshes, MATT_GREY, shots, folder, settings, progress, workers)
     _write_chart(folder / "chart.csv", reference, settings, clicks_seed)
     write_yaml(folder / "reference.yaml", reference.model_dump(mode="json"))
-    cameras = [{"id": camera, "file": f"cam{camera}.avi"} for camera in CAMERAS]
-    document = {"format": "footscan.capture/1", "reference": "reference.yaml", "x_mm": 0.0, "cameras": cameras}
-    write_yaml(folder / "capture.yaml", document)
+    write_yaml(folder / "capture.yaml", capture_document().model_dump(mode="json", exclude_unset=True))
+
+
+def capture_document() -> Capture:
+    """What capture.yaml holds, of every capture."""
+    cameras = [CaptureCamera(id=camera, file=f"cam{camera}.avi") for camera in CAMERAS]
+    return Capture(format="footscan.capture/1", reference="reference.yaml", x_mm=0.0, cameras=cameras)
 
 
 def prism(profile: Floats) -> Mesh:

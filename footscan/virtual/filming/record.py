@@ -14,7 +14,7 @@ from footscan.virtual.filming.renderers import Shot, shoot
 from footscan.virtual.filming.stripe_truth import write_stripe_truth
 from footscan.virtual.optics.scanner import HEIGHT, WIDTH
 from footscan.virtual.optics.scene import SKIN, Mesh, Surface
-from schemas.base.documents import validate
+from schemas.base.json_files import validate
 from schemas.parameters.simulation import SimulationSettings
 from schemas.scan import Scan
 

@@ -23,7 +23,7 @@ from footscan.virtual.optics.scanner import standard_scanner
 from footscan.virtual.optics.scene import MATT_GREY, Mesh, Scene, Surface
 from footscan.virtual.optics.sensor import compress, photograph
 from footscan.virtual.optics.texture import random_texture
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 from schemas.parameters.simulation import SimulationSettings
 
 Progress = Callable[[int, int], None]

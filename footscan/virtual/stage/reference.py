@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from schemas.base.documents import read_yaml
 from schemas.base.errors import RefusedInput
+from schemas.base.yaml_files import read_yaml
 from schemas.reference import ReferenceObject
 
 _PROFILE: list[tuple[float, float]] = [

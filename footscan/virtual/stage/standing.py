@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.virtual.portable import cos_sin, product
+from schemas.parameters.simulation import SimulationSettings
 
 Floats = NDArray[np.float64]
 
@@ -20,3 +21,9 @@ def stand_on_glass(vertices: Floats, middle_x_mm: float, turn_deg: float = 0.0) 
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     middle = (low + high) / 2.0
     return np.asarray(vertices + np.array([middle_x_mm - middle[0], -middle[1], -low[2]]), np.float64)
+
+
+def stand_in_the_middle(vertices: Floats, settings: SimulationSettings, turn_deg: float = 0.0) -> Floats:
+    """`vertices` turned about Z and shifted onto the glass (Z = 0), to the middle of the travel and to Y = 0."""
+    travel_middle = settings.start_mm + settings.step_mm * (settings.frames - 1) / 2
+    return stand_on_glass(vertices, travel_middle, turn_deg)

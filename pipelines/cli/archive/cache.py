@@ -132,7 +132,7 @@ def verify(
         count, differences, problems = _recompute(workflow or WORKFLOW, share, seed)
         facts |= {
             "recomputed": count,
-            "differences": [vars(difference) for difference in differences],
+            "differences": [{"step": one.step, "recorded": one.recorded, "found": one.found} for one in differences],
             "problems": problems,
         }
         if not as_json:

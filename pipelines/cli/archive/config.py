@@ -20,7 +20,7 @@ config = typer.Typer(help="What a workflow says, and what is wrong with it.", no
 def show(workflow: WorkflowFile = None, settings: Settings = None, as_json: AsJson = False) -> None:
     """Every value in force, and where it comes from: a line of the file, --set, or the default."""
     from pipelines.archive.workflow_file import read_workflow
-    from schemas.base.documents import read_text
+    from schemas.base.json_files import read_text
     from schemas.base.overrides import overridden, parse_settings
     from schemas.parameters.scan import ScanParameters
 

@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,7 +17,7 @@ from schemas.base.errors import RefusedInput, printable
 if TYPE_CHECKING:
     from rich.tree import Tree
 
-    from pipelines.engine.store.store import Store
+    from pipelines.engine.store.store import Acceptance, Store
     from pipelines.engine.trace import Trace, TracedAction, TracedInput
 
 SHOWN_CHARACTERS = 100
@@ -95,6 +96,7 @@ def _action_json(action: "TracedAction") -> dict[str, Any]:
         "libraries": action.libraries,
         "result": action.result,
         "inputs": [_input_json(taken) for taken in action.inputs],
+        **({} if action.accepted is None else {"accepted": asdict(action.accepted)}),
     }
 
 
@@ -146,12 +148,20 @@ def _grow(tree: "Tree", taken_as: str, key: str, found: "Trace", shown: set[str]
 
 def _facts(action: "TracedAction") -> list[str]:
     values = action.parameters.get("values") if isinstance(action.parameters, dict) else None
-    from schemas.base.documents import canonical_json
+    from schemas.base.model import canonical_json
 
     given = [f"{name} {canonical_json(value)}" for name, value in values.items()] if isinstance(values, dict) else []
     libraries = ", ".join(f"{name} {version}" for name, version in action.libraries.items())
     facts = [f"parameters: {', '.join(given)}"] if given else []
-    return [*facts, f"code: {str(action.code)[:12]} with {libraries or 'libraries that are not known any more'}"]
+    facts.append(f"code: {str(action.code)[:12]} with {libraries or 'libraries that are not known any more'}")
+    return facts if action.accepted is None else [*facts, _acceptance(action.accepted)]
+
+
+def _acceptance(accepted: "Acceptance") -> str:
+    return (
+        f"accepted {accepted.date} from code {accepted.code[:12]} ({', '.join(accepted.changes)}): "
+        f"{accepted.sample} of {accepted.of} computed again, all the same; {accepted.reason}"
+    )
 
 
 def _leaf(taken: "TracedInput") -> str:

@@ -12,7 +12,7 @@ from pipelines.cli.terminal.output import AsJson, keep_inputs, message, print_js
 from schemas.base.errors import RefusedInput
 
 if TYPE_CHECKING:
-    from pipelines.calibrate import CaptureCalibration
+    from pipelines.capture_job import CaptureCalibration
 
 
 def capture(
@@ -32,6 +32,9 @@ def capture(
         Path | None, typer.Option(help="Write the corners that were found here, as a chart of control points (CSV).")
     ] = None,
     picture: Picture = None,
+    cache: Annotated[
+        Path | None, typer.Option(help="Folder of a content store: what it holds of this capture is not made again.")
+    ] = None,
     keep_going: Annotated[
         bool,
         typer.Option("--keep-going", help="Go on with cameras that see the object from another side than their own."),
@@ -39,7 +42,7 @@ def capture(
     as_json: AsJson = False,
 ) -> None:
     """Calibrate from the stripe over the reference object: nobody clicks."""
-    from pipelines.calibrate import calibrate_capture
+    from pipelines.capture_job import calibrate_capture
     from pipelines.cli.calibrate.model_table import print_trials
     from pipelines.engine.pool import cores
     from pipelines.recordings.captures import read_capture
@@ -51,7 +54,7 @@ def capture(
     keep_inputs([out, chart, picture], *recorded.files)
     parameters = CaptureCalibrationParameters(model=model, order=order, placement_tolerance_mm=tolerance_mm)
     with drawn(recorded, picture):
-        made = calibrate_capture(recorded, parameters, cores(), keep_going=keep_going)
+        made = calibrate_capture(recorded, parameters, cores(), cache, keep_going=keep_going)
     calibration = made.calibration
     write_calibration(calibration, out)
     if chart is not None:

@@ -25,10 +25,13 @@ def check(
         float, typer.Option(min=0.01, max=50, help="How far the object may stand from where it should.")
     ] = 1.0,
     picture: Picture = None,
+    cache: Annotated[
+        Path | None, typer.Option(help="Folder of a content store: what it holds of this capture is not made again.")
+    ] = None,
     as_json: AsJson = False,
 ) -> int:
     """Measure how far each camera has drifted since its calibration; the exit status is 1 unless all are steady."""
-    from pipelines.calibrate import check_calibration
+    from pipelines.capture_job import check_calibration
     from pipelines.engine.pool import cores
     from pipelines.recordings.captures import read_capture
     from schemas.calibration import read_calibration
@@ -39,7 +42,7 @@ def check(
     known = read_calibration(calibration)
     parameters = CaptureCalibrationParameters(placement_tolerance_mm=placement_tolerance_mm)
     with drawn(today, picture):
-        drifts = check_calibration(known, today, parameters, tolerance_mm, cores())
+        drifts = check_calibration(known, today, parameters, tolerance_mm, cores(), cache)
     moved = [drift for drift in drifts if drift.verdict != "steady"]
     if as_json:
         print_json(

@@ -28,7 +28,7 @@ def drawn(capture: "RecordedCapture", picture: Path | None) -> Iterator[None]:
         What was raised within.
     """
     from footscan.calibration.capture.refused_capture import RefusedCapture
-    from pipelines.calibrate import picture_of
+    from pipelines.capture_job import picture_of
     from pipelines.engine.files.atomic import write_atomically
 
     try:

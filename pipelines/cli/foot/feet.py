@@ -87,7 +87,7 @@ def read_foot(place: Path) -> "Foot":
     RefusedInput
         No such file, or not as measures are.
     """
-    from schemas.base.documents import read_json
+    from schemas.base.json_files import read_json
     from schemas.feet import Foot
 
     file = _measures_file(place)

@@ -84,7 +84,7 @@ def measure(
 def _manual_landmarks(file: Path) -> "dict[str, NDArray[np.float64]]":
     import numpy as np
 
-    from schemas.base.documents import read_yaml
+    from schemas.base.yaml_files import read_yaml
     from schemas.landmarks import ManualLandmarks
 
     return {name: np.array(point) for name, point in read_yaml(file, ManualLandmarks).points().items()}

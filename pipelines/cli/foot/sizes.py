@@ -27,7 +27,7 @@ def sizes(
     from footscan.sizing.identity import sighting
     from footscan.sizing.sizes import foot_sizes
     from footscan.sizing.table import TABLE, read_table
-    from schemas.base.documents import read_text
+    from schemas.base.json_files import read_text
 
     rules = read_table(table)
     if show_table:

@@ -89,7 +89,7 @@ def scan(
     from pipelines.live.scanner import LiveScanner, ScanOrder
     from pipelines.live.storing import ScanName, next_scan_name
     from pipelines.live.virtual.world import World
-    from schemas.base.documents import pseudonym
+    from schemas.base.model import pseudonym
 
     pseudonym(patient, "PATIENT")
     if name is not None:

@@ -12,9 +12,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from pipelines.scan import DELIVERED
-from schemas.base.documents import pseudonym
 from schemas.base.errors import FootscanError, RefusedInput
 from schemas.base.limits import limit, refuse_beyond
+from schemas.base.model import pseudonym
 from schemas.measures import Measures
 from schemas.quality import Quality
 from schemas.recording import Recording

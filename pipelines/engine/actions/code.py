@@ -7,7 +7,6 @@ Python's own.
 import ast
 import contextlib
 import gc
-import importlib.metadata
 import importlib.util
 import sys
 import threading
@@ -18,24 +17,16 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+from pipelines.engine.actions.libraries import versions_that_count
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import file_state, is_settled, sha256
 from pipelines.engine.files.seal import BROKEN, sealed, unsealed
-from schemas.base.documents import canonical_json
 from schemas.base.errors import Fault
+from schemas.base.model import canonical_json
 
 OWN = ROOMS = ("schemas", "footscan", "pipelines")
 """The project's own packages."""
 MEMORY = Path(__file__).parent / "__pycache__" / f"code.{sys.implementation.cache_tag}.json"
-
-DISTRIBUTIONS = {
-    "PIL": ("pillow",),
-    "skimage": ("scikit-image",),
-    "yaml": ("PyYAML",),
-    "open3d": ("open3d-cpu", "open3d"),
-}
-"""Distributions that bring a module of another name."""
-
 
 _PARSING = threading.Lock()
 """With Python 3.11, a thread that builds a syntax tree can fail where another one builds one, or runs code of its own
@@ -49,7 +40,7 @@ class CodeIdentity:
     modules: dict[str, str]
     """Digest of the syntax tree of each project module reached, itself included."""
     libraries: dict[str, str]
-    """Version of each library imported by one of them."""
+    """Version of each library whose arithmetic one of them can use, and of Python."""
 
     @cached_property
     def document(self) -> bytes:
@@ -108,7 +99,7 @@ def _identity(module: str) -> CodeIdentity:
             if imported.split(".")[0] in ROOMS:
                 waiting.extend(_with_parents(imported))
             elif imported not in sys.stdlib_module_names:
-                libraries[imported] = _version(imported)
+                libraries |= versions_that_count(imported)
     return CodeIdentity(dict(sorted(modules.items())), dict(sorted(libraries.items())))
 
 
@@ -205,13 +196,3 @@ def _drop_docstring(node: ast.AST) -> None:
         # A text that stands alone documents what is above it, wherever it stands.
         kept = [s for s in node.body if not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant))]
         node.body = kept or [ast.Pass()]
-
-
-@cache
-def _version(module: str) -> str:
-    for distribution in DISTRIBUTIONS.get(module, (module,)):
-        try:
-            return importlib.metadata.version(distribution)
-        except importlib.metadata.PackageNotFoundError:
-            continue
-    raise ModuleNotFoundError(module)

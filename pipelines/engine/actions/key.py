@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from pipelines.engine.actions.code import code_identity
 from pipelines.engine.actions.step import Step
 from pipelines.engine.files.digest import sha256
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 
 PreImage = dict[str, Any]
 

@@ -5,7 +5,7 @@ import json
 from typing import Any
 
 from pipelines.engine.files.digest import sha256
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 
 BROKEN = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 """What `unsealed`, and reading what it gives, may raise."""

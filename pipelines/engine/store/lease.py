@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipelines.engine.store.store import Store
-from schemas.base.documents import canonical_json
 from schemas.base.errors import Fault
+from schemas.base.model import canonical_json
 
 log = logging.getLogger("footscan.store")
 

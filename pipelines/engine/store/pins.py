@@ -4,8 +4,8 @@ import json
 
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.store.store import Store, plain_hex
-from schemas.base.documents import canonical_json, pseudonym
 from schemas.base.errors import DamagedError, RefusedInput
+from schemas.base.model import canonical_json, pseudonym
 
 FOLDER = "pins"
 

@@ -8,7 +8,7 @@ since it was checked is not read again (`verified`).
 import contextlib
 import logging
 import re
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,24 @@ KINDS = ("refused", "finding")
 
 
 @dataclass(frozen=True)
+class Acceptance:
+    """Why a result of an earlier version of the code stands for an action that was not run itself."""
+
+    code: str
+    """Digest of that version, see `CodeIdentity`."""
+    changes: list[str]
+    """What differs between it and the version of the action, a line each."""
+    sample: int
+    """Actions of the same step and versions that were run again, all with the recorded result."""
+    of: int
+    """Actions of the same step and versions."""
+    date: str
+    """ISO 8601, UTC."""
+    reason: str
+    """In the words of whoever accepted it."""
+
+
+@dataclass(frozen=True)
 class Row:
     """What an action came to."""
 
@@ -36,6 +54,8 @@ class Row:
     """The result, in the content store; None for a failure."""
     failure: tuple[str, str] | None = None
     """Kind (`refused` or `finding`) and problem of an action that failed by its input's fault."""
+    accepted: Acceptance | None = None
+    """Of an action that was not run: its outcome is that of an earlier version."""
 
 
 @dataclass(frozen=True)
@@ -112,9 +132,10 @@ class Store:
     def record(self, step_name: str, row: Row, sources: dict[str, str] | None = None) -> None:
         """Write the row of an action, and remember it as the last one of its step."""
         key = key_of(row.image)
-        self.files.write(
-            row_name(key), sealed({"image": row.image, "digest": row.digest, "failure": row.failure}, self.secret)
-        )
+        content = {"image": row.image, "digest": row.digest, "failure": row.failure}
+        if row.accepted is not None:
+            content["accepted"] = asdict(row.accepted)
+        self.files.write(row_name(key), sealed(content, self.secret))
         self.note_latest(step_name, key, sources or {})
         state = self.files.state(row_name(key))
         if self.verified is not None and state is not None:
@@ -149,12 +170,13 @@ class Store:
             image, digest, failure = value["image"], value["digest"], value["failure"]
             if key_of(image) != key:
                 raise ValueError("the row of another action")
+            accepted = None if "accepted" not in value else Acceptance(**value["accepted"])
             if failure is None:
-                return Row(image, plain_hex(digest))
+                return Row(image, plain_hex(digest), None, accepted)
             kind, problem = failure
             if digest is not None or kind not in KINDS or not isinstance(problem, str):
                 raise ValueError("neither a result nor a failure")
-            return Row(image, None, (kind, problem))
+            return Row(image, None, (kind, problem), accepted)
         except (ValueError, KeyError, TypeError, RecursionError):
             log.warning("%s: damaged, will be made again", self.files.path(row_name(key)))
             return None

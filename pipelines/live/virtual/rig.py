@@ -18,7 +18,7 @@ from pipelines.live.rig_file import read_rig, write_rig
 from pipelines.live.scanner import LiveScanner
 from pipelines.live.virtual.process import WorldProcess
 from pipelines.live.virtual.world import CAMERAS, EXPOSURE_MS, World, block_range_mm
-from pipelines.simulate import calibration_steps
+from pipelines.simulate import filmed_calibration_steps
 from schemas.base.errors import Fault
 from schemas.parameters.simulation import SimulationSettings
 from schemas.rig import Rig, RigCamera
@@ -107,7 +107,7 @@ def _with_latencies(rig: Rig, world: World, on_progress: OnProgress) -> Rig:
 
 def _calibrate(folder: Path, file: Path, scanner_seed: int) -> None:
     """The scanner's calibration, from a capture of the reference object."""
-    steps = calibration_steps(
+    steps = filmed_calibration_steps(
         f"virtual-{scanner_seed}", folder / f"capture-{scanner_seed}", SimulationSettings(scanner_seed=scanner_seed)
     )
     with Workspace(folder / CACHE) as workspace, workspace.lease():

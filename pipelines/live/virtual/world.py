@@ -29,8 +29,8 @@ from footscan.virtual.optics.scene import SKIN, Mesh
 from footscan.virtual.stage.pictures import Light, Progress, StagePictures, Subject
 from footscan.virtual.stage.reference_stage import NOTHING, block_subject
 from footscan.virtual.stage.stage import Positions, Stage, indices_of_travel
-from pipelines.virtual_objects import stand_in_the_middle
-from schemas.base.documents import Document
+from footscan.virtual.stage.standing import stand_in_the_middle
+from schemas.base.model import Document
 from schemas.parameters.simulation import Scale, Seed, SimulationSettings
 
 CAMERAS = range(1, 9)

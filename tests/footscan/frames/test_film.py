@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from footscan.frames.film import Film, encoded_frames, film_files, frame_digest, open_film, pixel_frames
+from footscan.frames.film import Film, encoded_frames, film_files, open_film, pixel_frames
+from footscan.frames.image import frame_digest
 from footscan.frames.ingest import ingest_film
 from schemas.base.errors import RefusedInput
 

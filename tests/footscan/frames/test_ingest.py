@@ -19,8 +19,8 @@ import simplejpeg
 import zarr
 
 from footscan.frames import ingest
-from footscan.frames.array import chunk_name, is_complete
-from footscan.frames.ingest import discard, ingest_film
+from footscan.frames.array import chunk_name, discard, is_complete
+from footscan.frames.ingest import ingest_film
 from footscan.frames.reader import read_frames
 from schemas.base.errors import Fault, RefusedInput
 from schemas.frames import GROUP, FrameManifest

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from footscan.measure.frame import FootFrame, foot_frame
 from footscan.mesh.rigid_transform import apply
 from footscan.virtual.foot.foot import Foot, make_foot, sample_shape
-from schemas.base.documents import Side
 from schemas.base.errors import Finding
+from schemas.base.model import Side
 from schemas.measures import Axis
 
 ABOVE_GLASS = np.array([120.0, -40.0, 33.0])

@@ -17,8 +17,8 @@ from pipelines.archive.job import job_of_scan, job_of_workflow, plan_job, run_jo
 from pipelines.engine import run as engine_run
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.steps import measure
-from schemas.base.documents import read_yaml
 from schemas.base.errors import Fault, Finding, RefusedInput
+from schemas.base.yaml_files import read_yaml
 from schemas.calibration import Calibration
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import Scan

@@ -15,7 +15,7 @@ import pytest
 from pipelines.cli.main import run_command
 from pipelines.regression.history import append
 from pipelines.regression.report.junit import junit_xml
-from schemas.base.documents import read_yaml
+from schemas.base.yaml_files import read_yaml
 from schemas.regression import NightEnded, Suite
 
 Regress = Callable[..., tuple[int, str, list[str]]]

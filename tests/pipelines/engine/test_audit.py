@@ -16,8 +16,8 @@ from pipelines.engine.plan import make_plan
 from pipelines.engine.store.lease import lease
 from pipelines.engine.store.pins import pin
 from pipelines.engine.store.store import Row, Store, blob_name, latest_name, row_name
-from schemas.base.documents import canonical_json
 from schemas.base.errors import DamagedError
+from schemas.base.model import canonical_json
 
 Chain = Callable[..., list[Step]]
 

@@ -10,7 +10,7 @@ from pipelines.engine.actions.key import image_text
 from pipelines.engine.actions.step import Output, Step, Value
 from pipelines.engine.explain import BETWEEN, Change, changes, code_of, inputs_of, kind_of, reason, side_by_side
 from pipelines.engine.store.store import Store, blob_name
-from schemas.base.documents import Document
+from schemas.base.model import Document
 
 
 class Factor(Document):

@@ -15,8 +15,8 @@ from pipelines.engine.plan import make_plan
 from pipelines.engine.store.lease import lease
 from pipelines.engine.store.pins import pin, unpin
 from pipelines.engine.store.store import Store, blob_name, open_store, row_name
-from schemas.base.documents import Document
 from schemas.base.errors import DamagedError
+from schemas.base.model import Document
 
 DAY_S = 86400.0
 JOIN_AGAIN = """

@@ -9,7 +9,7 @@ import pytest
 from pipelines.engine.actions.step import Failure, Output, Step, Success, Value
 from pipelines.engine.plan import State, make_plan, with_places, without_places
 from pipelines.engine.store.store import Store, blob_name
-from schemas.base.documents import Document
+from schemas.base.model import Document
 
 RunSteps = Callable[..., Any]
 

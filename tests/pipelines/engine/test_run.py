@@ -14,8 +14,8 @@ from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.run import run_plan
 from pipelines.engine.store.store import Row, Store, blob_name
-from schemas.base.documents import Document
 from schemas.base.errors import Fault
+from schemas.base.model import Document
 
 RunSteps = Callable[..., Any]
 

@@ -11,7 +11,7 @@ from pipelines.engine.actions.step import Output, SourceFile, Step, Value
 from pipelines.engine.files.file_digests import FileDigests
 from pipelines.engine.store.store import Row, Store, row_name
 from pipelines.engine.trace import Trace, blob_digest, read_actions, row_key, trace
-from schemas.base.documents import Document
+from schemas.base.model import Document
 
 
 class Factor(Document):

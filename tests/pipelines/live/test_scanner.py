@@ -25,8 +25,8 @@ from pipelines.live.light import light_by_hand
 from pipelines.live.scanner import LiveScanner, ScanOrder
 from pipelines.live.state import ScannerState
 from pipelines.live.storing import ScanName, next_scan_name
-from schemas.base.documents import read_json
 from schemas.base.errors import Fault, Finding, RefusedInput
+from schemas.base.json_files import read_json
 from schemas.recording import Recording
 from schemas.rig import Rig, RigCamera, RigLatency, RigTravel
 

@@ -6,8 +6,8 @@ import pytest
 
 from footscan.recordings.scans import RecordedScan
 from pipelines.recordings.calibration_choice import calibration_places, choose_calibration
-from schemas.base.documents import validate
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import validate
 from schemas.scan import Scan
 from schemas.workflow import Workflow
 
@@ -34,7 +34,7 @@ def chosen(calibrations: list[dict[str, str]], name: str = "one", **fields: str)
         "cameras": [{"id": 1, "file": "cam1.avi"}],
     } | fields
     scan = RecordedScan(Path("folder"), Path("archive"), validate("scan.yaml", Scan, document))
-    return choose_calibration(scan, calibration_places(workflow(calibrations), Path("base"))).name
+    return choose_calibration(scan, calibration_places(workflow(calibrations), Path("base"))).file.name
 
 
 @pytest.mark.parametrize(
@@ -76,6 +76,16 @@ def test_two_for_the_same_scans_are_refused() -> None:
         workflow([*PLACES, {"file": "c.json", "scanner": "B"}])
     with pytest.raises(RefusedInput, match="calibration and calibrations exclude each other"):
         workflow(PLACES, calibration="c.json")
+
+
+@pytest.mark.parametrize(("fields", "found"), [({}, "neither"), ({"file": "a.json", "capture": "a"}, "both")])
+def test_a_calibration_is_a_file_or_a_capture(fields: dict[str, str], found: str) -> None:
+    with pytest.raises(RefusedInput, match=f"expected exactly one of file and capture, found {found}"):
+        workflow([{"scanner": "A"} | fields])
+    captured = calibration_places(workflow([{"capture": "a"}, {"file": "b.json", "scanner": "B"}]), Path("base"))
+    assert [(place.file, place.is_capture) for place in captured] == [
+        (Path("base/a"), True), (Path("base/b.json"), False)
+    ]  # fmt: skip
 
 
 def test_one_calibration_is_for_all() -> None:

@@ -10,11 +10,24 @@ import pytest
 from pipelines.engine.pool import StepEnd
 from pipelines.regression import film
 from pipelines.regression.sets import PreparedSet, parameters_of, prepare
-from pipelines.steps import calibrate_capture, simulate_capture
+from pipelines.steps import (
+    all_recognise,
+    calibrate,
+    capture_stripe,
+    fit,
+    own_side,
+    place,
+    recognise,
+    simulate_capture,
+)
 from schemas.base.errors import Fault
 from schemas.parameters.simulation import SimulationSettings
 from schemas.parameters.virtual_scan import VirtualScan
 from schemas.regression import Suite
+
+STEPS = (capture_stripe, recognise, place, all_recognise, own_side, fit, calibrate)
+KINDS = {"film", "capture", "calibrate"}
+"""What is filmed, and the last step of a calibration."""
 
 SUITE: dict[str, Any] = {
     "format": "footscan.suite/1",
@@ -35,7 +48,11 @@ class Filming:
 
     def __init__(self, patch: pytest.MonkeyPatch, out: Path) -> None:
         self.out = out
-        for module, file in ((film, "scan.yaml"), (simulate_capture, "capture.yaml"), (calibrate_capture, None)):
+        for module, file in (
+            (film, "scan.yaml"),
+            (simulate_capture, "capture.yaml"),
+            *((step, None) for step in STEPS),
+        ):
             patch.setattr(module, "run", self.step(file))
 
     def step(self, file: str | None) -> Any:
@@ -49,10 +66,10 @@ class Filming:
         return run
 
     def prepare(self, name: str) -> tuple[PreparedSet, list[str]]:
-        """The set, and the kinds of steps that ran for it."""
+        """The set, and those of `KINDS` that ran for it."""
         ends: list[StepEnd] = []
         prepared = prepare(name, Suite.model_validate(SUITE), Path("nowhere"), self.out, ends.append)
-        return prepared, [end.step.kind for end in ends if end.ran]
+        return prepared, [end.step.kind for end in ends if end.ran and end.step.kind in KINDS]
 
 
 @pytest.fixture

@@ -16,8 +16,8 @@ from pipelines.engine.pool import StepEnd, Threads
 from pipelines.tuning.files import write_files
 from pipelines.tuning.report.result import Trial
 from pipelines.tuning.search import FOLDER, Tuned, tune
-from schemas.base.documents import read_yaml
 from schemas.base.errors import RefusedInput
+from schemas.base.yaml_files import read_yaml
 from schemas.workflow import Workflow
 
 GRID = """\

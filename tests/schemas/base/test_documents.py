@@ -9,16 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.base.documents import (
-    Document,
-    canonical_json,
-    inside,
-    parse_json,
-    pseudonym,
-    read_json,
-    read_yaml,
-)
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import parse_json, read_json
+from schemas.base.model import Document, canonical_json, pseudonym
+from schemas.base.paths import inside
+from schemas.base.yaml_files import read_yaml
 from schemas.base.yaml_text import MAX_DEPTH
 from schemas.scan import Scan
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from schemas.base.documents import read_yaml
 from schemas.base.errors import RefusedInput
 from schemas.base.limits import LIMITS, VARIABLE, BeyondLimitError, check_limits, limit, read_bounded, refuse_beyond
+from schemas.base.yaml_files import read_yaml
 from schemas.scan import Scan
 
 DOCS = Path(__file__).parents[3] / "docs"

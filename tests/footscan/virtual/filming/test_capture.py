@@ -13,7 +13,7 @@ from footscan.virtual.filming.stripe_truth import is_lit, is_seen
 from footscan.virtual.optics.scanner import HEIGHT, VOLUME_MM, WIDTH, standard_scanner
 from footscan.virtual.optics.scene import MATT_GREY, Scene
 from footscan.virtual.stage.reference import standard_reference
-from schemas.base.documents import read_yaml
+from schemas.base.yaml_files import read_yaml
 from schemas.parameters.simulation import SimulationSettings
 from schemas.reference import Capture, ReferenceObject
 

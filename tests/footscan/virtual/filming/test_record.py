@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from footscan.virtual.filming.record import record_scan
 from footscan.virtual.optics.scanner import standard_scanner
-from schemas.base.documents import read_yaml
 from schemas.base.errors import RefusedInput
+from schemas.base.yaml_files import read_yaml
 from schemas.parameters.simulation import SimulationSettings
 from schemas.scan import Scan
 

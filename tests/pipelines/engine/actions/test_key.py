@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from pipelines.engine.actions import code
+from pipelines.engine.actions import libraries
 from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Output, SourceFile, Step, Value
-from schemas.base.documents import Document, canonical_json
+from schemas.base.model import Document, canonical_json
 from schemas.parameters.normals import NormalParameters
 from schemas.parameters.outliers import OutlierParameters
 
@@ -103,7 +103,7 @@ def test_depends_on_code_and_libraries(package: Any, monkeypatch: pytest.MonkeyP
     package.write("helper", "X = 2")
     keys.add(key(clean_step(module=package.load("step"))))
     package.forget()
-    monkeypatch.setattr(code, "_version", lambda _: "999")
+    monkeypatch.setattr(libraries, "_version", lambda _: "999")
     keys.add(key(clean_step(module=package.load("step"))))
     assert len(keys) == 3
 

@@ -14,7 +14,7 @@ import pytest
 from pipelines.engine.store import lease as lease_module
 from pipelines.engine.store.lease import STALE_S, is_ahead, lease, leases, live_leases, take_over
 from pipelines.engine.store.store import Store
-from schemas.base.documents import canonical_json
+from schemas.base.model import canonical_json
 
 
 def test_a_lease_lasts_as_long_as_its_run(store: Store) -> None:

@@ -13,8 +13,8 @@ from pipelines.engine.files import places as files_module
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.store.store import Latest, Row, Store, blob_name, row_name
 from pipelines.engine.store.verified_index import Known
-from schemas.base.documents import canonical_json
 from schemas.base.errors import Fault
+from schemas.base.model import canonical_json
 
 IMAGE = {"step": "clean", "code": "d" * 64, "parameters": None, "inputs": {"cloud": ["result", "a" * 64]}}
 

@@ -1,0 +1,195 @@
+"""One capture as a job: a calibration from it, or how far the scanner has drifted since its last one."""
+
+import importlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import islice
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.calibration.capture.as_arrays import points_of, seen_by
+from footscan.calibration.capture.found_corners import FoundCorner
+from footscan.calibration.capture.from_capture import CalibratedView, Recognised
+from footscan.calibration.capture.refused_capture import RefusedCapture
+from footscan.calibration.checks.drift import Drift, drift_of
+from footscan.calibration.models.selection import ModelTrial
+from footscan.frames.film import open_film, pixel_frames
+from footscan.report.calibration.capture_figure import capture_figure
+from pipelines.arrays import unpack
+from pipelines.calibrate import CaptureInputs, calibration_steps, camera_steps, fit_steps, recorded_inputs
+from pipelines.engine.actions.step import Failure, Outcome, Output, Step
+from pipelines.engine.pool import Threads
+from pipelines.engine.run import content_of
+from pipelines.engine.store.store import Store
+from pipelines.engine.workspace import Workspace
+from pipelines.recordings.captures import RecordedCapture
+from schemas.base.errors import DamagedError, Fault
+from schemas.calibration import Calibration, CameraCalibration
+from schemas.parameters.calibration import CaptureCalibrationParameters
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CaptureCalibration:
+    """A calibration from a capture, and how it came about."""
+
+    calibration: Calibration
+    trials: list[ModelTrial]
+    corners: list[FoundCorner]
+    x_mm: float
+    """Of all corners: where the laser's plane stood."""
+    departures_mm: Floats
+    """(K, 2) how far, in Y and Z, the object stood from where it was said, as the cameras agree; zeros where that does
+    not help."""
+
+
+def calibrate_capture(
+    capture: RecordedCapture,
+    parameters: CaptureCalibrationParameters,
+    workers: int,
+    cache: Path | None = None,
+    *,
+    keep_going: bool = False,
+) -> CaptureCalibration:
+    """The calibration of all cameras of a capture, with so many threads; what `cache` holds of it is not made again.
+
+    With `keep_going` cameras that see the object from another side than they stand on are calibrated all the same.
+
+    Raises
+    ------
+    RefusedInput
+        Two cameras have one film; or the object is not recognised or stood elsewhere than said, as `RefusedCapture`.
+    Fault
+        A step could not be run to its end.
+    """
+    with _job(capture, workers, cache) as job:
+        steps = calibration_steps(job.name, job.inputs, parameters, keep_going=keep_going)
+        made = job.run(steps)
+        fits = [json.loads(_fit(job, made, camera)["document"].tobytes()) for camera in sorted(job.cameras)]
+        poses = unpack(made[f"{job.name}/place"])["poses"]
+        return CaptureCalibration(
+            Calibration.model_validate_json(made[f"{job.name}/calibrate"]),
+            [ModelTrial(**trial) for fit in fits for trial in fit["trials"]],
+            [FoundCorner(**corner) for fit in fits for corner in fit["corners"]],
+            capture.document.x_mm,
+            poses[:, :2] - np.array(capture.reference.placements_mm, np.float64),
+        )
+
+
+def check_calibration(
+    calibration: Calibration,
+    capture: RecordedCapture,
+    parameters: CaptureCalibrationParameters,
+    tolerance_mm: float,
+    workers: int,
+    cache: Path | None = None,
+) -> list[Drift]:
+    """How far each camera of a scanner has drifted since its calibration, by a capture of today.
+
+    A camera that does not recognise the object, or is in the capture or the calibration alone, is part of the result.
+
+    Raises
+    ------
+    RefusedInput
+        The object stood elsewhere than said or is recognised by no camera, as `RefusedCapture`.
+    Fault
+        A step could not be run to its end.
+    """
+    with _job(capture, workers, cache) as job:
+        steps = camera_steps(job.name, job.inputs, parameters)
+        made = job.run([*steps, *fit_steps(job.name, job.inputs, parameters, "place")])
+        drifts = []
+        for known in sorted(calibration.cameras, key=lambda camera: camera.camera):
+            if known.camera in job.cameras:
+                drifts.append(_drift(job, made, known, tolerance_mm))
+            else:
+                drifts.append(Drift(known.camera, "not in the capture"))
+        known_ids = {known.camera for known in calibration.cameras}
+        unknown = sorted(set(job.cameras) - known_ids)
+        return drifts + [Drift(camera, "not in the calibration") for camera in unknown]
+
+
+def picture_of(capture: RecordedCapture, refused: RefusedCapture) -> bytes:
+    """A PNG of what a capture was refused for."""
+    films = {camera.id: capture.film(camera) for camera in capture.document.cameras}
+    shown = [
+        (evidence, next(islice(pixel_frames(open_film(films[evidence.camera])), evidence.frame, None), None))
+        for evidence in refused.evidence
+    ]
+    return capture_figure(str(refused), shown)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """A capture whose steps can be run."""
+
+    name: str
+    inputs: CaptureInputs
+    workspace: Workspace
+    workers: int
+
+    @property
+    def cameras(self) -> list[int]:
+        """The numbers of the cameras."""
+        return list(self.inputs.paths)
+
+    def run(self, steps: Sequence[Step]) -> dict[str, bytes]:
+        """The result of every step by its name; raises what refused one."""
+        with self.workspace.lease():
+            outcomes = self.workspace.run(steps, Threads(self.workers), lambda _: None)
+            for step in steps:
+                if isinstance(failure := outcomes[step.name], Failure):
+                    _raise(failure, {step.name: step for step in steps}, outcomes, self.workspace.store)
+            return {name: self._result(name, outcome) for name, outcome in outcomes.items()}
+
+    def _result(self, name: str, outcome: Outcome) -> bytes:
+        assert not isinstance(outcome, Failure), "raised before"
+        result = self.workspace.store.get(outcome.digest)
+        if result is None:
+            raise DamagedError(f"{name}: the result is damaged, expected what was stored; run again")
+        return result
+
+
+@contextmanager
+def _job(capture: RecordedCapture, workers: int, cache: Path | None) -> Iterator[_Job]:
+    """The job of a capture; without a `cache` its store lasts as long as the job."""
+    with TemporaryDirectory(prefix="footscan-") as passing, Workspace(cache or Path(passing)) as workspace:
+        inputs = recorded_inputs(capture, workspace.digests)
+        yield _Job(f"capture/{capture.folder.name}", inputs, workspace, workers)
+
+
+def _raise(failure: Failure, steps: Mapping[str, Step], outcomes: Mapping[str, Outcome], store: Store) -> None:
+    """Raise what a step failed by. A refusal is raised by the step itself, with the evidence that no store keeps."""
+    if failure.kind == "refused":
+        step = steps[failure.cause]
+        content = {}
+        for name, source in step.inputs.items():
+            before = outcomes[source.step] if isinstance(source, Output) else None
+            assert not isinstance(before, Failure), "a cause has all its inputs"
+            digest = "" if before is None else before.digest
+            content[name] = content_of(step, source, digest, store)
+        importlib.import_module(step.module).run(content, step.parameters, step.places)
+    raise Fault(failure.problem)
+
+
+def _fit(job: _Job, made: Mapping[str, bytes], camera: int) -> Mapping[str, NDArray[Any]]:
+    return unpack(made[f"{job.name}/fit-{camera}"])
+
+
+def _drift(job: _Job, made: Mapping[str, bytes], known: CameraCalibration, tolerance_mm: float) -> Drift:
+    camera = known.camera
+    stripe, found = (unpack(made[f"{job.name}/{kind}-{camera}"]) for kind in ("stripe", "recognise"))
+    recognised = seen_by(camera, stripe, found)[1]
+    if not isinstance(recognised, Recognised):
+        return Drift(camera, "not recognised", remark=recognised)
+    fit = _fit(job, made, camera)
+    today = CameraCalibration.model_validate(json.loads(fit["document"].tobytes())["calibration"])
+    drift = drift_of(known, CalibratedView(today, [], points_of(fit), []), tolerance_mm)
+    return replace(drift, remark=recognised.contradiction or drift.remark)

@@ -1,0 +1,82 @@
+"""How far two results of a step are apart, in words."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from pipelines.arrays import unpack
+from schemas.base.errors import DamagedError, RefusedInput
+from schemas.base.json_files import parse_json
+
+SHOWN = 3
+"""Arrays or fields that are named."""
+
+
+def difference_in_words(old: bytes, new: bytes) -> str:
+    """The arrays, or the fields of a document, that differ; of numbers the largest difference.
+
+    Examples
+    --------
+    >>> difference_in_words(b'{"length": 250.0, "side": "left"}', b'{"length": 250.5, "side": "left"}')
+    'length 250.0 -> 250.5'
+    """
+    for differences in (_of_arrays, _of_documents):
+        try:
+            found = list(differences(old, new))
+        except (DamagedError, RefusedInput, UnicodeDecodeError):
+            continue
+        more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
+        return ", ".join(found[:SHOWN]) + more if found else "the same values, written differently"
+    return f"{len(old)} bytes -> {len(new)} bytes"
+
+
+def _of_arrays(old: bytes, new: bytes) -> Iterator[str]:
+    before, after = _fields(unpack(old)), _fields(unpack(new))
+    for name in sorted(before.keys() | after.keys()):
+        if name not in before or name not in after:
+            yield f"{name} {'is missing' if name in before else 'is new'}"
+            continue
+        was, now = before[name], after[name]
+        if was.shape != now.shape or was.dtype != now.dtype:
+            yield f"{name} {was.dtype}{list(was.shape)} -> {now.dtype}{list(now.shape)}"
+            continue
+        differs = was != now
+        if was.dtype.kind == "f":
+            differs &= ~(np.isnan(was) & np.isnan(now))
+        if differs.any():
+            yield f"{name}: {int(differs.sum())} of {was.size} values{_at_most(was[differs], now[differs])}"
+
+
+def _fields(arrays: dict[str, np.ndarray[Any, Any]]) -> dict[str, np.ndarray[Any, Any]]:
+    """Arrays by their names, those of a structured array by its name and the field's."""
+    plain: dict[str, np.ndarray[Any, Any]] = {}
+    for name, array in arrays.items():
+        fields = array.dtype.names
+        plain |= {name: array} if fields is None else {f"{name}.{field}": array[field] for field in fields}
+    return plain
+
+
+def _at_most(was: np.ndarray[Any, Any], now: np.ndarray[Any, Any]) -> str:
+    if was.dtype.kind not in "fiu":
+        return ""
+    distance = np.abs(was.astype(np.float64) - now.astype(np.float64))
+    return f" by at most {float(np.max(distance)):.3g}"
+
+
+def _of_documents(old: bytes, new: bytes) -> Iterator[str]:
+    before, after = dict(_leaves(parse_json("old", old.decode()))), dict(_leaves(parse_json("new", new.decode())))
+    for name in before | after:
+        if name not in before or name not in after:
+            yield f"{name} {'is missing' if name in before else 'is new'}"
+        elif before[name] != after[name]:
+            yield f"{name} {before[name]} -> {after[name]}"
+
+
+def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Values of a document that are no objects and no lists, by their dotted names."""
+    if not isinstance(value, dict | list):
+        yield name, value
+        return
+    for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
+        yield from _leaves(inner, f"{name}.{key}" if name else str(key))

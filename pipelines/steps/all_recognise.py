@@ -1,0 +1,22 @@
+"""The poses of the reference object, where every camera recognises it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from footscan.calibration.capture.as_arrays import seen_of
+from footscan.calibration.capture.refused_capture import refuse_unrecognised
+from pipelines.arrays import unpack
+
+
+def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
+    """`inputs`: the `poses`, each camera's `stripe-N` and `recognised-N`; `places`: the `capture` document.
+
+    Raises
+    ------
+    RefusedCapture
+        A camera does not recognise the object.
+    """
+    del parameters
+    seen = seen_of({name: unpack(data) for name, data in inputs.items() if name != "poses"})
+    refuse_unrecognised(seen.views, seen.unrecognised, str(places["capture"]))
+    return inputs["poses"]

@@ -1,0 +1,31 @@
+"""The calibrations of all cameras to one calibration file, with how well each two of them agree."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from footscan.calibration.capture.as_arrays import points_of, seen_of
+from footscan.calibration.capture.from_capture import CalibratedView, assemble
+from footscan.calibration.capture.reference import doubts_about
+from pipelines.arrays import unpack
+from schemas.calibration import CameraCalibration, Source
+from schemas.reference import ReferenceObject
+
+
+def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
+    """`inputs`: the `reference` object, each camera's `stripe-N`, `recognised-N` and `fit-N`, the `digests` of the
+    files by name, and `about`: their names in order, that of the reference object's file, and the software."""
+    del parameters, places
+    about, digests = json.loads(inputs["about"]), json.loads(inputs["digests"])
+    arrays = {name: unpack(inputs[name]) for name in inputs if name.startswith(("stripe-", "recognised-", "fit-"))}
+    views = []
+    for fit in (arrays[name] for name in arrays if name.startswith("fit-")):
+        camera = CameraCalibration.model_validate(json.loads(fit["document"].tobytes())["calibration"])
+        views.append(CalibratedView(camera, [], points_of(fit), []))
+    reference = ReferenceObject.model_validate_json(inputs["reference"])
+    places_doubted = doubts_about(reference.profile_mm, reference.placements_mm)
+    doubts = [f"{about['reference']}: {doubt}" for doubt in places_doubted]
+    doubts += [doubt for known in seen_of(arrays).recognised.values() for doubt in known.doubts]
+    sources = [Source(name=name, sha256=digests[name]) for name in about["files"]]
+    calibration = assemble(views, sources, about["software"], doubts)
+    return (calibration.model_dump_json(indent=2) + "\n").encode()

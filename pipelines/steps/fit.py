@@ -1,0 +1,34 @@
+"""What one camera recognises, and the poses of the object, to the calibration of this camera."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from footscan.calibration.capture.as_arrays import points_arrays, seen_by
+from footscan.calibration.capture.from_capture import calibrate_view
+from footscan.calibration.capture.reference import edges_of
+from pipelines.arrays import pack, unpack
+from schemas.base.model import canonical_json
+from schemas.parameters.calibration import CalibrationParameters
+from schemas.reference import ReferenceObject
+
+
+def run(inputs: Mapping[str, bytes], parameters: CalibrationParameters, places: Mapping[str, Path]) -> bytes:
+    """`inputs`: the `reference` object, its `poses`, the `camera`, its `stripe`, what is `recognised`; `places`: the
+    `capture` document. The result holds nothing where the camera does not recognise the object."""
+    camera = json.loads(inputs["camera"])["id"]
+    _, recognised = seen_by(camera, unpack(inputs["stripe"]), unpack(inputs["recognised"]))
+    if isinstance(recognised, str):
+        return pack()
+    edges = edges_of(ReferenceObject.model_validate_json(inputs["reference"]).profile_mm)
+    poses = unpack(inputs["poses"])["poses"]
+    made = calibrate_view(recognised, edges, poses, parameters, str(places["capture"]))
+    document = {
+        "calibration": made.calibration.model_dump(mode="json"),
+        "trials": [asdict(trial) for trial in made.trials],
+        "corners": [asdict(corner) for corner in made.corners],
+    }
+    return pack(document=np.frombuffer(canonical_json(document).encode(), np.uint8), **points_arrays(made.points))
