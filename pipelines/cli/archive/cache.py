@@ -20,22 +20,22 @@ if TYPE_CHECKING:
     from pipelines.engine.store.lease import Lease
     from pipelines.engine.store.store import Store
 
-cache = typer.Typer(help="The store of all results: its size, what can go, whether it is sound.", no_args_is_help=True)
+cache = typer.Typer(help="Inspect, verify and clean the store of results.", no_args_is_help=True)
 
 HOUR_S = 3600.0
 
-Place = Annotated[str | None, typer.Option("--cache", help="The store: a folder or a URL, without a workflow.")]
+Place = Annotated[str | None, typer.Option("--cache", help="Result store (folder or URL), instead of a workflow.")]
 OfWorkflow = Annotated[Path | None, typer.Option("--workflow", help="The workflow; default: workflow.yaml.")]
-ScanName = Annotated[str, typer.Argument(help="A scan: its folder, or patient/scan.")]
+ScanName = Annotated[str, typer.Argument(help="Folder of a scan, or patient/scan.")]
 TakeOver = Annotated[
-    bool, typer.Option("--take-over", help="Remove the leases of runs elsewhere, or with a wrong clock, that are gone.")
+    bool, typer.Option("--take-over", help="Remove the leases of dead runs on other machines, or with a wrong clock.")
 ]
-OlderThan = Annotated[float, typer.Option(min=0, help="Hours below which nothing goes.")]
+OlderThan = Annotated[float, typer.Option(min=0, help="Smallest age in hours of what is deleted.")]
 
 
 @cache.command("stats")
 def stats(workflow: WorkflowFile = None, place: Place = None, as_json: AsJson = False) -> None:
-    """Say what lies in the store, by kind of step, and what gc would free."""
+    """Show the content of the store by kind of step, and what gc would free."""
     from pipelines.engine.garbage_collection import read_contents
     from pipelines.engine.store.pins import read_pins
 
@@ -63,12 +63,12 @@ def stats(workflow: WorkflowFile = None, place: Place = None, as_json: AsJson = 
 def gc(
     workflow: WorkflowFile = None,
     place: Place = None,
-    delete: Annotated[bool, typer.Option("--delete", help="Delete it; otherwise it is only listed.")] = False,
+    delete: Annotated[bool, typer.Option("--delete", help="Delete what is listed.")] = False,
     older_than: OlderThan = 24.0,
     take_over: TakeOver = False,
     as_json: AsJson = False,
 ) -> int:
-    """List, and with --delete delete, what no step's last action and no pin reaches, or a vanished scan's alone.
+    """List results that no last action of a step and no pin needs; with --delete, delete them.
 
     Nothing is deleted while a run is under way.
     """
@@ -112,11 +112,13 @@ def gc(
 def verify(
     workflow: WorkflowFile = None,
     place: Place = None,
-    recompute: Annotated[str | None, typer.Option(help="Do a share of the actions again, such as 5%.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the choice of these actions.")] = 0,
+    recompute: Annotated[
+        str | None, typer.Option(help="Share of the actions to compute again and compare, for example 5%.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the sample.")] = 0,
     as_json: AsJson = False,
 ) -> int:
-    """Read everything in the store and hold it against its digests and seals; remove what is damaged."""
+    """Check every file of the store against its digest or seal, and remove damaged ones."""
     from pipelines.engine import audit
 
     share = None if recompute is None else _share(recompute)
@@ -152,11 +154,14 @@ def seal(
     workflow: WorkflowFile = None,
     place: Place = None,
     every: Annotated[
-        bool, typer.Option("--all", help="Also what was written without the seal since: only if you wrote all of it.")
+        bool,
+        typer.Option(
+            "--all", help="Also seal rows that were written without a seal since; only if all of them are yours."
+        ),
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Seal the rows of a store with a secret of yours, so that nobody else can make one.
+    """Seal the rows of a store with a secret of yours, so that nobody else can add valid ones.
 
     The first time, what lies in the store is sealed; from then on, a row without the seal counts as missing.
     """
@@ -175,7 +180,7 @@ def seal(
 
 @cache.command("pin")
 def pin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_json: AsJson = False) -> None:
-    """Keep the present results of a scan, whatever is computed of it later."""
+    """Protect the present results of a scan from gc."""
     from pipelines.engine.store import pins
 
     store, name = _store(workflow, place), _scan_name(scan)
@@ -188,7 +193,7 @@ def pin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_jso
 
 @cache.command("unpin")
 def unpin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_json: AsJson = False) -> None:
-    """Keep them no longer than others."""
+    """End the protection of the results of a scan."""
     from pipelines.engine.store import pins
 
     store, name = _store(workflow, place), _scan_name(scan)
@@ -200,7 +205,7 @@ def unpin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_j
 
 
 def open_place(place: Path | str, group: int | None = None) -> "Store":
-    """The store at a place, read anew at every turn; RefusedInput where there is none."""
+    """Open the store at a place without an index of what was verified; RefusedInput if there is none."""
     from pipelines.engine.files.places import LocalFiles
     from pipelines.engine.store.permissions import warn_if_others_can_write
     from pipelines.engine.store.store import open_store
@@ -253,7 +258,7 @@ def _garbage(
 
 
 def _delivered(results: Path, secret: bytes | None, without: Collection[str] = ()) -> set[str]:
-    """Digests of the files that lie in a folder of results, but for those of some scans."""
+    """Digests of the delivered files in a folder of results, except those of some scans."""
     from pipelines.archive.job import CACHE
     from pipelines.engine.files.file_digests import FileDigests
     from pipelines.scan import DELIVERED
@@ -287,7 +292,7 @@ def _share(text: str) -> float:
 
 
 def _recompute(workflow: Path, share: float, seed: int) -> "tuple[int, list[Difference], list[str]]":
-    """Do a sample of the actions of all scans of a workflow again: how many, what differed, what could not be done."""
+    """Repeat a sample of the actions of a workflow; returns their number, the differences and the failures."""
     from pipelines.archive.job import job_of_workflow, plan_job
     from pipelines.engine import audit
 
@@ -371,7 +376,7 @@ def _run_json(one: "Lease") -> dict[str, Any]:
 
 
 def take_over_leases(store: "Store") -> "list[Lease]":
-    """Take over all leases but those of this machine's own runs, and say which they were."""
+    """Remove all leases except those of running processes of this machine, and print them."""
     from pipelines.engine.store.lease import take_over
 
     taken = take_over(store)
@@ -381,7 +386,7 @@ def take_over_leases(store: "Store") -> "list[Lease]":
 
 
 def told_lease(one: "Lease") -> str:
-    """Who holds a lease, since when, and what to do where it is no run's."""
+    """Holder and start of a lease, and what to do if it is not that of a run."""
     from pipelines.engine.store.lease import is_ahead
 
     if one.host is None:
