@@ -29,8 +29,9 @@ class CaptureInputs:
     reference: ReferenceObject
     paths: Mapping[int, Path]
     """The film of each camera."""
-    films: Mapping[int, Input]
-    """Its digest, or those of all that another step filmed."""
+    films: Mapping[int, Mapping[str, Input]]
+    """What decides the stripe of each camera: the `film`; or the listing of all that another step filmed, as `film`,
+    and the `file` in it."""
     names: list[str]
     """All files within the capture's folder: capture.yaml, the reference object, the films."""
     digests: Input
@@ -46,7 +47,7 @@ def recorded_inputs(capture: RecordedCapture, digests: FileDigests) -> CaptureIn
         Two cameras have one and the same film.
     """
     paths = {camera.id: capture.film(camera) for camera in capture.document.cameras}
-    films: dict[int, Input] = {}
+    films: dict[int, dict[str, Input]] = {}
     cameras: dict[tuple[str, ...], int] = {}
     for camera, path in paths.items():
         frames = tuple(digests.of(file)[0] for file in film_files(path))
@@ -54,7 +55,7 @@ def recorded_inputs(capture: RecordedCapture, digests: FileDigests) -> CaptureIn
         if other != camera:
             problem = f"has the same film as camera {other}, expected its own"
             raise RefusedInput(capture.file, problem, field=f"camera {camera}")
-        films[camera] = source_files(path, digests)
+        films[camera] = {"film": source_files(path, digests)}
     named = {file.relative_to(capture.folder).as_posix(): digests.of(file)[0] for file in capture.files}
     listed = Value(canonical_json(named).encode())
     return CaptureInputs(capture.file, capture.document, capture.reference, paths, films, list(named), listed)
@@ -69,8 +70,9 @@ def camera_steps(name: str, capture: CaptureInputs, parameters: CaptureCalibrati
     document = {"capture": capture.file}
     for camera in capture.document.cameras:
         film = {"film": capture.paths[camera.id], **document}
-        taken = {"film": capture.films[camera.id]}
-        stripe = _step(name, "stripe", "capture_stripe", parameters.extraction, taken, camera.id, places=film)
+        stripe = _step(
+            name, "stripe", "capture_stripe", parameters.extraction, capture.films[camera.id], camera.id, places=film
+        )
         seen: dict[str, Input] = {
             "stripe": Output(stripe.name), "reference": _reference(capture), "camera": _camera(camera)
         }  # fmt: skip

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from pipelines.calibrate import CaptureInputs, calibration_steps
-from pipelines.engine.actions.step import Output, Step
+from pipelines.engine.actions.step import Output, Step, Value
 from pipelines.recordings.captures import CAPTURE_FILE
 from pipelines.scan import STEPS
 from schemas.parameters.calibration import CaptureCalibrationParameters
@@ -33,7 +33,7 @@ def _filmed_inputs(folder: Path, listing: Output) -> CaptureInputs:
         document,
         filmed_reference(),
         {camera: folder / name for camera, name in names.items()},
-        dict.fromkeys(names, listing),
+        {camera: {"film": listing, "file": Value(name.encode())} for camera, name in names.items()},
         [CAPTURE_FILE, document.reference, *names.values()],
         listing,
     )
