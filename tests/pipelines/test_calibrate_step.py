@@ -13,7 +13,7 @@ from footscan.calibration.capture.stripe_arrays import stripe_arrays
 from pipelines.calibrate import calibration_steps, recorded_inputs
 from pipelines.capture_job import calibrate_capture
 from pipelines.engine.actions.key import image_text, key_of
-from pipelines.engine.actions.step import Failure, Outcome, Step
+from pipelines.engine.actions.step import Failure, Outcome, Output, Step
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
 from pipelines.engine.plan import make_plan
