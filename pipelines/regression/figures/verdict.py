@@ -1,4 +1,4 @@
-"""A night's figures beside the accepted ones."""
+"""Verdicts on the figures of a night, compared with the accepted ones."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,7 +7,7 @@ from pipelines.regression.report.result import JudgedFigure, Verdict
 from schemas.regression import NightEnded, Suite
 
 ROUNDING = 1e-9
-"""Differences of decimal numbers are no exact ones."""
+"""Bound of the rounding error of a difference of two figures."""
 
 
 def judge_figures(
@@ -18,7 +18,7 @@ def judge_figures(
     suite: Suite,
     history: Sequence[NightEnded] = (),
 ) -> list[JudgedFigure]:
-    """Each figure that there is, or that was accepted, in the order of their names.
+    """Judge each figure that exists or was accepted, in the order of `in_order`.
 
     Parameters
     ----------
@@ -50,13 +50,13 @@ def judge_figures(
 def verdict(
     value: float | None, accepted: float | None, allowed: float, goal: Goal, truth: float | None, *, is_known: bool
 ) -> Verdict:
-    """What to think of one figure; `is_known` whether the baseline has it, be it as null."""
+    """Judge one figure; `is_known` is True if the baseline has it, even as null."""
     if value is None and accepted is None:
         return "same" if is_known else "new"
     if value is None:
         return "missing"
     if accepted is None:
-        return "better" if is_known else "new"  # what could not be told before can be told now
+        return "better" if is_known else "new"  # a figure that was unknown before is known now
     gain = accepted - value
     if abs(gain) <= allowed + ROUNDING:
         return "same"
@@ -70,7 +70,7 @@ def verdict(
 
 
 def in_order(figure: str) -> tuple[int, str]:
-    """For sorting: what matters most first."""
+    """Sort key of a figure: the most important groups come first."""
     group = figure.partition(".")[0]
     return (_GROUPS.index(group) if group in _GROUPS else len(_GROUPS)), figure
 

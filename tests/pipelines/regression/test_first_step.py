@@ -42,17 +42,17 @@ AFTER = {"clean", "surface", "measure"}
     ("otherwise", "gone", "expected"),
     [
         (set(), set(), []),
-        ({"measure"}, set(), [(["measure"], "its result is another")]),
+        ({"measure"}, set(), [(["measure"], "its result differs")]),
         (
             {"extract-1", "map-1", "extract-2", "map-2", *AFTER},
             set(),
-            [(["extract-1", "extract-2"], "its result is another")],
+            [(["extract-1", "extract-2"], "its result differs")],
         ),
-        ({"extract-2", "map-2", *AFTER}, set(), [(["extract-2"], "its result is another")]),
-        ({"calibrate", "map-1", "map-2", *AFTER}, set(), [(["calibrate"], "its result is another")]),
-        ({"film", "ingest-1", "extract-1", "map-1", *AFTER}, set(), [(["film"], "its result is another")]),
-        (AFTER, {"ingest-2", "extract-2", "map-2"}, [(["ingest-2"], "is no more")]),
-        (set(), {"measure"}, [(["measure"], "is no more")]),
+        ({"extract-2", "map-2", *AFTER}, set(), [(["extract-2"], "its result differs")]),
+        ({"calibrate", "map-1", "map-2", *AFTER}, set(), [(["calibrate"], "its result differs")]),
+        ({"film", "ingest-1", "extract-1", "map-1", *AFTER}, set(), [(["film"], "its result differs")]),
+        (AFTER, {"ingest-2", "extract-2", "map-2"}, [(["ingest-2"], "no longer exists")]),
+        (set(), {"measure"}, [(["measure"], "no longer exists")]),
     ],
 )  # fmt: skip
 def test_first(otherwise: set[str], gone: set[str], expected: list[tuple[list[str], str]], tmp_path: Path) -> None:
@@ -67,8 +67,8 @@ ELSEWHERE = [AcceptedStep(step=name, key="2" * 64, result="e" * 64) for name in 
     ("otherwise", "gone", "expected"),
     [
         (set(), set(), []),
-        ({"map-2", *AFTER}, set(), [(["map-2"], "its result is another")]),
-        (AFTER, {"ingest-2", "extract-2", "map-2"}, [(["ingest-2"], "is no more")]),
+        ({"map-2", *AFTER}, set(), [(["map-2"], "its result differs")]),
+        (AFTER, {"ingest-2", "extract-2", "map-2"}, [(["ingest-2"], "no longer exists")]),
     ],
 )
 def test_first_since_the_last_good_night_where_the_baseline_is_from_elsewhere(

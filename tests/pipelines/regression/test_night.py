@@ -146,7 +146,7 @@ def test_a_camera_that_is_no_more(root: Path) -> None:
     document = root / "archive/P0001/S1/scan.yaml"
     document.write_text(document.read_text().replace("  - {id: 5, file: cam5.avi}\n", ""))
     one = only(night(root))
-    assert [(list(first.steps), first.why) for first in one.first] == [(["ingest-5"], "is no more")]
+    assert [(list(first.steps), first.why) for first in one.first] == [(["ingest-5"], "no longer exists")]
     assert figure(one, "points.camera-5").verdict == "missing"
 
 
@@ -192,7 +192,7 @@ def test_sets_come_and_go(root: Path) -> None:
     assert {one.name: one.count("new") > 0 for one in found.result.sets} == {"foot": False, "more": True}
     gone = night(root, SUITE.replace("foot:", "other:"))
     assert gone.status == 1
-    assert {one.name: one.problem for one in gone.result.sets} == {"other": None, "foot": "is no more in the suite"}
+    assert {one.name: one.problem for one in gone.result.sets} == {"other": None, "foot": "is no longer in the suite"}
 
 
 def test_a_night_at_a_time_and_one_that_was_killed(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
