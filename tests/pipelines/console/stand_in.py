@@ -68,7 +68,7 @@ class StandIn:
             words = "not connected", "check its USB cable and its power, then connect"
             return Health([Device("Controller", "bad", *words)], CAMERAS)
         devices = [Device("Controller", "ok", "the heads stand" if self._homed else "ready; heads not homed")]
-        unknown = "warning", "where it stands is not known", "home the heads"
+        unknown = "warning", "position unknown", "home the heads"
         devices += [Device(f"Head {n}", *(("ok", "at X = -18.0 mm") if self._homed else unknown)) for n in (1, 2, 3)]
         for camera in CAMERAS:
             if camera == self.lost_camera:

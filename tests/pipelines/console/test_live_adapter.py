@@ -37,7 +37,7 @@ def test_what_is_not_connected_is_told(over_nothing: OverLive) -> None:
     health = over_nothing.health()
     told = {device.name: (device.level, device.words) for device in health.devices}
     assert told["Controller"] == ("bad", "not connected")
-    assert told["Head 2"] == ("unknown", "not known")
+    assert told["Head 2"] == ("unknown", "position unknown")
     assert told["Camera 5"] == ("unknown", "not open")
     assert told["Passes"] == ("ok", "All 2 cameras in one pass: cameras 1, 5 on no USB bus of this computer.")
     assert told["Disk"][1].endswith("GB are free for scans")
