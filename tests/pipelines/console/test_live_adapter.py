@@ -52,7 +52,7 @@ def test_orders_to_nothing_are_faults_and_a_stop_is_none(over_nothing: OverLive,
     for order in (over_nothing.connect, over_nothing.home, over_nothing.resume, over_nothing.shine):
         with pytest.raises(FootscanError):
             order()
-    with pytest.raises(FootscanError, match=r"^camera 1: latency: has none"):
+    with pytest.raises(FootscanError, match=r"^camera 1: latency: is missing"):
         over_nothing.film("P1", "right", keep_partial=False)
     assert not (tmp_path / "archive").exists()
     over_nothing.close()

@@ -150,7 +150,7 @@ def test_a_camera_that_fails_costs_the_scan_unless_it_is_to_be_kept(bench: Bench
     bench.scanner.home()
     cut = bench.streams._cameras[5]
     when_filming(bench, lambda: cut._cut(True))
-    with pytest.raises(Finding, match="the scan is not whole: camera 5"):
+    with pytest.raises(Finding, match="the scan is incomplete: camera 5"):
         bench.scanner.scan(bench.order())
     assert bench.scanner.state.name == "failed"
     bench.assert_dark_and_empty()
@@ -258,7 +258,7 @@ def test_a_disk_that_fills_up_ends_the_travel(bench: Bench, monkeypatch: pytest.
 def test_a_camera_without_a_latency_is_refused_before_anything_moves(bench: Bench) -> None:
     cameras = [camera.model_copy(update={"latency": None}) for camera in bench.scanner.rig.cameras]
     bench.scanner.rig = bench.scanner.rig.model_copy(update={"cameras": cameras})
-    with pytest.raises(RefusedInput, match="camera 1: latency: has none in the rig"):
+    with pytest.raises(RefusedInput, match="camera 1: latency: is missing in the rig"):
         bench.scanner.scan(bench.order())
     bench.assert_dark_and_empty()
 
