@@ -18,7 +18,11 @@ _SHARE = 0.98
 
 
 def colour_limit(distance: NDArray[np.floating]) -> float:
-    """End of the colour scale of (V,) signed distances, mm: a multiple of 0.5 mm that covers 98 % of them."""
+    """End of the colour scale of (V,) signed distances, mm: a multiple of 0.5 mm that covers 98 % of them.
+
+    >>> colour_limit(np.array([0.2, -0.9, np.nan]))
+    1.0
+    """
     finite = np.abs(distance[np.isfinite(distance)])
     if not finite.size:
         return _LEAST_LIMIT_MM

@@ -8,18 +8,30 @@ NARROW_SPACE = "\N{NARROW NO-BREAK SPACE}"
 
 
 def text(value: object) -> str:
-    """Escape `value` for use between tags and within quoted attributes; control characters are replaced."""
+    """Escape `value` for use between tags and within quoted attributes; control characters are replaced.
+
+    >>> text("<b>&")
+    '&lt;b&gt;&amp;'
+    """
     return escape("".join(c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}" for c in str(value)))
 
 
 def number(value: float, decimals: int = 0) -> str:
-    """Write `value` with a fixed number of decimals, a minus sign and narrow spaces between thousands."""
+    """Write `value` with a fixed number of decimals, a minus sign and narrow spaces between thousands.
+
+    >>> number(265.14, 1)
+    '265.1'
+    """
     digits = f"{abs(value):,.{decimals}f}".replace(",", NARROW_SPACE)
     return f"\N{MINUS SIGN}{digits}" if value < 0 and digits.strip("0.") else digits
 
 
 def words(name: str) -> str:
-    """Write the identifier `name` as a phrase: `ball_girth` becomes "Ball girth"."""
+    """Write the identifier `name` as a phrase.
+
+    >>> words("ball_girth")
+    'Ball girth'
+    """
     phrase = name.replace("_", " ")
     return phrase[:1].upper() + phrase[1:]
 

@@ -104,6 +104,9 @@ def crop(shape: tuple[int, ...], i: NDArray[np.floating], j: NDArray[np.floating
     """First row, number of rows, first column and number of columns of the cut around the points (i, j), px.
 
     Its aspect is 4:3 as far as the image allows. Without points it is the whole image.
+
+    >>> crop((480, 640), np.array([300.0, 340.0]), np.array([200.0, 260.0]))
+    (170, 120, 240, 160)
     """
     rows, columns = shape[:2]
     if not len(i):

@@ -19,7 +19,11 @@ LONG_PX = 30.0
 
 
 def round_up(value: float) -> float:
-    """The least of 1, 2 and 5 times a power of ten that is not below `value`; 0.001 at least."""
+    """The least of 1, 2 and 5 times a power of ten that is not below `value`; 0.001 at least.
+
+    >>> round_up(0.03)
+    0.05
+    """
     power = 10.0 ** np.floor(np.log10(max(value, 1e-3)))
     return float(next(factor * power for factor in (1, 2, 5, 10) if factor * power >= value * (1 - 1e-9)))
 

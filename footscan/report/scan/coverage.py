@@ -39,7 +39,11 @@ def points_per_frame(cloud: NDArray[np.void], camera: int, frames: int) -> NDArr
 
 
 def ticks(frames: int) -> range:
-    """Frames with a label: multiples of 1, 2 or 5 times a power of ten, at most `_MOST_TICKS` of them."""
+    """Frames with a label: multiples of 1, 2 or 5 times a power of ten, at most `_MOST_TICKS` of them.
+
+    >>> list(ticks(30))
+    [0, 5, 10, 15, 20, 25]
+    """
     steps = (factor * 10**power for power in itertools.count() for factor in (1, 2, 5))
     return range(0, frames, next(step for step in steps if -(-frames // step) <= _MOST_TICKS))
 

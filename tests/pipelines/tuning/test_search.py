@@ -203,7 +203,7 @@ def test_what_held_out_scans_do_not_tell_is_said(bench: Bench) -> None:
     scan.write_text(scan.read_text().replace("truth: truth.stl\n", ""))
     tuned = bench.seek("tune: {search: {outliers.shortest: [2]}, sampler: grid, held_out: P0002/*}\n").result
     assert tuned.held_out == []
-    assert "The held-out scans do not tell accuracy." in tuned.notes
+    assert "The held-out scans do not test accuracy." in tuned.notes
 
 
 def test_without_truth_the_cameras_stand_in(bench: Bench) -> None:
