@@ -105,11 +105,11 @@ class ConsoleServer(uvicorn.Server):
         await super().shutdown(sockets)
 
     def _protocol(self) -> asyncio.Protocol:
-        made = self.config.http_protocol_class(  # type: ignore[call-arg]
+        protocol = self.config.http_protocol_class(  # type: ignore[call-arg]
             config=self.config, server_state=self.server_state, app_state=self.lifespan.state
         )
-        assert isinstance(made, asyncio.Protocol)
-        return made
+        assert isinstance(protocol, asyncio.Protocol)
+        return protocol
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:

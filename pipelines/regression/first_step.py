@@ -49,7 +49,7 @@ class PresentStep:
 
 
 @dataclass(frozen=True)
-class KnownSteps:
+class EarlierSteps:
     """Earlier results of the steps of a set."""
 
     accepted: Sequence[AcceptedStep]
@@ -83,30 +83,30 @@ def present_steps(steps: Sequence[Step], outcomes: Mapping[str, Outcome]) -> lis
     return present
 
 
-def first_steps(known: KnownSteps, present: Sequence[PresentStep], store: Store) -> list[FirstStep]:
+def first_steps(earlier: EarlierSteps, present: Sequence[PresentStep], store: Store) -> list[FirstStep]:
     """Find the steps at which two runs begin to differ; empty if they agree, or nothing was accepted."""
-    if not known.accepted:
+    if not earlier.accepted:
         return []
     names = {step.name for step in present}
-    gone = [name for name in known.lasting if name not in names]
-    first = [FirstStep([name], "no longer exists") for name in _chain_starts(gone)]
+    missing = [name for name in earlier.lasting if name not in names]
+    first = [FirstStep([name], "no longer exists") for name in _chain_starts(missing)]
     differ: set[str] = set()
     roots: list[PresentStep] = []
     for step in present:
-        if all(before.result != step.result for before in known.of(step.name)):
+        if all(before.result != step.result for before in earlier.of(step.name)):
             differ.add(step.name)
             follows = any(name in differ for name in _before(step.step, names))
             # A step that combines all cameras differs if one of them is missing.
-            if not follows and (step.step.camera is not None or not any(map(_of_a_camera, gone))):
+            if not follows and (step.step.camera is not None or not any(map(_of_a_camera, missing))):
                 roots.append(step)
-    first += [_explained(step, known, store) for step in roots]
+    first += [_explained(step, earlier, store) for step in roots]
     return list(_grouped(first))
 
 
 def costly_steps(
     figures: Sequence[JudgedFigure],
     keeps_most: str | None,
-    known: KnownSteps,
+    earlier: EarlierSteps,
     present: Sequence[PresentStep],
     store: Store,
 ) -> list[FirstStep]:
@@ -131,7 +131,7 @@ def costly_steps(
             kind = keeps_most if group == "memory" else _slowest(figures, kinds)
         steps = [step for step in present if step.step.kind == kind]
         if steps:
-            first = _explained(steps[0], known, store)
+            first = _explained(steps[0], earlier, store)
             costly.append(FirstStep([step.name for step in steps], why, first.changes))
     return costly
 
@@ -158,10 +158,10 @@ def _before(step: Step, names: set[str]) -> Iterator[str]:
         yield "calibrate"
 
 
-def _chain_starts(gone: Sequence[str]) -> list[str]:
-    """The first missing step of each camera, or the first of all; `gone` is in the order of the steps."""
+def _chain_starts(missing: Sequence[str]) -> list[str]:
+    """The first missing step of each camera, or the first of all; `missing` is in the order of the steps."""
     starts: dict[str, str] = {}
-    for name in gone:
+    for name in missing:
         starts.setdefault(name.rpartition("-")[2] if _of_a_camera(name) else "", name)
     return [name for camera, name in starts.items() if camera or len(starts) == 1]
 
@@ -170,11 +170,11 @@ def _of_a_camera(name: str) -> bool:
     return name.rpartition("-")[2].isdecimal()
 
 
-def _explained(step: PresentStep, known: KnownSteps, store: Store) -> FirstStep:
-    before = known.of(step.name)
+def _explained(step: PresentStep, earlier: EarlierSteps, store: Store) -> FirstStep:
+    before = earlier.of(step.name)
     if not before:
         return FirstStep([step.name], "is new")
-    rows = (store.row(earlier.key) for earlier in before if earlier.key and step.image)
+    rows = (store.row(accepted.key) for accepted in before if accepted.key and step.image)
     row = next((row for row in rows if row is not None), None)
     shown: list[Change] = []
     if row is not None:

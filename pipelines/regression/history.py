@@ -109,10 +109,10 @@ def alone(folder: Path) -> Iterator[None]:
         yield
 
 
-def gaps(history: History, every: timedelta) -> list[tuple[datetime, datetime]]:
-    """Ends of two successive nights, for each pair between which a night is missing; one is expected every `every`."""
+def gaps(history: History, interval: timedelta) -> list[tuple[datetime, datetime]]:
+    """Ends of successive nights between which a night is missing; one is expected every `interval`."""
     ends = sorted(night.time for night in history.ended)
-    return [(before, after) for before, after in pairwise(ends) if after - before > GAP * every]
+    return [(before, after) for before, after in pairwise(ends) if after - before > GAP * interval]
 
 
 def _append(descriptor: int, data: bytes) -> None:

@@ -19,7 +19,7 @@ from pipelines.regression.baseline import (
 from pipelines.regression.figures.costs import cost_figures, keeps_most
 from pipelines.regression.figures.timed import take_times
 from pipelines.regression.figures.verdict import judge_figures
-from pipelines.regression.first_step import KnownSteps, costly_steps, first_steps
+from pipelines.regression.first_step import EarlierSteps, costly_steps, first_steps
 from pipelines.regression.history import History, alone, append, gaps, night_name, read_history
 from pipelines.regression.pictures import difference_pictures
 from pipelines.regression.report.page import regress_page
@@ -119,10 +119,10 @@ def run_night(regression: Regression, on_step_end: OnStepEnd, on_set: OnSet, acc
         with workspace_of(out).lease():
             good = read_good_steps(out)
             for data_set in suite.sets:
-                known = KnownSteps(accepted_steps.sets.get(data_set, []), good.get(data_set, []))
+                earlier = EarlierSteps(accepted_steps.sets.get(data_set, []), good.get(data_set, []))
                 accepted = {} if baseline is None else baseline.sets.get(data_set, {})
                 judged_set = _judge_set(
-                    data_set, regression, accepted, known, history, gathered, on_step_end,
+                    data_set, regression, accepted, earlier, history, gathered, on_step_end,
                     is_accepted=accept is not None,
                 )  # fmt: skip
                 on_set(judged_set)
@@ -160,7 +160,7 @@ def _judge_set(
     name: str,
     regression: Regression,
     accepted: Mapping[str, float | None],
-    known: KnownSteps,
+    earlier: EarlierSteps,
     history: History,
     gathered: _Gathered,
     on_step_end: OnStepEnd,
@@ -180,7 +180,7 @@ def _judge_set(
         gathered.problems[name] = run.problem
 
     def judge(run: SetRun) -> JudgedSet:
-        return JudgedSet(name, run.problem, judge_figures(name, run.figures, accepted, run.known, suite, nights))
+        return JudgedSet(name, run.problem, judge_figures(name, run.figures, accepted, run.truths, suite, nights))
 
     judged = judge(run)
     for _ in range(TIMED_AGAIN if run.timed else 0):
@@ -194,13 +194,13 @@ def _judge_set(
     gathered.steps[name] = [step.accepted for step in run.steps]
     if run.store is None:
         return judged
-    first = first_steps(known, run.steps, run.store)
+    first = first_steps(earlier, run.steps, run.store)
     if not first and judged.count(*BAD):
-        first = first_steps(KnownSteps(known.accepted), run.steps, run.store)
-    first += costly_steps(judged.figures, keeps_most(run.timed), known, run.steps, run.store)
+        first = first_steps(EarlierSteps(earlier.accepted), run.steps, run.store)
+    first += costly_steps(judged.figures, keeps_most(run.timed), earlier, run.steps, run.store)
     results = {step.name: step.result for step in run.steps}
-    changed_steps = sum(results.get(step.step) != step.result for step in known.accepted)
-    pictures, note = difference_pictures(known, results, run.store)
+    changed_steps = sum(results.get(step.step) != step.result for step in earlier.accepted)
+    pictures, note = difference_pictures(earlier, results, run.store)
     return replace(judged, first=first, otherwise=changed_steps, pictures=pictures, note=note)
 
 

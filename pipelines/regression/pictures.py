@@ -10,7 +10,7 @@ from footscan.verify.compare import vertex_distances
 from footscan.verify.regions import foot_regions
 from pipelines.engine.store.store import Store
 from pipelines.regression.figures.delivered import shape_of
-from pipelines.regression.first_step import KnownSteps
+from pipelines.regression.first_step import EarlierSteps
 from schemas.base.errors import FootscanError
 
 LAST_GOOD = "that of the last good night"
@@ -19,7 +19,7 @@ SHAPES = ("surface", "orient")
 
 
 def difference_pictures(
-    known: KnownSteps, present: Mapping[str, str], store: Store
+    earlier: EarlierSteps, present: Mapping[str, str], store: Store
 ) -> tuple[dict[str, bytes], str | None]:
     """Draw the first shape that differs: PNG by caption, and a note on why pictures are missing, if they are.
 
@@ -27,8 +27,8 @@ def difference_pictures(
     ----------
     present : results of the steps by name, as in `AcceptedStep`
     """
-    accepted = {step.step: step.result for step in known.accepted}
-    good = {step.step: step.result for step in known.good}
+    accepted = {step.step: step.result for step in earlier.accepted}
+    good = {step.step: step.result for step in earlier.good}
     differing = [name for name in SHAPES if name in accepted and name in present and accepted[name] != present[name]]
     for name in differing:
         now = _shape(store, present[name])

@@ -24,8 +24,8 @@ class SetRun:
     """Why it was not run to its end."""
     is_fault: bool = False
     figures: Mapping[str, float | None] = field(default_factory=dict)
-    known: Mapping[str, float] = field(default_factory=dict)
-    """True measures of the foot by name."""
+    truths: Mapping[str, float] = field(default_factory=dict)
+    """True measures of the foot, mm, by name."""
     steps: Sequence[PresentStep] = ()
     timed: Sequence[Sequence[Pass]] = ()
     """Passes of each timed process."""
@@ -45,7 +45,7 @@ def run_set(prepared: PreparedSet, passes: int, on_step_end: OnStepEnd) -> SetRu
     planned = plan_job(job)
     [end] = run_job(planned, Threads(job.threads), on_step_end)
     if planned.refused:
-        return SetRun(problem=end.problem, known=prepared.known)
+        return SetRun(problem=end.problem, truths=prepared.truths)
     planned_again = plan_job(job)
     steps, outcomes = _outcomes(prepared, planned_again)
     planned_again.workspace.close()
@@ -58,7 +58,7 @@ def run_set(prepared: PreparedSet, passes: int, on_step_end: OnStepEnd) -> SetRu
         results = {step.name: step.result for step in present}
         figures |= {"steps.unsteady": len(unsteady(timed, results)), **cost_figures(timed)}
     is_fault = end.kind in {"fault", "damaged"}
-    return SetRun(end.problem, is_fault, figures, prepared.known, present, timed, job, store)
+    return SetRun(end.problem, is_fault, figures, prepared.truths, present, timed, job, store)
 
 
 def _outcomes(prepared: PreparedSet, planned: PlannedJob) -> tuple[list[Step], dict[str, Outcome]]:

@@ -33,7 +33,7 @@ class PreparedSet:
 
     name: str
     job: Job
-    known: Mapping[str, float] = field(default_factory=dict)
+    truths: Mapping[str, float] = field(default_factory=dict)
     """True measures of the foot, mm, by name, as far as they are known."""
     filming: Sequence[Step] = ()
     """The steps that filmed it."""

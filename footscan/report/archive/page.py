@@ -46,7 +46,7 @@ def archive_page(rows: Sequence[ScanRow], mark: str) -> str:
     for row in sorted(rows, key=_order):
         patients[row.patient].append(row)
     failed = sum(row.status not in STATUS for row in rows)
-    found = sum(row.status == "finding" for row in rows)
+    with_finding = sum(row.status == "finding" for row in rows)
     bodies = "\n".join(f"<tbody>{''.join(map(_row, scans))}</tbody>" for scans in patients.values())
     heads = "".join(
         f'<th scope="col"{" class=n" if name in _NUMERIC else ""}>'
@@ -54,7 +54,7 @@ def archive_page(rows: Sequence[ScanRow], mark: str) -> str:
         + "</th>"
         for name, key in _HEADINGS.items()
     )
-    tiles = {"Scans": len(rows), "Patients": len(patients), "With a finding": found, "Failed": failed}
+    tiles = {"Scans": len(rows), "Patients": len(patients), "With a finding": with_finding, "Failed": failed}
     boxes = "".join(f"<div><span>{name}</span><b>{number(count)}</b></div>" for name, count in tiles.items())
     return page(
         title="Archive of scans",

@@ -37,8 +37,8 @@ def arrow_unit_mm(cameras: Sequence[CameraCalibration]) -> float:
 
 def figures_of(camera: CameraCalibration) -> str:
     """The residuals of a camera in words; without residuals, the number of its fitted points."""
-    known = [("rms", camera.rms_mm), ("held out", camera.held_out_rms_mm), ("worst", camera.worst_mm)]
-    figures = ", ".join(f"{name} {mm:.3f}" for name, mm in known if mm is not None)
+    residuals = [("rms", camera.rms_mm), ("held out", camera.held_out_rms_mm), ("worst", camera.worst_mm)]
+    figures = ", ".join(f"{name} {mm:.3f}" for name, mm in residuals if mm is not None)
     return f"{figures} mm" if figures else f"{camera.points} points"
 
 

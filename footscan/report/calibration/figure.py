@@ -40,8 +40,8 @@ def calibration_figure(calibration: Calibration) -> bytes:
 
     cameras = calibration.cameras[:MOST_CAMERAS]
     sigmas = {camera.camera: deviation_of(camera) for camera in cameras}
-    known = [sigma[np.isfinite(sigma)] for sigma in sigmas.values() if sigma is not None]
-    all_sigmas = np.concatenate([np.empty(0), *known])
+    finite = [sigma[np.isfinite(sigma)] for sigma in sigmas.values() if sigma is not None]
+    all_sigmas = np.concatenate([np.empty(0), *finite])
     colours = Normalize(0.0, round_up(float(np.quantile(all_sigmas, SHARE))) if all_sigmas.size else 1.0)
     unit_mm = arrow_unit_mm(cameras)
 

@@ -227,8 +227,8 @@ def _agreement(report: FusionReport) -> list[str]:
 
 
 def _calibration(calibration: Calibration, file: Source) -> str:
-    made = f"{calibration.created:%Y-%m-%d %H:%M} UTC" if calibration.created else "unknown"
-    rows = [["File", text(file.name)], ["SHA-256", text(file.sha256)], ["Made", made]]
+    created = f"{calibration.created:%Y-%m-%d %H:%M} UTC" if calibration.created else "unknown"
+    rows = [["File", text(file.name)], ["SHA-256", text(file.sha256)], ["Made", created]]
     return table(["", ""], rows) + calibration_panels(calibration)
 
 

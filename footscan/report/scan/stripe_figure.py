@@ -154,9 +154,9 @@ def film_figure(
     from matplotlib.figure import Figure
 
     shown, (rows, columns) = _sample(frames, _frames_to_show(points, count, lost))
-    seen = f"{len(np.unique(points['frame']))} of " if len(points) else ""
-    gone = f"; {len(lost)} lost" if lost else ""
-    summary = f"{_counted(len(points))} in {seen}{count} frame{'s' * (count != 1)}{gone}"
+    with_points = f"{len(np.unique(points['frame']))} of " if len(points) else ""
+    lost_note = f"; {len(lost)} lost" if lost else ""
+    summary = f"{_counted(len(points))} in {with_points}{count} frame{'s' * (count != 1)}{lost_note}"
     title = _fitting([about, summary], FILM_INCHES)
     strips = -(-max(len(shown), 1) // SHOWN_COLUMNS)
     aspect = float(np.clip(rows / columns, 0.4, 1.5))

@@ -14,7 +14,7 @@ def judge_figures(
     data_set: str,
     figures: Mapping[str, float | None],
     accepted: Mapping[str, float | None],
-    known: Mapping[str, float],
+    truths: Mapping[str, float],
     suite: Suite,
     history: Sequence[NightEnded] = (),
 ) -> list[JudgedFigure]:
@@ -22,14 +22,14 @@ def judge_figures(
 
     Parameters
     ----------
-    known : true measures of the foot by name
+    truths : true measures of the foot, mm, by name
     history : earlier nights
     """
-    truths = {measure_figure(name, unit): value for name, value in known.items() for unit in _UNITS}
+    true_figures = {measure_figure(name, unit): value for name, value in truths.items() for unit in _UNITS}
     judged = []
     for name in sorted(figures.keys() | accepted.keys(), key=in_order):
         value, before = rounded(name, figures.get(name)), accepted.get(name)
-        goal, truth = goal_of(name), truths.get(name)
+        goal, truth = goal_of(name), true_figures.get(name)
         allowed = 0.0 if before is None else tolerance_of(data_set, name, suite).allows(before)
         nights = [night.sets.get(data_set, {}).get(name) for night in history]
         judged.append(
@@ -40,7 +40,7 @@ def judge_figures(
                 allowed=allowed,
                 better=goal,
                 truth=truth,
-                verdict=verdict(value, before, allowed, goal, truth, is_known=name in accepted),
+                verdict=verdict(value, before, allowed, goal, truth, in_baseline=name in accepted),
                 history=[*nights, value],
             )
         )
@@ -48,15 +48,15 @@ def judge_figures(
 
 
 def verdict(
-    value: float | None, accepted: float | None, allowed: float, goal: Goal, truth: float | None, *, is_known: bool
+    value: float | None, accepted: float | None, allowed: float, goal: Goal, truth: float | None, *, in_baseline: bool
 ) -> Verdict:
-    """Judge one figure; `is_known` is True if the baseline has it, even as null."""
+    """Judge one figure; `in_baseline` is True if the baseline has it, even as null."""
     if value is None and accepted is None:
-        return "same" if is_known else "new"
+        return "same" if in_baseline else "new"
     if value is None:
         return "missing"
     if accepted is None:
-        return "better" if is_known else "new"  # a figure that was unknown before is known now
+        return "better" if in_baseline else "new"  # a figure that was unknown before is known now
     gain = accepted - value
     if abs(gain) <= allowed + ROUNDING:
         return "same"

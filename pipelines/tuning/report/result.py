@@ -60,7 +60,7 @@ class Gain:
 
     @property
     def means(self) -> tuple[float | None, float | None]:
-        """Mean values, present and winner, over the data sets on which neither failed; without any, each over its own."""
+        """Mean values, present and winner, over the data sets on which neither failed (if none: each over its own)."""
         columns = zip(*(self.both or self.sets.values()), strict=True)
         succeeded = [[value for value in column if value is not None] for column in columns]
         present, winner = (fmean(values) if values else None for values in succeeded)

@@ -7,7 +7,7 @@ import pytest
 from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Input, Output, Step, Value
 from pipelines.engine.store.store import Store, open_store
-from pipelines.regression.first_step import KnownSteps, PresentStep, first_steps
+from pipelines.regression.first_step import EarlierSteps, PresentStep, first_steps
 from schemas.regression import AcceptedStep
 
 
@@ -56,7 +56,7 @@ AFTER = {"clean", "surface", "measure"}
     ],
 )  # fmt: skip
 def test_first(otherwise: set[str], gone: set[str], expected: list[tuple[list[str], str]], tmp_path: Path) -> None:
-    found = first_steps(KnownSteps(ACCEPTED), present(otherwise, gone), open_store(tmp_path))
+    found = first_steps(EarlierSteps(ACCEPTED), present(otherwise, gone), open_store(tmp_path))
     assert [(list(one.steps), one.why) for one in found] == expected
 
 
@@ -74,20 +74,20 @@ ELSEWHERE = [AcceptedStep(step=name, key="2" * 64, result="e" * 64) for name in 
 def test_first_since_the_last_good_night_where_the_baseline_is_from_elsewhere(
     otherwise: set[str], gone: set[str], expected: list[tuple[list[str], str]], tmp_path: Path
 ) -> None:
-    found = first_steps(KnownSteps(ELSEWHERE, ACCEPTED), present(otherwise, gone), open_store(tmp_path))
+    found = first_steps(EarlierSteps(ELSEWHERE, ACCEPTED), present(otherwise, gone), open_store(tmp_path))
     assert [(list(one.steps), one.why) for one in found] == expected
 
 
 def test_a_step_that_came_after_the_baseline_and_is_known_from_the_last_good_night(tmp_path: Path) -> None:
     store = open_store(tmp_path)
-    assert first_steps(KnownSteps(ACCEPTED[:-1], ACCEPTED), present(set()), store) == []
-    assert first_steps(KnownSteps(ACCEPTED, ACCEPTED[:-1]), present(set(), {"measure"}), store) == []
+    assert first_steps(EarlierSteps(ACCEPTED[:-1], ACCEPTED), present(set()), store) == []
+    assert first_steps(EarlierSteps(ACCEPTED, ACCEPTED[:-1]), present(set(), {"measure"}), store) == []
 
 
 def test_nothing_accepted_and_a_step_that_is_new(tmp_path: Path) -> None:
     store = open_store(tmp_path)
-    assert first_steps(KnownSteps([]), present({"clean"}), store) == []
-    [found] = first_steps(KnownSteps(ACCEPTED[:-1]), present(set()), store)
+    assert first_steps(EarlierSteps([]), present({"clean"}), store) == []
+    [found] = first_steps(EarlierSteps(ACCEPTED[:-1]), present(set()), store)
     assert (list(found.steps), found.why) == (["measure"], "is new")
 
 
@@ -105,7 +105,7 @@ def test_what_changed_is_told_where_the_store_still_knows(tmp_path: Path) -> Non
     store.record("P/S/measure", Row(before, "a" * 64))
     accepted = [*ACCEPTED[:-1], AcceptedStep(step="measure", key=key_of(before), result="a" * 64)]
     steps = [*present(set())[:-1], PresentStep(CHAIN[-1], key_of(now), json.dumps(now), "b" * 64)]
-    [found] = first_steps(KnownSteps(accepted), steps, store)
+    [found] = first_steps(EarlierSteps(accepted), steps, store)
     assert [change.text for change in found.changes] == [
         "parameter settings changed: seed 1 → 2",
         'parameter side changed: "left" → "right"',

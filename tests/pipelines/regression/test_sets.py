@@ -80,7 +80,7 @@ def filming(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Filming:
 def test_what_was_filmed_is_not_filmed_again(filming: Filming) -> None:
     prepared, ran = filming.prepare("ambient")
     assert sorted(ran) == ["calibrate", "capture", "film"]
-    assert prepared.known == {"foot_length": 262.0}
+    assert prepared.truths == {"foot_length": 262.0}
     assert prepared.job.folders == [filming.out / "films/virtual/ambient"]
     assert filming.prepare("ambient")[1] == []
     (prepared.job.folders[0] / "scan.yaml").unlink()  # which is written last: without it nothing was filmed
