@@ -41,7 +41,7 @@ class Presence:
             while not ended.wait(LOOKS_SECONDS):
                 if time.monotonic() - self._heard > GONE_SECONDS:
                     gone.set()
-                    with suppress(FootscanError):  # the state tells it
+                    with suppress(FootscanError):  # the state reports it
                         stop()
 
         thread = threading.Thread(target=watch, name="presence of the page", daemon=True)

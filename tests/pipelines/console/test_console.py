@@ -1,4 +1,4 @@
-"""One operator, one thing at a time, and a stop that is always there."""
+"""The console: one operator, one action at a time, and a Stop that is always available."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The live scanner in words: what is not there is named, with what to do."""
+"""The live scanner in words: missing devices are named with a remedy."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +21,7 @@ RIG = {
 
 @pytest.fixture
 def over_nothing(tmp_path: Path) -> OverLive:
-    """Over a rig of which nothing is plugged in."""
+    """An adapter over a rig without any connected device."""
     rig = Rig.model_validate(
         {
             "format": "footscan.rig/1",

@@ -1,4 +1,4 @@
-"""Which page is in charge."""
+"""The page in charge: entering, leaving, taking over."""
 
 import pytest
 

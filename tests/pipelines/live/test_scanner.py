@@ -1,4 +1,4 @@
-"""The live scanner with a virtual board and two cameras that film a made-up foot: what it keeps, says and refuses."""
+"""The live scanner with a virtual board and two cameras that film a made-up foot: stored scans, states, refusals."""
 
 import datetime
 import threading
@@ -37,12 +37,12 @@ DAY = datetime.date(2026, 11, 20)
 RATE = 20.0
 LATENCY_S = 0.04
 STEP_MM = 10.0
-"""Between two pictures of the made-up foot."""
+"""Spacing of the pictures of the made-up foot."""
 
 
 @dataclass
 class Bench:
-    """A scanner, its world, and where its scans go."""
+    """A scanner, its world, and the folder of its scans."""
 
     scanner: LiveScanner
     board: Board
@@ -66,7 +66,7 @@ class Bench:
 
 @pytest.fixture
 def bench(pristine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    # A busy host times frames badly and says so: how well places must be known is not what is tested here.
+    # A busy host times frames badly and reports it; the accuracy of positions is not tested here.
     monkeypatch.setattr(storing, "LARGEST_SD_MM", 5.0)
     monkeypatch.setattr(frame_positions, "LARGEST_SD_MM", 5.0)
     with open_bench(pristine, tmp_path) as one:
@@ -274,7 +274,7 @@ def test_the_light_is_chosen_where_none_is_given(bench: Bench) -> None:
 
 
 def when_filming(bench: Bench, happens: object) -> None:
-    """Has something happen in the middle of the next travel with light."""
+    """Cause an event in the middle of the next travel with light."""
     assert callable(happens)
 
     def watch() -> None:

@@ -1,4 +1,4 @@
-"""Where the difference between two runs begins."""
+"""The first steps in which two runs differ."""
 
 from pathlib import Path
 
@@ -27,11 +27,11 @@ NAMES = [one.name.removeprefix("P/S/") for one in CHAIN]
 ACCEPTED = [AcceptedStep(step=name, key="0" * 64, result="a" * 64) for name in NAMES]
 
 
-def present(otherwise: set[str], gone: set[str] = frozenset()) -> list[PresentStep]:  # type: ignore[assignment]
+def present(differing: set[str], missing: set[str] = frozenset()) -> list[PresentStep]:  # type: ignore[assignment]
     return [
-        PresentStep(one, "1" * 64, "{}", ("b" if name in otherwise else "a") * 64)
+        PresentStep(one, "1" * 64, "{}", ("b" if name in differing else "a") * 64)
         for one, name in zip(CHAIN, NAMES, strict=True)
-        if name not in gone
+        if name not in missing
     ]
 
 
@@ -39,7 +39,7 @@ AFTER = {"clean", "surface", "measure"}
 
 
 @pytest.mark.parametrize(
-    ("otherwise", "gone", "expected"),
+    ("differing", "missing", "expected"),
     [
         (set(), set(), []),
         ({"measure"}, set(), [(["measure"], "its result differs")]),
@@ -55,8 +55,8 @@ AFTER = {"clean", "surface", "measure"}
         (set(), {"measure"}, [(["measure"], "no longer exists")]),
     ],
 )  # fmt: skip
-def test_first(otherwise: set[str], gone: set[str], expected: list[tuple[list[str], str]], tmp_path: Path) -> None:
-    found = first_steps(EarlierSteps(ACCEPTED), present(otherwise, gone), open_store(tmp_path))
+def test_first(differing: set[str], missing: set[str], expected: list[tuple[list[str], str]], tmp_path: Path) -> None:
+    found = first_steps(EarlierSteps(ACCEPTED), present(differing, missing), open_store(tmp_path))
     assert [(list(one.steps), one.why) for one in found] == expected
 
 
@@ -64,7 +64,7 @@ ELSEWHERE = [AcceptedStep(step=name, key="2" * 64, result="e" * 64) for name in 
 
 
 @pytest.mark.parametrize(
-    ("otherwise", "gone", "expected"),
+    ("differing", "missing", "expected"),
     [
         (set(), set(), []),
         ({"map-2", *AFTER}, set(), [(["map-2"], "its result differs")]),
@@ -72,9 +72,9 @@ ELSEWHERE = [AcceptedStep(step=name, key="2" * 64, result="e" * 64) for name in 
     ],
 )
 def test_first_since_the_last_good_night_where_the_baseline_is_from_elsewhere(
-    otherwise: set[str], gone: set[str], expected: list[tuple[list[str], str]], tmp_path: Path
+    differing: set[str], missing: set[str], expected: list[tuple[list[str], str]], tmp_path: Path
 ) -> None:
-    found = first_steps(EarlierSteps(ELSEWHERE, ACCEPTED), present(otherwise, gone), open_store(tmp_path))
+    found = first_steps(EarlierSteps(ELSEWHERE, ACCEPTED), present(differing, missing), open_store(tmp_path))
     assert [(list(one.steps), one.why) for one in found] == expected
 
 

@@ -1,4 +1,4 @@
-"""A night with the small archive: nothing has changed, something has, and what befalls a night."""
+"""A night with the small archive: without changes, with changes, and with failures."""
 
 import re
 import shutil
@@ -25,7 +25,7 @@ sets:
 
 
 def ignore(_: object) -> None:
-    """Nobody listens."""
+    """Ignore the end of a step."""
 
 
 def reason(text: str) -> Acceptance:
@@ -108,7 +108,7 @@ def test_the_first_step_and_what_changed_in_it(
 
 
 def test_a_baseline_of_another_kind_of_machine(root: Path) -> None:
-    """There every step came out otherwise, by rounding, and no figure did."""
+    """On the other machine every step differs by rounding, but no figure does."""
     accepted = root / "baseline.steps.yaml"
     accepted.write_text(re.sub(r'(key|result): "[0-9a-f]{64}"', rf'\1: "{"e" * 64}"', accepted.read_text()))
     (root / "nights/good.steps.yaml").write_text("damaged: [")
@@ -116,7 +116,7 @@ def test_a_baseline_of_another_kind_of_machine(root: Path) -> None:
     assert (first.status, only(first).otherwise) == (0, 16)
     assert [list(one.steps) for one in only(first).first] == [["ingest-1", "ingest-5"]]
     assert (night(root).status, only(night(root)).first) == (0, [])
-    for grid_steps in (1.25, 1.3):  # a bad night does not become the one to compare with
+    for grid_steps in (1.25, 1.3):  # a bad night does not become the last good one
         worse = night(root, with_parameters(f"{{surface: {{grid_steps: {grid_steps}}}}}"))
         [one] = only(worse).first
         assert list(one.steps) == ["surface"]

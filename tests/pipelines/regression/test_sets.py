@@ -27,7 +27,7 @@ from schemas.regression import Suite
 
 STEPS = (capture_stripe, recognise, place, all_recognise, own_side, fit, calibrate)
 KINDS = {"film", "capture", "calibrate"}
-"""What is filmed, and the last step of a calibration."""
+"""Kinds of the steps that film, and of the last step of a calibration."""
 
 SUITE: dict[str, Any] = {
     "format": "footscan.suite/1",
@@ -44,7 +44,7 @@ SUITE: dict[str, Any] = {
 
 
 class Filming:
-    """Counts what would be filmed and calibrated, and leaves behind what the steps would."""
+    """Counts the steps that would film and calibrate, and writes their outputs in their place."""
 
     def __init__(self, patch: pytest.MonkeyPatch, out: Path) -> None:
         self.out = out

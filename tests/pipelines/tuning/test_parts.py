@@ -1,4 +1,4 @@
-"""The pieces of a search: its space, its samplers, its journal, its data, its winner."""
+"""The parts of a search: space, samplers, journal, data, winner."""
 
 import doctest
 import json
@@ -43,7 +43,7 @@ def test_examples(module: ModuleType) -> None:
 
 
 def scans(*names: str, truth: str = "", side: str = "right") -> list[Any]:
-    """Names as `patient/scan`; those in `truth` have one."""
+    """Scans with the names `patient/scan`; those in `truth` name a truth."""
     return [
         SimpleNamespace(
             name=name,

@@ -1,4 +1,4 @@
-"""Colours of a foot: each vertex by the measured point that is nearest to it."""
+"""Colours of a foot: each vertex has that of the nearest measured point."""
 
 import numpy as np
 

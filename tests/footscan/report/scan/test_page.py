@@ -247,7 +247,7 @@ def test_the_page_asks_for_nothing_from_elsewhere(scan):
 
 
 class Balance(HTMLParser):
-    """Tags that were opened and are still open; refuses a wrong end."""
+    """Stack of open tags; fails at a wrong end tag."""
 
     void = frozenset({"meta", "input", "img"})
 
@@ -276,7 +276,7 @@ def test_the_same_scan_gives_the_same_bytes_in_every_thread(scan):
 
 
 def test_a_left_foot_is_shown_as_it_is():
-    # Scanner and foot stand alike, but for 10 mm in X and the mirror that makes a right foot of a left one.
+    # The frames of scanner and foot differ by 10 mm in X and by the mirror that makes a right foot of a left one.
     mirrored = [[1, 0, 0, -10], [0, -1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
     assert upright(np.array([[30.0, 4.0, 5.0]]), mirrored).tolist() == [[20, 4, 5]]
     turned = [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 2], [0, 0, 0, 1]]

@@ -1,4 +1,4 @@
-"""What is told of a scan that is not good: which camera, and why."""
+"""Advice on a scan of poor quality: camera and reason."""
 
 from typing import Any
 

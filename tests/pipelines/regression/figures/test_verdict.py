@@ -1,4 +1,4 @@
-"""Figures beside the accepted ones, and the file of the accepted ones."""
+"""Verdicts on figures, and the file of the accepted figures."""
 
 from datetime import UTC, datetime
 from pathlib import Path

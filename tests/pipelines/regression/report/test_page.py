@@ -1,4 +1,4 @@
-"""The page of the morning: what it says, how its lines run, and that names are data in it."""
+"""The page of a night: its text, its history lines, and escaped names."""
 
 import re
 import xml.etree.ElementTree as ET
@@ -56,7 +56,7 @@ BAD = JudgedSet(
 
 
 class Text(HTMLParser):
-    """What a person reads, and the elements in which it stands."""
+    """The words of a page, and the elements that hold them."""
 
     def __init__(self, page: str) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The page of a search: whole, without a network, and with names as data."""
+"""The page of a search: well formed, self-contained, with escaped names."""
 
 import re
 from html.parser import HTMLParser
@@ -46,7 +46,7 @@ def result() -> TuneResult:
 
 
 class Elements(HTMLParser):
-    """Elements and words of a page; refuses a wrong end of a tag."""
+    """Elements and words of a page; fails at a wrong end tag."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
