@@ -11,7 +11,7 @@ from footscan.capture.cameras.usb_bus import Pass
 from pipelines.console.scanner import Device, Health, Level, Scanned, Side
 from pipelines.live.devices import passes_of
 from pipelines.live.light import ScanLight
-from pipelines.live.scanner import LiveScanner, ScanOrder
+from pipelines.live.scanner import REPORT_SECONDS, LiveScanner, ScanOrder
 from pipelines.live.state import OnState, ScannerState
 from pipelines.live.storing import ScanName, next_scan_name
 from schemas.base.errors import FootscanError
@@ -141,7 +141,7 @@ class OverLive:
         door = "" if heads.board.watches_door else "; it has no input for a lid: opening a lid stops nothing"
         level = LEVELS.get(state.name, "ok" if heads.board.watches_door else "warning")
         yield Device("Controller", level, f"{state.words}{door}", state.remedy)
-        reports = heads.log.between(time.monotonic() - 1.0, float("inf"))
+        reports = heads.log.between(time.monotonic() - REPORT_SECONDS, float("inf"))
         for head in (1, 2, 3):
             if not heads.board.homed:
                 yield Device(f"Head {head}", "warning", "position unknown", "home the heads")

@@ -20,6 +20,9 @@ from schemas.base.model import canonical_json
 from schemas.recording import LeftOut, RecordedBoard, RecordedCamera, RecordedLight, RecordedPass, Recording
 from schemas.rig import Rig, RigCamera
 
+LONGEST_TEXT = 1000
+"""Most characters of a warning, as in `schemas.recording.Text`."""
+
 
 @dataclass
 class ScanStory:
@@ -75,7 +78,9 @@ def recording_document(
             for filmed, planned in zip(story.filmed, story.passes, strict=True)
         ],
         cameras=cameras,
-        warnings=[f"camera {camera} is left out: {problem}"[:1000] for camera, problem in sorted(left_out.items())],
+        warnings=[
+            f"camera {camera} is left out: {problem}"[:LONGEST_TEXT] for camera, problem in sorted(left_out.items())
+        ],
     )
 
 
@@ -90,7 +95,7 @@ def _camera(camera: RigCamera, story: ScanStory, film: FilmFrames) -> RecordedCa
         exposure_ms=actual.get("exposure_ms"),
         gain=actual.get("gain"),
         light_reason=story.light.reasons.get(camera.id),
-        not_fixed=[f"{name}: {control.problem}"[:1000] for name, control in fixed.items() if control.problem],
+        not_fixed=[f"{name}: {control.problem}"[:LONGEST_TEXT] for name, control in fixed.items() if control.problem],
         expected=len(film.x_mm) + len(film.left_out),
         stored=len(film.arrivals),
         lost=[LeftOut(number=int(film.number[k]), reason=reason) for k, reason in film.lost.items()],

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from footscan.capture.board.heads import HEADS, SLACK_MM, Heads
@@ -32,9 +31,14 @@ FRAME_BYTES = 40_000
 """Expected size of a frame, for the check of the free space before a scan."""
 WATCH_SECONDS = 0.1
 """Interval at which heads, disk and stops are checked; chosen by hand."""
+JOG_FACTOR, JOG_SECONDS = 2.0, 5.0
+"""Longest wait for a jog: this factor of its time at full speed, plus this time; chosen by hand."""
+REPORT_SECONDS = 1.0
+"""Age of the reports of the board among which the latest position is looked for; chosen by hand."""
 UNDER_WAY = ("moving", "jogging", "homing", "held", "door")
+"""States of the board in which a stop is always sent to it: heads move or are held."""
 ANSWERING = (*UNDER_WAY, "ready", "not homed", "alarm", "restarting")
-"""States of the board in which a stop is sent to it."""
+"""States of the board in which a stop is sent to it during an activity of the scanner."""
 STOPPED = "stopped; nothing of this scan is kept"
 
 
@@ -79,9 +83,7 @@ class LiveScanner:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @property
@@ -136,7 +138,7 @@ class LiveScanner:
             self._refuse_stopped()
             heads.jog(by_mm, mm_per_s, head)
             try:
-                limit = time.monotonic() + 2.0 * abs(by_mm) / mm_per_s + 5.0
+                limit = time.monotonic() + JOG_FACTOR * abs(by_mm) / mm_per_s + JOG_SECONDS
                 x_mm = heads.position_mm()  # a new report, so that the state is that after the order
                 while heads.state.name == "jogging" and time.monotonic() < limit:
                     time.sleep(WATCH_SECONDS)
@@ -385,7 +387,7 @@ class LiveScanner:
             except Fault:
                 with suppress(Fault):  # the state reports it
                     self._stop_heads(UNDER_WAY)
-            for latest in heads.log.between(time.monotonic() - 1.0, math.inf)[-1:]:
+            for latest in heads.log.between(time.monotonic() - REPORT_SECONDS, math.inf)[-1:]:
                 self._board.progress((latest.x_mm[0] - plan.start_mm) / (plan.end_mm - plan.start_mm))
 
         try:

@@ -24,6 +24,8 @@ from schemas.scan import Scan
 
 LARGEST_SD_MM = 0.3
 """Largest standard deviation of the position of a frame; a frame with a larger one is lost. Chosen by hand."""
+MOST_SCANS = 999
+"""Most scans of a day and side of a patient; chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -150,8 +152,8 @@ def _background(
 def next_scan_name(archive: Path, patient: str, side: Literal["right", "left"], date: datetime.date) -> str:
     """The first free name such as `2026-11-20-R`, `2026-11-20-R-2`; RefusedInput if 999 are taken."""
     first = f"{date.isoformat()}-{side[0].upper()}"
-    names = [first, *(f"{first}-{number}" for number in range(2, 1000))]
+    names = [first, *(f"{first}-{number}" for number in range(2, MOST_SCANS + 1))]
     for name in names:
         if not (archive / patient / name).exists():
             return name
-    raise RefusedInput(archive / patient, "has 999 scans of this day and side, expected fewer")
+    raise RefusedInput(archive / patient, f"has {MOST_SCANS} scans of this day and side, expected fewer")

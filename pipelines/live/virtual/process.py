@@ -6,7 +6,6 @@ import sys
 import threading
 from collections.abc import Callable
 from queue import Empty, Queue
-from types import TracebackType
 from typing import Any, Self
 
 from pipelines.live.virtual.world import SubjectName, World
@@ -47,9 +46,7 @@ class WorldProcess:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def put(self, subject: SubjectName, progress: Callable[[int, int], None] | None = None) -> None:
