@@ -11,6 +11,7 @@ _STOPS = np.array(
 )
 """Blue inside, nearly white at zero, red outside; lightness falls to both ends, for colour-blind readers too."""
 _UNKNOWN = np.array([165, 165, 165], np.uint8)
+"""Grey of an unknown distance."""
 _LEAST_LIMIT_MM = 0.5
 """Shortest scale; chosen by hand."""
 _SHARE = 0.98

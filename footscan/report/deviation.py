@@ -31,6 +31,7 @@ _OCTAHEDRON_FACES = np.array(
 )
 _INK = (70, 70, 70)
 _BAR_PX, _ABOVE_PX, _BELOW_PX = 240, 30, 52
+"""Width of the colour bar; room above a picture for its title, and below for the bar."""
 
 
 class Deviation(NamedTuple):

@@ -4,6 +4,8 @@ import base64
 from collections.abc import Iterable, Sequence
 from html import escape
 
+UNITS = {"mm": ("mm", 1), "mm2": ("mm²", 0), "mm3": ("mm³", 0), "deg": ("°", 1), "1": ("", 3)}
+"""How the unit of a measure is written, and the decimals of its values."""
 NARROW_SPACE = "\N{NARROW NO-BREAK SPACE}"
 
 

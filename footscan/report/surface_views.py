@@ -18,6 +18,7 @@ _LABELS_LEFT_MM, _LABELS_BELOW_MM = 17.0, 13.0
 """Room for the figures of the grid."""
 _GRID_MM = 10
 _LABELLED_MM = 50
+"""Spacing of the lines of the grid, and of the labelled lines."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class View:
 
 
 X, Y, Z = range(3)
+"""Axes of the foot's frame."""
 
 
 def views_of(side: Side | None) -> list[View]:

@@ -16,6 +16,7 @@ from schemas.base.errors import Fault
 from schemas.rig import Rig
 
 MAINS: dict[int, Literal[0, 50, 60]] = {0: 0, 50: 50, 60: 60}
+"""Mains frequencies, Hz, as the literal type that the camera controls take."""
 TEST_PLACES = 3
 """Positions along the travel at which the light is measured; chosen by hand."""
 FRAMES_A_PLACE = 2

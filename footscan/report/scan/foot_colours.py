@@ -23,8 +23,9 @@ CAMERAS = (
 
 Camera 9 has the colour of camera 1 again."""
 SURE, UNSURE = np.array([253, 231, 37], np.float64), np.array([68, 1, 84], np.float64)
+"""RGB of a certain and of an uncertain point."""
 _MIDDLE = np.array([33, 145, 140], np.float64)
-"""Middle of the ramp from `SURE` to `UNSURE`: three colours of viridis (Smith and van der Walt, 2015)."""
+"""Middle of the ramp from `SURE` to `UNSURE`; the three are colours of viridis (Smith and van der Walt, 2015)."""
 _SHARE = 0.98
 """Quantile of the uncertainty at which its colour scale ends; chosen by hand."""
 _LEAST_SIGMA_MM = 1e-3

@@ -10,7 +10,7 @@ from footscan.report.calibration.panels import calibration_panels
 from footscan.report.colours import colour_bar, colour_limit, distance_colours
 from footscan.report.comparison.figures import figures_facts, moved_note, regions_table
 from footscan.report.filled import filled_colours, filled_key
-from footscan.report.markup import number, section, table, text, words
+from footscan.report.markup import UNITS, number, section, table, text, words
 from footscan.report.page import page
 from footscan.report.sample_frames import FRAMES_SCRIPT, FrameSample, sample_frames
 from footscan.report.scan.coverage import coverage_plot
@@ -43,8 +43,6 @@ _FIRST = (
 """Measures in the order in which they are read; others follow by name."""
 _TILES = 4
 """Measures that stand out above the table: the first of them that have a value."""
-_UNITS = {"mm": ("mm", 1), "mm2": ("mm²", 0), "mm3": ("mm³", 0), "deg": ("°", 1), "1": ("", 3)}
-"""How a unit is written, and the decimals of its values."""
 
 
 class ScanTitle(NamedTuple):
@@ -153,7 +151,7 @@ def _ordered(measures: Measures) -> Iterator[tuple[str, Measure]]:
 def _tiles(measures: Measures) -> str:
     taken = [(name, measure) for name, measure in _ordered(measures) if measure.value is not None][:_TILES]
     tiles = "".join(
-        f"<div><span>{text(words(name))}</span><b>{_value(measure)}</b> {_UNITS[measure.unit][0]}</div>"
+        f"<div><span>{text(words(name))}</span><b>{_value(measure)}</b> {UNITS[measure.unit][0]}</div>"
         for name, measure in taken
     )
     return f'<div class="tiles">{tiles}</div>' if tiles else ""
@@ -167,7 +165,7 @@ def _measures(measures: Measures, drawings: Mapping[str, Drawing], turned: str) 
         [
             _name(name, measure, name in drawings),
             _value(measure),
-            _UNITS[measure.unit][0],
+            UNITS[measure.unit][0],
             f'<span class="status {measure.status}">{measure.status}</span>',
             text(measure.definition) + (f'<p class="note">{text(note)}</p>' if (note := _note(measure)) else ""),
         ]
@@ -181,7 +179,7 @@ def _measures(measures: Measures, drawings: Mapping[str, Drawing], turned: str) 
 def _name(name: str, measure: Measure, is_drawn: bool) -> str:
     if not is_drawn:
         return text(words(name))
-    caption = f"{words(name)} {_value(measure)} {_UNITS[measure.unit][0]}: {measure.definition}"
+    caption = f"{words(name)} {_value(measure)} {UNITS[measure.unit][0]}: {measure.definition}"
     return (
         f'<button type="button" data-shows="{text(name)}" data-told="{text(caption)}" aria-pressed="false">'
         f"{text(words(name))}</button>"
@@ -190,7 +188,7 @@ def _name(name: str, measure: Measure, is_drawn: bool) -> str:
 
 def _note(measure: Measure) -> str:
     """The note below the definition: a remark and the uncertainty of the value."""
-    unit, decimals = _UNITS[measure.unit]
+    unit, decimals = UNITS[measure.unit]
     sigma = None
     if measure.uncertainty is not None:
         sigma = f"standard deviation {number(measure.uncertainty, decimals + 1)} {unit}".rstrip()
@@ -198,7 +196,7 @@ def _note(measure: Measure) -> str:
 
 
 def _value(measure: Measure) -> str:
-    return "–" if measure.value is None else number(measure.value, _UNITS[measure.unit][1])
+    return "–" if measure.value is None else number(measure.value, UNITS[measure.unit][1])
 
 
 def _cameras_table(quality: Quality, cloud: NDArray[np.void]) -> str:

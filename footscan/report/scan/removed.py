@@ -26,11 +26,13 @@ _KEPT_COLOUR, _GROUND, _GLASS = (190, 197, 204), (255, 255, 255), (221, 226, 231
 _PALETTE = [_KEPT_COLOUR, *(_COLOURS[reason] for reason in REASONS), _GROUND, _GLASS]
 """Colours of the pixels by code: kept, then the reasons in their order, then ground and glass."""
 _PIXELS_PER_MM = 1.5
+"""Resolution of the pictures; chosen by hand."""
 _BEYOND_MM, _MARGIN_MM = 110.0, 5.0
 """Largest extent of a picture beyond the kept points (removed points may lie anywhere), and its margin.
 
 Chosen by hand."""
 _GAP_PX = 12
+"""Gap between the two views of a camera."""
 
 
 def removed_table(cameras: Sequence[CameraQuality]) -> str:

@@ -40,6 +40,7 @@ PICTURE_INCHES = 8.5
 LEAST_INCHES = 2.8
 """Least length of its shorter side: an image that is one pixel high is drawn stretched."""
 PANEL_INCHES, APART_INCHES = 1.35, 0.25
+"""Size of a panel across the stripe, and the gap between panels."""
 LEFT, RIGHT, TOP, BOTTOM = 0.8, 1.0, 0.37, 0.6
 """Margins of the figure of a single frame, inches. Its parts are placed explicitly so that rows and columns align."""
 TITLE_POINTS, LINE_INCHES, LETTER_INCHES = 11, 0.19, 0.095
@@ -48,6 +49,7 @@ NOTE_INCHES = 0.6
 """Room for the words "no stripe" in place of the panels."""
 
 SHOWN_FRAMES, SHOWN_COLUMNS = 8, 4
+"""Most frames in the figure of a film, and frames in a row."""
 SHOWN_BARE = 2
 """Most frames without points among the frames shown, if other frames hold points."""
 FILM_INCHES = 13.0

@@ -8,7 +8,7 @@ import numpy as np
 from footscan.mesh.formats.files import FARTHEST_MM, PARSERS
 from footscan.mesh.mesh import Mesh
 from footscan.report.filled import CUT, filled_colours, filled_key
-from footscan.report.markup import key, number, section, table, text, words
+from footscan.report.markup import UNITS, key, number, section, table, text, words
 from footscan.report.quality_lights import Level, Light, quality_lights, worst
 from footscan.report.scan.foot_colours import CAMERAS
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
@@ -28,7 +28,6 @@ VERDICTS = {
     "poor": "A poor scan",
     "unknown": "A scan that cannot be fully judged",
 }
-UNITS = {"mm": ("mm", 1), "mm2": ("mm²", 0), "mm3": ("mm³", 0), "deg": ("°", 1), "1": ("", 3)}
 FIRST = ("foot_length", "foot_breadth", "ball_girth", "instep_girth", "instep_height", "heel_breadth", "arch_index")
 FILES = {"report.html": "Whole report", "foot.stl": "Surface (STL)", "measures.json": "Measures (JSON)"}
 

@@ -10,6 +10,7 @@ from footscan.stripe.extract import extract_stripe
 from schemas.parameters.extraction import ExtractionParameters
 
 DOT = (0, 240, 138)
+"""RGB of a stripe point."""
 SMALLER = 2
 """Every second column and row is shown: enough for a tile of the page."""
 

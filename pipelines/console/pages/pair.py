@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from footscan.report.markup import number, section, table, text, words
+from footscan.report.markup import UNITS, number, section, table, text, words
 from footscan.sizing.pairs import compare_pair
 from footscan.sizing.table import read_table
 from pipelines.console.pages.results import read_measures
@@ -10,9 +10,6 @@ from pipelines.console.pages.shell import shell
 from schemas.feet import Foot
 from schemas.pairs import Pair, PairRow
 from schemas.sizes import Sizes
-
-DECIMALS = {"mm": 1, "mm2": 0, "mm3": 0, "deg": 1}
-UNITS = {"mm2": "mm²", "mm3": "mm³", "deg": "°", "1": ""}
 
 
 def pair_page(results: Path, patient: str, left: str, right: str) -> str:
@@ -63,12 +60,11 @@ def _size_table(sizes: Sizes) -> str:
 
 
 def _row(row: PairRow) -> list[str]:
-    decimals = DECIMALS.get(row.unit, 3)
+    unit, decimals = UNITS.get(row.unit, (row.unit, 3))
     left, right, difference = (
         "–" if value is None else number(value, decimals) for value in (row.left, row.right, row.difference)
     )
     note = f'<p class="note">{text(row.note)}</p>' if row.note else ""
-    unit = UNITS.get(row.unit, row.unit)
     return [text(words(row.measure)) + note, left, right, difference, text(unit), text(row.larger or "–")]
 
 

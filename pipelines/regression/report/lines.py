@@ -6,6 +6,7 @@ from footscan.report.markup import text
 from pipelines.regression.report.result import JudgedFigure
 
 WIDTH, HEIGHT, MARGIN = 180.0, 36.0, 4.0
+"""Size and margin of the plot, in units of the drawing."""
 FEWEST = 8
 """Nights that the plot has room for at least, so that the line of a young history stays short."""
 COLOURS = {"better": "#17632f", "same": "#1f6f8b", "worse": "#b3261e", "missing": "#b3261e", "new": "#7a5200"}

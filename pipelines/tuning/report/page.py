@@ -12,6 +12,7 @@ from pipelines.tuning.report.result import Gain, Goal, Trial, TuneResult
 from pipelines.tuning.report.stripe_change import COLOURS, change_figures
 
 DECIMALS = {"mm": 4, "%": 2, "s": 2}
+"""Decimals of a value, by its unit."""
 STATUS = {"real": "ok", "fails less": "ok", "real loss": "incomplete", "fails more": "incomplete"}
 """CSS class of a verdict; any other verdict is uncertain."""
 SHOWN = 60
