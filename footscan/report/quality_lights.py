@@ -1,4 +1,4 @@
-"""How good a scan is at a glance: four lights, each with the figure that decides it."""
+"""Quality of a scan at a glance: four lights, each with the figure that decides it."""
 
 import math
 from typing import Literal, NamedTuple
@@ -12,11 +12,16 @@ LEVELS: tuple[Level, ...] = ("good", "fair", "unknown", "poor")
 """From the best to the worst."""
 
 LOST_SHARE = 0.05
-"""Of a scan's frames: with more lost, stripes are missing side by side, and the surface is filled between them."""
+"""Largest share of lost frames that is still fair; chosen by hand.
+
+If more frames are lost, neighbouring stripes are missing, and the surface is filled between them."""
 AGREE_MM = (0.1, 0.25)
-"""Of a camera from the others: the noise of a stripe point, and the accuracy that a whole scan is to have."""
+"""Largest distance of a camera from the others that is good, and fair: the noise of a stripe point, and the accuracy
+that is expected of a whole scan."""
 FILLED_SHARES = (0.1, 0.25)
-"""Of the surface: toes hide some 5 % from all cameras of a whole scan."""
+"""Largest filled share of the surface that is good, and fair; chosen by hand.
+
+In a whole scan, toes hide some 5 % of the surface from all cameras."""
 
 
 class Light(NamedTuple):
@@ -28,13 +33,16 @@ class Light(NamedTuple):
 
 
 def quality_lights(measures: Measures, quality: Quality) -> list[Light]:
-    """Of the frames, the agreement of the cameras, the surface and the measures."""
+    """Judge the frames, the agreement of the cameras, the surface and the measures."""
     return [_frames(quality), _cameras(quality), _surface(quality), _measures(measures)]
 
 
 def apart_mm(quality: Quality) -> dict[int, float]:
-    """How far each camera sees the skin from where the others see it, mm: the root mean square of offset and scatter of
-    its pairs, by robust figures, each weighted with the places at which both see it."""
+    """Distance between the skin as each camera sees it and as the others see it, mm, by camera.
+
+    It is the root mean square over the camera's pairs of median offset and robust scatter, weighted by the number of
+    places that both cameras see.
+    """
     squares: dict[int, float] = {}
     places: dict[int, int] = {}
     for pair in quality.fusion.pairs:
@@ -46,7 +54,7 @@ def apart_mm(quality: Quality) -> dict[int, float]:
 
 
 def worst(lights: list[Light]) -> Level:
-    """The level of the worst of them; unknown where there is none."""
+    """The worst level of all lights; unknown without lights."""
     return max((light.level for light in lights), key=LEVELS.index, default="unknown")
 
 
@@ -61,7 +69,7 @@ def _cameras(quality: Quality) -> Light:
     apart = apart_mm(quality)
     if not apart:
         return Light("Cameras", "unknown", "no two cameras see the same skin")
-    camera = max(apart, key=lambda one: apart[one])
+    camera = max(apart, key=lambda camera_id: apart[camera_id])
     why = f"camera {camera} is the farthest from the others, by {number(apart[camera], 2)} mm"
     return Light("Cameras", _level(apart[camera], AGREE_MM), why)
 

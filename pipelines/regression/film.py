@@ -1,4 +1,4 @@
-"""The parametric foot of a suite, filmed by the virtual scanner; the result tells what the foot is and was filmed."""
+"""A step that films the parametric foot of a suite with the virtual scanner."""
 
 import json
 from collections.abc import Mapping
@@ -16,9 +16,9 @@ PATIENT = "virtual"
 
 
 def run(inputs: Mapping[str, bytes], parameters: VirtualScan, places: Mapping[str, Path]) -> bytes:
-    """`places`: the `folder` of the scan, which bears its name.
+    """`places`: the `folder` of the scan, which has the name of the scan.
 
-    The result has the foot's `known` measures in mm by name, and the digests of the `films`.
+    The result holds the true measures of the foot, mm, by name (`known`), and the digests of the `films`.
     """
     del inputs
     folder, settings = places["folder"], parameters.settings

@@ -1,4 +1,4 @@
-"""The live scanner in words: what is not there is named, with what to do."""
+"""The live scanner in words: missing devices are named with a remedy."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +21,7 @@ RIG = {
 
 @pytest.fixture
 def over_nothing(tmp_path: Path) -> OverLive:
-    """Over a rig of which nothing is plugged in."""
+    """An adapter over a rig without any connected device."""
     rig = Rig.model_validate(
         {
             "format": "footscan.rig/1",
@@ -37,7 +37,7 @@ def test_what_is_not_connected_is_told(over_nothing: OverLive) -> None:
     health = over_nothing.health()
     told = {device.name: (device.level, device.words) for device in health.devices}
     assert told["Controller"] == ("bad", "not connected")
-    assert told["Head 2"] == ("unknown", "not known")
+    assert told["Head 2"] == ("unknown", "position unknown")
     assert told["Camera 5"] == ("unknown", "not open")
     assert told["Passes"] == ("ok", "All 2 cameras in one pass: cameras 1, 5 on no USB bus of this computer.")
     assert told["Disk"][1].endswith("GB are free for scans")
@@ -52,7 +52,7 @@ def test_orders_to_nothing_are_faults_and_a_stop_is_none(over_nothing: OverLive,
     for order in (over_nothing.connect, over_nothing.home, over_nothing.resume, over_nothing.shine):
         with pytest.raises(FootscanError):
             order()
-    with pytest.raises(FootscanError, match=r"^camera 1: latency: has none"):
+    with pytest.raises(FootscanError, match=r"^camera 1: latency: is missing"):
         over_nothing.film("P1", "right", keep_partial=False)
     assert not (tmp_path / "archive").exists()
     over_nothing.close()

@@ -1,4 +1,4 @@
-"""The page of an archive: its rows, in which order, and that names are data and pictures files beside it."""
+"""The page of an archive: order of its rows, escaped names, relative addresses of pictures."""
 
 import re
 from html.parser import HTMLParser
@@ -14,7 +14,7 @@ HOSTILE = "<script>alert('1')</script>\"&"
 
 
 class Rows(HTMLParser):
-    """Words of each row of the table; refuses a wrong end of a tag."""
+    """Words of each row of the table; fails at a wrong end tag."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
