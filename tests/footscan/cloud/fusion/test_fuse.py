@@ -62,7 +62,7 @@ def test_a_camera_that_stands_far_off_is_named_and_outvoted() -> None:
     cloud, report = fuse(arch(shift=(0.0, 1.6), moved=2), PARAMETERS)
     assert [correction.kind for correction in report.corrections] == ["none"] * 4
     assert len(report.warnings) == 1
-    assert report.warnings[0].startswith("camera 2 stands 1.6")
+    assert report.warnings[0].startswith("camera 2 deviates from the others by 1.6")
     seen_by_others = np.degrees(np.arctan2(cloud["z"] / 40, cloud["y"] / 30)) > 0
     assert np.percentile(off_arch(cloud[seen_by_others]), 90) < 0.1
 
