@@ -1,0 +1,18 @@
+"""The examples in the docstrings of the calibration's modules run."""
+
+import doctest
+from importlib import import_module
+
+import pytest
+
+MODULES = [
+    *("models.fit", "models.homography", "models.maps", "models.observations", "models.polynomial"),
+    *("models.region", "models.selection", "chart.plane_fit", "chart.quadratic"),
+]
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_examples(module: str) -> None:
+    results = doctest.testmod(import_module(f"footscan.calibration.{module}"))
+    assert results.attempted
+    assert not results.failed
