@@ -75,7 +75,7 @@ def test_placements_outvote_the_mounting(pinhole: Any, edges: Edges) -> None:
 def test_a_symmetric_object_in_one_placement_needs_the_mounting(pinhole: Any, edges: Edges) -> None:
     camera = pinhole(target_mm=(10.0, 60.0))
     stripes = filmed(camera, PLACEMENTS[:1])
-    with pytest.raises(UnrecognisedError, match="say where the camera stands"):
+    with pytest.raises(UnrecognisedError, match="state where the camera stands"):
         recognise(stripes, edges, PLACEMENTS[:1], Mounting(0, 0, 0))
     mirrored = recognise(stripes, edges, PLACEMENTS[:1], Mounting(-1, -1, 1))
     expected = GRID * [-1, 1]  # the cross is its own mirror image, so the mirrored camera sees the same
