@@ -34,6 +34,16 @@ def views_of(cameras: Iterable[CameraCalibration]) -> dict[int, View]:
     Returns
     -------
     Camera -> view.
+
+    Examples
+    --------
+    A frontal view of 320 x 240 mm, at the typical distance:
+
+    >>> from schemas.calibration import PolynomialMap
+    >>> map_ = PolynomialMap(order=1, centre_px=(319.5, 239.5), scale_px=100, alpha_y=[0, 50, 0], alpha_z=[0, 0, -50])
+    >>> view = views_of([CameraCalibration(camera=1, map=map_, region_px=[], points=0)])[1]
+    >>> print(view.centre.round(3) + 0.0, view.outline.max(axis=0).round(3))
+    [300.   0.   0.] [159.75 119.75]
     """
     calibrations = {camera.camera: camera for camera in cameras}
     centres = camera_centres(calibrations.values())

@@ -99,7 +99,7 @@ def fit(model: Model, observations: Observations, *, robust: bool) -> Fit:
     normal, _ = _normal_equations(jacobian, weights, np.zeros(len(weights)))
     condition = _condition(normal + np.diag(model.prior_precision()))
     if not (condition < WORST_CONDITION and np.abs(parameters).max() <= LARGEST):
-        raise UndeterminedError("the places of the data do not determine all unknowns")
+        raise UndeterminedError("the arrangement of the data does not determine all unknowns")
     residuals = _residuals(model, observations, parameters)
     remoteness = _remoteness(residuals) if robust else np.zeros(len(residuals))
     covariance = _covariance(observations, jacobian, residuals, remoteness, model.prior_precision())

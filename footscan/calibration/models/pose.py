@@ -66,6 +66,15 @@ def camera_centre(camera: CameraCalibration) -> Floats | None:
     -------
     (3,) float64, mm: X from the laser plane, Y and Z. None if the map does not determine it: a map without
     perspective, or one distorted by too few control points.
+
+    Examples
+    --------
+    A frontal view gives the side of the plane and a typical distance:
+
+    >>> from schemas.calibration import PolynomialMap
+    >>> map_ = PolynomialMap(order=1, centre_px=(319.5, 239.5), scale_px=100, alpha_y=[0, 50, 0], alpha_z=[0, 0, -50])
+    >>> print(camera_centre(CameraCalibration(camera=1, map=map_, region_px=[], points=0)).round(3) + 0.0)
+    [300.   0.   0.]
     """
     pixels = _samples(camera)
     plane = to_world(camera, pixels)

@@ -69,6 +69,20 @@ def disagreements(stripes: Stripes, overlaps: Overlaps) -> Pairs:
     """Summarise the distances of each pair of cameras that saw the same skin.
 
     A distance is positive if the camera with the smaller number places the skin farther out.
+
+    Examples
+    --------
+    Two cameras see an arch, the second one 0.1 mm farther out:
+
+    >>> from footscan.cloud.fusion.stripes import sort_stripes
+    >>> from footscan.cloud.points import make_points
+    >>> angle = np.linspace(0.0, np.pi, 200)
+    >>> arch = np.column_stack([np.zeros(200), np.cos(angle), np.sin(angle)])
+    >>> clouds = [make_points(radius * arch, camera, source=np.arange(200)) for camera, radius in ((1, 60), (2, 60.1))]
+    >>> stripes = sort_stripes(clouds)
+    >>> _, disagreement = disagreements(stripes, find_overlaps(stripes, stripes.yz, 1.0))[1, 2]
+    >>> print(round(disagreement.median_mm, 3))
+    -0.1
     """
     outward = np.sign(np.sum(stripes.normals * (stripes.yz - _middles(stripes)), axis=1))[overlaps.point]
     camera = stripes.camera[overlaps.point]

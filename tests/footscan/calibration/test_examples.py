@@ -7,7 +7,7 @@ import pytest
 
 MODULES = [
     *("models.fit", "models.homography", "models.maps", "models.observations", "models.polynomial"),
-    *("models.region", "models.selection", "chart.plane_fit", "chart.quadratic"),
+    *("models.pose", "models.region", "models.selection", "chart.plane_fit", "chart.quadratic"),
     *("capture.edge_points", "capture.from_capture", "capture.lines", "capture.reference", "capture.stripe_arrays"),
 ]
 

@@ -7,7 +7,7 @@ import pytest
 
 MODULES = [
     *("clutter", "colour", "mapping", "normals", "outliers", "planes", "plate", "points", "segments", "uncertainty"),
-    *("fusion.fuse", "fusion.motion", "fusion.stripes"),
+    *("views", "fusion.agreement", "fusion.fuse", "fusion.motion", "fusion.stripes"),
 ]
 
 

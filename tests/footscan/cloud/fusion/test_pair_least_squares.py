@@ -19,7 +19,7 @@ def forms() -> Forms:
 
 
 def left(coefficients: np.ndarray) -> np.ndarray:
-    """What the coefficients leave of each comparison."""
+    """The residual of each comparison under the coefficients."""
     apart = coefficients[PAIRS[:, 0]] - coefficients[PAIRS[:, 1]]
     return np.asarray(DISTANCES - np.sum(ROWS * apart, axis=1))
 
