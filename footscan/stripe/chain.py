@@ -107,6 +107,18 @@ def neighbours(profiles: NDArray[np.float64], gap: float, cells: Cells) -> NDArr
     Returns
     -------
     (N, 2) int32, point numbers in the columns `BEHIND` and `AHEAD`; `NONE` at the ends of the stripe.
+
+    Examples
+    --------
+    Three points in a row, with normals along j:
+
+    >>> from footscan.stripe.profile import COLUMNS
+    >>> profiles = np.zeros((3, COLUMNS))
+    >>> profiles[:, I], profiles[:, J], profiles[:, NORMAL_J] = [4.0, 6.0, 8.0], 5.0, 1.0
+    >>> print(neighbours(profiles, 3.0, place(profiles, 16, 16)))
+    [[ 1 -1]
+     [ 2  0]
+     [-1  1]]
     """
     heads, others = cells
     nearest = np.full((len(profiles), 2), NONE, np.int32)
@@ -190,6 +202,15 @@ def pieces_of(profiles: NDArray[np.float64], gap: float, cells: Cells) -> tuple[
     -------
     piece : (N,) int32, the number of each point's piece, from 0.
     count : the number of pieces.
+
+    Examples
+    --------
+    >>> from footscan.stripe.profile import COLUMNS
+    >>> profiles = np.zeros((3, COLUMNS))
+    >>> profiles[:, I], profiles[:, J] = [4.0, 6.0, 14.0], 5.0
+    >>> piece, count = pieces_of(profiles, 3.0, place(profiles, 16, 16))
+    >>> print(piece, count)
+    [0 0 1] 2
     """
     heads, others = cells
     piece = np.full(len(profiles), NONE, np.int32)

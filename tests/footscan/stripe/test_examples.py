@@ -6,7 +6,9 @@ from importlib import import_module
 import pytest
 
 
-@pytest.mark.parametrize("module", ["centre", "clutter", "extract", "film", "limits", "redness", "ridge", "smoothing"])
+@pytest.mark.parametrize(
+    "module", ["centre", "chain", "clutter", "extract", "film", "limits", "redness", "ridge", "smoothing"]
+)
 def test_examples(module: str) -> None:
     results = doctest.testmod(import_module(f"footscan.stripe.{module}"))
     assert results.attempted
