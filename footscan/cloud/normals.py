@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 CELLS_A_RADIUS = 2
-"""Cells a radius: the side of the cells in which neighbours are searched. It decides on time, not on results."""
+"""Cells a radius: the side of the cells in which neighbours are searched. Chosen for speed."""
 FEWEST = 6
 """Points from which a plane is fitted, the point itself included; with fewer the radius is doubled. Chosen by hand."""
 LEAST_BREADTH = 0.15

@@ -33,7 +33,9 @@ class Removed:
 def remove_outliers(
     points: NDArray[np.void], views: Mapping[int, View], parameters: OutlierParameters
 ) -> tuple[NDArray[np.void], Removed]:
-    """Drop the points that cannot belong to the foot, in this order:
+    """Drop the points that cannot belong to the foot.
+
+    They are dropped in this order:
 
     - points outside the control volume ("volume"), and points that the calibration does not support ("extrapolated");
     - the foot's mirror image and the glass itself ("glass"), then static objects ("clutter"): they would confirm each

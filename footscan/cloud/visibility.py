@@ -20,9 +20,9 @@ Ints = NDArray[np.int32]
 UNKNOWN, CONFIRMED, DENIED = range(3)
 """The answers of the other cameras for a point."""
 FACING, AS_WELL, GRAZING = 0.4, 0.7, 0.15
-"""Least cosine between a surface's normal and the direction to a camera from which the camera is expected to see the
-stripe: the first number, or, if the camera that saw it has a smaller cosine, the second number times that cosine, but
-never less than the third. Chosen by hand."""
+"""Least cosine between a surface's normal and the direction to a camera at which the camera is expected to see the
+stripe: the first number, or the second times the cosine of the camera that saw it if that is less, but never less than
+the third. Chosen by hand."""
 FLAT = 0.3
 """Variance across a plane, relative to that along it, from which the plane has no normal. Chosen by hand."""
 OUTLINE_MM = 3.0

@@ -8,7 +8,7 @@ from schemas.fusion import Kind
 Floats = NDArray[np.float64]
 
 SCALE_MM = 50.0
-"""Distance from the centre at which each term moves a point by about its coefficient: half the width of a foot."""
+"""Distance from the centre at which each term moves a point by about its coefficient. Chosen by hand."""
 TERMS: dict[Kind, int] = {"none": 0, "rigid": 3, "affine": 6, "quadratic": 12}
 """Number of terms of each kind of motion; a kind contains the terms of the kinds before it."""
 MOST_TERMS = TERMS["quadratic"]
