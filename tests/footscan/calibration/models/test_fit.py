@@ -154,15 +154,15 @@ def test_covariance_is_the_scatter_of_repeats(kind: str, robust: bool, pinhole: 
     exact = stripe(world, pixels, 3, per_block=len(pixels) // 60)
     if kind == "points":
         exact = of_points(pixels, world, np.arange(60))
-    seen, told = [], []
+    seen, predicted = [], []
     for _ in range(300):
         noise = generator.normal(0, 0.1, exact.independent)
         repeat = replace(exact, offsets=exact.offsets + noise[exact.block])
         found = fit(model, repeat, robust=robust)
         seen.append(model.world(found.parameters, PROBES))
-        told.append(covariance_at(found, PROBES))
+        predicted.append(covariance_at(found, PROBES))
     scatter = np.std(seen, axis=0)
-    expected = np.sqrt(np.diagonal(np.mean(told, axis=0), axis1=1, axis2=2))
+    expected = np.sqrt(np.diagonal(np.mean(predicted, axis=0), axis1=1, axis2=2))
     np.testing.assert_allclose(scatter / expected, 1.0, atol=0.15)
 
 

@@ -185,8 +185,8 @@ def test_many_groups_are_ten_folds(pinhole: Any) -> None:
 def test_nothing_can_be_held_out_of_one_group(pinhole: Any) -> None:
     pixels = image(20)
     observations = clicked(pinhole().world(pixels), pixels, 0.1)
-    one = replace(observations, group=np.zeros(40, np.intp))
-    found, trials = fares(one)
+    one_group = replace(observations, group=np.zeros(40, np.intp))
+    found, trials = fares(one_group)
     assert found is None
     assert {trial.held_out_rms_mm for trial in trials.values()} == {None}
     assert trials["homography"].rms_mm is not None
