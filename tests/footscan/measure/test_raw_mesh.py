@@ -39,14 +39,14 @@ def test_what_may_be_inches_or_a_child_in_centimetres_must_be_stated() -> None:
         taken(foot.vertices * 12.3 / 262, foot.faces)
     mesh = taken(foot.vertices * 12.3 / 262, foot.faces, unit="cm")
     assert foot_frame(mesh.vertices, mesh.faces, "right").length == pytest.approx(123.0, abs=0.2)
-    assert "cm, given" in mesh.notes[0]
+    assert "cm, as stated" in mesh.notes[0]
 
 
 def test_a_surface_that_looks_inward_is_turned_over() -> None:
     foot = known_foot()
     mesh = taken(foot.vertices, foot.faces[:, ::-1])
     np.testing.assert_array_equal(mesh.faces, taken(foot.vertices, foot.faces).faces)
-    assert mesh.notes == ("the surface looked inward and was turned over",)
+    assert mesh.notes == ("the surface faced inward and was turned over",)
 
 
 def test_open_meshes_are_accepted() -> None:
