@@ -14,7 +14,7 @@ from footscan.measure.landmarks.dorsal import CORNER_MM
 from footscan.measure.landmarks.errors import saddle_gradient, summit_gradient
 from footscan.measure.landmarks.sides import FULL_SIZE_MM
 from footscan.measure.outline import Outline, Plane, smooth_outline
-from footscan.measure.quantity import NotThere, Quantity
+from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.measure.roughness import roughness
 from footscan.mesh.sections import Cuttable, Loop, cut, cuttable
 from footscan.mesh.topology import vertex_normals
@@ -76,13 +76,13 @@ class FootSurface:
 
         Raises
         ------
-        NotThere
+        NotMeasurable
             There is no section, or it has a gap.
         """
         x = 0.5 * self.length_mm
         near = self.mesh.vertices[np.abs(self.mesh.vertices[:, 0] - x) < MIDFOOT_SHARE * self.length_mm]
         if not len(near):
-            raise NotThere("the surface has no section here")
+            raise NotMeasurable("the surface has no section here")
         inside = np.array([x, *(near[:, 1:].min(axis=0) + near[:, 1:].max(axis=0)) / 2])
         return self.outline(Plane.across(inside, ACROSS), inside)
 
@@ -99,12 +99,12 @@ class FootSurface:
 
         Raises
         ------
-        NotThere
+        NotMeasurable
             The landmark was not found.
         """
         if name not in self._places:
             if name not in self.landmarks:
-                raise NotThere(f"{name.replace('_', ' ')} was not found")
+                raise NotMeasurable(f"{name.replace('_', ' ')} was not found")
             landmark = self.landmarks[name]
             doubt = f"{name.replace('_', ' ')} by a fallback" if landmark.method == "fallback" else None
             gradient = self._landmark_gradient(name, landmark)
@@ -143,16 +143,16 @@ class FootSurface:
 
         Raises
         ------
-        NotThere
+        NotMeasurable
             There is no loop, or it is open by CLOSED_GAP_MM or more.
         """
         key = tuple(np.concatenate([plane.point, plane.normal, seed]).tolist())
         if key not in self._outlines:
             loop = nearest_loop(self.sections(plane), plane, seed)
             if loop is None:
-                raise NotThere("the surface has no section here")
+                raise NotMeasurable("the surface has no section here")
             if loop.gap >= CLOSED_GAP_MM:
-                raise NotThere(f"the surface has a gap of {loop.gap:.0f} mm here")
+                raise NotMeasurable(f"the surface has a gap of {loop.gap:.0f} mm here")
             self._outlines[key] = self.smooth(loop, plane)
         return self._outlines[key]
 

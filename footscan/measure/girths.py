@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from footscan.measure.foot_surface import ACROSS, UP, FootSurface, Place
 from footscan.measure.hull import hull_corners
 from footscan.measure.outline import Outline, Plane
-from footscan.measure.quantity import NotThere, Quantity, combined
+from footscan.measure.quantity import NotMeasurable, Quantity, combined
 
 Floats = NDArray[np.float64]
 
@@ -125,7 +125,7 @@ def ankle_girth(foot: FootSurface) -> Quantity:
     medial, lateral = foot.place("medial_malleolus"), foot.place("lateral_malleolus")
     low, high = medial.z.value + ANKLE_CLEARANCE_MM, foot.top - CUT_MARGIN_MM
     if high - low < 2 * ANKLE_STEP_MM:
-        raise NotThere(f"the surface ends {foot.top - medial.z.value:.0f} mm above the medial malleolus")
+        raise NotMeasurable(f"the surface ends {foot.top - medial.z.value:.0f} mm above the medial malleolus")
     inside = (medial.point + lateral.point) / 2
 
     def level(height: Floats) -> tuple[Plane, Floats]:
@@ -153,7 +153,7 @@ def girth(foot: FootSurface, cut: Cut, stations: list[Quantity]) -> Quantity:
 
     Raises
     ------
-    NotThere
+    NotMeasurable
         The surface has no section there, or a gap.
     """
     at = np.array([station.value for station in stations])
@@ -180,12 +180,12 @@ def tape(outline: Outline) -> Tape:
 
     Raises
     ------
-    NotThere
+    NotMeasurable
         The outline encloses no area.
     """
     corners = hull_corners(outline.points)
     if len(corners) < 3:
-        raise NotThere("the section of the surface holds no area")
+        raise NotMeasurable("the section of the surface holds no area")
     around = outline.points[corners]
     ahead = around[[*range(1, len(around)), 0]] - around
     length = np.hypot(ahead[:, 0], ahead[:, 1])

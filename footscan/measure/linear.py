@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from footscan.measure.foot_surface import ACROSS, UP, FootSurface, Place, nearest_loop
 from footscan.measure.girths import upright_plane
 from footscan.measure.outline import Outline, Plane
-from footscan.measure.quantity import NotThere, Quantity, combined
+from footscan.measure.quantity import NotMeasurable, Quantity, combined
 
 Floats = NDArray[np.float64]
 
@@ -148,7 +148,7 @@ def toe_height(foot: FootSurface) -> Quantity:
         plane = Plane.across(at, ACROSS)
         loop = nearest_loop(foot.sections(plane), plane, at, LEAST_TOE_MM)
         if loop is None or loop.gap > 0:
-            raise NotThere("the surface has a gap at the big toe")
+            raise NotMeasurable("the surface has a gap at the big toe")
         outline = foot.smooth(loop, plane)
         middle = np.abs(outline.points[:, 0]) <= HALLUX_HALF_BREADTH_MM  # merged toes are broader
         return farthest(foot, outline, 1, 1.0, at[2], among=middle)
@@ -169,7 +169,7 @@ def arch_height(foot: FootSurface) -> Quantity:
     x, z = plane.solid(outline.points)[:, 0] / foot.length_mm, outline.points[:, 1] + at[2]
     window = (x >= ARCH_WINDOW[0]) & (x <= ARCH_WINDOW[1]) & (z < inside[2])
     if not window.any():
-        raise NotThere("the surface has no sole here")
+        raise NotMeasurable("the surface has no sole here")
     return farthest(foot, outline, 1, 1.0, at[2], among=window)
 
 
@@ -314,7 +314,7 @@ def _toe_angle(foot: FootSurface, heel: str, ball: str, tip: str, medial: float)
     is_toe = (x > end - TOE_REGION * foot.length_mm) & (x > ball_place.x.value + TOE_FROM_BALL_MM)
     toe = np.flatnonzero(is_toe & (z < TOE_HEIGHT_MM))
     if not len(toe):
-        raise NotThere("the surface has no toe here")
+        raise NotMeasurable("the surface has no toe here")
     along, across = x[toe] - ball_place.x.value, medial * (y[toe] - ball_place.y.value)
     steepness = across / along
     touching = int(np.argmax(steepness))

@@ -12,7 +12,7 @@ from footscan.measure import girths, linear, plantar, solid
 from footscan.measure.foot_landmarks import Landmark, find_landmarks
 from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame import FootFrame, foot_frame
-from footscan.measure.quantity import NotThere, Quantity
+from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.mesh.rigid_transform import apply
 from footscan.rows import distinct_rows
 from schemas.base.model import Side
@@ -277,7 +277,7 @@ def _measure(
 ) -> Measure:
     try:
         quantity = definition.compute(surface)
-    except NotThere as missing:
+    except NotMeasurable as missing:
         return Measure(
             value=None, unit=definition.unit, status="incomplete", definition=definition.text, note=str(missing)
         )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from footscan.measure.foot_surface import CLOSED_GAP_MM, UP, FootSurface
 from footscan.measure.hull import hull_corners
 from footscan.measure.outline import Outline, Plane
-from footscan.measure.quantity import NotThere, Quantity, combined
+from footscan.measure.quantity import NotMeasurable, Quantity, combined
 
 Floats = NDArray[np.float64]
 
@@ -52,13 +52,13 @@ def footprint(foot: FootSurface) -> Print:
 
     Raises
     ------
-    NotThere
+    NotMeasurable
         The surface has a gap at the sole, or does not reach the floor.
     """
     plane = Plane.across(np.array([0.0, 0.0, CONTACT_MM]), UP)
     loops = foot.sections(plane)
     if any(loop.gap >= CLOSED_GAP_MM for loop in loops):
-        raise NotThere("the surface has a gap at the sole")
+        raise NotMeasurable("the surface has a gap at the sole")
     outlines = [foot.smooth(loop, plane) for loop in loops]
     ball = _BallLine(foot)
     outlines = [
@@ -67,7 +67,7 @@ def footprint(foot: FootSurface) -> Print:
         if abs(_area(outline.points)) >= LEAST_MM2 and ball.ahead(outline.points).min() < TOES * foot.length_mm
     ]
     if not outlines:
-        raise NotThere("the foot does not reach the floor")
+        raise NotMeasurable("the foot does not reach the floor")
     points = np.concatenate([outline.points for outline in outlines])
     merged = bool(np.any(ball.ahead(points) > MERGED * foot.length_mm))
     limit = TOES * foot.length_mm if merged else np.inf
@@ -120,7 +120,7 @@ def clarke_angle(foot: FootSurface) -> Quantity:
     largest = max(contact.outlines, key=lambda outline: abs(_area(outline.points)))
     points, thirds = largest.points, contact.rear + (contact.front - contact.rear) * np.array([1 / 3, 2 / 3])
     if not (points[:, 0].min() < thirds[0] and points[:, 0].max() > thirds[1]):
-        raise NotThere("the print is in two parts: its medial border does not run from heel to ball")
+        raise NotMeasurable("the print is in two parts: its medial border does not run from heel to ball")
     corners = hull_corners(points)
     start, end = points[corners], points[np.roll(corners, -1)]
     middle = np.mean(thirds)
@@ -135,13 +135,13 @@ def clarke_angle(foot: FootSurface) -> Quantity:
     between = (points[:, 0] > points[heel, 0]) & (points[:, 0] < points[ball, 0])
     between &= points[:, 1] > (points[[heel, ball], 1].min() + points[:, 1].min()) / 2  # not the lateral border
     if not between.any():
-        raise NotThere("the print has no arch")
+        raise NotMeasurable("the print has no arch")
     place = along - along[np.argmax(np.where(between, depth, -np.inf))]
     near = np.flatnonzero(between & (np.abs(place) <= APEX_MM))
     weights = np.linalg.pinv(np.column_stack([place[near] ** k for k in range(3)]))
     level, slope, bend = weights @ depth[near]
     if len(near) < LEAST_POINTS or bend >= 0:
-        raise NotThere("the print has no arch")
+        raise NotMeasurable("the print has no arch")
     apex = float(np.clip(-slope / (2 * bend), -APEX_MM, APEX_MM))
     run, rise = float((along - place)[0]) + apex, float(level + apex * (slope + apex * bend))
     factor = np.rad2deg(1.0 / (run**2 + rise**2))

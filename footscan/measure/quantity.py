@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-class NotThere(Exception):
+class NotMeasurable(Exception):
     """Raised where a measure cannot be taken; the message names what is missing and becomes the note of the measure."""
 
 

@@ -8,7 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from footscan.compiled import compiled
 from footscan.measure.foot_surface import CLOSED_GAP_MM, FootSurface
 from footscan.measure.girths import EXCESS_POWER
-from footscan.measure.quantity import NotThere, Quantity, combined
+from footscan.measure.quantity import NotMeasurable, Quantity, combined
 from footscan.mesh.sections import Cuttable
 
 Floats = NDArray[np.float64]
@@ -100,7 +100,7 @@ def _thirds(foot: FootSurface, areas: Floats) -> Floats:
 
 
 def _check_closed(foot: FootSurface, level: float) -> None:
-    """Raises `NotThere` if the surface has a hole below `level` as wide as `CLOSED_GAP_MM`."""
+    """Raises `NotMeasurable` if the surface has a hole below `level` as wide as `CLOSED_GAP_MM`."""
     faces, slots = np.nonzero(foot.mesh.neighbours < 0)
     first, second = foot.mesh.faces[faces, slots], foot.mesh.faces[faces, (slots + 1) % 3]
     vertices = foot.mesh.vertices
@@ -114,4 +114,4 @@ def _check_closed(foot: FootSurface, level: float) -> None:
     count, hole = connected_components(graph, directed=False)
     widest = max(float(np.linalg.norm(np.ptp(vertices[used[hole == k]], axis=0))) for k in range(count))
     if widest >= CLOSED_GAP_MM:
-        raise NotThere(f"the surface has a hole of {widest:.0f} mm")
+        raise NotMeasurable(f"the surface has a hole of {widest:.0f} mm")

@@ -6,7 +6,7 @@ from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame import FootFrame
 from footscan.measure.girths import girth, tape
 from footscan.measure.outline import Plane
-from footscan.measure.quantity import NotThere, Quantity
+from footscan.measure.quantity import NotMeasurable, Quantity
 
 ALONG = np.array([1.0, 0.0, 0.0])
 
@@ -124,7 +124,7 @@ def test_narrow_gaps_are_closed_and_wide_ones_told(width: float, problem: str | 
     if problem is None:
         assert around(surface(mesh)).value == pytest.approx(2 * np.pi * 40, abs=0.1)
     else:
-        with pytest.raises(NotThere, match=problem):
+        with pytest.raises(NotMeasurable, match=problem):
             around(surface(mesh))
 
 
@@ -136,7 +136,7 @@ def test_the_loop_around_the_seed_is_taken() -> None:
 
 
 def test_short_loops_are_no_section_of_a_foot() -> None:
-    with pytest.raises(NotThere, match="no section"):
+    with pytest.raises(NotMeasurable, match="no section"):
         around(surface(prism(ellipse(9, 9, 60))))
 
 
