@@ -107,32 +107,32 @@ def find_landmarks(foot: FootFrame, manual: Mapping[str, Point] | None = None) -
     }
     if unknown := set(marked) - set(LANDMARKS):
         raise KeyError(f"{sorted(unknown)[0]!r} is no landmark")
-    found = _of_outline(foot) | marked
-    ball = [found.get(name) for name in ("metatarsale_tibiale", "metatarsale_fibulare")]
+    landmarks = _of_outline(foot) | marked
+    ball = [landmarks.get(name) for name in ("metatarsale_tibiale", "metatarsale_fibulare")]
     if ball[0] is not None and ball[1] is not None and ball[0].point[1] <= ball[1].point[1]:
         raise Finding("metatarsale_tibiale does not lie on the medial side of metatarsale_fibulare: exchanged?")
-    found |= _of_toes(foot, found) | marked
-    found |= _of_back(foot, found) | _of_leg(foot) | _under_skin(foot) | marked
-    return {name: found[name] for name in LANDMARKS if name in found}
+    landmarks |= _of_toes(foot, landmarks) | marked
+    landmarks |= _of_back(foot, landmarks) | _of_leg(foot) | _under_skin(foot) | marked
+    return {name: landmarks[name] for name in LANDMARKS if name in landmarks}
 
 
 def _of_outline(foot: FootFrame) -> dict[str, Landmark]:
-    found: dict[str, Landmark | None] = {
+    landmarks: dict[str, Landmark | None] = {
         "pternion": _outermost(pternion(foot.samples, foot.length, foot.low), 0.95),
         "metatarsale_tibiale": _outermost(metatarsale_tibiale(foot.samples, foot.length), 0.9),
         "metatarsale_fibulare": _outermost(metatarsale_fibulare(foot.samples, foot.length), 0.9),
     }
     for name, find in (("heel_medial", heel_medial), ("heel_lateral", heel_lateral)):
         side = find(foot.samples, foot.length)  # the broadest place of its window may lie at the border
-        found[name] = None if side is None else Landmark(side.point, "geometric", _trust(0.9, side), cap=side.cap)
+        landmarks[name] = None if side is None else Landmark(side.point, "geometric", _trust(0.9, side), cap=side.cap)
     landing = landing_point(foot.vertices, foot.faces, foot.length)
     if landing is not None:
-        found["landing_point"] = Landmark(landing, "geometric", 0.9 if foot.floor != "resting" else 0.5)
-    return {name: landmark for name, landmark in found.items() if landmark is not None}
+        landmarks["landing_point"] = Landmark(landing, "geometric", 0.9 if foot.floor != "resting" else 0.5)
+    return {name: landmark for name, landmark in landmarks.items() if landmark is not None}
 
 
-def _of_toes(foot: FootFrame, found: Mapping[str, Landmark]) -> dict[str, Landmark]:
-    sides = [found[name].point[1] for name in ("metatarsale_tibiale", "metatarsale_fibulare") if name in found]
+def _of_toes(foot: FootFrame, landmarks: Mapping[str, Landmark]) -> dict[str, Landmark]:
+    sides = [landmarks[name].point[1] for name in ("metatarsale_tibiale", "metatarsale_fibulare") if name in landmarks]
     if len(sides) < 2:
         return {}
     points = forefoot_points(foot.vertices, foot.faces, foot.length, foot.low)
@@ -145,27 +145,27 @@ def _of_toes(foot: FootFrame, found: Mapping[str, Landmark]) -> dict[str, Landma
     }
 
 
-def _of_back(foot: FootFrame, found: Mapping[str, Landmark]) -> dict[str, Landmark]:
-    landmarks = {}
+def _of_back(foot: FootFrame, landmarks: Mapping[str, Landmark]) -> dict[str, Landmark]:
+    back = {}
     junction = junction_point(foot.vertices, foot.faces, foot.length, _top(foot))
     if junction is not None:
         point, cap = junction
-        landmarks["junction_point"] = Landmark(point, "geometric", 0.8, cap=cap)
+        back["junction_point"] = Landmark(point, "geometric", 0.8, cap=cap)
     instep = instep_point(foot.samples, foot.length)
     if instep is not None:
         point, is_bend = instep
         note = None if is_bend else "the back of the foot has no bend here: half way along the foot"
         method: Method = "geometric" if is_bend else "fallback"
-        landmarks["instep_point"] = Landmark(point, method, 0.5 if is_bend else 0.3, note)
-    if "metatarsale_tibiale" in found and "metatarsale_fibulare" in found:
-        tibiale, fibulare = found["metatarsale_tibiale"].point, found["metatarsale_fibulare"].point
+        back["instep_point"] = Landmark(point, method, 0.5 if is_bend else 0.3, note)
+    if "metatarsale_tibiale" in landmarks and "metatarsale_fibulare" in landmarks:
+        tibiale, fibulare = landmarks["metatarsale_tibiale"].point, landmarks["metatarsale_fibulare"].point
         for name, share in (("first", FIRST_HEAD), ("second", SECOND_HEAD)):
             above = metatarsal_top(foot.samples, tibiale, fibulare, share)
             if above is not None:
-                landmarks[f"{name}_metatarsal_head_top"] = Landmark(
+                back[f"{name}_metatarsal_head_top"] = Landmark(
                     above, "fallback", 0.5, f"{share:.0%} of the ball's breadth from its medial side"
                 )
-    return landmarks
+    return back
 
 
 def _of_leg(foot: FootFrame) -> dict[str, Landmark]:

@@ -1,4 +1,4 @@
-"""Where the surface ends along the travel: at heel and toes, which no stripe meets squarely."""
+"""The ends of the surface along the travel, at heel and toes, which no stripe meets squarely."""
 
 from dataclasses import dataclass
 

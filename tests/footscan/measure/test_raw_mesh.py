@@ -120,9 +120,9 @@ def test_no_foot_is_a_finding(shape: Shape, problem: str) -> None:
         mesh = taken(*shape)
         foot_frame(mesh.vertices, mesh.faces, "unknown")
 
-    with pytest.raises(Finding, match=problem) as told:
+    with pytest.raises(Finding, match=problem) as caught:
         measured()
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_coordinates_that_are_no_numbers_are_a_finding() -> None:
