@@ -60,7 +60,7 @@ def doubts(first: Foot, second: Foot) -> list[str]:
     reasons = [f"{foot.source}: side unknown, assumed as stated" for foot in feet if foot.side == "unknown"]
     reasons += [f"{foot.source}: {foot.side_note}" for foot in feet if foot.side_note]
     if not (first.patient and second.patient):
-        reasons.append("patient not known of both, assumed to be the same")
+        reasons.append("patient unknown for one or both, assumed to be the same")
     elif first.patient != second.patient:
         reasons.append(f"of two patients: {first.patient} and {second.patient}")
     if first.axis != second.axis:

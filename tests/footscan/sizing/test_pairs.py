@@ -119,4 +119,4 @@ def test_feet_of_two_people_are_refused(make_foot: MakeFoot, table: SizeTable) -
     assert compare_pair(left, right, table).notes == ["of two patients: P1 and P2"]
     unknown = make_foot("right")
     refuse_other_patient(left, unknown)
-    assert compare_pair(left, unknown, table).notes == ["patient not known of both, assumed to be the same"]
+    assert compare_pair(left, unknown, table).notes == ["patient unknown for one or both, assumed to be the same"]
