@@ -1,6 +1,5 @@
 """`footscan cache`: what lies in the store, what of it can go, and whether it is sound."""
 
-import socket
 import time
 from collections.abc import Collection, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -9,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.cli.archive.leases import TakeOver, lease_in_words, lease_json, take_over_leases
 from pipelines.cli.archive.run import WORKFLOW, WorkflowFile
-from pipelines.cli.archive.why import json_time, local_time, plan_of_scan
+from pipelines.cli.archive.why import plan_of_scan
 from pipelines.cli.terminal.output import AsJson, message, print_json, print_line, print_table
 from schemas.base.errors import Fault, RefusedInput, one_line
 
 if TYPE_CHECKING:
     from pipelines.engine.audit import Difference
     from pipelines.engine.garbage_collection import Contents, Garbage
-    from pipelines.engine.store.lease import Lease
     from pipelines.engine.store.store import Store
 
 cache = typer.Typer(help="Inspect, verify and clean the store of results.", no_args_is_help=True)
@@ -27,9 +26,6 @@ HOUR_S = 3600.0
 Place = Annotated[str | None, typer.Option("--cache", help="Result store (folder or URL), instead of a workflow.")]
 OfWorkflow = Annotated[Path | None, typer.Option("--workflow", help="The workflow; default: workflow.yaml.")]
 ScanName = Annotated[str, typer.Argument(help="Folder of a scan, or patient/scan.")]
-TakeOver = Annotated[
-    bool, typer.Option("--take-over", help="Remove the leases of dead runs on other machines, or with a wrong clock.")
-]
 OlderThan = Annotated[float, typer.Option(min=0, help="Smallest age in hours of what is deleted.")]
 
 
@@ -95,8 +91,8 @@ def gc(
             "deleted": len(deleted),
             "deleted_bytes": _bytes(contents, deleted),
             "vanished": vanished,
-            "runs": [_run_json(one) for one in live],
-            "taken_over": [_run_json(one) for one in taken_over],
+            "runs": [lease_json(one) for one in live],
+            "taken_over": [lease_json(one) for one in taken_over],
         }
         print_json({"store": _place(store), **_garbage_json(contents, garbage), **facts})
     elif delete:
@@ -104,7 +100,7 @@ def gc(
     elif garbage.names:
         print_line("nothing was deleted: --delete does it")
     for one in live:
-        message(f"footscan: {told_lease(one)}; nothing is deleted while it is")
+        message(f"footscan: {lease_in_words(one)}; nothing is deleted while it is")
     return 1 if delete and live else 0
 
 
@@ -365,38 +361,3 @@ def _garbage_json(contents: "Contents", garbage: "Garbage") -> dict[str, Any]:
         "young_files": len(garbage.young),
         "young_bytes": _bytes(contents, garbage.young),
     }
-
-
-def _run_json(one: "Lease") -> dict[str, Any]:
-    from pipelines.engine.store.lease import is_ahead
-
-    started, heartbeat = json_time(one.started), json_time(one.heartbeat)
-    times = {"started": started, "heartbeat": heartbeat, "ahead": is_ahead(one)}
-    return {"host": one.host, "process": one.process, **times}
-
-
-def take_over_leases(store: "Store") -> "list[Lease]":
-    """Remove all leases except those of running processes of this machine, and print them."""
-    from pipelines.engine.store.lease import take_over
-
-    taken = take_over(store)
-    for one in taken:
-        message(f"footscan: taken over: {one.name} of {_holder(one)}")
-    return taken
-
-
-def told_lease(one: "Lease") -> str:
-    """Holder and start of a lease, and what to do if it is not that of a run."""
-    from pipelines.engine.store.lease import is_ahead
-
-    if one.host is None:
-        return f"{one.name}: damaged, so a run may be under way ('footscan cache verify' removes it)"
-    if is_ahead(one):
-        when = f"is dated in the future, {local_time(one.heartbeat)}: the clock there is wrong, or the one here"
-        return f"{_holder(one)} {when} (if no run is under way there, --take-over removes {one.name})"
-    hint = "" if one.host == socket.gethostname() else " (if that host is gone, --take-over)"
-    return f"{_holder(one)} is running since {local_time(one.started)}{hint}"
-
-
-def _holder(one: "Lease") -> str:
-    return "an unknown process" if one.host is None else one_line(f"process {one.process} on {one.host}")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.archive.cache import TakeOver, take_over_leases, told_lease
+from pipelines.cli.archive.leases import TakeOver, lease_in_words, take_over_leases
 from pipelines.cli.archive.run import WORKFLOW
 from pipelines.cli.terminal.output import AsJson, message, print_json, print_line
 from schemas.base.errors import RefusedInput, one_line
@@ -67,7 +67,7 @@ def forget(
     elif is_done:
         print_line(f"{subject.name}: erased; neither the name nor a digest is found in archive, results and store")
     for one in live:
-        message(f"footscan: {told_lease(one)}; nothing is erased while it is")
+        message(f"footscan: {lease_in_words(one)}; nothing is erased while it is")
     for place in found.remains:
         message(one_line(f"footscan: {place}: still bears {subject.name}, or is a copy of theirs: erase it by hand"))
     if not as_json:
