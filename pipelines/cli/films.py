@@ -55,7 +55,8 @@ def simulate_scan(
     laser_off: Annotated[bool, typer.Option("--laser-off", help="Also film backgrounds, with the laser off.")] = False,
 ) -> None:
     """Film a mesh that stands on the glass, centred on the travel."""
-    from footscan.virtual.filming.record import record_scan
+    from footscan.virtual.filming.record import ScanExtras, ScanName, record_scan
+    from footscan.virtual.optics.scene import Mesh
     from footscan.virtual.stage.standing import BLOCK_TURN_DEG, stand_in_the_middle
     from pipelines.cli.terminal.progress import frame_progress
     from pipelines.virtual_objects import virtual_object
@@ -70,16 +71,11 @@ def simulate_scan(
     vertices = stand_in_the_middle(vertices, settings, turn)
     with frame_progress("filming") as progress:
         record_scan(
-            vertices,
-            faces,
+            Mesh(vertices, faces),
             out,
-            patient=pseudonym(patient, "--patient"),
-            scan=pseudonym(scan or out.resolve().name, "--scan"),
-            side=known_side,
-            settings=settings,
-            calibration=calibration,
-            stripe_truth=stripe_truth,
-            laser_off=laser_off,
+            ScanName(pseudonym(patient, "--patient"), pseudonym(scan or out.resolve().name, "--scan"), known_side),
+            settings,
+            extras=ScanExtras(calibration, stripe_truth=stripe_truth, laser_off=laser_off),
             progress=progress,
         )
     message(f"{out}: filmed {settings.frames} frames by each of 8 cameras")

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.virtual.filming.record import record_scan
+from footscan.virtual.filming.record import ScanExtras, ScanName, record_scan
 from footscan.virtual.foot.foot import make_foot
+from footscan.virtual.optics.scene import Mesh
 from footscan.virtual.stage.standing import stand_in_the_middle
 from pipelines.engine.files.digest import sha256
 from schemas.parameters.virtual_scan import VirtualScan
@@ -24,14 +25,11 @@ def run(inputs: Mapping[str, bytes], parameters: VirtualScan, places: Mapping[st
     folder, settings = places["folder"], parameters.settings
     foot = make_foot(side=parameters.side)
     record_scan(
-        stand_in_the_middle(foot.vertices, settings),
-        foot.faces.astype(np.int64),
+        Mesh(stand_in_the_middle(foot.vertices, settings), foot.faces.astype(np.int64)),
         folder,
-        patient=PATIENT,
-        scan=folder.name,
-        side=parameters.side,
-        settings=settings,
-        laser_off=parameters.laser_off,
+        ScanName(PATIENT, folder.name, parameters.side),
+        settings,
+        extras=ScanExtras(laser_off=parameters.laser_off),
     )
     films = {film.name: sha256(film.read_bytes()) for film in sorted(folder.glob("*.avi"))}
     return (json.dumps({"known": foot.measures, "films": films}, indent=2, sort_keys=True) + "\n").encode()

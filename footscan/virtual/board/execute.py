@@ -12,7 +12,8 @@ from footscan.virtual.board.motion import Light, Move
 from footscan.virtual.board.rails import Triple
 
 SEARCH, LOCATE = 1.5, 5.0
-"""Homing goes this often the largest travel for a switch, and this often the pull-off to find it again."""
+"""Homing searches a switch over 1.5 times the largest travel, and locates it again over 5 times the pull-off (Grbl's
+HOMING_AXIS_SEARCH_SCALAR and HOMING_AXIS_LOCATE_SCALAR)."""
 
 
 def execute_gcode(board: Machine, line: str) -> Work:

@@ -1,6 +1,6 @@
 """The virtual board's firmware: states, realtime commands and the pump of lines, by the public protocol of Grbl 1.1.
 
-It knows no thread and no port: bytes go in by `receive`, time by `tick`, text comes out by `say`.
+It uses no thread and no port: bytes go in by `receive`, time by `tick`, text comes out by `say`.
 """
 
 from collections.abc import Callable
@@ -15,15 +15,17 @@ from footscan.virtual.board.system import execute_system
 
 RX_BYTES = 128
 PLANNED_MOVES = 15
+"""Sizes of the receive buffer and of the planner, as Grbl 1.1 reports them (`Bf:15,128`)."""
 RESET, QUERY, START, HOLD, DOOR, JOG_CANCEL = 0x18, ord("?"), ord("~"), ord("!"), 0x84, 0x85
 FEED_STEPS = {0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}
 RAPIDS = {0x95: 100, 0x96: 50, 0x97: 25}
 LIGHT_STEPS = {0x9A: 10, 0x9B: -10, 0x9C: 1, 0x9D: -1}
 FEED_RESET, LIGHT_RESET, LIGHT_STOP = 0x90, 0x99, 0x9E
+"""Realtime commands of Grbl 1.1; the steps are changes of the overrides in percent."""
 CRITICAL = (1, 2)
-"""Alarms after which nothing but a reset is heard."""
+"""Alarms after which the firmware accepts only a reset."""
 ALARM_SECONDS = 0.5
-"""How long the firmware waits behind an alarm, for the message to leave."""
+"""Pause of the firmware after an alarm, in which the message is sent."""
 
 
 @dataclass

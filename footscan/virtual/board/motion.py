@@ -16,7 +16,7 @@ SAME_WAY = 0.999_999
 """Cosine of the angle between two moves that are passed through without slowing down."""
 TINY = 1e-9
 KEPT = 20_000
-"""Pieces of the past that are kept: far more than an hour of scanning."""
+"""Pieces of past motion that are kept: a bound of memory, far more than an hour of scanning."""
 
 Watch = Literal["none", "limits", "homing"]
 
