@@ -1,4 +1,4 @@
-"""The poses of the reference object, where every camera recognises it."""
+"""The poses of the reference object, refused unless every camera recognises it."""
 
 from collections.abc import Mapping
 from pathlib import Path

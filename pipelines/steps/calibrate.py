@@ -1,4 +1,4 @@
-"""The calibrations of all cameras to one calibration file, with how well each two of them agree."""
+"""The calibrations of all cameras to one calibration file, with the agreement of each pair of cameras."""
 
 import json
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     reference = ReferenceObject.model_validate_json(inputs["reference"])
     places_doubted = doubts_about(reference.profile_mm, reference.placements_mm)
     doubts = [f"{about['reference']}: {doubt}" for doubt in places_doubted]
-    doubts += [doubt for known in seen_of(arrays).recognised.values() for doubt in known.doubts]
+    doubts += [doubt for camera in seen_of(arrays).recognised.values() for doubt in camera.doubts]
     sources = [Source(name=name, sha256=digests[name]) for name in about["files"]]
     calibration = assemble(views, sources, about["software"], doubts)
     return (calibration.model_dump_json(indent=2) + "\n").encode()

@@ -1,4 +1,4 @@
-"""The poses of the reference object, where every camera sees it from the side on which it stands."""
+"""The poses of the reference object, refused unless every camera sees it from the side on which the camera stands."""
 
 from collections.abc import Mapping
 from pathlib import Path

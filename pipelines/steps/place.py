@@ -1,4 +1,4 @@
-"""What all cameras recognise to the poses in which the reference object stood."""
+"""The recognised edges of all cameras to the poses in which the reference object stood."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,7 +20,7 @@ def run(inputs: Mapping[str, bytes], parameters: PlacementParameters, places: Ma
     Raises
     ------
     RefusedCapture
-        The object stood elsewhere than said, or no camera recognises it.
+        The object was wrongly placed, or no camera recognises it.
     """
     reference = ReferenceObject.model_validate_json(inputs["reference"])
     seen = seen_of({name: unpack(data) for name, data in inputs.items() if name != "reference"})

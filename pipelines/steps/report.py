@@ -21,7 +21,7 @@ from schemas.parameters.foot import FootParameters
 from schemas.quality import Quality
 
 FRAMES_SHOWN = 12
-"""Along the travel, of each camera."""
+"""Frames of each camera along the travel that the page shows; chosen by hand."""
 
 
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:

@@ -1,4 +1,4 @@
-"""The parametric foot, filmed by the virtual scanner; the result is what is known of the foot."""
+"""The parametric foot, filmed by the virtual scanner; the result is the true measures of the foot."""
 
 import json
 from collections.abc import Mapping
