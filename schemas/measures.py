@@ -8,7 +8,7 @@ from schemas.base.model import Document, Side
 
 Unit = Literal["mm", "mm2", "mm3", "deg", "1"]
 Status = Literal["ok", "uncertain", "incomplete"]
-Place = tuple[float, float, float]
+Position = tuple[float, float, float]
 
 
 class Measure(Document):
@@ -27,7 +27,7 @@ class Measure(Document):
     surface_length: float | None = None
     """For a girth: the length along the surface in mm, hollows included; the value is that of a tape, which bridges
     them."""
-    plane: tuple[Place, Place] | None = None
+    plane: tuple[Position, Position] | None = None
     """For a girth: a point in mm and the unit normal of its plane, frame of the mesh."""
     filled_share: float | None = None
     """Share of the value that rests on filled instead of measured surface, from 0 to 1; None if unknown."""
@@ -47,7 +47,7 @@ Axis = Literal["toe2", "ball_center", "brannock"]
 class MeasuredLandmark(Document):
     """The place of a landmark, and the method that found it."""
 
-    point: Place
+    point: Position
     """mm, frame of the mesh"""
     method: Literal["geometric", "fallback", "manual"]
     confidence: float = Field(ge=0, le=1)

@@ -44,7 +44,7 @@ FACING = {
 """Direction in which each landmark that is a summit of the surface is outermost; foot frame."""
 
 
-class Place(NamedTuple):
+class LandmarkQuantities(NamedTuple):
     """A landmark as three quantities, mm, in the foot's frame."""
 
     x: Quantity
@@ -66,7 +66,7 @@ class FootSurface:
         self.normals: Floats = vertex_normals(foot.vertices, foot.faces)
         self.errors, self.noise = roughness(foot.vertices, self.normals, foot.faces)
         self.landmarks = landmarks
-        self._places: dict[str, Place] = {}
+        self._places: dict[str, LandmarkQuantities] = {}
         self._outlines: dict[tuple[float, ...], Outline] = {}
         self._results: dict[Callable[[FootSurface], Any], Any] = {}
 
@@ -91,7 +91,7 @@ class FootSurface:
         """Height of the highest point, mm."""
         return float(self.mesh.vertices[:, 2].max())
 
-    def place(self, name: str) -> Place:
+    def place(self, name: str) -> LandmarkQuantities:
         """The landmark `name`, with its derivatives by the displacements of the vertices.
 
         The derivatives are known for summits and for the junction of foot and leg. Those of the landing point are 0,
@@ -108,7 +108,7 @@ class FootSurface:
             landmark = self.landmarks[name]
             doubt = f"{name.replace('_', ' ')} by a fallback" if landmark.method == "fallback" else None
             gradient = self._landmark_gradient(name, landmark)
-            self._places[name] = Place(
+            self._places[name] = LandmarkQuantities(
                 *(Quantity(float(value), row, doubt) for value, row in zip(landmark.point, gradient, strict=True))
             )
         return self._places[name]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.foot_surface import ACROSS, UP, FootSurface, Place
+from footscan.measure.foot_surface import ACROSS, UP, FootSurface, LandmarkQuantities
 from footscan.measure.hull import hull_corners
 from footscan.measure.outline import Outline, Plane
 from footscan.measure.quantity import NotMeasurable, Quantity, combined
@@ -244,7 +244,7 @@ def _across(foot: FootSurface, x: Quantity, inside: Floats) -> Quantity:
     return girth(foot, plane, [x])
 
 
-def _through(foot: FootSurface, low: Floats, high: Place) -> Quantity:
+def _through(foot: FootSurface, low: Floats, high: LandmarkQuantities) -> Quantity:
     def plane(at: Floats) -> tuple[Plane, Floats]:
         upper = np.array([at[0], high.y.value, at[1]])
         middle = (low + upper) / 2

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.foot_surface import ACROSS, UP, FootSurface, Place, nearest_loop
+from footscan.measure.foot_surface import ACROSS, UP, FootSurface, LandmarkQuantities, nearest_loop
 from footscan.measure.girths import upright_plane
 from footscan.measure.outline import Outline, Plane
 from footscan.measure.quantity import NotMeasurable, Quantity, combined
@@ -293,7 +293,7 @@ def _midfoot_sides(foot: FootSurface) -> tuple[Quantity, Quantity]:
     )
 
 
-def _angle(start: Place, end: Place) -> Quantity:
+def _angle(start: LandmarkQuantities, end: LandmarkQuantities) -> Quantity:
     """Horizontal angle of the line between two points against the axis, degrees."""
     along, across = (end.point - start.point)[:2]
     factor = float(np.rad2deg(1.0 / (along**2 + across**2)))

@@ -16,7 +16,7 @@ from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.mesh.rigid_transform import apply
 from footscan.rows import distinct_rows
 from schemas.base.model import Side
-from schemas.measures import Axis, Measure, MeasuredLandmark, Measures, Place, Status, Unit
+from schemas.measures import Axis, Measure, MeasuredLandmark, Measures, Position, Status, Unit
 
 Floats = NDArray[np.float64]
 
@@ -304,12 +304,12 @@ def _measure(
     )
 
 
-def _plane_in_mesh(point: Floats, normal: Floats, to_mesh: Floats) -> tuple[Place, Place]:
+def _plane_in_mesh(point: Floats, normal: Floats, to_mesh: Floats) -> tuple[Position, Position]:
     moved, turned = apply(to_mesh, point[None])[0], to_mesh[:3, :3] @ normal
     return _place(moved, 3), _place(turned / np.linalg.norm(turned), 6)
 
 
-def _place(point: Floats, digits: int) -> Place:
+def _place(point: Floats, digits: int) -> Position:
     x, y, z = np.round(point, digits).tolist()
     return x, y, z
 

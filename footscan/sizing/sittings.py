@@ -47,7 +47,7 @@ def latest_changes(patient: str, feet: Sequence[Foot]) -> list[tuple[Foot, Foot]
     return changes
 
 
-def passed_over(feet: Iterable[Foot], taken: Sequence[Foot]) -> list[Foot]:
+def feet_left_out(feet: Iterable[Foot], taken: Sequence[Foot]) -> list[Foot]:
     """Feet that were not `taken` although they are no older than the oldest one taken, or have no date."""
     oldest = min((foot.date for foot in taken if foot.date), default=None)
     return [foot for foot in feet if foot not in taken and (foot.date is None or oldest is None or foot.date >= oldest)]

@@ -68,7 +68,7 @@ class Poses:
 
 
 @dataclass(frozen=True)
-class Fit:
+class PoseFit:
     """Distances of points in S poses from a surface."""
 
     distances: Floats
@@ -77,12 +77,12 @@ class Fit:
     """(S, N) as in `Nearest`"""
 
 
-def fit_of(poses: Poses, points: Floats, surface: Surface) -> Fit:
+def fit_of(poses: Poses, points: Floats, surface: Surface) -> PoseFit:
     """Compute the distances of `points`, (N, 3) mm, from `surface` in each pose."""
     placed = poses.place(points)
     nearest = surface.nearest(placed.reshape(-1, 3))
     distances = np.linalg.norm(placed.reshape(-1, 3) - nearest.places, axis=1)
-    return Fit(distances.reshape(placed.shape[:2]), nearest.within.reshape(placed.shape[:2]))
+    return PoseFit(distances.reshape(placed.shape[:2]), nearest.within.reshape(placed.shape[:2]))
 
 
 def capped_squares(poses: Poses, points: Floats, surface: Surface, cap: float) -> Floats:
@@ -114,7 +114,7 @@ def settle(pose: Poses, points: Floats, surface: Surface, scale: float, most_ste
     return pose, scale, moved
 
 
-def step(poses: Poses, points: Floats, surface: Surface, scale: Floats, along: float) -> tuple[Poses, Floats, Fit]:
+def step(poses: Poses, points: Floats, surface: Surface, scale: Floats, along: float) -> tuple[Poses, Floats, PoseFit]:
     """Take one Gauss-Newton step of each pose towards the least robust distance.
 
     Parameters
@@ -146,7 +146,7 @@ def step(poses: Poses, points: Floats, surface: Surface, scale: Floats, along: f
     rotations = Rotation.from_rotvec(turns).as_matrix()
     moved = Poses(np.einsum("sij,sjk->sik", rotations, poses.rotations), poses.translations + shifts)
     movement = np.linalg.norm(turns, axis=1) * radius + np.linalg.norm(shifts, axis=1)
-    return moved, movement, Fit(distances, within)
+    return moved, movement, PoseFit(distances, within)
 
 
 def normal_equations(

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 simulate = typer.Typer(help="Film with the virtual scanner: a scan, or the reference object.", no_args_is_help=True)
 
 Out = Annotated[Path, typer.Option(help="Folder to write; must be new or empty.")]
-Light = Annotated[Literal["dark", "ambient", "bright"], typer.Option(help="Light in the room.")]
+RoomLight = Annotated[Literal["dark", "ambient", "bright"], typer.Option(help="Light in the room.")]
 Seed = Annotated[int, typer.Option(min=0, help="Random seed of noise, speckle and clicks.")]
 ScannerSeed = Annotated[
     int, typer.Option(min=0, help="Random seed of the scanner's geometry; use the same one for capture and scans.")
@@ -46,7 +46,7 @@ def simulate_scan(
     ] = None,
     frames: Annotated[int, typer.Option(min=1, max=10_000)] = 200,
     step_mm: Annotated[float, typer.Option(min=0.01, max=1000)] = 2.0,
-    light: Light = "ambient",
+    light: RoomLight = "ambient",
     seed: Seed = 1,
     scanner_seed: ScannerSeed = 1,
     stripe_truth: Annotated[
@@ -86,7 +86,7 @@ def simulate_capture(
     out: Out,
     reference: Annotated[Path | None, typer.Option(help="Reference object (YAML); default: the standard one.")] = None,
     placements: Annotated[int | None, typer.Option(min=1, help="Number of placements to film; default: all.")] = None,
-    light: Light = "ambient",
+    light: RoomLight = "ambient",
     seed: Seed = 1,
     scanner_seed: ScannerSeed = 1,
 ) -> None:

@@ -31,7 +31,7 @@ PlaceFoot = Callable[[Side, Callable[[int, int], None]], None]
 """Puts the foot of a side onto the glass of a virtual scanner; the second argument hears of the progress."""
 
 
-class OverLive:
+class LiveAdapter:
     """A `Scanner` over a `LiveScanner`."""
 
     def __init__(

@@ -12,7 +12,7 @@ from footscan.calibration.models.selection import rms
 from schemas.calibration import CameraCalibration, PairAgreement
 
 Floats = NDArray[np.float64]
-Place = tuple[int, int, int]
+EdgeStretch = tuple[int, int, int]
 """Number of the placement, of the edge, and of the stretch of `BLOCK_MM` along it."""
 
 FEWEST_POINTS = 3
@@ -45,7 +45,7 @@ def pair_agreements(cameras: Mapping[int, CameraCalibration], points: Mapping[in
     return pairs
 
 
-def _offsets(camera: CameraCalibration, points: EdgePoints) -> dict[Place, float]:
+def _offsets(camera: CameraCalibration, points: EdgePoints) -> dict[EdgeStretch, float]:
     """The median distance, mm, from the true edge at which a camera places each stretch of it."""
     across = points.across(to_world(camera, points.pixels))
     stretch = np.floor(points.along / BLOCK_MM).astype(np.intp)

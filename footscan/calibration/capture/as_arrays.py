@@ -11,7 +11,7 @@ from footscan.calibration.capture.edge_points import EdgePoints
 from footscan.calibration.capture.from_capture import CameraView, Recognised
 from footscan.calibration.capture.placement import CameraFit
 from footscan.calibration.capture.recognition import FirstMap
-from footscan.calibration.models.fit import Fit
+from footscan.calibration.models.fit import ModelFit
 from footscan.calibration.models.homography import HomographyModel, image_frame
 from schemas.mounting import Mounting, Sign
 
@@ -67,11 +67,11 @@ def seen_by(camera: int, stripe: Arrays, recognised: Arrays) -> tuple[CameraView
     first = FirstMap(recognised["matrix"], recognised["explained"], recognised["score"].item(), seen_from)
     lens = HomographyModel(*image_frame(view.image_px), distorted=True)
     covariance, condition = recognised.get("covariance"), recognised["condition"].item()
-    fit = Fit(lens, recognised["parameters"], covariance, condition, recognised["residuals"])
+    fit = ModelFit(lens, recognised["parameters"], covariance, condition, recognised["residuals"])
     return view, Recognised(view, first, CameraFit(points_of(recognised), fit))
 
 
-def seen_of(arrays: Mapping[str, Arrays]) -> Seen:
+def camera_views_of(arrays: Mapping[str, Arrays]) -> Seen:
     """Restore the views of all cameras; `arrays` holds a `stripe-N` and a `recognised-N` for each camera N."""
     numbers = [int(name.removeprefix("stripe-")) for name in arrays if name.startswith("stripe-")]
     seen = {camera: seen_by(camera, arrays[f"stripe-{camera}"], arrays[f"recognised-{camera}"]) for camera in numbers}

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from footscan.calibration.capture.edge_points import EdgePoints, edge_distances, edge_points, to_object
 from footscan.calibration.capture.reference import Edges
-from footscan.calibration.models.fit import Fit, UndeterminedError, fit
+from footscan.calibration.models.fit import ModelFit, UndeterminedError, fit
 from footscan.calibration.models.homography import HomographyModel
 from footscan.calibration.models.selection import held_out_residuals, rms
 from footscan.robust import MAD_TO_SD
@@ -63,7 +63,7 @@ class CameraFit:
     """A map with distortion, and the points of the stripe to which it was fitted."""
 
     points: EdgePoints
-    fit: Fit
+    fit: ModelFit
 
     def world(self, pixels: Floats) -> Floats:
         """Y and Z, (N, 2) mm, of `pixels` (N, 2), px."""

@@ -55,10 +55,10 @@ def edges_of(profile: Sequence[Sequence[float]]) -> Edges:
     return Edges(start, end, normal, np.sum(normal * start, axis=1), length)
 
 
-def doubts_about(profile: Sequence[Sequence[float]], placements: Sequence[Sequence[float]]) -> list[str]:
+def placement_doubts(profile: Sequence[Sequence[float]], placements: Sequence[Sequence[float]]) -> list[str]:
     """Describe possible mistakes in the `placements` (dY, dZ), mm, of a profile of corners (Y, Z), mm.
 
-    >>> doubts_about([[0, 0], [10, 0], [10, 10]], [[0, 0], [0, -3]])
+    >>> placement_doubts([[0, 0], [10, 0], [10, 10]], [[0, 0], [0, -3]])
     ['placement 1 reaches down to Z = -3 mm, below the glass at 0']
     """
     doubts = []

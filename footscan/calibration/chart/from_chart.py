@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from footscan.calibration.chart.chart import Chart
 from footscan.calibration.chart.quadratic import ORDER as QUADRATIC
 from footscan.calibration.chart.quadratic import QuadraticFit, fit_quadratic
-from footscan.calibration.models.fit import Fit
+from footscan.calibration.models.fit import ModelFit
 from footscan.calibration.models.maps import IMAGE_PX, Model
 from footscan.calibration.models.observations import Observations, of_points
 from footscan.calibration.models.polynomial import PolynomialModel, terms
@@ -108,7 +108,7 @@ def _refuse_poor(chart: Chart, source: str) -> None:
 
 
 def calibrated(
-    fitted: Fit, observations: Observations, trial: ModelTrial, image_px: tuple[int, int]
+    fitted: ModelFit, observations: Observations, trial: ModelTrial, image_px: tuple[int, int]
 ) -> CameraCalibration:
     """Build the entry of a camera in the calibration file."""
     covariance: list[list[float]] = []

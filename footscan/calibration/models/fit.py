@@ -35,7 +35,7 @@ CONVERGED, CONVERGED_MM2 = 1e-12, 1e-24
 
 
 @dataclass(frozen=True)
-class Fit:
+class ModelFit:
     """A model with fitted parameters."""
 
     model: Model
@@ -64,7 +64,7 @@ class UndeterminedError(Exception):
     """The observations do not determine the parameters."""
 
 
-def fit(model: Model, observations: Observations, *, robust: bool) -> Fit:
+def fit(model: Model, observations: Observations, *, robust: bool) -> ModelFit:
     """Fit a model by least squares of the distances from the observed lines (Levenberg-Marquardt).
 
     Each block counts as one observation, however many pixels it has. With `robust`, outliers lose their weight.
@@ -103,10 +103,10 @@ def fit(model: Model, observations: Observations, *, robust: bool) -> Fit:
     residuals = _residuals(model, observations, parameters)
     remoteness = _remoteness(residuals) if robust else np.zeros(len(residuals))
     covariance = _covariance(observations, jacobian, residuals, remoteness, model.prior_precision())
-    return Fit(model, parameters, covariance, condition, residuals)
+    return ModelFit(model, parameters, covariance, condition, residuals)
 
 
-def predict(fitted: Fit, observations: Observations) -> Floats:
+def predict(fitted: ModelFit, observations: Observations) -> Floats:
     """Residuals (N,), mm, of observations under a fit to the same or to other observations."""
     return _residuals(fitted.model, observations, fitted.parameters)
 

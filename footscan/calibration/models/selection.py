@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.models.fit import Fit, UndeterminedError, fit, predict
+from footscan.calibration.models.fit import ModelFit, UndeterminedError, fit, predict
 from footscan.calibration.models.homography import HomographyModel, image_frame
 from footscan.calibration.models.maps import Model
 from footscan.calibration.models.observations import Observations
@@ -89,7 +89,7 @@ def requested_models(models: Sequence[Model], parameters: CalibrationParameters)
 
 def select(
     models: Sequence[Model], observations: Observations, camera: int, *, robust: bool
-) -> tuple[Fit | None, list[ModelTrial]]:
+) -> tuple[ModelFit | None, list[ModelTrial]]:
     """Select the model with the least expected error.
 
     Held-out data lie where the data lie, perhaps on few lines. They do not show the error in the region between, where
@@ -130,7 +130,9 @@ def _with_a_lens(models: Sequence[Model], trials: list[ModelTrial]) -> list[Mode
     ]
 
 
-def try_model(model: Model, observations: Observations, camera: int, *, robust: bool) -> tuple[Fit | None, ModelTrial]:
+def try_model(
+    model: Model, observations: Observations, camera: int, *, robust: bool
+) -> tuple[ModelFit | None, ModelTrial]:
     """Fit one model, and measure its errors; without a fit if the observations do not determine it."""
     observations = observations.sorted()
     common = ModelTrial(
@@ -159,7 +161,7 @@ def try_model(model: Model, observations: Observations, camera: int, *, robust: 
     )
 
 
-def held_out_residuals(fitted: Fit, observations: Observations, *, robust: bool) -> Floats | None:
+def held_out_residuals(fitted: ModelFit, observations: Observations, *, robust: bool) -> Floats | None:
     """Cross-validate a fit: residuals (N,), mm, of each observation under the model fitted without its fold of groups.
 
     None if the other folds do not determine the model.
@@ -194,7 +196,7 @@ def _expected(trial: ModelTrial) -> float:
     return float(np.hypot(trial.held_out_rms_mm, trial.region_sigma_mm))
 
 
-def _region_sigma(fitted: Fit, pixels: Floats) -> float | None:
+def _region_sigma(fitted: ModelFit, pixels: Floats) -> float | None:
     """The predicted standard deviation over the convex hull of `pixels` (N, 2), mm."""
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     i, j = np.meshgrid(*(np.linspace(low[k], high[k], REGION_GRID) for k in (0, 1)))

@@ -66,7 +66,7 @@ class Comparisons:
     """(C,) True if they are enough to move the camera."""
 
 
-class Fit(NamedTuple):
+class CorrectionFit(NamedTuple):
     """Fitted motions of all cameras."""
 
     yz: Floats
@@ -103,7 +103,9 @@ def correct(stripes: Stripes, overlaps: Overlaps, parameters: FusionParameters) 
         too_far |= {int(stripes.cameras[k]): float(motions[k]) for k in far}
 
 
-def _fit(stripes: Stripes, overlaps: Overlaps, trusted: NDArray[np.bool_], parameters: FusionParameters) -> Fit:
+def _fit(
+    stripes: Stripes, overlaps: Overlaps, trusted: NDArray[np.bool_], parameters: FusionParameters
+) -> CorrectionFit:
     """Fit the motions of all `trusted` cameras (C,)."""
     coefficients = np.zeros((len(stripes.cameras), MOST_TERMS))
     for round_ in range(ROUNDS):
@@ -116,7 +118,7 @@ def _fit(stripes: Stripes, overlaps: Overlaps, trusted: NDArray[np.bool_], param
             break
         if round_ < ROUNDS - 1:
             overlaps = find_overlaps(stripes, yz, parameters.overlap_mm)
-    return Fit(yz, comparisons, terms, coefficients)
+    return CorrectionFit(yz, comparisons, terms, coefficients)
 
 
 def _compare(stripes: Stripes, overlaps: Overlaps, coefficients: Floats, trusted: NDArray[np.bool_]) -> Comparisons:
@@ -180,7 +182,7 @@ def _moved_all(stripes: Stripes, frame: Frame, coefficients: Floats) -> Floats:
     return yz
 
 
-def _largest_motions(fit: Fit) -> Floats:
+def _largest_motions(fit: CorrectionFit) -> Floats:
     """(C,) the largest motion of a point in the range where each camera was compared, mm."""
     frame = fit.comparisons.frame
     motions = np.zeros(len(fit.terms))
@@ -193,7 +195,7 @@ def _largest_motions(fit: Fit) -> Floats:
     return motions
 
 
-def _reports(stripes: Stripes, fit: Fit, motions: Floats) -> list[CameraCorrection]:
+def _reports(stripes: Stripes, fit: CorrectionFit, motions: Floats) -> list[CameraCorrection]:
     """Describe the correction of each camera."""
     forms, frame = fit.comparisons.forms, fit.comparisons.frame
     before, after, weight = (

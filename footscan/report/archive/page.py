@@ -7,7 +7,7 @@ from typing import NamedTuple
 from footscan.report.archive.script import SCRIPT
 from footscan.report.markup import number, text
 from footscan.report.page import page
-from footscan.report.quality_lights import LEVELS, Light, worst
+from footscan.report.quality_lights import LEVELS, TrafficLight, worst
 from footscan.report.thumbnail import HEIGHT_PX, WIDTH_PX
 
 SIDES = ("left", "right", "unknown")
@@ -30,7 +30,7 @@ class ScanRow(NamedTuple):
     length_mm: float | None = None
     size: str | None = None
     """EU size."""
-    lights: Sequence[Light] = ()
+    lights: Sequence[TrafficLight] = ()
     report: str | None = None
     """Relative address of its report."""
     picture: str | None = None
@@ -105,7 +105,7 @@ def _row(row: ScanRow) -> str:
     )
 
 
-def _light(light: Light) -> str:
+def _light(light: TrafficLight) -> str:
     title = text(f"{light.name}: {light.level}, {light.why}")
     return f'<span class="light {light.level}" title="{title}">{text(light.name)}</span>'
 

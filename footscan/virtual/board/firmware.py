@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from footscan.virtual.board.execute import execute_gcode
 from footscan.virtual.board.gcode import Modes
 from footscan.virtual.board.machine import Counters, Machine, Overrides, State, Work
-from footscan.virtual.board.motion import Light
+from footscan.virtual.board.motion import LaserPower
 from footscan.virtual.board.report import status_report
 from footscan.virtual.board.system import execute_system
 
@@ -46,7 +46,7 @@ class Firmware(Machine):
         """
         self._work = self._waits_for = None
         self.motion.steps = (0.0, 0.0, 0.0)
-        self.motion.stand_in_light(Light())
+        self.motion.stand_in_light(LaserPower())
         self.state = "Alarm" if self.memory.flag(22) else "Idle"
         if boot_seconds:
             self._boots_at = self.now + boot_seconds
@@ -86,7 +86,7 @@ class Firmware(Machine):
     def alarm(self, number: int) -> None:
         """Stops everything. What happened is said; the two worst are followed by a reset of the host's."""
         self.motion.kill()
-        self.motion.stand_in_light(Light())
+        self.motion.stand_in_light(LaserPower())
         self.state = "Alarm"
         self.say(f"ALARM:{number}")
         if number in CRITICAL:
@@ -141,7 +141,7 @@ class Firmware(Machine):
         if self._boots_at is not None:
             return
         moving = self.state in ("Run", "Jog", "Home") or self.motion.speed > 0.0
-        self.motion.stand_in_light(Light())
+        self.motion.stand_in_light(LaserPower())
         if moving and self.state != "Alarm":
             self.alarm(6 if self.state == "Home" else 3)
         else:
@@ -184,7 +184,7 @@ class Firmware(Machine):
             self._open_door()
         self._door_seen = self.door_ajar
         if self.state == "Door" and self.motion.speed == 0.0:
-            self.motion.stand_in_light(Light())
+            self.motion.stand_in_light(LaserPower())
 
     def _open_door(self) -> None:
         if self.state == "Home":
@@ -221,7 +221,7 @@ class Firmware(Machine):
         elif byte == HOLD and self.state in ("Run", "Idle"):
             self.motion.holding = True
             if self.memory.flag(32) and self.state == "Idle":
-                self.motion.stand_in_light(Light())
+                self.motion.stand_in_light(LaserPower())
             self.state = "Hold"
 
     def _start(self) -> None:
@@ -245,7 +245,7 @@ class Firmware(Machine):
         elif byte in LIGHT_STEPS:
             now.light = min(max(now.light + LIGHT_STEPS[byte], 10), 200)
         elif byte == LIGHT_STOP and self.state == "Hold" and not self.memory.flag(32):
-            self.motion.stand_in_light(Light())
+            self.motion.stand_in_light(LaserPower())
         if now != was:
             self.counters.overrides = 0
             self.apply_overrides()

@@ -41,7 +41,7 @@ _RENDERERS_A_PROCESS = 2
 """A bound of memory: a renderer takes 90 MB."""
 
 
-class Light(NamedTuple):
+class StageLight(NamedTuple):
     """The light that was set, as factors of the simulation's settings."""
 
     power: float = 1.0
@@ -49,9 +49,9 @@ class Light(NamedTuple):
     exposure: float = 1.0
     gain: float = 1.0
 
-    def nearest_level(self) -> "Light":
+    def nearest_level(self) -> "StageLight":
         """Returns the rendered light nearest to this one."""
-        return Light(*map(_nearest_level, self))
+        return StageLight(*map(_nearest_level, self))
 
 
 class Subject(NamedTuple):
@@ -93,7 +93,7 @@ class StagePictures:
                 self._pool.shutdown(cancel_futures=True)
                 self._pool = None
 
-    def picture(self, camera: int, index: int, light: Light) -> bytes:
+    def picture(self, camera: int, index: int, light: StageLight) -> bytes:
         """Returns the JPEG picture, from the folder or rendered now (some tenths of a second)."""
         light, index = light.nearest_level(), self._seen(index)
         path = self._path(camera, index, light)
@@ -104,7 +104,7 @@ class StagePictures:
             return path.read_bytes()
 
     def prepare(
-        self, cameras: Iterable[int], indices: Iterable[int], light: Light, progress: Progress | None = None
+        self, cameras: Iterable[int], indices: Iterable[int], light: StageLight, progress: Progress | None = None
     ) -> int:
         """Render missing pictures and return their number; `progress` gets the number of pictures done and in total."""
         light = light.nearest_level()
@@ -138,7 +138,7 @@ class StagePictures:
     def _seen(self, index: int) -> int:
         return 0 if self._job.subject.mesh is None else index  # an empty scanner looks the same everywhere
 
-    def _path(self, camera: int, index: int, light: Light) -> Path:
+    def _path(self, camera: int, index: int, light: StageLight) -> Path:
         level = "-".join(f"{factor:.3f}" for factor in light)
         return self._folder / level / f"cam{camera}" / f"{index}.jpg"
 
@@ -201,7 +201,7 @@ class _Studio:
 
         self._renderer = renderer
 
-    def jpeg(self, camera: int, index: int, light: Light) -> bytes:
+    def jpeg(self, camera: int, index: int, light: StageLight) -> bytes:
         settings = self._job.settings
         random = np.random.default_rng([settings.seed, camera, index % 2**32, 4])  # as films have it
         seen = self._renderer(camera, light.power).light(self._scene, index * self._job.grid_mm, random)
@@ -225,7 +225,7 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _render(camera: int, light: Light, indices: list[int], folder: Path) -> None:
+def _render(camera: int, light: StageLight, indices: list[int], folder: Path) -> None:
     """Write pictures into `folder`; each appears under its name when it is complete."""
     folder.mkdir(parents=True, exist_ok=True)
     for index in indices:

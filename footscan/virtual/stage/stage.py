@@ -23,7 +23,7 @@ from math import floor
 
 import numpy as np
 
-from footscan.virtual.stage.pictures import Light, StagePictures
+from footscan.virtual.stage.pictures import StageLight, StagePictures
 
 Positions = tuple[float, float, float]
 
@@ -80,7 +80,7 @@ class Stage:
         """The JPEG picture that `camera` took at `seconds`; never the same bytes twice in a row."""
         pictures = self._pictures
         x = self._position_at(seconds)[HEAD_OF_CAMERA[camera]]
-        light = Light(self._power_at(seconds), *self._light_of(camera)).nearest_level()
+        light = StageLight(self._power_at(seconds), *self._light_of(camera)).nearest_level()
         sight = (pictures, round(x / pictures.grid_mm), light)
         before, times, grained = self._shown.get(camera, (None, 0, []))
         if sight != before:

@@ -74,9 +74,9 @@ def read_latest_pair(folder: Path) -> "list[Foot]":
 
 def tell_passed_over(folder: Path, feet: "Sequence[Foot]", taken: "Sequence[Foot]") -> None:
     """Print the scans that were not used although they are not older."""
-    from footscan.sizing.sittings import passed_over
+    from footscan.sizing.sittings import feet_left_out
 
-    if names := ", ".join(foot.scan or foot.source for foot in passed_over(feet, taken)):
+    if names := ", ".join(foot.scan or foot.source for foot in feet_left_out(feet, taken)):
         message(one_line(f"{folder}: not taken: {names}"))
 
 

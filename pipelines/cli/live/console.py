@@ -77,7 +77,7 @@ def _opened(
     rig: Path | None, archive: Path, results: Path, calibration: Path | None, folder: Path, grid_mm: float | None
 ) -> "Iterator[Scanner]":
     """The scanner of a rig. With a grid it is a virtual one, whose foot is placed on request."""
-    from pipelines.console.live_adapter import OverLive
+    from pipelines.console.live_adapter import LiveAdapter
     from pipelines.live.light import light_by_hand
     from pipelines.live.scanner import LiveScanner
     from pipelines.live.virtual.world import EXPOSURE_MS
@@ -90,4 +90,4 @@ def _opened(
         light = None if opened.world is None else light_by_hand(opened.rig, 1.0, EXPOSURE_MS)
         place_foot = None if opened.world is None else opened.world.put
         with LiveScanner(opened.rig) as scanner:
-            yield OverLive(scanner, archive, results, calibration, light, place_foot)
+            yield LiveAdapter(scanner, archive, results, calibration, light, place_foot)

@@ -9,7 +9,7 @@ from footscan.mesh.formats.files import FARTHEST_MM, PARSERS
 from footscan.mesh.mesh import Mesh
 from footscan.report.filled import CUT, filled_colours, filled_key
 from footscan.report.markup import UNITS, key, number, section, table, text, words
-from footscan.report.quality_lights import Level, Light, quality_lights, worst
+from footscan.report.quality_lights import Level, TrafficLight, quality_lights, worst
 from footscan.report.scan.foot_colours import CAMERAS
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
 from footscan.report.surface_views import upright
@@ -81,7 +81,7 @@ def _mesh(results: Path, patient: str, scan: str) -> Mesh:
     return mesh
 
 
-def _verdict(level: Level, lights: Sequence[Light], lines: Sequence[str]) -> str:
+def _verdict(level: Level, lights: Sequence[TrafficLight], lines: Sequence[str]) -> str:
     rows = "".join(
         f'<li><span class="light {light.level}">{light.level}</span> <b>{text(light.name)}</b> {text(light.why)}</li>'
         for light in lights

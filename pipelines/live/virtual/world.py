@@ -25,7 +25,7 @@ from footscan.virtual.board.rails import Gait
 from footscan.virtual.filming.streams import VirtualStreams
 from footscan.virtual.foot.foot import Foot, FootShape, make_foot, sample_shape
 from footscan.virtual.optics.scene import SKIN, Mesh
-from footscan.virtual.stage.pictures import Light, Progress, StagePictures, Subject
+from footscan.virtual.stage.pictures import Progress, StageLight, StagePictures, Subject
 from footscan.virtual.stage.reference_stage import NOTHING, block_subject
 from footscan.virtual.stage.stage import Positions, Stage, indices_of_travel
 from footscan.virtual.stage.standing import stand_in_the_middle
@@ -147,8 +147,8 @@ class VirtualWorld:
         pictures = StagePictures(self._subject(subject), self._settings, Path(world.pictures), world.grid_mm)
         rail = range(floor(RAIL_MM[0] / world.dark_grid_mm), ceil(RAIL_MM[1] / world.dark_grid_mm) + 1)
         dark = {round(k * world.dark_grid_mm / world.grid_mm) for k in rail}
-        pictures.prepare(CAMERAS, dark, Light(0.0), progress)
-        pictures.prepare(CAMERAS, indices_of_travel(*self._lit_mm(subject), world.grid_mm), Light(), progress)
+        pictures.prepare(CAMERAS, dark, StageLight(0.0), progress)
+        pictures.prepare(CAMERAS, indices_of_travel(*self._lit_mm(subject), world.grid_mm), StageLight(), progress)
         return pictures
 
     def _lit_mm(self, subject: SubjectName) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from footscan.calibration.models.fit import Fit, UndeterminedError, fit, predict
+from footscan.calibration.models.fit import ModelFit, UndeterminedError, fit, predict
 from footscan.calibration.models.homography import HomographyModel
 from footscan.calibration.models.maps import Model, prediction_covariance
 from footscan.calibration.models.observations import Observations, of_points
@@ -49,7 +49,7 @@ def image(count: int, seed: int = 1) -> np.ndarray:
     return np.random.default_rng(seed).uniform([0, 0], [639, 479], (count, 2))
 
 
-def covariance_at(found: Fit, pixels: np.ndarray) -> np.ndarray:
+def covariance_at(found: ModelFit, pixels: np.ndarray) -> np.ndarray:
     assert found.covariance is not None
     camera = CameraCalibration(
         camera=1,

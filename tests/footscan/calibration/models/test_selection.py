@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from footscan.calibration.models.fit import Fit, fit, predict
+from footscan.calibration.models.fit import ModelFit, fit, predict
 from footscan.calibration.models.homography import HomographyModel
 from footscan.calibration.models.observations import Observations, of_points
 from footscan.calibration.models.polynomial import PolynomialModel
@@ -32,7 +32,7 @@ def clicked(world: np.ndarray, pixels: np.ndarray, noise_mm: float, seed: int = 
     return of_points(pixels, world + noise, np.arange(len(world)))
 
 
-def fares(observations: Observations, *, robust: bool = False) -> tuple[Fit | None, Mapping[str, ModelTrial]]:
+def fares(observations: Observations, *, robust: bool = False) -> tuple[ModelFit | None, Mapping[str, ModelTrial]]:
     found, trials = select(candidates(observations.pixels, IMAGE_PX), observations, 3, robust=robust)
     assert [trial.model for trial in trials] == NAMES
     return found, {trial.model: trial for trial in trials}
