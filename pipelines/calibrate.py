@@ -21,7 +21,7 @@ from schemas.reference import Capture, ReferenceObject
 
 @dataclass(frozen=True)
 class CaptureInputs:
-    """What the steps of a calibration take of a capture, recorded or yet to be filmed."""
+    """The inputs that the steps of a calibration take from a capture, recorded or yet to be filmed."""
 
     file: Path
     """Its capture.yaml."""
@@ -29,24 +29,25 @@ class CaptureInputs:
     reference: ReferenceObject
     paths: Mapping[int, Path]
     """The film of each camera."""
-    films: Mapping[int, Input]
-    """Its digest, or those of all that another step filmed."""
+    films: Mapping[int, Mapping[str, Input]]
+    """Inputs of each camera's stripe: its `film`; or, as `film`, the step that lists the digests of all films, and the
+    name of its `file`."""
     names: list[str]
     """All files within the capture's folder: capture.yaml, the reference object, the films."""
     digests: Input
-    """Theirs, by name."""
+    """Digests of these files, by name."""
 
 
 def recorded_inputs(capture: RecordedCapture, digests: FileDigests) -> CaptureInputs:
-    """What the steps take of a capture that was recorded.
+    """The inputs of the steps from a recorded capture.
 
     Raises
     ------
     RefusedInput
-        Two cameras have one and the same film.
+        Two cameras have the same film.
     """
     paths = {camera.id: capture.film(camera) for camera in capture.document.cameras}
-    films: dict[int, Input] = {}
+    films: dict[int, dict[str, Input]] = {}
     cameras: dict[tuple[str, ...], int] = {}
     for camera, path in paths.items():
         frames = tuple(digests.of(file)[0] for file in film_files(path))
@@ -54,23 +55,24 @@ def recorded_inputs(capture: RecordedCapture, digests: FileDigests) -> CaptureIn
         if other != camera:
             problem = f"has the same film as camera {other}, expected its own"
             raise RefusedInput(capture.file, problem, field=f"camera {camera}")
-        films[camera] = source_files(path, digests)
+        films[camera] = {"film": source_files(path, digests)}
     named = {file.relative_to(capture.folder).as_posix(): digests.of(file)[0] for file in capture.files}
     listed = Value(canonical_json(named).encode())
     return CaptureInputs(capture.file, capture.document, capture.reference, paths, films, list(named), listed)
 
 
 def camera_steps(name: str, capture: CaptureInputs, parameters: CaptureCalibrationParameters) -> list[Step]:
-    """The steps that each camera of a capture takes by itself, and where the object stood, as all of them tell.
+    """The steps of each camera of a capture, and the step that places the object from the views of all cameras.
 
-    `name` is that of the graph's scan; the kinds are `stripe`, `recognise` and `place`.
+    `name` is the name of the graph's scan; the kinds are `stripe`, `recognise` and `place`.
     """
     steps: list[Step] = []
     document = {"capture": capture.file}
     for camera in capture.document.cameras:
         film = {"film": capture.paths[camera.id], **document}
-        taken = {"film": capture.films[camera.id]}
-        stripe = _step(name, "stripe", "capture_stripe", parameters.extraction, taken, camera.id, places=film)
+        stripe = _step(
+            name, "stripe", "capture_stripe", parameters.extraction, capture.films[camera.id], camera.id, places=film
+        )
         seen: dict[str, Input] = {
             "stripe": Output(stripe.name), "reference": _reference(capture), "camera": _camera(camera)
         }  # fmt: skip
@@ -80,7 +82,7 @@ def camera_steps(name: str, capture: CaptureInputs, parameters: CaptureCalibrati
 
 
 def fit_steps(name: str, capture: CaptureInputs, parameters: CaptureCalibrationParameters, poses: str) -> list[Step]:
-    """The calibration of each camera by itself, with the object in the `poses` that the step of this kind tells."""
+    """The calibration of each camera by itself, with the object in the poses from the step of kind `poses`."""
     return [
         _step(
             name, "fit", "fit", parameters.fit,
@@ -126,31 +128,31 @@ class CaptureOfScan:
     """The calibration of a scan, made from a capture by steps of the scan's own graph."""
 
     name: str
-    """Of the graph's scan."""
+    """Name of the graph's scan."""
     capture: CaptureInputs
     steps: list[Step]
-    """From the capture's films to what the scan takes of its calibration."""
+    """Steps from the capture's films to the parts of the calibration that the scan takes."""
 
     @classmethod
     def drawn(cls, name: str, capture: CaptureInputs) -> "CaptureOfScan":
-        """The calibration of the scan `name`; what is taken of it is added to its steps."""
+        """The calibration of the scan `name`; each part that a scan takes adds a step to `steps`."""
         return cls(name, capture, calibration_steps(name, capture, CaptureCalibrationParameters()))
 
     @property
     def source(self) -> Output:
-        """Its name and digest."""
+        """Name and digest of the calibration."""
         named = {"name": Value(canonical_json(self.capture.file.parent.name).encode())}
         return self._taken("calibration-source", "calibration_source", named)
 
     def camera(self, camera: int) -> Output:
-        """The map of one camera; RefusedInput where the capture lacks it."""
+        """The map of one camera; RefusedInput if the capture lacks the camera."""
         if camera not in self.capture.paths:
             known = ", ".join(map(str, self.capture.paths))
             raise RefusedInput(self.capture.file, f"has no camera {camera}, expected one of {known}", field="cameras")
         return self._taken("camera-map", "camera_map", {"camera": Value(canonical_json(camera).encode())}, camera)
 
     def cameras(self, ids: frozenset[int]) -> Output:
-        """All of it, with the maps of these cameras alone."""
+        """The calibration with the maps of these cameras alone."""
         return self._taken("camera-maps", "camera_maps", {"cameras": Value(canonical_json(sorted(ids)).encode())})
 
     def _taken(self, kind: str, module: str, told: Mapping[str, Input], camera: int | None = None) -> Output:

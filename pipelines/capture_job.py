@@ -38,16 +38,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class CaptureCalibration:
-    """A calibration from a capture, and how it came about."""
+    """A calibration from a capture, and the evidence behind it."""
 
     calibration: Calibration
     trials: list[ModelTrial]
     corners: list[FoundCorner]
     x_mm: float
-    """Of all corners: where the laser's plane stood."""
+    """X of all corners: the position of the laser plane."""
     departures_mm: Floats
-    """(K, 2) how far, in Y and Z, the object stood from where it was said, as the cameras agree; zeros where that does
-    not help."""
+    """(K, 2) distances in Y and Z, mm, of the object from its K nominal placements, as the cameras agree; zeros where a
+    correction does not help."""
 
 
 def calibrate_capture(
@@ -58,14 +58,14 @@ def calibrate_capture(
     *,
     keep_going: bool = False,
 ) -> CaptureCalibration:
-    """The calibration of all cameras of a capture, with so many threads; what `cache` holds of it is not made again.
+    """The calibration of all cameras of a capture, by `workers` threads; results in `cache` are not computed again.
 
     With `keep_going` cameras that see the object from another side than they stand on are calibrated all the same.
 
     Raises
     ------
     RefusedInput
-        Two cameras have one film; or the object is not recognised or stood elsewhere than said, as `RefusedCapture`.
+        Two cameras have the same film; as `RefusedCapture`: the object is not recognised, or was wrongly placed.
     Fault
         A step could not be run to its end.
     """
@@ -91,14 +91,14 @@ def check_calibration(
     workers: int,
     cache: Path | None = None,
 ) -> list[Drift]:
-    """How far each camera of a scanner has drifted since its calibration, by a capture of today.
+    """The drift of each camera of a scanner since its calibration, by a capture of today.
 
     A camera that does not recognise the object, or is in the capture or the calibration alone, is part of the result.
 
     Raises
     ------
     RefusedInput
-        The object stood elsewhere than said or is recognised by no camera, as `RefusedCapture`.
+        As `RefusedCapture`: the object was wrongly placed, or no camera recognises it.
     Fault
         A step could not be run to its end.
     """
@@ -117,7 +117,7 @@ def check_calibration(
 
 
 def picture_of(capture: RecordedCapture, refused: RefusedCapture) -> bytes:
-    """A PNG of what a capture was refused for."""
+    """A PNG of the evidence for which a capture was refused."""
     films = {camera.id: capture.film(camera) for camera in capture.document.cameras}
     shown = [
         (evidence, next(islice(pixel_frames(open_film(films[evidence.camera])), evidence.frame, None), None))
@@ -141,7 +141,7 @@ class _Job:
         return list(self.inputs.paths)
 
     def run(self, steps: Sequence[Step]) -> dict[str, bytes]:
-        """The result of every step by its name; raises what refused one."""
+        """The result of every step by its name; raises the error of a step that failed."""
         with self.workspace.lease():
             outcomes = self.workspace.run(steps, Threads(self.workers), lambda _: None)
             for step in steps:
@@ -166,7 +166,7 @@ def _job(capture: RecordedCapture, workers: int, cache: Path | None) -> Iterator
 
 
 def _raise(failure: Failure, steps: Mapping[str, Step], outcomes: Mapping[str, Outcome], store: Store) -> None:
-    """Raise what a step failed by. A refusal is raised by the step itself, with the evidence that no store keeps."""
+    """Raise the error of a failed step. The step itself repeats a refusal, with the evidence that no store keeps."""
     if failure.kind == "refused":
         step = steps[failure.cause]
         content = {}

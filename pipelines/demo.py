@@ -1,4 +1,4 @@
-"""The whole product on one foot: film, calibrate, reconstruct, measure, and hold the result against what is known."""
+"""The demo: film one foot, calibrate, reconstruct, measure, and compare the result with the known foot."""
 
 import json
 import time
@@ -20,12 +20,12 @@ from schemas.parameters.demo import FilmedFoot
 from schemas.parameters.scan import ScanParameters
 
 Watch = Callable[[str, int, int], AbstractContextManager[OnStepEnd]]
-"""Called with the name of a part, how many steps are to run and how many it has; gives what shall hear of them."""
+"""Called with a part's name, its number of steps to run and of all steps; returns the listener for their ends."""
 
 
 @dataclass
 class DemoResult:
-    """What the demo came to."""
+    """The results of the demo."""
 
     results: Path
     """Folder of the scan's results."""
@@ -36,7 +36,7 @@ class DemoResult:
 
 
 def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
-    """Film a parametric foot and the reference object, calibrate, and run the scan; parts that are there are kept.
+    """Film a parametric foot and the reference object, calibrate, and run the scan; finished parts are kept.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def _filming(folder: Path, foot: FilmedFoot) -> list[Step]:
 
 
 def _job(folder: Path, results: Path) -> Job:
-    """As the project's workflow.yaml has it."""
+    """The same job as that of the project's workflow.yaml."""
     archive = folder / "archive"
     return Job(
         folders=list(scan_folders(archive)),

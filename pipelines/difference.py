@@ -1,4 +1,4 @@
-"""How far two results of a step are apart, in words."""
+"""The difference of two results of a step, in words."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -10,11 +10,11 @@ from schemas.base.errors import DamagedError, RefusedInput
 from schemas.base.json_files import parse_json
 
 SHOWN = 3
-"""Arrays or fields that are named."""
+"""Most arrays or fields that are named; chosen by hand."""
 
 
 def difference_in_words(old: bytes, new: bytes) -> str:
-    """The arrays, or the fields of a document, that differ; of numbers the largest difference.
+    """The arrays, or the fields of a document, that differ, with the largest difference of numbers.
 
     Examples
     --------
@@ -23,11 +23,11 @@ def difference_in_words(old: bytes, new: bytes) -> str:
     """
     for differences in (_of_arrays, _of_documents):
         try:
-            found = list(differences(old, new))
+            changes = list(differences(old, new))
         except (DamagedError, RefusedInput, UnicodeDecodeError):
             continue
-        more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
-        return ", ".join(found[:SHOWN]) + more if found else "the same values, written differently"
+        more = f" and {len(changes) - SHOWN} more" if len(changes) > SHOWN else ""
+        return ", ".join(changes[:SHOWN]) + more if changes else "the same values, written differently"
     return f"{len(old)} bytes -> {len(new)} bytes"
 
 

@@ -22,7 +22,7 @@ from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm
 
 STEPS = "pipelines.steps"
-"""Where the modules of the steps lie; they are imported when they run, for a plan needs none of their libraries."""
+"""Package of the steps' modules; they are imported when they run, because a plan needs none of their libraries."""
 DELIVERED = {
     "cloud.ply": "cloud.ply",
     "foot.stl": "foot.stl",
@@ -31,51 +31,51 @@ DELIVERED = {
     "quality.json": "quality",
     "report.html": "report",
 }
-"""What lies in a scan's results, and the step that makes it."""
+"""The files of a scan's results, and the step that makes each."""
 
 
 class ScanCalibration(Protocol):
-    """What the steps of a scan take of its calibration."""
+    """The parts of a calibration that the steps of a scan take."""
 
     @property
     def source(self) -> Input:
-        """Its name and digest."""
+        """Name and digest of the calibration."""
 
     def camera(self, camera: int) -> Input:
-        """The map of one camera; RefusedInput where it has none."""
+        """The map of one camera; RefusedInput if there is none."""
 
     def cameras(self, ids: frozenset[int]) -> Input:
-        """All of it, with the maps of these cameras alone."""
+        """The calibration with the maps of these cameras alone."""
 
 
 @dataclass(frozen=True)
 class CalibrationFile:
-    """A calibration, where it was read from and its file's digest."""
+    """A calibration, its file and the digest of the file."""
 
     path: Path
     content: Calibration
     digest: str
     _drawn: dict[object, Value] = field(default_factory=dict, compare=False, repr=False)
-    """What its scans take of it: the same for many of them, and slow to write down."""
+    """Parts that scans take, cached: they are the same for many scans, and slow to serialise."""
 
     @property
     def source(self) -> Value:
-        """Its name and digest."""
+        """Name and digest of the calibration."""
         return self._once("source", lambda: Source(name=self.path.name, sha256=self.digest))
 
     def camera(self, camera: int) -> Value:
-        """The map of one camera; RefusedInput where it has none."""
+        """The map of one camera; RefusedInput if there is none."""
         return self._once(camera, lambda: self.content.camera(camera, self.path))
 
     def cameras(self, ids: frozenset[int]) -> Value:
-        """All of it, with the maps of these cameras alone."""
+        """The calibration with the maps of these cameras alone."""
         maps = [camera for camera in self.content.cameras if camera.camera in ids]
         return self._once(ids, lambda: self.content.model_copy(update={"cameras": maps}))
 
-    def _once(self, what: object, draw: Callable[[], Document]) -> Value:
-        if what not in self._drawn:
-            self._drawn[what] = _document(draw(), self.path)
-        return self._drawn[what]
+    def _once(self, part: object, draw: Callable[[], Document]) -> Value:
+        if part not in self._drawn:
+            self._drawn[part] = _document(draw(), self.path)
+        return self._drawn[part]
 
 
 def scan_steps(
@@ -143,7 +143,7 @@ def scan_steps(
 
 @dataclass(frozen=True)
 class _Camera:
-    """What the steps of one camera lead to."""
+    """The results of the steps of one camera."""
 
     id: int
     array: Path
@@ -161,7 +161,7 @@ def _camera_steps(
     digests: FileDigests,
     add: Callable[[Step], Output],
 ) -> _Camera:
-    """The steps from one camera's film to its world points, and to their colours where it has laser-off frames."""
+    """The steps from one camera's film to its world points, and to their colours if it has laser-off frames."""
     film = scan.film(camera)
     array = scan.array(camera)
     manifest = add(

@@ -1,9 +1,9 @@
-"""What every virtual recording needs beside its scan: a calibration of the virtual scanner."""
+"""The calibration of the virtual scanner, which every virtual recording needs."""
 
 from pathlib import Path
 
 from pipelines.calibrate import CaptureInputs, calibration_steps
-from pipelines.engine.actions.step import Output, Step
+from pipelines.engine.actions.step import Output, Step, Value
 from pipelines.recordings.captures import CAPTURE_FILE
 from pipelines.scan import STEPS
 from schemas.parameters.calibration import CaptureCalibrationParameters
@@ -11,8 +11,9 @@ from schemas.parameters.simulation import SimulationSettings
 
 
 def filmed_calibration_steps(name: str, capture: Path, settings: SimulationSettings) -> list[Step]:
-    """Film the reference object into the folder `capture`, and calibrate from it: steps of `name`, of kind `capture`
-    the first and `calibrate` the last."""
+    """The steps of `name` that film the reference object into the folder `capture` and calibrate from it.
+
+    The first is of kind `capture`, the last of kind `calibrate`."""
     film_capture = Step(
         name, "capture", f"{STEPS}.simulate_capture", settings,
         places={"folder": capture}, writes=capture / CAPTURE_FILE,
@@ -22,7 +23,7 @@ def filmed_calibration_steps(name: str, capture: Path, settings: SimulationSetti
 
 
 def _filmed_inputs(folder: Path, listing: Output) -> CaptureInputs:
-    """What the steps take of a capture that the virtual scanner is to film."""
+    """The inputs of the steps from a capture that the virtual scanner will film."""
     from footscan.virtual.filming.capture import capture_document
     from pipelines.steps.simulate_capture import filmed_reference
 
@@ -33,7 +34,7 @@ def _filmed_inputs(folder: Path, listing: Output) -> CaptureInputs:
         document,
         filmed_reference(),
         {camera: folder / name for camera, name in names.items()},
-        dict.fromkeys(names, listing),
+        {camera: {"film": listing, "file": Value(name.encode())} for camera, name in names.items()},
         [CAPTURE_FILE, document.reference, *names.values()],
         listing,
     )

@@ -1,4 +1,4 @@
-"""Name and version of this program, as files that it writes bear them."""
+"""Name and version of this program, for the files that it writes."""
 
 from importlib.metadata import version
 

@@ -1,4 +1,4 @@
-"""What the virtual scanner can film: a mesh from a file, the parametric foot, the block."""
+"""The objects that the virtual scanner can film: a mesh from a file, the parametric foot, the block."""
 
 from pathlib import Path
 from typing import Literal
@@ -16,7 +16,7 @@ Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
 DIAGONAL_MM = (20.0, 600.0)
-"""A mesh outside of this is in another unit, or no thing for a foot scanner."""
+"""Smallest and largest diagonal of a mesh; others are in another unit or not the size of a foot. Chosen by hand."""
 
 
 def virtual_object(

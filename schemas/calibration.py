@@ -2,8 +2,8 @@
 
 Version 1 holds what the thesis holds: six coefficients for Y and six for Z a camera, of the plain pixel coordinates.
 Version 2 holds polynomials of any order in normalised coordinates with the region that supports them. Version 3, the
-current one, holds any of the models with their covariance, and says what they were made from. Older files are migrated
-when they are read.
+current one, holds any of the models with their covariance and their sources. Older files are migrated when they are
+read.
 """
 
 import math
@@ -22,12 +22,12 @@ from schemas.calibration_history import CalibrationV1, CalibrationV2, migrate_v1
 VERSION = 3
 _FAMILY = "footscan.calibration/"
 LARGEST = 1e15
-"""No number of a camera's map is larger; what is computed from it stays finite."""
+"""Largest number in a camera's map, so that results computed from it stay finite; chosen by hand."""
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Side = Annotated[int, Field(ge=1, le=100_000)]
 Scale = Annotated[float, Field(ge=1e-9, le=LARGEST)]
 DENT_PX = 1e-6
-"""How far a corner of a convex region may lie inside of it, for rounding."""
+"""Distance in px by which a corner of a convex region may lie inside it, for rounding; chosen by hand."""
 
 
 class PolynomialMap(Document):
@@ -50,7 +50,7 @@ class PolynomialMap(Document):
 
 
 class Distortion(Document):
-    """From the seen to the ideal place of a pixel, in normalised coordinates (Brown 1971), with r^2 = u^2 + v^2:
+    """Map from the seen to the ideal place of a pixel, in normalised coordinates (Brown 1971), with r^2 = u^2 + v^2:
 
     u + u (k1 r^2 + k2 r^4) + 2 p1 u v + p2 (r^2 + 2 u^2) and v + v (k1 r^2 + k2 r^4) + p1 (r^2 + 2 v^2) + 2 p2 u v.
     """
@@ -62,7 +62,7 @@ class Distortion(Document):
 
 
 class Correction(Document):
-    """What is added to Y and Z in mm: polynomials of (u, v) without their terms of degree 0 and 1."""
+    """Polynomials of (u, v), without terms of degree 0 and 1, that are added to Y and Z in mm."""
 
     order: Annotated[int, Field(ge=2, le=5)]
     alpha_y: list[Number]
@@ -77,7 +77,7 @@ class Correction(Document):
 class HomographyMap(Document):
     """A plane seen by a pinhole: (Y w, Z w, w) = `matrix` (u, v, 1), with u = (i - centre_i) / scale and v likewise.
 
-    `distortion` is taken out of (u, v) first; `correction` is added at the end.
+    `distortion` is removed from (u, v) first; `correction` is added at the end.
     """
 
     model: Literal["homography"] = "homography"
@@ -93,33 +93,33 @@ PixelMap = Annotated[PolynomialMap | HomographyMap, Field(discriminator="model")
 
 
 Residual = tuple[Number, Number, Number, Number]
-"""A pixel (i, j), and how far the map takes it from its place in Y and in Z, mm."""
+"""A pixel (i, j), and the error of its mapped place in Y and in Z, mm."""
 
 
 class CameraCalibration(Document):
-    """The map of one camera, how sure it is, and where."""
+    """The map of one camera, its uncertainty, and its region of support."""
 
     camera: Annotated[int, Field(ge=1)]
     image_px: tuple[Side, Side] | None = None
-    """Columns and rows of the images it holds for; None where they are not known."""
+    """Columns and rows of the images that the map is valid for; None if unknown."""
     map: PixelMap
     covariance: list[list[float]] = Field(default_factory=list)
-    """Of the map's parameters, the lower triangle row by row; empty where it is not known. The order of parameters is
+    """Covariance of the map's parameters, the lower triangle row by row; empty if unknown. The order of parameters is
     alpha_y, alpha_z; or matrix, k1, k2, p1, p2, then alpha_y and alpha_z of the correction."""
     condition: float | None = None
     """Condition number of the fit with all columns scaled to one length."""
     region_px: Annotated[list[Point], Field(max_length=10_000)]
-    """Corners of the convex region of pixels (i, j) that data support; empty where it is not known."""
+    """Corners of the convex region of pixels (i, j) that data support; empty if unknown."""
     points: Annotated[int, Field(ge=0)]
-    """How many control points, or points of the stripe, were used."""
+    """Number of control points, or of points of the stripe, in the fit."""
     rms_mm: float | None = None
-    """Distance from what was fitted, root mean square."""
+    """Root mean square of the distances of the fitted points."""
     held_out_rms_mm: float | None = None
-    """The same on what was held out of the fit; None where there is too little to hold any out."""
+    """The same for points held out of the fit; None if there are too few points to hold any out."""
     worst_mm: float | None = None
-    """Largest distance, on what was held out where that is known."""
+    """Largest distance, of the points held out if there are any."""
     residuals: Annotated[list[Residual], Field(max_length=10_000)] = Field(default_factory=list)
-    """What the fit leaves at each control point, or across each stretch of an edge; empty where it is not known."""
+    """Residuals of the fit at each control point, or across each stretch of an edge; empty if unknown."""
 
     @model_validator(mode="after")
     def _is_triangle(self) -> Self:
@@ -137,11 +137,11 @@ class CameraCalibration(Document):
 
 
 class PairAgreement(Document):
-    """How far apart two cameras place one and the same edge."""
+    """The distance between two cameras' places of the same edges."""
 
     cameras: tuple[int, int]
     places: Annotated[int, Field(ge=1)]
-    """Stretches of edges that both saw."""
+    """Number of stretches of edges that both cameras saw."""
     rms_mm: float
     worst_mm: float
 
@@ -154,7 +154,7 @@ class Source(Document):
 
 
 class Calibration(Document):
-    """The current version."""
+    """The content of a calibration file, in its current version."""
 
     format: Literal["footscan.calibration/3"] = "footscan.calibration/3"
     unit: Literal["mm"] = "mm"
@@ -163,12 +163,12 @@ class Calibration(Document):
     software: str
     """Name and version of the program that wrote it."""
     created: AwareDatetime | None = None
-    """When; None where it was made as a step of a pipeline, whose results depend on nothing but their inputs."""
+    """Time of creation; None if a step of a pipeline made it, because its results depend on nothing but its inputs."""
     cameras: Annotated[list[CameraCalibration], Field(min_length=1)]
     warnings: list[str] = Field(default_factory=list)
-    """What looked like a mistake in the sources, a line each."""
+    """Probable mistakes in the sources, one line each."""
     pairs: list[PairAgreement] = Field(default_factory=list)
-    """Disagreement of each two cameras that saw the same edges."""
+    """Disagreement of each pair of cameras that saw the same edges."""
 
     @model_validator(mode="after")
     def _unique(self) -> Self:
@@ -178,7 +178,7 @@ class Calibration(Document):
         return self
 
     def camera(self, camera_id: int, source: Path | str = "calibration") -> CameraCalibration:
-        """The map of one camera, or a refusal that names what there is."""
+        """The map of one camera, or a refusal that lists the cameras of the calibration."""
         for camera in self.cameras:
             if camera.camera == camera_id:
                 return camera
@@ -187,7 +187,7 @@ class Calibration(Document):
 
 
 def parameter_count(pixel_map: PolynomialMap | HomographyMap) -> int:
-    """How many numbers a map has that a fit can change."""
+    """Number of parameters of a map that a fit can change."""
     if isinstance(pixel_map, PolynomialMap):
         return len(pixel_map.alpha_y) + len(pixel_map.alpha_z)
     correction = pixel_map.correction
@@ -201,13 +201,13 @@ def _check_terms(order: int, without: int, alpha_y: list[float], alpha_z: list[f
 
 
 def _convex(corners: list[Point]) -> bool:
-    """Whether corners run once around a convex region, either way; a corner may stand twice or lie on a side."""
+    """True if corners run once around a convex region, either way; a corner may be repeated or lie on a side."""
     turns: list[float] = []
     for k, (i, j) in enumerate(corners):
         (i0, j0), (i1, j1) = corners[k - 1], corners[(k + 1) % len(corners)]
         a, b = (i - i0, j - j0), (i1 - i, j1 - j)
         longer = max(math.hypot(*a), math.hypot(*b)) or 1.0
-        turns.append((a[0] * b[1] - a[1] * b[0]) / longer)  # about how far the corner stands out, px
+        turns.append((a[0] * b[1] - a[1] * b[0]) / longer)  # about the distance by which the corner stands out, px
     return (min(turns) >= -DENT_PX) != (max(turns) <= DENT_PX)
 
 

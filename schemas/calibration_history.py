@@ -1,4 +1,4 @@
-"""Former versions of the calibration file, and how each becomes the next."""
+"""Former versions of the calibration file, and their migration to the next version."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -103,7 +103,7 @@ def migrate_v1(old: CalibrationV1, source: Path | str) -> CalibrationV2:
 
 
 def migrate_v2(old: CalibrationV2) -> dict[str, Any]:
-    """Version 2 as the content of version 3: the same polynomials, whose covariance nobody noted."""
+    """Version 2 as the content of version 3: the same polynomials, without a covariance."""
     return {
         "format": "footscan.calibration/3",
         "sources": [{"name": old.source, "sha256": old.source_sha256}],

@@ -1,4 +1,4 @@
-"""A foot as shoes are chosen for it: what measures.json tells, whoever wrote it, and whose foot it is."""
+"""The measures of a foot for the choice of shoes, from a measures.json by any program, and the owner of the foot."""
 
 import re
 from datetime import date
@@ -11,9 +11,9 @@ from schemas.base.model import Document, Side
 from schemas.measures import Status
 
 AS_TOLD = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
-"""Measures that a person or another version wrote down are as good as ours: what is not needed is passed over."""
+"""Measures by a person or another version are accepted, too: unknown fields are ignored."""
 LARGEST = 1e12
-"""A thousand cubic metres in mm3: what is beyond is no measure of a foot."""
+"""A thousand cubic metres in mm3: no measure of a foot is larger."""
 
 
 class Reading(Document):
@@ -45,15 +45,15 @@ class Foot(Document):
     unit: Literal["mm"] = "mm"
     side: Side = "unknown"
     side_note: str | None = None
-    """Where the form of the foot speaks against its side."""
+    """Warning that the form of the foot contradicts its side."""
     axis: str | None = None
     measures: dict[str, Reading]
     finding: str | None = None
-    """Why nothing was measured."""
+    """Reason why nothing was measured."""
     patient: str | None = None
     scan: str | None = None
     source: str = "measures"
-    """What messages call it."""
+    """Name of the foot in messages."""
 
     @model_validator(mode="before")
     @classmethod
@@ -70,15 +70,15 @@ class Foot(Document):
 
     @property
     def name(self) -> str:
-        """`patient/scan` where they are known, the file otherwise."""
+        """`patient/scan` if both are known, or else the file."""
         return f"{self.patient}/{self.scan}" if self.patient and self.scan else self.source
 
     @property
     def date(self) -> date | None:
-        """The day that the name of the scan tells: 2026-11-20-R."""
+        """The day in the name of the scan, such as 2026-11-20-R."""
         for year, month, day in re.findall(r"(?<!\d)(\d{4})-?(\d\d)-?(\d\d)(?!\d)", self.scan or ""):
             try:
                 return date(int(year), int(month), int(day))
-            except ValueError:  # a number that is no day
+            except ValueError:  # not a date
                 continue
         return None

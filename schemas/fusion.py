@@ -1,4 +1,4 @@
-"""What the fusion of the cameras tells: how far apart they place the same skin, and how they were moved."""
+"""The report of the fusion: the disagreement of the cameras about the same skin, and their corrections."""
 
 from typing import Annotated, Literal
 
@@ -23,17 +23,17 @@ class Disagreement(Document):
 
 
 class PairDisagreement(Document):
-    """Of two cameras, before and after the corrections."""
+    """Disagreement of two cameras, before and after the corrections."""
 
     cameras: tuple[Camera, Camera]
     points: Count
-    """Places at which they were compared."""
+    """Number of places at which they were compared."""
     before: Disagreement
     after: Disagreement
 
 
 class CameraCorrection(Document):
-    """What moves the points of a camera in the laser's plane.
+    """The correction that moves the points of a camera in the laser plane.
 
     With u = (Y - centre) / scale and v = (Z - centre) / scale, the terms are, in this order: (1, 0), (0, 1), (-v, u);
     for `affine` also (u, v), (u, -v), (v, u); for `quadratic` also (u^2, 0), (uv, 0), (v^2, 0), (0, u^2), (0, uv),
@@ -46,13 +46,13 @@ class CameraCorrection(Document):
     centre_mm: tuple[float, float] = (0.0, 0.0)
     scale_mm: Length = 1.0
     range_mm: tuple[float, float, float, float] | None = None
-    """Least Y and Z, greatest Y and Z of where the camera was compared with others; None where it was not."""
+    """Least Y and Z, greatest Y and Z of the places where the camera was compared with others; None if it was not."""
     shift_mm: tuple[float, float] = (0.0, 0.0)
-    """Of Y and Z at the centre."""
+    """Shift of Y and Z at the centre."""
     rotation_deg: float = 0.0
     """From Y towards Z."""
     largest_mm: Length = 0.0
-    """How far the point that moves most is moved, within the range."""
+    """Largest displacement of a point within the range."""
     points: Count
     """Places at which the camera was compared with others."""
     held_out_before_mm: Length | None = None
@@ -62,11 +62,11 @@ class CameraCorrection(Document):
 
 
 class FusionReport(Document):
-    """How well the cameras agree."""
+    """The agreement of the cameras."""
 
     pairs: list[PairDisagreement] = Field(default_factory=list)
     corrections: list[CameraCorrection] = Field(default_factory=list)
     """One a camera."""
     contradicted: dict[Camera, Count] = Field(default_factory=dict)
-    """Points by camera that gave way to those of others."""
+    """Number of points by camera that were dropped in favour of other cameras."""
     warnings: list[str] = Field(default_factory=list)

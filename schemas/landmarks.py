@@ -7,31 +7,31 @@ from pydantic import Field
 from schemas.base.model import Document
 
 Coordinate = Annotated[float, Field(ge=-1e4, le=1e4)]
-Place = tuple[Coordinate, Coordinate, Coordinate]
+LandmarkPosition = tuple[Coordinate, Coordinate, Coordinate]
 
 
 class Places(Document):
     """x, y and z of each landmark that was set."""
 
-    pternion: Place | None = None
-    landing_point: Place | None = None
-    metatarsale_tibiale: Place | None = None
-    metatarsale_fibulare: Place | None = None
-    toe_1_tip: Place | None = None
-    toe_2_tip: Place | None = None
-    toe_3_tip: Place | None = None
-    toe_4_tip: Place | None = None
-    toe_5_tip: Place | None = None
-    first_metatarsal_head_top: Place | None = None
-    second_metatarsal_head_top: Place | None = None
-    instep_point: Place | None = None
-    junction_point: Place | None = None
-    navicular: Place | None = None
-    medial_malleolus: Place | None = None
-    lateral_malleolus: Place | None = None
-    fifth_metatarsal_tuberosity: Place | None = None
-    heel_medial: Place | None = None
-    heel_lateral: Place | None = None
+    pternion: LandmarkPosition | None = None
+    landing_point: LandmarkPosition | None = None
+    metatarsale_tibiale: LandmarkPosition | None = None
+    metatarsale_fibulare: LandmarkPosition | None = None
+    toe_1_tip: LandmarkPosition | None = None
+    toe_2_tip: LandmarkPosition | None = None
+    toe_3_tip: LandmarkPosition | None = None
+    toe_4_tip: LandmarkPosition | None = None
+    toe_5_tip: LandmarkPosition | None = None
+    first_metatarsal_head_top: LandmarkPosition | None = None
+    second_metatarsal_head_top: LandmarkPosition | None = None
+    instep_point: LandmarkPosition | None = None
+    junction_point: LandmarkPosition | None = None
+    navicular: LandmarkPosition | None = None
+    medial_malleolus: LandmarkPosition | None = None
+    lateral_malleolus: LandmarkPosition | None = None
+    fifth_metatarsal_tuberosity: LandmarkPosition | None = None
+    heel_medial: LandmarkPosition | None = None
+    heel_lateral: LandmarkPosition | None = None
 
 
 LANDMARKS = tuple(Places.model_fields)
@@ -46,7 +46,7 @@ class ManualLandmarks(Document):
     landmarks: Places
     """In the frame of the mesh, as its file has it; in mm, whatever the unit of that file."""
 
-    def points(self) -> dict[str, Place]:
+    def points(self) -> dict[str, LandmarkPosition]:
         """Those that were set, by their names."""
-        set_: dict[str, Place] = self.landmarks.model_dump(exclude_none=True)
+        set_: dict[str, LandmarkPosition] = self.landmarks.model_dump(exclude_none=True)
         return set_

@@ -8,14 +8,14 @@ from schemas.base.model import Document, Side
 
 Unit = Literal["mm", "mm2", "mm3", "deg", "1"]
 Status = Literal["ok", "uncertain", "incomplete"]
-Place = tuple[float, float, float]
+Position = tuple[float, float, float]
 
 
 class Measure(Document):
     """One measure."""
 
     value: float | None
-    """None where it cannot be told."""
+    """None if it could not be measured."""
     unit: Unit
     status: Status
     """"uncertain" has a value that rests on a fallback or on filled surface; "incomplete" has none, and a note that
@@ -23,18 +23,16 @@ class Measure(Document):
     definition: str
     note: str | None = None
     uncertainty: float | None = None
-    """Standard deviation that comes from the errors of the mesh, in the unit of the value; None where that is not
-    known."""
+    """Standard deviation due to the errors of the mesh, in the unit of the value; None if unknown."""
     surface_length: float | None = None
-    """Of a girth: the length along the surface, hollows included, mm; the value is that of a tape, which bridges
+    """For a girth: the length along the surface in mm, hollows included; the value is that of a tape, which bridges
     them."""
-    plane: tuple[Place, Place] | None = None
-    """Of a girth, a point in mm and the unit normal of the plane in which it was taken, frame of the mesh."""
+    plane: tuple[Position, Position] | None = None
+    """For a girth: a point in mm and the unit normal of its plane, frame of the mesh."""
     filled_share: float | None = None
-    """How far the value rests on surface that was filled and not measured, from 0 to 1; None where the mesh does not
-    tell."""
+    """Share of the value that rests on filled instead of measured surface, from 0 to 1; None if unknown."""
     calibration: tuple[float, float] | None = None
-    """(a, b), where the value is a + b times what was measured; None where it is what was measured."""
+    """(a, b) if the value is a + b times the measured value; None if it is the measured value itself."""
 
     @model_validator(mode="after")
     def _value_unless_incomplete(self) -> Self:
@@ -47,9 +45,9 @@ Axis = Literal["toe2", "ball_center", "brannock"]
 
 
 class MeasuredLandmark(Document):
-    """Where a landmark is, and how it was found."""
+    """The place of a landmark, and the method that found it."""
 
-    point: Place
+    point: Position
     """mm, frame of the mesh"""
     method: Literal["geometric", "fallback", "manual"]
     confidence: float = Field(ge=0, le=1)
@@ -63,7 +61,7 @@ class Measures(Document):
     unit: Literal["mm"] = "mm"
     side: Side
     side_note: str | None = None
-    """Where the form of the foot speaks against the side."""
+    """Warning that the form of the foot contradicts the side."""
     axis: Axis | None
     """The foot axis that lengths run along: from the rearmost heel point to the tip of the second toe ("toe2") or to
     the middle of the ball, or along the tangent of heel and ball on the medial side; None where nothing could be
@@ -74,4 +72,4 @@ class Measures(Document):
     measures: dict[str, Measure]
     landmarks: dict[str, MeasuredLandmark] = Field(default_factory=dict)
     finding: str | None = None
-    """Why nothing could be measured, where that is so: the surface is no foot."""
+    """Reason why nothing could be measured, if so: the surface is no foot."""

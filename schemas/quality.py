@@ -1,4 +1,4 @@
-"""quality.json: how good a scan and its surface are."""
+"""quality.json: the quality of a scan and its surface."""
 
 from typing import Annotated, Literal
 
@@ -13,7 +13,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class CameraQuality(Document):
-    """What one camera gave."""
+    """The frames and points of one camera."""
 
     camera: Annotated[int, Field(ge=1)]
     frames: Count
@@ -27,7 +27,7 @@ class CameraQuality(Document):
 
 
 class MeshQuality(Document):
-    """How whole a mesh is."""
+    """The completeness and topology of a mesh."""
 
     vertices: Count
     triangles: Count
@@ -42,9 +42,9 @@ class MeshQuality(Document):
     largest_hole_mm: Annotated[float, Field(ge=0)] = 0.0
     """Length of the longest of them."""
     filled_share: Share | None = None
-    """Of the area, what no camera saw, the flat cut apart; null where it is not known."""
+    """Share of the area that no camera saw, without the flat cut; null if unknown."""
     cut_share: Share | None = None
-    """Of the area, the flat cut above the ankle."""
+    """Share of the area in the flat cut above the ankle."""
     triangle_quality: Share | None = None
     """Mean over the triangles of 4 sqrt(3) area / (sum of the squared edges), which is 1 for an even one."""
     worst_triangles: Share | None = None
@@ -52,10 +52,10 @@ class MeshQuality(Document):
 
 
 class Figures(Document):
-    """Distances of points to a surface, in mm. Without a prefix: how far away it is, to any side."""
+    """Distances of points to a surface, in mm; those without the prefix `signed` are absolute."""
 
     points: Count | None = None
-    """How many distances were taken."""
+    """Number of distances."""
     mean: float
     std: float
     min: float
@@ -79,33 +79,33 @@ class RegionFigures(Figures):
 
 
 class Completeness(Figures):
-    """Distances of the second surface to the first: what of it is there."""
+    """Distances of the second surface to the first, which show its missing parts."""
 
     within_mm: Annotated[float, Field(gt=0)]
     within_share: Share
-    """Of the second surface, what lies no farther than `within_mm` from the first."""
+    """Share of the second surface that lies at most `within_mm` from the first."""
     regions: list[RegionFigures] = Field(default_factory=list)
 
 
 class Histogram(Document):
-    """How distances are spread over classes of one width, from the least to the greatest."""
+    """Counts of distances in classes of equal width, from the least to the greatest."""
 
     signed: bool
-    """Whether the distances are; otherwise they count to any side alike."""
+    """True if the distances are signed, false if they are absolute."""
     edges_mm: list[float]
-    """One more than there are classes; a class holds its lower edge, the last one its upper edge, too."""
+    """Edges of the classes, one more than classes. A class includes its lower edge, the last one also its upper."""
     counts: list[Count]
     shares: list[Share]
 
 
 class Comparison(Figures):
-    """Distances of one surface to another, in mm, and how it was moved beforehand."""
+    """Distances of one surface to another, in mm, and the transform that was applied first."""
 
     unit: Literal["mm"] = "mm"
     transform: list[list[float]] | None = None
-    """4 x 4, what the first was moved by before the distances were taken."""
+    """4 x 4 transform that moved the first surface before the distances were taken."""
     regions: list[RegionFigures] = Field(default_factory=list)
-    """By region of the foot that the second is, where it is one; what has no point is left out."""
+    """Distances by region of the foot, if the second surface is a foot; regions without points are left out."""
     histograms: list[Histogram] = Field(default_factory=list)
     completeness: Completeness | None = None
 
@@ -115,12 +115,12 @@ class Quality(Document):
 
     format: Literal["footscan.quality/1"] = "footscan.quality/1"
     calibration: Source
-    """The file that pixels were mapped by."""
+    """The calibration file that mapped the pixels."""
     cameras: list[CameraQuality]
     fusion: FusionReport = Field(default_factory=FusionReport)
-    """How far apart the cameras place the same skin, and how they were moved."""
+    """Disagreement of the cameras about the same skin, and their corrections."""
     cloud_points: Count
-    """Points of the cloud that the surface was made of."""
+    """Number of points of the cloud from which the surface was made."""
     mesh: MeshQuality
     truth: Comparison | None = None
-    """Distances of the surface to the reference model, where the scan names one."""
+    """Distances of the surface to the reference model, if the scan names one."""

@@ -18,11 +18,11 @@ class RecordedBoard(Document):
 
     port: Text
     version: Text
-    """As its firmware says."""
+    """Version that its firmware reports."""
     settings_sha256: Sha256
     """Of its settings, as it lists them."""
     reports: Count
-    """How often it said where the heads were, while they travelled."""
+    """Number of position reports while the heads travelled."""
     report_sd_s: Deviation
     """Standard deviation of the time that such a report stands for, root mean square."""
     lost_steps_mm: tuple[float, float, float] | None = None
@@ -34,13 +34,13 @@ class RecordedPass(Document):
 
     cameras: Annotated[list[int], Field(min_length=1)]
     reason: Text
-    """Why these and no more."""
+    """Reason for this choice of cameras."""
     start_mm: Millimetres
     end_mm: Millimetres
     mm_per_s: Annotated[float, Field(gt=0)]
-    """That was asked for."""
+    """Requested speed."""
     seconds: Deviation
-    """That it took."""
+    """Duration of the travel."""
 
 
 class RecordedLight(Document):
@@ -48,7 +48,7 @@ class RecordedLight(Document):
 
     power: Share
     looks: Count
-    """How many test frames a camera took."""
+    """Number of test frames of a camera."""
     is_measured: bool = True
     """False where power and exposure were given by hand."""
 
@@ -68,15 +68,15 @@ class RecordedCamera(Document):
     device: Text
     """Its stable name or URL."""
     name: Text | None = None
-    """What it calls itself."""
+    """Name that it reports."""
     head: HeadNumber
     exposure_ms: Milliseconds | None = None
-    """None where it cannot be set or read."""
+    """None if it cannot be set or read."""
     gain: Share | None = None
     light_reason: Text | None = None
-    """Why this exposure."""
+    """Reason for this exposure."""
     not_fixed: list[Text] = Field(default_factory=list)
-    """Controls that the camera lacks, or set otherwise than it was asked."""
+    """Controls that the camera lacks, or set to another value than requested."""
 
     expected: Count
     """Exposures while its head travelled."""
@@ -118,4 +118,4 @@ class Recording(Document):
     passes: Annotated[list[RecordedPass], Field(min_length=1)]
     cameras: Annotated[list[RecordedCamera], Field(min_length=1)]
     warnings: list[Text] = Field(default_factory=list)
-    """What an operator was told."""
+    """Warnings that were shown to the operator."""

@@ -34,7 +34,7 @@ class DataSet(Document):
 
 
 class Tolerance(Document):
-    """By how much a figure may differ from the accepted one, the larger of both."""
+    """Largest difference of a figure from the accepted one: the larger of both bounds."""
 
     absolute: Annotated[float, Field(ge=0)] = 0.0
     """In the figure's own unit."""
@@ -42,7 +42,7 @@ class Tolerance(Document):
     """Share of the accepted figure."""
 
     def allows(self, accepted: float) -> float:
-        """How far from `accepted` is the same."""
+        """Largest distance from `accepted` that is tolerated."""
         return max(self.absolute, self.relative * abs(accepted))
 
 
@@ -61,7 +61,7 @@ AnyTolerance = Annotated[Tolerance, BeforeValidator(_as_tolerance)]
 
 
 class Suite(Document):
-    """What is run every night; its paths are relative to it."""
+    """The scans that are run every night; its paths are relative to it."""
 
     format: Literal["footscan.suite/1"]
     baseline: Name = "baseline.yaml"
@@ -69,9 +69,9 @@ class Suite(Document):
     out: Name = "nights"
     """Folder of films, cache, history and page."""
     every_hours: Annotated[float, Field(gt=0)] | None = None
-    """How often it is to run: longer gaps are marked on the page."""
+    """Intended interval of the runs: longer gaps are marked on the page."""
     timed_passes: Annotated[int, Field(ge=0, le=20)] = 2
-    """How often a scan is run with an empty cache, to take time and memory; 0 takes neither."""
+    """Number of runs of a scan with an empty cache, to measure time and memory; 0 measures neither."""
     parameters: ScanParameters = ScanParameters()
     tolerances: dict[Name, AnyTolerance] = Field(default_factory=dict)
     """By figure, with `*` as in a shell, before it `SET:` for one set alone; the last that fits wins, then those of the
@@ -86,7 +86,7 @@ def _reason(text: str) -> str:
 
 
 class Acceptance(Document):
-    """Why figures were accepted."""
+    """The reason why figures were accepted."""
 
     reason: Annotated[str, AfterValidator(_reason)]
     date: AwareDatetime
@@ -105,7 +105,7 @@ class Baseline(Document):
 
 
 class AcceptedStep(Document):
-    """What a step came to."""
+    """The accepted result of a step."""
 
     step: str
     """`extract-3`"""
@@ -116,7 +116,7 @@ class AcceptedStep(Document):
 
 
 class AcceptedSteps(Document):
-    """What the steps of all sets came to when the baseline was accepted, each after those that it takes from."""
+    """The results of the steps of all sets when the baseline was accepted, each step after its inputs."""
 
     format: Literal["footscan.steps/1"] = "footscan.steps/1"
     sets: dict[Pseudonym, list[AcceptedStep]]

@@ -109,7 +109,7 @@ def _each_once(cameras: list[RigCamera]) -> list[RigCamera]:
         values = [getattr(camera, field) for camera in cameras]
         for value in values:
             if values.count(value) > 1:
-                raise ValueError(f"{field} {value} stands twice, expected each once")
+                raise ValueError(f"{field} {value} is listed twice, expected each once")
     return cameras
 
 

@@ -18,7 +18,7 @@ class Travel(Document):
 
 
 class CameraSource(Document):
-    """Where the frames of one camera lie."""
+    """The place of the frames of one camera."""
 
     id: Annotated[int, Field(ge=1, le=64)]
     file: RelativePath
@@ -29,7 +29,7 @@ class CameraFilm(CameraSource):
     """One camera of a scan."""
 
     background: RelativePath | None = None
-    """A film, a folder of frames or an image with the laser off: one frame for all, or one for each of the film's."""
+    """A film, a folder of frames or an image with the laser off: one frame for all, or one for each film frame."""
     travel: Travel | None = None
     """The camera's own travel; default: the scan's."""
     positions: RelativePath | None = None
@@ -46,7 +46,7 @@ class Scan(Document):
     travel: Travel | None = None
     calibration: RelativePath | None = None
     scanner: Pseudonym | None = None
-    """Which scanner filmed it: a workflow may have a calibration for each."""
+    """The scanner that filmed it: a workflow may have a calibration for each scanner."""
     date: datetime.date | None = None
     """Day of the scan; default: the day that the scan's name begins with, if any."""
     truth: RelativePath | None = None
@@ -63,7 +63,7 @@ class Scan(Document):
 
     @property
     def day(self) -> datetime.date | None:
-        """`date`, or that of a name such as 2026-11-20-R."""
+        """`date`, or the date in a name such as 2026-11-20-R."""
         if self.date is not None or not (named := re.match(r"\d{4}-\d{2}-\d{2}", self.scan)):
             return self.date
         try:
@@ -73,8 +73,8 @@ class Scan(Document):
 
 
 def unique_ids(cameras: Sequence[CameraSource]) -> None:
-    """Refuses two cameras with one id."""
+    """Refuse two cameras with the same id."""
     ids = [camera.id for camera in cameras]
     for camera_id in ids:
         if ids.count(camera_id) > 1:
-            raise ValueError(f"camera {camera_id} stands twice, expected each id once")
+            raise ValueError(f"camera {camera_id} is listed twice, expected each id once")

@@ -1,4 +1,4 @@
-"""The search of `footscan tune`: the section `tune:` of workflow.yaml, and the journal of what was tried."""
+"""The search of `footscan tune`: the section `tune:` of workflow.yaml, and the journal of its trials."""
 
 import difflib
 from collections.abc import Mapping
@@ -30,9 +30,9 @@ class SearchRange(Document):
     low: float
     high: float
     log: bool = False
-    """Whether equal ratios count as equal steps."""
+    """True if equal ratios count as equal steps."""
     step: Annotated[float, Field(gt=0)] | None = None
-    """From value to value, from `low` on; a grid over numbers that are not whole needs it."""
+    """Step from value to value, starting at `low`; a grid over numbers that are not whole needs it."""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -60,7 +60,7 @@ def _kind_of_held_out(value: Any) -> str:
 
 
 Patterns = Annotated[list[Annotated[str, Field(min_length=1)]], BeforeValidator(_as_list), Field(min_length=1)]
-"""Of scans as `patient/scan`, with `*`, `?` and `[...]` as in a shell."""
+"""Patterns of scans as `patient/scan`, with `*`, `?` and `[...]` as in a shell."""
 Search = Annotated[
     Annotated[SearchRange, Tag("range")] | Annotated[list[Any], Field(min_length=1), Tag("choices")],
     Discriminator(_kind_of_search),
@@ -76,20 +76,20 @@ def _accuracy_alone() -> list[Objective]:
 
 
 class Tuning(Document):
-    """Which parameters are sought, over which scans, and what is better."""
+    """The parameters that are sought, the scans that decide, and the objectives."""
 
     data: Patterns = Field(default_factory=lambda: ["*"])
-    """Scans of the archive that decide, less those held out."""
+    """Scans of the archive that decide, without those held out."""
     held_out: HeldOut | None = None
     """Scans that take no part in the search and test its winner; or a share, drawn by `seed`, of the patients."""
     search: Annotated[dict[str, Search], Field(min_length=1)]
-    """What is tried of each parameter, by `section.name`: a range, or a list of values."""
+    """Values to try for each parameter, by `section.name`: a range, or a list."""
     objectives: Annotated[list[Objective], Field(min_length=1)] = Field(default_factory=_accuracy_alone)
-    """What is better; of several, what is best in all at once is sought (the Pareto front)."""
+    """Objectives to optimise; with several, the search seeks their Pareto front."""
     sampler: Sampler = "tpe"
     """`grid` tries every combination; the others are Optuna's."""
     trials: Annotated[int, Field(ge=1, le=10_000)] = 40
-    """How many different sets of parameters are tried; a grid is tried as a whole."""
+    """Number of different sets of parameters that are tried; a grid is tried as a whole."""
     seed: Annotated[int, Field(ge=0)] = 1
 
     @field_validator("objectives")
@@ -102,7 +102,7 @@ class Tuning(Document):
     @field_validator("search")
     @classmethod
     def _of_known_parameters(cls, search: Mapping[str, SearchRange | list[Any]]) -> dict[str, SearchRange | list[Any]]:
-        """Each parameter takes what is tried of it; choices become the parameter's own type."""
+        """Check that each parameter accepts its values; choices become the parameter's own type."""
         wrong: dict[str, ValueError] = {}
         checked: dict[str, SearchRange | list[Any]] = {}
         for name, tried in search.items():
@@ -119,7 +119,7 @@ class Tuning(Document):
 
 
 class TuneJournal(Document):
-    """The first line of a journal: the search that those who follow were tried for."""
+    """The first line of a journal: the search that the trials below belong to."""
 
     format: Literal["footscan.trials/1"] = "footscan.trials/1"
     search: dict[str, Any]
@@ -132,19 +132,19 @@ class TriedPoint(Document):
     """A further line of a journal: a set of parameters whose steps have all been run."""
 
     point: dict[str, Any] | None
-    """Value of each parameter that is sought; None for the present ones."""
+    """Value of each parameter that is sought; None for the present values."""
     seconds: dict[str, float]
-    """How long each step took that was run for it, by the key of its action."""
+    """Duration of each step that was run for it, by the key of its action."""
 
 
 def is_whole(name: str) -> bool:
-    """Whether a parameter `section.name` is a whole number."""
+    """True if a parameter `section.name` is a whole number."""
     return _fields()[name][0] is int
 
 
 @cache
 def _fields() -> dict[str, tuple[Any, TypeAdapter[Any]]]:
-    """Type, and what checks a value, of each parameter by `section.name`."""
+    """Type and value check of each parameter, by `section.name`."""
     found: dict[str, tuple[Any, TypeAdapter[Any]]] = {}
     for section, model in ScanParameters.model_fields.items():
         assert isinstance(model.annotation, type)
@@ -156,7 +156,7 @@ def _fields() -> dict[str, tuple[Any, TypeAdapter[Any]]]:
 
 
 def _checked(name: str, tried: SearchRange | list[Any]) -> SearchRange | list[Any]:
-    """What is tried of a parameter, its choices in the parameter's own type; ValueError where it does not take them."""
+    """The values to try for a parameter, choices in its own type; ValueError if the parameter does not accept them."""
     if name not in _fields():
         near = difflib.get_close_matches(name, _fields(), n=1)
         raise ValueError("unknown parameter, " + (f"did you mean {near[0]!r}?" if near else "expected SECTION.NAME"))

@@ -23,7 +23,7 @@ def _path(named: str) -> str:
 
 
 def _without_empty(sections: Any) -> Any:
-    """A section with nothing below its name says as much as one that is left out."""
+    """The sections without empty ones: an empty section means the same as an absent one."""
     if sections is None:
         return {}
     if not isinstance(sections, dict):
@@ -46,16 +46,16 @@ Folders = Annotated[
 
 
 class ChosenCalibration(Document):
-    """A calibration, and for which scans it is meant: either its file, or the capture that it is made from."""
+    """A calibration, as its file or as the capture that it is made from, and the scans that it is meant for."""
 
     file: AnyPath | None = None
     """The calibration file."""
     capture: AnyPath | None = None
     """Folder of a capture of the reference object."""
     scanner: Pseudonym | None = None
-    """For scans of this scanner; default: of any."""
+    """Scanner whose scans it is for; default: any."""
     since: datetime.date | None = None
-    """For scans of this day and later, until the next one takes over; default: from the start."""
+    """First day of the scans that it is for, until the next calibration takes over; default: from the start."""
 
     @model_validator(mode="after")
     def _file_or_capture(self) -> Self:
@@ -72,20 +72,20 @@ class Workflow(Document):
     archive: Folders
     """Folder that holds the scans, each a folder with a scan.yaml; or several such folders."""
     calibration: AnyPath | None = None
-    """Used for scans that name none themselves."""
+    """Calibration of the scans that name none themselves."""
     calibrations: list[ChosenCalibration] = Field(default_factory=list)
-    """Likewise, where they differ by scanner and date; excludes `calibration`."""
+    """Calibrations by scanner and date, for scans that name none themselves; excludes `calibration`."""
     results: AnyPath
     """Folder for `<patient>/<scan>/`."""
     cache: Annotated[str, AfterValidator(_place)] | None = None
-    """Folder of the content store, or its URL as fsspec has it; default: `.footscan` in the results."""
+    """Folder of the content store, or its URL for fsspec; default: `.footscan` in the results."""
     group: Annotated[str, Field(min_length=1, max_length=64)] | None = None
-    """Group of users of this machine who share what is written; default: it is the owner's alone."""
+    """Group of users of this machine who share the files that are written; default: only their owner reads them."""
     workers: Annotated[int, Field(ge=1, le=256)] | None = None
-    """How many steps run at once; default: as many as there are cores."""
+    """Number of steps that run at once; default: the number of cores."""
     parameters: Annotated[ScanParameters, BeforeValidator(_without_empty)] = ScanParameters()
     tune: Tuning | None = None
-    """What `footscan tune` seeks."""
+    """The search of `footscan tune`."""
 
     @model_validator(mode="after")
     def _one_calibration_a_scan(self) -> Self:

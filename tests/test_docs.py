@@ -78,7 +78,7 @@ def test_json_schemas_say_what_fields_mean(json_schemas: ModuleType) -> None:
     camera = calibration["$defs"]["CameraCalibration"]["properties"]
     assert camera["region_px"]["description"].startswith("Corners of the convex region of pixels")
     assert camera["region_px"]["maxItems"] == 10_000
-    assert calibration["properties"]["created"]["description"].startswith("When; None where")
+    assert calibration["properties"]["created"]["description"].startswith("Time of creation; None if")
     assert "format" in calibration["required"]
 
 

@@ -1,4 +1,4 @@
-"""Which of the frames that came are the film's: each at a place that is known, a lost one at an empty place."""
+"""Selects the frames of a film: each has a known place, and a lost frame has a place without a picture."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,18 +19,18 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 MARGIN_SECONDS = 1.0
-"""Reports and frames of so long before and after a travel belong to it."""
+"""Reports and frames within this time before and after a travel belong to it. Chosen by hand."""
 USUAL_JITTERS = 3.0
-"""Delays within so many standard deviations are usual."""
+"""Delays within this many standard deviations are usual. Chosen by hand."""
 MOST_LOST = 0.05
-"""Share of a film's frames; a film that lacks more has holes in it."""
+"""Largest share of lost frames in a complete film. Chosen by hand."""
 WIDEST_GAP_STEPS = 4.0
-"""Between two places with a picture, in usual steps."""
+"""Largest gap between two places with a picture, in usual steps. Chosen by hand."""
 
 
 @dataclass(frozen=True)
 class CameraTiming:
-    """What is known of a camera's times."""
+    """Latency and uncertainty of a camera's times."""
 
     latency: Timed
     exposure_share: float
@@ -44,7 +44,7 @@ class FilmFrames:
     """The film of one camera; frames k = 0 to K - 1."""
 
     arrivals: dict[int, int]
-    """Which arrival each frame is; a frame that is not named is lost."""
+    """Arrival number of each frame; a frame without one is lost."""
     x_mm: Floats
     """(K,) scanner frame."""
     sd_mm: Floats
@@ -58,7 +58,7 @@ class FilmFrames:
     left_out: dict[int, str]
     """Why an exposure on the travel is not in the film, by its number on the camera's own clock."""
     problem: str | None
-    """Why the film is not whole; None where it is."""
+    """Why the film is incomplete; None if it is complete."""
 
 
 def motion_of_head(log: PositionLog, head: int, travel: Travel) -> HeadMotion:
@@ -149,7 +149,7 @@ def place_frames(
 def standing_frame(
     tally: FilmTally, times: tuple[int, FrameTimes], timing: CameraTiming, standing: Travel
 ) -> int | None:
-    """The last sound arrival that was taken while the heads stood; None where there is none."""
+    """The last sound arrival that was taken while the heads stood; None if there is none."""
     first, clock = times
     taken = clock.seconds - timing.latency.seconds
     fitting = [

@@ -1,4 +1,4 @@
-"""X of each frame, with its uncertainty: where the head stood when the camera exposed it.
+"""Computes X of each frame, with its uncertainty: the place of the head when the camera exposed it.
 
 Later steps want each frame at a place of its own. Nothing minds places in falling order or uneven steps; but a head
 that stands films one stripe again and again. What stands still in a tenth of a film is taken for a glint of the
@@ -21,8 +21,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 STANDING_MM = 0.1
+"""Frames closer than this are of one place. Chosen by hand."""
 LARGEST_SD_MM = 0.5
-"""A frame whose place is less certain is worth nothing: its stripe would lie in another one's place."""
+"""A frame whose place is less certain is dropped: its stripe could lie at the place of another frame. Chosen by
+hand."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class FramePositions:
 
 
 def frame_positions(number: Ints, seconds: Floats, sd_s: Floats, motion: HeadMotion, latency: Timed) -> FramePositions:
-    """The places of a camera's frames.
+    """Compute the places of a camera's frames.
 
     Parameters
     ----------
@@ -120,7 +122,7 @@ def frame_positions(number: Ints, seconds: Floats, sd_s: Floats, motion: HeadMot
 
 
 def write_positions(path: Path, x_mm: Iterable[float]) -> None:
-    """Writes the file of positions that scan.yaml names: columns frame,x_mm; under its name when it is whole."""
+    """Write the file of positions that scan.yaml names: columns frame,x_mm; under its name when it is complete."""
     partial = path.with_name(path.name + ".part")
     rows = "".join(f"{frame},{x:.4f}\n" for frame, x in enumerate(x_mm))
     partial.write_text("frame,x_mm\n" + rows, encoding="utf-8")

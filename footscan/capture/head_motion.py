@@ -1,10 +1,10 @@
-"""How a head moved, from where the controller reported it to be, now and then.
+"""Smooths the motion of a head from the controller's reports of its place.
 
-The reports, ten or twenty a second, are exact in place (whole steps) and uncertain in time (some milliseconds, for
-nobody knows when between question and answer they were true). Between them a head can speed up, slow down or stop.
+The reports, ten or twenty a second, are exact in place (whole steps) and uncertain in time (some milliseconds, since
+they were true at an unknown moment between question and answer). Between them a head can speed up, slow down or stop.
 So the motion is smoothed as a velocity that wanders (Rauch, Tung, Striebel: "Maximum likelihood estimates of linear
-dynamic systems", AIAA Journal 3 (1965) 1445-1450), how much being told by the reports around: evenly moving heads are
-averaged over many reports, and where the speed changes only the nearest ones count, and the uncertainty says so.
+dynamic systems", AIAA Journal 3 (1965) 1445-1450), by an amount inferred from the reports around: evenly moving heads
+are averaged over many reports, and where the speed changes only the nearest ones count, and the uncertainty says so.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ FASTEST_MM_PER_S = 200.0
 LEAST_WANDER = 0.05
 """mm^2/s^3: changes of speed that an even motion may still have; within a second about 0.2 mm/s."""
 NEIGHBOURS = 6
-"""Changes of speed at so many reports to either side count for an interval."""
+"""Changes of speed at this many reports to either side count for an interval. Chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class HeadReports:
     x_mm: Floats
     """X in mm, scanner frame."""
     stands: Bools | None = None
-    """Where the controller says that it holds the head, or has sent it nowhere; None: nowhere."""
+    """True where the controller holds the head or has given it no target; None: False everywhere."""
 
 
 @dataclass(frozen=True)

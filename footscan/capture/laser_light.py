@@ -1,7 +1,7 @@
-"""How brightly the lasers shine and how long the cameras expose, by what the cameras see of the stripe.
+"""Chooses the power of the lasers and the exposure of the cameras from the stripe in their pictures.
 
 The stripe should just begin to saturate: darker, its faint parts are lost; brighter, its core is a white plain whose
-middle nobody sees, and glints and reflections grow with it. The room's light is told from the stripe by their ratio,
+middle is invisible, and glints and reflections grow with it. The room's light is told from the stripe by their ratio,
 which exposure does not change: so the lasers shine with all their power, and the exposure of each camera follows,
 unless even the shortest one is too long for that.
 
@@ -24,25 +24,28 @@ Look = Callable[[float, Mapping[int, float]], Mapping[int, Sequence[Rgb]]]
 heads that are the same for every call."""
 
 LARGEST_SATURATION = 0.35
-"""Of the stripe's width, the white core; the median over its points."""
+"""Share of the stripe's width that is white, the median over its points. Chosen by hand."""
 LEAST_PEAK = 190.0
-"""Grey levels of red in the stripe's middle, the median over its points."""
+"""Grey level of red in the stripe's middle, the median over its points. Chosen by hand."""
 LEAST_POINTS = 60
-"""Of a frame: with fewer, the stripe is not seen."""
+"""With fewer points in a frame, the stripe is not seen. Chosen by hand."""
 LEAST_SCORE = 0.5
+"""Median score of a stripe that stands out. Chosen by hand."""
 LARGEST_FALSE_SHARE = 0.25
-"""Of the points of the stripe, so many may be found with the lasers off."""
+"""Share of the stripe's points that may be found with the lasers off. Chosen by hand."""
 LARGEST_WHITE_SHARE = 0.05
-"""Of the picture: beyond that the room is too bright for the exposure."""
+"""Share of the picture; with more the room is too bright for the exposure. Chosen by hand."""
 WHITE_GREY = 250
+"""Grey level from which a pixel is white. Chosen by hand."""
 MOST_LOOKS = 8
+"""A bound of time."""
 FINEST_STEP = 1.3
-"""Exposures closer than this factor are not told apart."""
+"""Exposures within this factor count as the same. Chosen by hand."""
 
 
 @dataclass(frozen=True)
 class LightLimits:
-    """Within what light may be set."""
+    """Limits of exposure and power. The defaults are chosen by hand."""
 
     shortest_ms: float = 0.3
     longest_ms: float = 20.0
@@ -54,10 +57,10 @@ class LightLimits:
 
 @dataclass(frozen=True)
 class StripeSeen:
-    """What one camera sees of the stripe, over its test frames."""
+    """The stripe in the test frames of one camera."""
 
     points: float
-    """A frame, in the mean."""
+    """Mean number per frame."""
     saturation: float
     """Median over points of the share of the width that is white, 0 to 1."""
     peak: float
@@ -72,11 +75,11 @@ class StripeSeen:
         return self.points >= LEAST_POINTS
 
     def worth(self) -> float:
-        """Points that stand out and are no white plain."""
+        """Number of points, weighted by score and by the share of the width that is not white."""
         return self.points * self.score * (1.0 - self.saturation) * (self.white <= LARGEST_WHITE_SHARE)
 
     def factor(self) -> float:
-        """By what the exposure should be changed; 1 where it is right."""
+        """Returns the factor by which the exposure should change; 1 if it is right."""
         if self.white > LARGEST_WHITE_SHARE:
             return 0.25 if self.white > 4 * LARGEST_WHITE_SHARE else 0.5
         if not self.is_found:
@@ -90,7 +93,7 @@ class StripeSeen:
 
 @dataclass(frozen=True)
 class LightChoice:
-    """What was chosen, and why."""
+    """The chosen light, with reasons."""
 
     power: float
     exposure_ms: dict[int, float]
@@ -101,7 +104,7 @@ class LightChoice:
 
 @dataclass
 class _Search:
-    """One camera's exposure, narrowed down."""
+    """The search for one camera's exposure."""
 
     exposure_ms: float
     too_dark_ms: float = 0.0
@@ -109,7 +112,7 @@ class _Search:
     tried: dict[float, StripeSeen] = field(default_factory=dict)
 
     def learn(self, seen: StripeSeen, limits: LightLimits) -> bool:
-        """Takes in what the exposure gave; whether another one is to be tried."""
+        """Record the stripe at the current exposure; returns True if another exposure is to be tried."""
         self.tried[self.exposure_ms] = seen
         factor = seen.factor()
         if factor > 1.0:
@@ -126,17 +129,17 @@ class _Search:
         return True
 
     def is_dazzled(self, limits: LightLimits) -> bool:
-        """Whether even the shortest exposure is too long."""
+        """Returns True if even the shortest exposure is too long."""
         shortest = min(self.tried)
         return shortest < FINEST_STEP * limits.shortest_ms and self.tried[shortest].factor() < 1.0
 
     def best(self) -> float:
-        """Of the exposures that were tried, the one that shows most of the stripe, best, without a white core."""
+        """Returns the last exposure that was right, or else the one of the greatest worth."""
         right = [exposure for exposure, seen in self.tried.items() if seen.factor() == 1.0]
         return right[-1] if right else max(self.tried, key=lambda exposure: (self.tried[exposure].worth(), exposure))
 
     def reason(self, exposure_ms: float, limits: LightLimits) -> str:
-        """Why this one."""
+        """Returns the reason for an exposure."""
         seen = self.tried[exposure_ms]
         stripe = f"red {seen.peak:.0f}, white core {100 * seen.saturation:.0f} % of the width"
         if seen.factor() == 1.0:
@@ -149,7 +152,7 @@ class _Search:
 
 
 def choose_light(cameras: Sequence[int], look: Look, limits: LightLimits | None = None) -> LightChoice:
-    """The light of a scan; `look` is called some three to eight times, the last time with the lasers off.
+    """Choose the light of a scan; `look` is called at most nine times, the last time with the lasers off.
 
     Raises
     ------
@@ -181,7 +184,7 @@ def choose_light(cameras: Sequence[int], look: Look, limits: LightLimits | None 
 
 
 def stripe_seen(frames: Sequence[Rgb], parameters: ExtractionParameters) -> StripeSeen:
-    """What is seen of the stripe in frames, (rows, columns, 3) uint8 RGB each, of one camera."""
+    """Measure the stripe in frames of one camera, (rows, columns, 3) uint8 RGB each."""
     stripes = [extract_stripe(frame, parameters) for frame in frames]
     points = np.concatenate(stripes)
     white = float(np.mean([np.mean(frame.min(axis=2) >= WHITE_GREY) for frame in frames]))

@@ -1,4 +1,4 @@
-"""How much later a camera's times are than the controller's, from passes over one object in both directions.
+"""Estimates a camera's latency against the controller from passes over one object in both directions.
 
 A camera that is late by t sees the object displaced by v t along the travel, v being the speed of the pass: to one side
 on the way forth, to the other on the way back. So no measure of the object and no calibration is needed, only that it
@@ -24,14 +24,14 @@ from schemas.base.errors import Finding
 Floats = NDArray[np.float64]
 
 LATENCIES = np.arange(-0.1, 0.5, 0.02)
-"""Seconds, tried first."""
+"""Seconds, tried first. Chosen by hand."""
 PLAY_MM = 0.1
-"""Of this order is the play of a drive, before anything is known of it."""
+"""Prior standard deviation of the play of a drive. Chosen by hand."""
 LARGEST_PLAY_MM = 1.0
 SHARE = (0.5, 0.5)
-"""The share of delays and its standard deviation, before anything is known of it."""
+"""Prior mean and standard deviation of the share of delays. Chosen by hand."""
 LEAST_DELAY_S = 5e-4
-"""Delays that scatter less say nothing."""
+"""Delays that scatter less carry no information. Chosen by hand."""
 LEAST_SPEED_CHANGE_MM_PER_S = 10.0
 LARGEST_SD_S = 0.005
 """At 36 mm/s this is 0.2 mm."""
@@ -40,9 +40,9 @@ LARGEST_FRAME_SD_S = 0.0075
 to 0.3 mm only."""
 LEAST_FRAMES = 20
 LEAST_POINTS = 30
-"""Of a frame in which the object is seen."""
+"""Least stripe points of a frame that shows the object. Chosen by hand."""
 AROUND = 2
-"""So many frames before and after those count too: there the object ends."""
+"""Frames before and after those that count too: there the object ends. Chosen by hand."""
 WAVES = 4
 """Cosines of 0 to 3 half waves over the picture's columns and rows."""
 COMPONENTS = 6
@@ -68,7 +68,7 @@ class Pass:
 
 @dataclass(frozen=True)
 class Latency:
-    """What passes over an object tell of a camera."""
+    """A camera's latency and its related unknowns, estimated from passes over an object."""
 
     seconds: float
     """The camera's times less the controller's."""
@@ -83,7 +83,7 @@ class Latency:
 
 
 def estimate_latency(camera: int, passes: Sequence[Pass]) -> Latency:
-    """The latency of one camera.
+    """Estimate the latency of one camera.
 
     Two passes forth and back at full speed and two at a third of it leave about a millisecond.
 

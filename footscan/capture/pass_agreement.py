@@ -1,4 +1,4 @@
-"""How well passes over one object agree: figures of the stripe as one curve of X, for some latency, play and share.
+"""Measures how well passes over one object agree: figures of the stripe as curves of X, for a latency, play, share.
 
 The curves, cubic splines, are fitted anew for each set of the three unknowns, and these by Gauss and Newton's steps
 along what the curves cannot explain (variable projection: G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973)
@@ -20,13 +20,14 @@ from footscan.robust import MAD_TO_SD
 Floats = NDArray[np.float64]
 
 FRAMES_A_KNOT = 3.0
+"""Mean number of frames between two knots of a curve. Chosen by hand."""
 CLUSTER_S = 0.5
 """Within such a time errors may be alike: a report of the controller that is off takes several frames with it."""
 AROUND = 9
 """Frames, by their X, that tell how well a curve follows."""
 RIDGE = 1e-9
 LEAST_FREEDOM = 0.05
-"""A frame that a curve goes through by force tells nothing, and must not tell it too loudly."""
+"""Lower bound of 1 - leverage: it limits the weight of frames that determine the curve alone. Chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of the unknowns beforehand, (3,) each."""
+    """Prior of the unknowns, (3,) each."""
 
     expected: Floats
     information: Floats

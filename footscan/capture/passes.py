@@ -1,4 +1,4 @@
-"""One pass of the heads along the foot: in the dark, with light, and where it is wanted back in the dark."""
+"""One pass of the heads along the foot: standing in the dark, with light, and optionally back in the dark."""
 
 import threading
 import time
@@ -13,13 +13,14 @@ from footscan.capture.cameras.stream import CapturedFrame
 from schemas.base.errors import Fault
 
 DARK_SECONDS = 0.4
-"""How long heads stand in the dark before and after: several frames of a slow camera."""
+"""Time for which the heads stand in the dark: several frames of a slow camera. Chosen by hand."""
 AFTER_SECONDS = 0.2
-"""A frame that was stamped so long after the end says that all before it have come."""
+"""A frame stamped this long after the end shows that all earlier frames have arrived. Chosen by hand."""
 LATEST_SECONDS = 5.0
+"""Longest wait for such a frame. Chosen by hand."""
 LEAD_SECONDS = 0.3
-"""Heads move evenly for so long before the first place that counts and behind the last: where speed changes between two
-reports of the board, nobody knows well where the heads were."""
+"""Heads move evenly for this long before the first place of the scan and after the last: where the speed changes
+between two reports of the board, the heads' places are uncertain. Chosen by hand."""
 
 Take = Callable[[str, CapturedFrame], None]
 """Takes a frame of a film by its name; `queue.Full` where it has no room."""
@@ -27,7 +28,7 @@ Take = Callable[[str, CapturedFrame], None]
 
 @dataclass(frozen=True)
 class PassPlan:
-    """What is to be done."""
+    """The travel, speed and light of a pass."""
 
     start_mm: float
     end_mm: float
@@ -35,22 +36,22 @@ class PassPlan:
     power: float
     """Of the lasers, 0 to 1."""
     dark_return: bool = False
-    """Whether the way back is filmed in the dark: what the light of the room shows of the skin."""
+    """True if the way back is filmed in the dark: the skin in the light of the room."""
 
 
 @dataclass
 class FilmTally:
-    """What came for one film."""
+    """The frames that arrived for one film."""
 
     taken: set[int] = field(default_factory=set)
     """Arrivals."""
     problems: dict[int, str] = field(default_factory=dict)
-    """What is wrong with an arrival."""
+    """Defects, by arrival."""
 
 
 @dataclass(frozen=True)
 class FilmedPass:
-    """What was filmed. Films are called `cam1` and `cam1-background`."""
+    """The films and travels of a pass. Films are called `cam1` and `cam1-background`."""
 
     cameras: tuple[int, ...]
     before: Travel
@@ -63,28 +64,28 @@ class FilmedPass:
     times: dict[int, tuple[int, FrameTimes]]
     """Of each camera, as `CameraStream.times` has them."""
     failed: dict[int, str]
-    """Cameras that were lost on the way, and why."""
+    """Cameras that failed during the pass, with the reason."""
 
 
 def film_name(camera: int, *, background: bool = False) -> str:
-    """Name of a film within the scan's group of arrays."""
+    """Returns the name of a film within the scan's group of arrays."""
     return f"cam{camera}-background" if background else f"cam{camera}"
 
 
 def film_pass(
     heads: Heads, deck: CameraDeck, cameras: Collection[int], plan: PassPlan, take: Take, check: Callable[[], None]
 ) -> FilmedPass:
-    """Films one pass with the cameras, which must be open.
+    """Film one pass with the cameras, which must be open.
 
     Parameters
     ----------
-    take : where frames go, by the name of their film.
-    check : called between the parts of the pass; what it raises ends it.
+    take : gets each frame with the name of its film.
+    check : called between the parts of the pass; an exception of it ends the pass.
 
     Raises
     ------
     Fault, RefusedInput
-        As `Heads.travel`. The lasers are off, and frames go nowhere.
+        As `Heads.travel`. The lasers are then off, and no frames are delivered.
     """
     sorter = _Sorter(take)
     connections = {camera: health.connections for camera, health in deck.health().items()}
@@ -124,7 +125,7 @@ def film_pass(
 
 
 class _Sorter:
-    """Gives each frame to the film that is being made, and notes it."""
+    """Passes each frame to the current film, and counts it."""
 
     def __init__(self, take: Take) -> None:
         self._take = take
@@ -137,7 +138,7 @@ class _Sorter:
 
     def take(self, frame: CapturedFrame) -> None:
         name = film_name(frame.camera, background=self._background)
-        self._take(name, frame)  # what it does not take is not noted, and so is lost
+        self._take(name, frame)  # a frame that is refused is not counted, and so is lost
         with self._lock:
             tally = self._films[name]
             tally.taken.add(frame.arrival)
@@ -150,7 +151,7 @@ class _Sorter:
 
 
 def _with_lead(plan: PassPlan, heads: Heads) -> tuple[float, float]:
-    """Where the travel begins and ends, as far as the rails allow."""
+    """Returns start and end of the travel with its lead, within the rails."""
     low, high = heads.reach_mm
     lead = LEAD_SECONDS * plan.mm_per_s * (1.0 if plan.end_mm >= plan.start_mm else -1.0)
     return min(max(plan.start_mm - lead, low), high), min(max(plan.end_mm + lead, low), high)

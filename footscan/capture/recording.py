@@ -1,8 +1,8 @@
-"""A scan into the archive while it is filmed: there as a whole, or not at all.
+"""Records a scan into the archive while it is filmed: as a whole, or not at all.
 
-Frames go straight from the cameras into the Zarr arrays of a hidden folder beside the scan's place, bit for bit, by a
-thread of its own: a disk that hesitates delays no camera. Only what is whole, and safely on the disk, gets the scan's
-name; what a killed process left is removed by the next recording.
+A separate thread writes the frames bit for bit into the Zarr arrays of a hidden folder beside the scan's place: a slow
+disk delays no camera. Only a complete scan, synced to the disk, gets the scan's name; the next recording removes the
+remains of a killed process.
 """
 
 import os
@@ -24,32 +24,34 @@ from schemas.frames import GROUP, FrameManifest
 from schemas.scan import Scan
 
 WAITING_FRAMES = 400
-"""On their way to the disk, at most: 10 MB, or what eight cameras send in three seconds."""
+"""Most frames that wait for the disk, a bound of memory: 10 MB, the frames of eight cameras in three seconds."""
 SPARE = 1.3
-"""So much of the expected size must be free: JPEG pictures of a bright room are larger."""
+"""Free space needed, as a multiple of the expected size: JPEG pictures of a bright room are larger. Chosen by hand."""
 LEAST_FREE_BYTES = 50_000_000
-"""A disk with less is taken for full: others write to it too."""
+"""A disk with less is taken for full: other programs write to it too. Chosen by hand."""
 FRAMES_A_LOOK = 100
+"""Frames between two checks of the free space. Chosen by hand."""
 SETTLE_SECONDS = 120.0
+"""Longest wait for the disk at the end of a pass. Chosen by hand."""
 
 
 class ScanRecording:
-    """A scan under way; a context manager, whose end without `finish` leaves nothing."""
+    """A scan in progress; a context manager, which leaves nothing if it ends without `finish`."""
 
     def __init__(self, place: Path, expected_bytes: int) -> None:
-        """Opens the recording.
+        """Open the recording.
 
         Parameters
         ----------
-        place : `ARCHIVE/PATIENT/SCAN`, where there is nothing yet.
+        place : `ARCHIVE/PATIENT/SCAN`, which must not exist.
         expected_bytes : size of all frames, as far as it can be known.
 
         Raises
         ------
         RefusedInput
-            There is something at `place`.
+            `place` exists.
         Fault
-            Too little space, or the archive cannot be written to.
+            The space is too small, or the archive is not writable.
         """
         self.place = place
         self._writers: dict[str, FrameWriter] = {}
@@ -87,26 +89,26 @@ class ScanRecording:
         self.close()
 
     def close(self) -> None:
-        """Ends the thread, and removes what is not finished."""
+        """End the thread, and remove an unfinished scan."""
         if self._thread.is_alive():
             self._waiting.put(None)
             self._thread.join()
         self._remove()
 
     def open_film(self, name: str) -> None:
-        """Begins a film, `cam1` or `cam1-background`."""
+        """Begin a film, `cam1` or `cam1-background`."""
         try:
             self._writers[name] = FrameWriter(self._partial / GROUP / name)
         except OSError as error:
             raise self._refused_by_disk(error) from None
 
     def take(self, name: str, arrival: int, jpeg: bytes) -> None:
-        """A frame of the film `name`, by its place in the order of arrival; from any thread, and at once.
+        """Add a frame to the film `name`, by its number in the order of arrival; from any thread, without waiting.
 
         Raises
         ------
         queue.Full
-            Too many frames wait for the disk, or it has failed: this one is lost. `check` tells why.
+            Too many frames wait for the disk, or the disk has failed: this frame is lost. `check` raises the reason.
         """
         if self._problem is not None:
             raise queue.Full
@@ -115,12 +117,12 @@ class ScanRecording:
             self._taken += 1
 
     def check(self) -> None:
-        """Fault where the disk has failed, or is full; then the recording cannot be finished."""
+        """Raise Fault if the disk has failed or is full; then the recording cannot be finished."""
         if self._problem is not None:
             raise self._problem
 
     def settle(self) -> None:
-        """Waits until all frames that were taken are written; errors as in `check`."""
+        """Wait until all frames are written; errors as in `check`."""
         with self._settled:
             done = self._settled.wait_for(lambda: not self._taken or self._problem, SETTLE_SECONDS)
         self.check()
@@ -128,12 +130,12 @@ class ScanRecording:
             raise Fault(f"{self.place}: frames wait for the disk since {SETTLE_SECONDS:g} s: it does not keep up")
 
     def close_film(self, name: str, frames: Mapping[int, int], count: int) -> FrameManifest:
-        """Makes a film of so many frames of what was taken; to be called once all is settled.
+        """Complete a film with `count` frames; call `settle` before.
 
         Parameters
         ----------
-        frames : the arrival that frame k of the film is, k being 0 to `count` - 1. Arrivals that are not named are
-            removed, frames without one are lost.
+        frames : arrival number of each frame k of the film, 0 <= k < `count`. Other arrivals are removed; a frame
+            without an arrival is lost.
         """
         self.check()
         writer = self._writers.pop(name)
@@ -144,21 +146,21 @@ class ScanRecording:
             raise self._refused_by_disk(error) from None
 
     def drop_film(self, name: str) -> None:
-        """Takes a film back."""
+        """Remove a film."""
         del self._writers[name]
         shutil.rmtree(self._partial / GROUP / name, ignore_errors=True)
 
     def file(self, name: str) -> Path:
-        """Where to write another file of the scan."""
+        """Returns the path for another file of the scan."""
         return self._partial / name
 
     def finish(self, scan: Scan) -> Path:
-        """Gives the scan its place, once all of it is on the disk; returns that.
+        """Sync the scan to the disk, move it to its place and return that.
 
         Raises
         ------
         Fault
-            It could not be written, or somebody else has put something there meanwhile. Nothing of it is left.
+            The scan cannot be written, or its place was taken meanwhile. Nothing of it is left.
         """
         self.check()
         if self._writers:
@@ -207,12 +209,12 @@ class ScanRecording:
     def _remove(self) -> None:
         shutil.rmtree(self._partial, ignore_errors=True)
         for folder in self._made:
-            with suppress(OSError):  # it has other scans by now
+            with suppress(OSError):  # it may hold other scans by now
                 folder.rmdir()
 
 
 def _sync(folder: Path) -> None:
-    """Everything in a folder onto the disk, a folder after what is in it."""
+    """Sync everything in a folder to the disk, each folder after its contents."""
     for parent, _, files in os.walk(folder, topdown=False):
         for name in files:
             _sync_one(Path(parent, name))

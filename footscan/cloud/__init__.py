@@ -1,1 +1,1 @@
-"""Stripe points to world points; fusion of the cameras; outliers."""
+"""Stripe points to world points, removal of outliers, normals, colours; fusion of the cameras."""

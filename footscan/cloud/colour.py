@@ -14,38 +14,53 @@ from footscan.stripe.points import StripePoints
 Singles = NDArray[np.float32]
 
 WIDEST_PX = 3.0
-"""Beyond so many pixels nothing counts for a point's colour, be the stripe ever so wide: the skin may end there."""
+"""Largest half width of the window for a point's colour, in px: beyond, the skin may end. Chosen by hand."""
 CLIPPED = 250
-"""A level from which on a channel may have been cut off; compression takes some off white."""
+"""Level from which a channel may be saturated; compression lowers white by a few levels. Chosen by hand."""
 CLIPPED_LIGHT = 0.95
-"""The same of a mean of pixels, in light; the level's is 0.956."""
+"""Mean light of several pixels from which a channel may be saturated; level 250 is 0.956."""
 CLIPPED_WEIGHT = 1e-3
-"""What is cut off counts only where there is nothing else."""
+"""Weight of a saturated pixel: it counts only where there is no other."""
 DARKEST = 3e-4
-"""Light of the first level of a picture: ratios of less say nothing."""
+"""Light of level 1 of 255, by the curve of sRGB: ratios of less light mean nothing."""
 LEAST_SHARED = 20
-"""Two cameras that see fewer of them in common are not compared."""
+"""Vertices that two cameras must both see to be compared. Chosen by hand."""
 REWEIGHTINGS = 8
+"""Iterations of the robust least squares: a bound of time."""
 HUBER = 1.345
+"""Residuals, in standard deviations, up to which a comparison counts in full (Huber 1964): 95 % efficiency for normal
+errors."""
+SMALLEST_BOUND = 1e-9
+"""Bound of the residuals if all of them vanish: keeps a division from failing."""
 
 
 def point_colours(stripe: StripePoints, laser_off: Callable[[int], Rgb | None]) -> tuple[Singles, NDArray[np.bool_]]:
-    """The colours of the points of one camera's stripe.
+    """Sample the colours of the points of one camera's stripe.
 
-    A frame with the laser off shows the skin that the stripe lies on at the very pixels of the stripe. Its pixels are
-    averaged under a pyramid around the point, as wide as the stripe; where that is two pixels, this is bilinear
+    A frame with the laser off shows the skin under the stripe at the pixels of the stripe. Its pixels are averaged with
+    the weights of a pyramid around the point, as wide as the stripe. For a width of 2 px this is bilinear
     interpolation.
 
     Parameters
     ----------
     stripe : (N,) of `STRIPE_DTYPE`; frame, i, j and width (px) are used
-    laser_off : gives the (rows, columns, 3) sRGB frame of a number, taken where the film's frame of this number was;
-        None where there is none. It may be the same memory at every call. Only frames with points are asked for
+    laser_off : returns the (rows, columns, 3) uint8 sRGB frame with the laser off for the number of a frame; None if
+        there is none. It may return the same memory at every call. It is called for frames with points only
 
     Returns
     -------
-    colours : (N, 3) red, green and blue in linear light, 1 being white; 0 where there is none
-    seen : (N,) whether there is one
+    colours : (N, 3) float32, red, green and blue in linear light, 1 for white; 0 for a point without colour
+    seen : (N,) bool, True for a point with a colour
+
+    Examples
+    --------
+    >>> from footscan.stripe.points import STRIPE_DTYPE
+    >>> stripe = np.zeros(1, STRIPE_DTYPE)
+    >>> stripe["i"], stripe["j"], stripe["width"] = 4.0, 4.0, 3.0
+    >>> white = np.full((9, 9, 3), 255, np.uint8)
+    >>> colours, seen = point_colours(stripe, lambda frame: white)
+    >>> print(colours.round(3), seen)
+    [[1. 1. 1.]] [ True]
     """
     colours, seen = np.zeros((len(stripe), 3), np.float32), np.zeros(len(stripe), np.bool_)
     light = linear_light(np.arange(256) / 255)
@@ -61,14 +76,34 @@ def point_colours(stripe: StripePoints, laser_off: Callable[[int], Rgb | None]) 
 
 
 def camera_gains(sums: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(C, 3) logarithms of what each camera's light is divided by.
+    """Estimate the gains of the cameras by robust least squares over the vertices that two cameras see.
 
-    Robust least squares (Huber 1964) over what each two cameras see at the same vertices. What no pair can tell, that
-    all cameras, or all that are linked by pairs, are lighter alike, is settled by their logarithms' mean, 0.
+    Pairs of cameras do not determine a common factor of all cameras that are linked by pairs. It is set so that the
+    mean of their logarithms is 0.
 
     Parameters
     ----------
-    sums : (V, C, 4) weighted light of each camera at some vertices, and its weight
+    sums : (V, C, 4) float64, weighted sums of each camera's linear light (red, green, blue) at V vertices, and the
+        weight
+
+    Returns
+    -------
+    (C, 3) float64, natural logarithms of the factors by which each camera's light is to be divided
+
+    References
+    ----------
+    P. J. Huber, "Robust estimation of a location parameter", Annals of Mathematical Statistics 35(1), 1964,
+    doi:10.1214/aoms/1177703732.
+
+    Examples
+    --------
+    The second camera is four times as bright as the first:
+
+    >>> sums = np.ones((30, 2, 4))
+    >>> sums[:, 0, :3], sums[:, 1, :3] = 0.1, 0.4
+    >>> print(np.exp(camera_gains(sums)).round(3))
+    [[0.5 0.5 0.5]
+     [2.  2.  2. ]]
     """
     count = sums.shape[1]
     weight = sums[:, :, 3]
@@ -96,24 +131,36 @@ def camera_gains(sums: NDArray[np.float64]) -> NDArray[np.float64]:
             total = np.bincount(first, pull, minlength=count) - np.bincount(second, pull, minlength=count)
             gains[:, channel] = inverse @ total
         left = np.sqrt(np.mean((ratio - gains[first] + gains[second]) ** 2, axis=1))
-        bound = HUBER * max(MAD_TO_SD * float(np.median(left)), 1e-9)
+        bound = HUBER * max(MAD_TO_SD * float(np.median(left)), SMALLEST_BOUND)
         trust = bound / np.maximum(left, bound)
     return gains
 
 
 def is_clipped(light: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(...) of (..., 3) whether a channel may have been cut off."""
+    """True where a channel of `light` (..., 3) may be saturated; (...).
+
+    >>> print(is_clipped(np.array([[0.2, 0.3, 0.4], [0.99, 0.3, 0.4]])))
+    [False  True]
+    """
     clipped: NDArray[np.bool_] = light.max(axis=-1) >= CLIPPED_LIGHT
     return clipped
 
 
 def linear_light(levels: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Light of the `levels` of a picture, both 0 to 1, by the curve of IEC 61966-2-1 (sRGB)."""
+    """Convert `levels` of an sRGB image to linear light, both 0 to 1 (IEC 61966-2-1).
+
+    >>> print(linear_light(np.array([0.0, 0.5, 1.0])).round(4))
+    [0.    0.214 1.   ]
+    """
     return np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)
 
 
 def as_level(light: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Levels of `light`, the inverse of `linear_light`."""
+    """Convert linear `light` to levels of an sRGB image: the inverse of `linear_light`.
+
+    >>> print(as_level(np.array([0.0, 0.214, 1.0])).round(2))
+    [0.  0.5 1. ]
+    """
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
@@ -125,6 +172,7 @@ def _averaged(
     rows: NDArray[np.float64],
     half_widths: NDArray[np.float64],
 ) -> tuple[Singles, NDArray[np.bool_]]:
+    """Average the light of a frame around places (N,), in px; colours and whether the place is in the frame."""
     height, width = frame.shape[:2]
     colours, seen = np.zeros((len(columns), 3), np.float32), np.zeros(len(columns), np.bool_)
     for n in range(len(columns)):

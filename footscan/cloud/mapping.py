@@ -20,23 +20,38 @@ def map_stripe(
     x_of_frame: NDArray[np.float64],
     parameters: MappingParameters,
 ) -> NDArray[np.void]:
-    """The world point of every stripe point, in the same order.
+    """Map stripe points to world points.
 
-    Y and Z follow from the pixel by the camera's calibration, X from where the head stood.
+    Y and Z follow from the pixel by the camera's calibration, X from the position of the head.
 
     Parameters
     ----------
     stripe : (N,) points of one camera, in their order along the stripe; frame, i, j, width and sigma (px) are used
-    x_of_frame : (F,) X of the laser plane in each frame, mm
+    x_of_frame : (F,) float64, X of the laser plane in each frame, mm, scanner frame
 
     Returns
     -------
-    (N,) array of `POINT_DTYPE`, mm, scanner frame. Points without support by the calibration are marked, not left out.
+    (N,) of `POINT_DTYPE`, mm, scanner frame, in the order of `stripe`. Points without support by the calibration are
+    marked, not left out.
 
     Raises
     ------
     RefusedInput
-        A stripe point's frame has no X.
+        The frame of a stripe point has no X.
+
+    Examples
+    --------
+    A camera whose map is 0.5 mm a px, with the origin at pixel (320, 240):
+
+    >>> from footscan.stripe.points import STRIPE_DTYPE
+    >>> from schemas.calibration import PolynomialMap
+    >>> map_ = PolynomialMap(order=1, centre_px=(320, 240), scale_px=100, alpha_y=[0, 50, 0], alpha_z=[0, 0, -50])
+    >>> camera = CameraCalibration(camera=1, map=map_, region_px=[], points=0)
+    >>> stripe = np.zeros(1, STRIPE_DTYPE)
+    >>> stripe["i"], stripe["j"], stripe["width"], stripe["sigma"] = 340.0, 200.0, 6.0, 0.1
+    >>> point = map_stripe(stripe, camera, np.array([12.5]), MappingParameters())[0]
+    >>> print(point["x"], point["y"], point["z"])
+    12.5 10.0 20.0
     """
     frame = stripe["frame"]
     if frame.size and not 0 <= int(frame.min()) <= int(frame.max()) < len(x_of_frame):
@@ -55,7 +70,7 @@ def map_stripe(
 
 
 def _supported(camera: CameraCalibration, pixels: NDArray[np.float64], parameters: MappingParameters) -> Mask:
-    """(N,) whether data support the map at a pixel, or its covariance tells that it holds there without them."""
+    """True for pixels (N,) at which data support the map, or its covariance predicts that it holds without them."""
     supported = is_supported(camera, pixels, parameters.margin_px)
     outside = np.flatnonzero(~supported)
     predicted = predicted_deviations(camera, pixels[outside])

@@ -1,4 +1,4 @@
-"""Normals of a cloud, all pointing outward."""
+"""Normals of a cloud, oriented outward."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -18,24 +18,27 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 CELLS_A_RADIUS = 2
-"""Neighbours are looked for in cells of this part of the radius."""
+"""Cells a radius: the side of the cells in which neighbours are searched. Chosen for speed."""
 FEWEST = 6
-"""So many points, the point itself included, make a plane, ..."""
+"""Points from which a plane is fitted, the point itself included; with fewer the radius is doubled. Chosen by hand."""
 LEAST_BREADTH = 0.15
-"""... where they scatter by this part of the radius, at least, across their longest direction: those of one
-stripe alone lie on a line. Else the radius is doubled."""
+"""Least standard deviation of the neighbours across their longest direction, relative to the radius; with less the
+radius is doubled, since points of one stripe lie on a line. Chosen by hand."""
 PASSES = 50
-"""So many times what neighbours decide spreads to their neighbours."""
+"""How often the orientation spreads from normals to their neighbours at most: a bound of time."""
+CAMERAS = 256
+"""Numbers that a camera can have (one byte)."""
 
 
 class Cells(NamedTuple):
-    """Points (N, 3) cell by cell, and which cells may hold neighbours."""
+    """The cells of points (N, 3) that are sorted by cell."""
 
     starts: NDArray[np.int64]
     """(V + 1,): where the points of each cell begin."""
     number: Ints
+    """As in `Voxels`."""
     place: Ints
-    """Both as in `Voxels`."""
+    """As in `Voxels`."""
     window: NDArray[np.int64]
     """(3,): how many cells away along each axis a neighbour may be."""
 
@@ -43,21 +46,36 @@ class Cells(NamedTuple):
 def estimate_normals(
     cloud: NDArray[np.void], views: Mapping[int, View], parameters: NormalParameters
 ) -> NDArray[np.float32]:
-    """(N, 3) unit normals of `cloud`, from planes through the neighbours of each point.
+    """Estimate the normals of a cloud from planes through the neighbours of each point.
 
-    A point was seen, so its normal points to the side on which its camera stood. Where the camera looked along the
-    surface, or its place is not known, the normals around decide; where there are none, what leads away from the
+    A point's normal points to the side of the camera that saw it. Where the camera looked along the surface, or its
+    position is unknown, the normals of the neighbours decide; without neighbours, the normal points away from the
     cloud's middle.
 
     Parameters
     ----------
-    cloud : (N,) array of `POINT_DTYPE`, mm, scanner frame
-    views : where the cameras stand, from the laser's plane
+    cloud : (N,) of `POINT_DTYPE`, mm, scanner frame
+    views : camera -> view, with the positions of the cameras relative to the laser plane
+
+    Returns
+    -------
+    (N, 3) float32, unit normals, scanner frame.
 
     Raises
     ------
     Finding
-        All points lie in one plane of the laser, or some are no numbers.
+        All points lie in one laser plane, or some are not finite.
+
+    Examples
+    --------
+    A flat sheet at Z = 10 mm without known cameras; the sign of its normals is open:
+
+    >>> from footscan.cloud.points import make_points
+    >>> x, y = (grid.ravel() for grid in np.meshgrid(np.arange(10.0), np.arange(10.0)))
+    >>> sheet = make_points(np.column_stack([x, y, np.full(100, 10.0)]), 1, x.astype(int))
+    >>> normals = estimate_normals(sheet, {}, NormalParameters())
+    >>> print(normals.shape, bool(np.allclose(np.abs(normals), [0, 0, 1], atol=1e-5)))
+    (100, 3) True
     """
     if not len(cloud):
         return np.zeros((0, 3), np.float32)
@@ -88,9 +106,9 @@ def estimate_normals(
 def _fit(
     xyz: Floats, radius: float, starts: NDArray[np.int64], number: Ints, place: Ints, window: NDArray[np.int64]
 ) -> Floats:
-    """(N, 3) unit normals, either way, of planes through what is nearer than `radius`, the nearer the heavier.
+    """(N, 3) unit normals, of either sign, of planes through the points within `radius`; near points weigh more.
 
-    Points (N, 3) come cell by cell; those of cell v begin at `starts[v]`.
+    The points `xyz` (N, 3) are sorted by cell.
     """
     normals = np.empty(xyz.shape)
     near, wide = np.empty(xyz.shape), np.empty(xyz.shape)
@@ -114,7 +132,7 @@ def _fit(
 def _gather(
     xyz: Floats, starts: NDArray[np.int64], number: Ints, place: Ints, window: NDArray[np.int64], near: Floats
 ) -> int:
-    """Brings together the points of the cells around a place; how many they are."""
+    """Copy the points of the cells around a place into `near`; returns their number."""
     count = 0
     a, b, c = place
     for i in range(a - window[0], a + window[0] + 1):
@@ -129,7 +147,7 @@ def _gather(
 
 @compiled
 def _sum_up(near: Floats, middle: Floats, radius: float, sums: Floats) -> bool:
-    """Adds up what is nearer than `radius`, seen from `middle`; whether that is too little for a plane."""
+    """Sum up the points within `radius` of `middle`, relative to it; True if they are too few for a plane."""
     sums[:] = 0.0
     count = 0
     reach = 1.0 / (radius * radius)
@@ -143,11 +161,11 @@ def _sum_up(near: Floats, middle: Floats, radius: float, sums: Floats) -> bool:
 
 
 def _cosines(cloud: NDArray[np.void], xyz: Floats, normals: Floats, views: Mapping[int, View]) -> Floats:
-    """(N,) cosines of the angles between the normals and the directions to the cameras; 0 where one is not known."""
-    centres = np.full((256, 3), np.nan)
+    """(N,) cosines of the angles between the normals and the directions to the cameras; 0 for an unknown camera."""
+    centres = np.full((CAMERAS, 3), np.nan)
     for camera, view in views.items():
         centres[camera] = view.centre
-    towards = centres[cloud["camera"]] - xyz * [0.0, 1.0, 1.0]  # the head stands where the point does
+    towards = centres[cloud["camera"]] - xyz * [0.0, 1.0, 1.0]  # the laser plane of the head is at the point's X
     cosines: Floats = np.sum(normals * towards, axis=1) / np.linalg.norm(towards, axis=1)
     return np.where(np.isfinite(cosines), cosines, 0.0)
 
@@ -160,24 +178,24 @@ def _spread(
     since: NDArray[np.int64],
     normals: Floats,
 ) -> None:
-    """Turns normals by the sum of those around that are sure; these are then sure for the next pass.
+    """Orient normals by the sum of the certain normals around them; they are then certain for the next pass.
 
-    `since` (N,): the pass from which each counts, counted down; 0 for those that are not sure.
+    `since` (N,): the pass from which each normal is certain, counted down; 0 for those that are not.
     """
     starts, _, place, _ = cells
     for step in range(PASSES - 1, 0, -1):
-        found = False
+        has_changed = False
         for v in range(len(place)):
             for n in range(starts[v], starts[v + 1]):
                 if since[n]:
                     continue
                 vote = _vote(n, place[v], xyz, radius, cells, since, step, normals)
                 if vote != 0.0:
-                    found = True
+                    has_changed = True
                     since[n] = step
                     if vote < 0.0:
                         normals[n] *= -1.0
-        if not found:
+        if not has_changed:
             break
     middle = np.array([np.mean(xyz[:, 0]), np.mean(xyz[:, 1]), np.mean(xyz[:, 2])])
     for n in range(len(xyz)):
@@ -196,7 +214,7 @@ def _vote(
     step: int,
     normals: Floats,
 ) -> float:
-    """How well the normal of point `n`, in the cell at `place`, agrees with those around that were sure before."""
+    """Weighted sum of the cosines between the normal of point `n`, in the cell at `place`, and certain ones around."""
     starts, number, _, window = cells
     total = 0.0
     for i in range(place[0] - window[0], place[0] + window[0] + 1):

@@ -1,4 +1,4 @@
-"""Points that are not the foot's, by what they come from."""
+"""Removal of the points that do not belong to the foot, by reason."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,37 +15,52 @@ from schemas.parameters.outliers import OutlierParameters
 Mask = NDArray[np.bool_]
 
 REASONS = ("volume", "extrapolated", "end", "isolated", "unconfirmed", "glass", "clutter")
-"""What points are dropped for; the code of a reason is its place here, counted from 1."""
+"""Reasons to drop a point; the code of a reason is its position here, counted from 1."""
 KEPT = 0
+"""Code of a point that is kept."""
 
 
 @dataclass(frozen=True)
 class Removed:
-    """What was dropped, and why."""
+    """The points that were dropped, and their reasons."""
 
     codes: NDArray[np.uint8]
-    """(N,): for each point that went in `KEPT`, or the code of its reason."""
+    """(N,): `KEPT` or the code of the reason, for each input point."""
     counts: dict[int, dict[str, int]]
-    """Camera -> reason -> how many: all reasons of each camera that has points."""
+    """Camera -> reason -> number of points; all reasons, for each camera that has points."""
 
 
 def remove_outliers(
     points: NDArray[np.void], views: Mapping[int, View], parameters: OutlierParameters
 ) -> tuple[NDArray[np.void], Removed]:
-    """The points that can be the foot's, in their order, and which others there were.
+    """Drop the points that cannot belong to the foot.
 
-    What is outside the control volume ("volume") and what the calibration does not support ("extrapolated") is dropped
-    first; then the foot's mirror image and the glass itself ("glass"), and what stands there without the foot
-    ("clutter"), for they would speak for each other; then segments of stripe without any before and behind them
-    ("isolated"), those that other cameras should see, and do not ("unconfirmed"), and the last points of a stripe where
-    other cameras see the same place within theirs ("end"); at last what is small and apart from the rest ("clutter"
-    again).
+    They are dropped in this order:
+
+    - points outside the control volume ("volume"), and points that the calibration does not support ("extrapolated");
+    - the foot's mirror image and the glass itself ("glass"), then static objects ("clutter"): they would confirm each
+      other;
+    - the last points of a stripe where other cameras see the same place within their stripes ("end"), segments of
+      stripe without any before and behind them ("isolated"), and segments that other cameras should see, but do not
+      ("unconfirmed");
+    - small parts apart from the rest ("clutter" again).
 
     Parameters
     ----------
-    points : (N,) array of `POINT_DTYPE`, mm, scanner frame: of all cameras, as they saw them
-    views : where the cameras stand, as far as that is known; nobody is asked to confirm what another camera saw unless
-        his place is
+    points : (N,) of `POINT_DTYPE`, mm, scanner frame, of all cameras
+    views : camera -> view; only cameras listed here are expected to confirm what another camera saw
+
+    Returns
+    -------
+    The points that are kept, in their order, and a report of the others.
+
+    Examples
+    --------
+    >>> from footscan.cloud.points import make_points
+    >>> points = make_points(np.array([[0.0, 0.0, 1e6]]), camera=3)
+    >>> kept, removed = remove_outliers(points, {}, OutlierParameters())
+    >>> print(len(kept), removed.counts[3]["volume"])
+    0 1
     """
     codes = np.zeros(len(points), np.uint8)
 
@@ -80,9 +95,10 @@ def _outside(points: NDArray[np.void], parameters: OutlierParameters) -> Mask:
 
 
 def _count(camera: NDArray[np.uint8], codes: NDArray[np.uint8]) -> dict[int, dict[str, int]]:
-    counts = np.zeros((256, len(REASONS) + 1), np.int64)
-    np.add.at(counts, (camera, codes), 1)
+    cameras, index = np.unique(camera, return_inverse=True)
+    counts = np.zeros((len(cameras), len(REASONS) + 1), np.int64)
+    np.add.at(counts, (index, codes), 1)
     return {
-        int(one): {reason: int(counts[one, code]) for code, reason in enumerate(REASONS, start=1)}
-        for one in np.unique(camera)
+        int(number): dict(zip(REASONS, of_camera[1:].tolist(), strict=True))
+        for number, of_camera in zip(cameras, counts, strict=True)
     }

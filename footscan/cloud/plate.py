@@ -1,4 +1,4 @@
-"""The glass plate that the foot stands on, where its own stripe shows, and what mirrors in it."""
+"""Points of the glass plate that the foot stands on, and of the foot's mirror image in it."""
 
 from collections.abc import Mapping
 
@@ -9,23 +9,38 @@ from footscan.cloud.points import PLANE_MM, stripe_step
 from footscan.cloud.views import View
 
 HIGH_MM = 5.0
-"""Points so far above the glass are those of the foot's sides."""
+"""Height above the glass from which points belong to the foot's sides. Chosen by hand."""
 FEWEST_HIGH = 10
-"""So many of them in a plane tell how broad the foot is there."""
+"""High points in a plane from which the width of the foot is known there. Chosen by hand."""
 FEWEST_PLANES = 5
-"""In so many planes, for else only the sole was seen."""
+"""Planes with known width from which the sides count as seen; with fewer only the sole was seen. Chosen by hand."""
 BESIDE_MM = 5.0
-"""The sole reaches no farther out than the sides do, or not by more than this."""
+"""Distance by which the sole may reach beyond the sides in Y. Chosen by hand."""
 AHEAD_PLANES = 2
-"""Nor farther along the travel than so many planes."""
+"""Planes by which the sole may reach beyond the sides along the travel. Chosen by hand."""
 
 
 def is_plate(points: NDArray[np.void], views: Mapping[int, View], glass_mm: float) -> NDArray[np.bool_]:
-    """Which `points` (N,) of `POINT_DTYPE`, N >= 1, all finite, lie below the glass at Z = 0, or in it, mm.
+    """Select the points that lie below the glass at Z = 0 or in it.
 
-    Below is what is farther below than `glass_mm`: a mirror image. In it lies what is no farther from it than that, but
-    stands beside, before or behind the sides of the foot. What is beside them is known where cameras above the glass
-    see both.
+    Points more than `glass_mm` below it are a mirror image. Points within `glass_mm` of it are in the glass if they lie
+    beside, before or behind the sides of the foot. The latter are dropped only if cameras above the glass see both
+    sides of the foot.
+
+    Parameters
+    ----------
+    points : (N,) of `POINT_DTYPE`, N >= 1, mm, scanner frame, all finite
+    views : camera -> view, mm
+
+    Returns
+    -------
+    (N,) bool.
+
+    Examples
+    --------
+    >>> from footscan.cloud.points import make_points
+    >>> print(is_plate(make_points(np.array([[0, 0, -20.0], [0, 0, 20.0]]), camera=1), {}, glass_mm=2.0))
+    [ True False]
     """
     z = points["z"]
     below: NDArray[np.bool_] = z < -glass_mm
@@ -47,23 +62,22 @@ def is_plate(points: NDArray[np.void], views: Mapping[int, View], glass_mm: floa
 def _sides(
     plane: NDArray[np.int64], y: NDArray[np.float32], is_high: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Least and greatest Y (P,) of the high points about each plane; None where too few planes have any.
+    """Least and greatest Y (P,) of the high points around each plane; None if too few planes have any.
 
-    A plane between others without high points of its own has those of the next before and behind it; beyond the first
-    and the last, where nothing stands, the least is infinite.
+    A plane without enough high points takes those of the nearest planes before and behind it. Beyond the first and the
+    last plane with high points, where there is no foot, the least Y is infinite.
     """
     planes = int(plane.max()) + 1
     low, high = np.full(planes, np.inf), np.full(planes, -np.inf)
     np.minimum.at(low, plane[is_high], y[is_high])
     np.maximum.at(high, plane[is_high], y[is_high])
-    known = np.flatnonzero(np.bincount(plane[is_high], minlength=planes) >= FEWEST_HIGH)
-    if len(known) < FEWEST_PLANES:
+    measured = np.flatnonzero(np.bincount(plane[is_high], minlength=planes) >= FEWEST_HIGH)
+    if len(measured) < FEWEST_PLANES:
         return None
-    every = np.arange(planes)
-    place = np.searchsorted(known, every)
-    before = known[np.maximum(np.searchsorted(known, every, side="right") - 1, 0)]
-    behind = known[np.minimum(place, len(known) - 1)]
+    number = np.arange(planes)
+    before = measured[np.maximum(np.searchsorted(measured, number, side="right") - 1, 0)]
+    behind = measured[np.minimum(np.searchsorted(measured, number), len(measured) - 1)]
     low, high = np.minimum(low[before], low[behind]), np.maximum(high[before], high[behind])
-    nothing = (every < known[0] - AHEAD_PLANES) | (every > known[-1] + AHEAD_PLANES)
-    low[nothing], high[nothing] = np.inf, -np.inf
+    is_outside = (number < measured[0] - AHEAD_PLANES) | (number > measured[-1] + AHEAD_PLANES)
+    low[is_outside], high[is_outside] = np.inf, -np.inf
     return low, high

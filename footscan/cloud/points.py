@@ -1,13 +1,13 @@
-"""World points: what a stripe point becomes, and what clouds are made of."""
+"""World points, of which clouds are made."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 PLANE_MM = 0.25
-"""Stripe planes closer than this are one."""
+"""Distance in X up to which stripe planes count as one plane. Chosen by hand."""
 
 UNKNOWN_SIGMA_MM = 0.1
-"""Standard deviation of points that nothing is known of."""
+"""Standard deviation assumed for points without one. Chosen by hand."""
 
 POINT_DTYPE = np.dtype(
     [
@@ -22,12 +22,18 @@ POINT_DTYPE = np.dtype(
         ("cameras", "u1"),
     ]
 )
-"""A world point: x, y, z in mm (scanner frame), the row of the stripe point it came from, its frame, its camera,
-whether the calibration supports its pixel, the standard deviation to be expected of its place in mm, along the normal
-of the surface within the laser's plane, and how many cameras it was made of.
+"""A world point.
 
-Coordinates are stored as float32: half a metre away their last digit is 0.03 µm, a thousandth of what a stripe
-resolves. Arithmetic on them is done in float64, see `coordinates`.
+x, y, z : mm, scanner frame
+source : row of the stripe point that it was mapped from
+frame : number of that point's frame
+camera : number of the camera
+supported : True if the calibration supports its pixel
+sigma : expected standard deviation of its place, mm, along the normal of the surface within the laser plane
+cameras : number of cameras whose points were averaged to it
+
+Coordinates are stored as float32: at half a metre their last digit is 0.03 µm, a thousandth of what a stripe resolves.
+Arithmetic on them is done in float64, see `coordinates`.
 """
 
 
@@ -39,7 +45,23 @@ def make_points(
     supported: bool | NDArray[np.bool_] = True,
     sigma: float | NDArray[np.floating] = UNKNOWN_SIGMA_MM,
 ) -> NDArray[np.void]:
-    """A (N,) array of `POINT_DTYPE` from (N, 3) coordinates in mm and, each, one value or N of them."""
+    """Build points from coordinates; the other fields are one value for all points or (N,) values.
+
+    Parameters
+    ----------
+    xyz : (N, 3), mm, scanner frame.
+    sigma : mm.
+
+    Returns
+    -------
+    (N,) of `POINT_DTYPE`, each seen by one camera.
+
+    Examples
+    --------
+    >>> points = make_points(np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]), camera=2, frame=np.array([7, 8]))
+    >>> points["z"].tolist(), points["camera"].tolist(), points["frame"].tolist()
+    ([3.0, 6.0], [2, 2], [7, 8])
+    """
     points = np.zeros(len(xyz), POINT_DTYPE)
     points["x"], points["y"], points["z"] = np.asarray(xyz).T
     points["camera"], points["frame"], points["source"], points["supported"] = camera, frame, source, supported
@@ -48,9 +70,13 @@ def make_points(
 
 
 def stripe_step(points: NDArray[np.void]) -> float:
-    """Distance in mm from one stripe plane to the next, as a camera travels; the median over frames and cameras.
+    """The distance from one stripe plane to the next along the travel, mm; the median over frames and cameras.
 
-    Cameras are looked at one by one, for their planes may lie between each other's. 0 where no camera has two planes.
+    Each camera is measured separately, since the planes of different cameras may lie between each other. The distance
+    is 0 if no camera has two planes.
+
+    >>> stripe_step(make_points(np.array([[0.0, 0, 0], [1.5, 0, 0], [3.0, 0, 0]]), camera=1, frame=np.arange(3)))
+    1.5
     """
     steps = [
         _frame_steps(points["frame"][points["camera"] == camera], points["x"][points["camera"] == camera])
@@ -60,11 +86,11 @@ def stripe_step(points: NDArray[np.void]) -> float:
 
 
 def _frame_steps(frame: NDArray[np.int32], x: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Ways in mm from each frame of one camera to its next one that holds points."""
+    """Distances in mm from each frame of one camera to its next frame that has points."""
     _, number, counts = np.unique(frame, return_inverse=True, return_counts=True)
     return np.abs(np.diff(np.bincount(number, x.astype(np.float64)) / counts))
 
 
 def coordinates(points: NDArray[np.void]) -> NDArray[np.float64]:
-    """(N, 3) X, Y, Z of `points` in mm."""
+    """(N, 3) float64, X, Y, Z of `points`, mm, scanner frame."""
     return np.column_stack([points[axis].astype(np.float64) for axis in "xyz"])

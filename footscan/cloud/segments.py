@@ -1,4 +1,4 @@
-"""Segments of stripe: points that follow each other in one frame of one camera."""
+"""Segments of stripe: consecutive points in one frame of one camera."""
 
 import math
 
@@ -10,20 +10,35 @@ from footscan.compiled import compiled
 Coordinate = NDArray[np.float32]
 Ints = NDArray[np.int32]
 
+SHORTEST_MM = 1e-9
+"""Length by which a stripe of one point is divided."""
+
 
 def segments_of(points: NDArray[np.void], gap_mm: float, longest_mm: float) -> tuple[Ints, Ints]:
-    """The number of the segment that each point belongs to, from 0 on without gaps, and its place from an end.
+    """Divide stripes into segments.
 
-    Both are (N,) int32; the place is 0 for the first and the last point of a piece of stripe, 1 for those next to them.
-    A segment goes on while points that follow each other along the stripe, as their `source` has it, lie no farther
-    than `gap_mm` from each other in the laser's plane; it is cut into even parts where it is longer than `longest_mm`.
+    A piece of stripe continues while consecutive points, in the order of `source`, are at most `gap_mm` apart in the
+    laser plane. A piece longer than `longest_mm` is divided into segments of equal length.
 
     Parameters
     ----------
-    points : (N,) of `POINT_DTYPE`, coordinates finite, in any order
+    points : (N,) of `POINT_DTYPE`, mm, coordinates finite, in any order
+
+    Returns
+    -------
+    segment : (N,) int32, the number of each point's segment, from 0 without gaps
+    place : (N,) int32, the place of each point from the nearer end of its piece: 0 for the first and the last point
+
+    Examples
+    --------
+    >>> from footscan.cloud.points import make_points
+    >>> yz = np.array([[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 9.0, 0.0]])
+    >>> segment, place = segments_of(make_points(yz, camera=1, source=np.arange(4)), gap_mm=1.0, longest_mm=10.0)
+    >>> segment.tolist(), place.tolist()
+    ([0, 0, 0, 1], [0, 1, 0, 0])
     """
     camera, frame, source, y, z = (points[name].copy() for name in ("camera", "frame", "source", "y", "z"))
-    if _sorted(camera, frame, source):
+    if _is_sorted(camera, frame, source):
         return _number(camera, frame, y, z, gap_mm, longest_mm)
     order = np.lexsort((source, frame, camera))
     segment, place = np.empty(len(points), np.int32), np.empty(len(points), np.int32)
@@ -32,7 +47,8 @@ def segments_of(points: NDArray[np.void], gap_mm: float, longest_mm: float) -> t
 
 
 @compiled
-def _sorted(camera: NDArray[np.uint8], frame: NDArray[np.int32], source: NDArray[np.int32]) -> bool:
+def _is_sorted(camera: NDArray[np.uint8], frame: NDArray[np.int32], source: NDArray[np.int32]) -> bool:
+    """True if points are sorted by camera, frame and source."""
     for n in range(1, len(camera)):
         if camera[n] != camera[n - 1]:
             if camera[n] < camera[n - 1]:
@@ -49,6 +65,7 @@ def _sorted(camera: NDArray[np.uint8], frame: NDArray[np.int32], source: NDArray
 def _number(
     camera: NDArray[np.uint8], frame: NDArray[np.int32], y: Coordinate, z: Coordinate, gap: float, longest: float
 ) -> tuple[Ints, Ints]:
+    """Number the segments of points that are sorted along the stripe; segments and places as in `segments_of`."""
     segment, place = np.zeros(len(y), np.int32), np.zeros(len(y), np.int32)
     along = np.zeros(len(y))
     start = segments = 0
@@ -59,7 +76,7 @@ def _number(
             continue
         parts = max(math.ceil(along[n - 1] / longest), 1)
         for m in range(start, n):
-            segment[m] = segments + min(int(parts * along[m] / max(along[n - 1], 1e-9)), parts - 1)
+            segment[m] = segments + min(int(parts * along[m] / max(along[n - 1], SHORTEST_MM)), parts - 1)
             place[m] = min(m - start, n - 1 - m)
         segments += parts
         start = n

@@ -1,4 +1,4 @@
-"""Segments of stripe that nothing supports: none before and behind them, or no camera that should see them."""
+"""Verdicts on segments of stripe: supported, isolated along the travel, or not confirmed by other cameras."""
 
 from collections.abc import Mapping
 
@@ -16,38 +16,53 @@ from schemas.parameters.outliers import OutlierParameters
 Ints = NDArray[np.int32]
 
 CELL_MM = 1.0
-"""Cells across the travel: other cameras' points count as the same within about 1.5 of them."""
+"""Side of the cells across the travel: points of two cameras count as the same within about 1.5 cells. Chosen by
+hand."""
 PLANES_MM = 2.0
-"""Cells along the travel are as long as its steps are, but not shorter than this."""
+"""Least length of the cells along the travel; they are as long as its steps if these are longer. Chosen by hand."""
 PLANES = 3
-"""How many cells before and behind a segment are searched for others."""
+"""Cells before and behind a segment that are searched for other points. Chosen by hand."""
 END_REACH = 3
-"""The first stripes of heel and toes, with nothing on their other side, are so many times farther apart than others."""
+"""Factor on the search distance for the first stripes of heel and toes, which have points on one side only and are
+farther apart than others. Chosen by hand."""
 
 SUPPORTED, END, ISOLATED, UNCONFIRMED = range(4)
+"""The verdicts on a point."""
 
 
 def judge_segments(
     points: NDArray[np.void], views: Mapping[int, View], parameters: OutlierParameters
 ) -> NDArray[np.uint8]:
-    """`SUPPORTED`, `END`, `ISOLATED` or `UNCONFIRMED` for each of `points` (N,) of `POINT_DTYPE`, N >= 1, all finite.
+    """Judge the segments of stripe.
 
-    Points of one segment are judged alike, so that a gap in another camera's stripe costs nothing; but at the ends of a
-    stripe, whose last pixels see half of it, points are given up for what other cameras see there within theirs.
+    All points of a segment get the same verdict, so that a gap in another camera's stripe does no harm. The exception
+    is the end of a stripe, where the last pixels see only a part of its width: points there are given up if another
+    camera sees the place within its stripe.
+
+    Parameters
+    ----------
+    points : (N,) of `POINT_DTYPE`, N >= 1, mm, scanner frame, all finite
+    views : camera -> view, of the cameras whose position is known
+
+    Returns
+    -------
+    (N,) uint8: `SUPPORTED`, `END`, `ISOLATED` or `UNCONFIRMED`.
     """
     segment, from_end = segments_of(points, parameters.gap_mm, parameters.segment_mm)
     size = np.bincount(segment)
     xyz, step = coordinates(points), stripe_step(points)
     voxels = voxelise(xyz, (max(step, PLANES_MM), CELL_MM, CELL_MM))
-    ids = np.unique(points["camera"])
-    camera = np.searchsorted(ids, points["camera"]).astype(np.uint8)
-    sight = sight_of(xyz, camera, len(ids), voxels)
-    answers = ask_others(xyz, camera, voxels.voxel, [views.get(int(one)) for one in ids], voxels, sight)
+    camera_numbers = np.unique(points["camera"])
+    camera = np.searchsorted(camera_numbers, points["camera"]).astype(np.uint8)
+    sight = sight_of(xyz, camera, len(camera_numbers), voxels)
+    answers = ask_others(
+        xyz, camera, voxels.voxel, [views.get(int(number)) for number in camera_numbers], voxels, sight
+    )
     confirmed, denied = (np.bincount(segment, answers == answer, len(size)) for answer in (CONFIRMED, DENIED))
 
     suspect = confirmed <= parameters.confirmed_share * size
     verdict = np.full(len(size), SUPPORTED, np.uint8)
-    if len(ids) >= parameters.fewest_cameras:
+    if len(camera_numbers) >= parameters.fewest_cameras:
         verdict[suspect & (denied > parameters.denied_share * size)] = UNCONFIRMED
     if step > 0:
         beside = _count_beside(segment, suspect, parameters.beside_mm, voxels)
@@ -63,7 +78,7 @@ def judge_segments(
 def _covered(
     is_end: NDArray[np.bool_], camera: NDArray[np.uint8], number: Ints, voxel: Ints, place: Ints
 ) -> NDArray[np.bool_]:
-    """Which of the points at an end have others near them that are at none, of another camera."""
+    """Select the points at an end of a stripe that are near points of another camera within its stripe."""
     within = np.zeros(len(place), np.uint64)
     for n in range(len(voxel)):
         if not is_end[n]:
@@ -77,7 +92,7 @@ def _covered(
 
 
 def _count_beside(segment: Ints, suspect: NDArray[np.bool_], beside_mm: float, voxels: Voxels) -> NDArray[np.int64]:
-    """(S,) how many points of each suspect segment have others before or behind them."""
+    """(S,) the number of points of each suspect segment that have others before or behind them; 0 for the rest."""
     reach = max(round(beside_mm / voxels.size[1]), 1)
     return np.asarray(_search(segment, suspect, reach, voxels.number, voxels.voxel, voxels.place))
 
@@ -86,6 +101,7 @@ def _count_beside(segment: Ints, suspect: NDArray[np.bool_], beside_mm: float, v
 def _search(
     segment: Ints, suspect: NDArray[np.bool_], reach: int, number: Ints, voxel: Ints, place: Ints
 ) -> NDArray[np.int64]:
+    """Count the points as in `_count_beside`, with a search distance of `reach` cells."""
     beside = np.zeros(len(suspect), np.int64)
     for n in range(len(segment)):
         s = segment[n]
@@ -101,7 +117,7 @@ def _search(
 
 @compiled
 def _occupied(place: Ints, side: int, reach: int, number: Ints) -> bool:
-    """Whether cells up to `reach` from a place, in Y and Z, hold points in the planes on one side of it."""
+    """True if cells within `reach` of a place in Y and Z hold points, in the planes on one side of it."""
     _, columns, rows = number.shape
     for away in range(1, PLANES + 1):
         for b in range(max(place[1] - reach, 0), min(place[1] + reach + 1, columns)):

@@ -1,4 +1,4 @@
-"""How far off a world point is to be expected, from its stripe point and its camera's calibration."""
+"""The uncertainty of a world point, from its stripe point and its camera's calibration."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,32 +10,50 @@ from schemas.calibration import CameraCalibration
 Floats = NDArray[np.float64]
 
 REACH = 3
-"""The stripe runs from so many points before a point to so many after it."""
+"""Points before and after a point between which the direction of the stripe is taken. Chosen by hand."""
 GAP_PX = 5.0
-"""Points of one piece of the stripe are no farther apart."""
+"""Largest distance of consecutive points of one piece of the stripe: the default of `gap_px` of the extraction."""
 END_ERROR = 0.13
-"""Where a stripe ends, at an edge or in a shadow, only a part of its width is seen, and its centre is off by so many
-widths; the error halves"""
+"""Error of the centre at the end of a stripe, in widths: at an edge or in a shadow only a part of the width is seen.
+Measured on virtual feet."""
 END_REACH = 0.8
-"""at so many widths from there. Measured on virtual feet."""
-EVERY = 8
-"""A calibration's covariance changes slowly: that of every eighth point serves those behind it."""
+"""Distance from the end, in widths, at which that error has halved. Measured on virtual feet."""
+COVARIANCE_STEP = 8
+"""Points that share one covariance of the calibration, which changes slowly: a bound of time."""
 SHORTEST_MM = 1e-9
-"""Per px; a map that is singular somewhere is of no use there, but still a number."""
+"""Least scale of a map, mm per px: the result stays finite where a map is singular."""
 
 
 def standard_deviations(stripe: StripePoints, camera: CameraCalibration) -> Floats:
-    """(N,) standard deviations of the world points of `stripe`, mm, along the normal of the surface in the laser plane.
+    """Estimate the standard deviations of the world points of one camera's stripe.
 
-    Three parts are added in squares. The stripe's `sigma`, and what it is off near the ends of its pieces, are in px
-    across it: a stripe along the unit vector t of the image runs along J t in the world, J being the derivatives of the
-    map, and one px across it there is |det J| / |J t|. What the calibration's covariance predicts knows of chance
-    alone, and is too little where the map is too stiff for its camera; it is taken to be no less than what the map left
-    on held-out data.
+    Three variances are added. The stripe's `sigma`, and its error near the ends of its pieces, are in px across the
+    stripe: with J the derivatives of the map, a stripe along the unit vector t of the image runs along J t in the
+    world, and 1 px across it is |det J| / |J t| mm there. The third is that of the calibration. Its covariance covers
+    random errors only, and is too small where the model is too stiff for the camera; the residual of the map on
+    held-out data is therefore its lower bound.
 
     Parameters
     ----------
     stripe : (N,) points of one camera, in their order along the stripe; frame, i, j, width and sigma (px) are used
+
+    Returns
+    -------
+    (N,) float64, mm, along the normal of the surface within the laser plane.
+
+    Examples
+    --------
+    The middle of a stripe with sigma 0.1 px and a map of 0.5 mm a px:
+
+    >>> from footscan.stripe.points import STRIPE_DTYPE
+    >>> from schemas.calibration import PolynomialMap
+    >>> map_ = PolynomialMap(order=1, centre_px=(320, 240), scale_px=100, alpha_y=[0, 50, 0], alpha_z=[0, 0, -50])
+    >>> camera = CameraCalibration(camera=1, map=map_, region_px=[], points=0)
+    >>> stripe = np.zeros(400, STRIPE_DTYPE)
+    >>> stripe["i"], stripe["j"], stripe["width"], stripe["sigma"] = np.arange(400), 240.0, 6.0, 0.1
+    >>> sigmas = standard_deviations(stripe, camera)
+    >>> print(round(float(sigmas[200]), 2), bool(sigmas[0] > sigmas[200]))
+    0.05 True
     """
     pixels = np.column_stack([stripe["i"], stripe["j"]]).astype(np.float64)
     directions, to_end = _along(stripe["frame"], pixels)
@@ -49,8 +67,8 @@ def standard_deviations(stripe: StripePoints, camera: CameraCalibration) -> Floa
     length = np.maximum(np.hypot(along[:, 0], along[:, 1]), SHORTEST_MM)
     area = np.abs(slope[:, 0, 0] * slope[:, 1, 1] - slope[:, 0, 1] * slope[:, 1, 0])
 
-    left = camera.held_out_rms_mm if camera.held_out_rms_mm is not None else camera.rms_mm
-    of_calibration = np.full(len(pixels), (left or 0.0) ** 2)
+    residual_mm = camera.held_out_rms_mm if camera.held_out_rms_mm is not None else camera.rms_mm
+    of_calibration = np.full(len(pixels), (residual_mm or 0.0) ** 2)
     covariance = _covariances(camera, pixels)
     if covariance is not None:
         normal = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, np.newaxis]
@@ -59,19 +77,28 @@ def standard_deviations(stripe: StripePoints, camera: CameraCalibration) -> Floa
 
 
 def predicted_deviations(camera: CameraCalibration, pixels: Floats) -> Floats | None:
-    """(N,) standard deviation in mm that the calibration's covariance predicts at (N, 2) `pixels`, in its worst
-    direction; None where it has no covariance."""
+    """Predict the standard deviations of a map from the covariance of its calibration.
+
+    Parameters
+    ----------
+    pixels : (N, 2) i and j, px.
+
+    Returns
+    -------
+    (N,) float64, mm, in the worst direction of Y and Z; None if the calibration has no covariance.
+    """
     covariance = _covariances(camera, pixels)
     return None if covariance is None else np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, -1], 0.0))
 
 
 def _covariances(camera: CameraCalibration, pixels: Floats) -> Floats | None:
-    covariance = prediction_covariance(camera, pixels[::EVERY])
-    return None if covariance is None else np.repeat(covariance, EVERY, axis=0)[: len(pixels)]
+    """(N, 2, 2) covariances of Y and Z, mm^2, one for `COVARIANCE_STEP` pixels; None if the camera has none."""
+    covariance = prediction_covariance(camera, pixels[::COVARIANCE_STEP])
+    return None if covariance is None else np.repeat(covariance, COVARIANCE_STEP, axis=0)[: len(pixels)]
 
 
 def _along(frame: NDArray[np.integer], pixels: Floats) -> tuple[Floats, Floats]:
-    """(N, 2) unit vectors along the stripe at its points (N, 2), and (N,) how far the next end of a piece is, px."""
+    """(N, 2) unit vectors along the stripe at its points (N, 2), and (N,) distances to the nearer end, px."""
     count = len(pixels)
     if count < 2:
         return np.tile([1.0, 0.0], (count, 1)), np.zeros(count)

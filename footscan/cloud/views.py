@@ -1,4 +1,4 @@
-"""From where, and over which part of the laser's plane, each camera looks."""
+"""Positions of the cameras, and the part of the laser plane that each one sees."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,28 +14,44 @@ from schemas.calibration import CameraCalibration
 Floats = NDArray[np.float64]
 
 STEPS_A_SIDE = 16
-"""How many places of each side of its region a camera's outline in the plane is drawn through."""
+"""Points of each side of a camera's region through which its outline in the plane is drawn. Chosen by hand."""
 
 
 @dataclass(frozen=True)
 class View:
-    """One camera, in the frame of the heads: X counts from the laser's plane, Y and Z are the scanner's."""
+    """The view of one camera in the frame of its head: X counts from the laser plane, Y and Z are the scanner's."""
 
     centre: Floats
-    """(3,) where it stands, mm."""
+    """(3,) position, mm."""
     outline: Floats
-    """(M, 2) corners in Y and Z, mm, of the convex part of the plane that its calibration supports, counterclockwise;
-    (0, 2) where that is not known."""
+    """(M, 2) corners in Y and Z, mm, of the convex part of the laser plane that the calibration supports,
+    counterclockwise; (0, 2) if it is not known."""
 
 
 def views_of(cameras: Iterable[CameraCalibration]) -> dict[int, View]:
-    """Camera -> view, of those cameras whose place the calibration, or their number, tells."""
+    """Derive the view of each camera whose position follows from its calibration, or from its number.
+
+    Returns
+    -------
+    Camera -> view.
+
+    Examples
+    --------
+    A frontal view of 320 x 240 mm, at the typical distance:
+
+    >>> from schemas.calibration import PolynomialMap
+    >>> map_ = PolynomialMap(order=1, centre_px=(319.5, 239.5), scale_px=100, alpha_y=[0, 50, 0], alpha_z=[0, 0, -50])
+    >>> view = views_of([CameraCalibration(camera=1, map=map_, region_px=[], points=0)])[1]
+    >>> print(view.centre.round(3) + 0.0, view.outline.max(axis=0).round(3))
+    [300.   0.   0.] [159.75 119.75]
+    """
     calibrations = {camera.camera: camera for camera in cameras}
     centres = camera_centres(calibrations.values())
     return {camera: View(centre, _outline(calibrations[camera])) for camera, centre in centres.items()}
 
 
 def _outline(camera: CameraCalibration) -> Floats:
+    """The convex outline (M, 2) of a camera's region in the laser plane, mm; (0, 2) if its map is singular."""
     right, bottom = np.array(camera.image_px or IMAGE_PX) - 1.0
     corners = np.array(camera.region_px or [(0.0, 0.0), (right, 0.0), (right, bottom), (0.0, bottom)])
     parts = np.arange(STEPS_A_SIDE)[:, None, None] / STEPS_A_SIDE
@@ -43,5 +59,5 @@ def _outline(camera: CameraCalibration) -> Floats:
     plane = to_world(camera, border.reshape(-1, 2))
     try:
         return np.asarray(plane[ConvexHull(plane).vertices])
-    except (QhullError, ValueError):  # all on one line, or not finite
+    except (QhullError, ValueError):  # all points on a line, or not finite
         return np.empty((0, 2))

@@ -1,7 +1,7 @@
-"""Which cameras should see a point, and whether they do.
+"""Confirmation and denial of points by the cameras that should see them.
 
-A camera should see what lies in its calibrated part of the laser's plane, faces it and is not hidden. Where it sees
-nothing there although its picture of this plane is not empty, or where it sees something behind, the point is denied.
+A camera should see a point that lies in its calibrated part of the laser plane, faces it and is not hidden. It denies
+the point if it sees nothing there, although its image of this plane is not empty, or if it sees something behind.
 """
 
 from typing import NamedTuple
@@ -18,48 +18,57 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 UNKNOWN, CONFIRMED, DENIED = range(3)
-"""What the other cameras say of a point."""
+"""The answers of the other cameras for a point."""
 FACING, AS_WELL, GRAZING = 0.4, 0.7, 0.15
-"""Cosine of the angle to a surface's normal up to which a camera is expected to see a stripe; where the camera that saw
-it has less, this part of its cosine, but never less than the last one."""
+"""Least cosine between a surface's normal and the direction to a camera at which the camera is expected to see the
+stripe: the first number, or the second times the cosine of the camera that saw it if that is less, but never less than
+the third. Chosen by hand."""
 FLAT = 0.3
-"""Variance across a plane, in parts of that along it, above which the plane means nothing."""
+"""Variance across a plane, relative to that along it, from which the plane has no normal. Chosen by hand."""
 OUTLINE_MM = 3.0
-"""How far inside its outline a camera is expected to see."""
+"""Margin inside its outline in which a camera is not expected to see. Chosen by hand."""
 CLEARANCE_CELLS = 4.0
-"""A point is not hidden by what is so close to it: its own surface."""
+"""Distance within which points do not hide a point: they are its own surface. Chosen by hand."""
 BEFORE_CELLS, BEHIND_CELLS = 3.0, 4.0
-"""What others see at least so far before a point hides it; what a camera sees so far behind, it sees through it."""
+"""Distances, in sides of a cell, from which points of other cameras in front of a point hide it, and from which a
+camera that sees points behind it sees through it. Chosen by hand."""
 FARTHEST_BEHIND = 0.5
-"""How far behind is looked for, in distances of the camera from its laser's plane."""
+"""Distance behind a point that is searched, in distances of the camera from the laser plane: a bound of time."""
 
 
 class Sight(NamedTuple):
-    """What all cameras saw, by cells."""
+    """The points of all cameras, by cells."""
 
     seen: NDArray[np.uint64]
-    """(V,): bit k stands for camera k of the list, which has points in the cell."""
+    """(V,): bit k is set if camera k of the list has points in the cell."""
     normals: Floats
-    """(V, 3): of the surface in and around a cell, either way; 0 where there is no telling."""
+    """(V, 3): normal of the surface in and around a cell, of either sign; 0 if it is not determined."""
     films: NDArray[np.bool_]
-    """(cells in X, cameras): whether a camera has points there at all."""
+    """(cells in X, cameras): True if the camera has points at this X."""
     solid: NDArray[np.bool_]
-    """Cells of twice the size that hold points."""
+    """True for cells of twice the size that hold points."""
 
 
 class Eyes(NamedTuple):
-    """Where cameras stand and what they can see."""
+    """Positions and outlines of the cameras."""
 
     centres: Floats
-    """(C, 3) mm; NaN where a camera's place is not known."""
+    """(C, 3) mm; NaN for a camera of unknown position."""
     sides: Floats
-    """As `_sides` gives them, of all cameras one after the other."""
+    """(S, 3): the sides of all outlines, camera by camera, as `_sides` returns them."""
     bounds: NDArray[np.int64]
     """(C + 1,): where the sides of each camera begin."""
 
 
 def sight_of(xyz: Floats, camera: NDArray[np.uint8], cameras: int, voxels: Voxels) -> Sight:
-    """Sums up points (N, 3); `camera` (N,) is the place of each one's camera in a list of so many."""
+    """Sum up the points of all cameras by cells.
+
+    Parameters
+    ----------
+    xyz : (N, 3) mm, scanner frame
+    camera : (N,) index of each point's camera, less than `cameras`, which is 64 at most
+    voxels : the cells of the points
+    """
     seen, films, normals = _sum_up(xyz, camera, cameras, voxels.number, voxels.voxel, voxels.place)
     solid = np.zeros([side // 2 + 1 for side in voxels.number.shape], np.bool_)
     solid[tuple(voxels.place.T // 2)] = True
@@ -69,12 +78,19 @@ def sight_of(xyz: Floats, camera: NDArray[np.uint8], cameras: int, voxels: Voxel
 def ask_others(
     xyz: Floats, camera: NDArray[np.uint8], voxel: Ints, views: list[View | None], voxels: Voxels, sight: Sight
 ) -> NDArray[np.uint8]:
-    """For each point (N,) whether another camera confirms it, or one that should see it denies it.
+    """Ask the other cameras about each point.
 
     Parameters
     ----------
-    xyz, camera, voxel : (N, 3) mm, scanner frame; the place of its camera in `views`; the number of its cell
-    views : of each camera of the list, where it is known
+    xyz : (N, 3) mm, scanner frame
+    camera : (N,) index of each point's camera in `views`
+    voxel : (N,) number of each point's cell
+    views : the view of each camera; None if it is unknown
+
+    Returns
+    -------
+    (N,) uint8: `CONFIRMED` if another camera sees the point, `DENIED` if one that should see it does not, else
+    `UNKNOWN`.
     """
     centres = np.array([np.full(3, np.nan) if view is None else view.centre for view in views])
     sides = [_sides(view) for view in views]
@@ -85,7 +101,7 @@ def ask_others(
 def _sides(view: View | None) -> Floats:
     """(M, 3): inward unit normals of the sides of a view's outline in Y and Z, and their distance from the origin."""
     if view is None or not len(view.outline):
-        return np.array([[0.0, 0.0, np.inf]])  # nothing is inside
+        return np.array([[0.0, 0.0, np.inf]])  # no point is inside
     along = np.roll(view.outline, -1, axis=0) - view.outline
     inward = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(along[:, 0], along[:, 1])[:, None]
     return np.column_stack([inward, np.sum(inward * view.outline, axis=1) + OUTLINE_MM])
@@ -95,6 +111,7 @@ def _sides(view: View | None) -> Floats:
 def _sum_up(
     xyz: Floats, camera: NDArray[np.uint8], cameras: int, number: Ints, voxel: Ints, place: Ints
 ) -> tuple[NDArray[np.uint64], NDArray[np.bool_], Floats]:
+    """The fields `seen`, `films` and `normals` of `Sight`."""
     count = len(place)
     seen = np.zeros(count, np.uint64)
     films = np.zeros((number.shape[0], cameras), np.bool_)
@@ -129,6 +146,7 @@ def _ask(
     voxels: Voxels,
     sight: Sight,
 ) -> NDArray[np.uint8]:
+    """The answers of `ask_others`."""
     centres, sides, bounds = eyes
     origin, size, number, _, place = voxels
     seen, normals, films, solid = sight
@@ -169,18 +187,19 @@ def _ask(
 
 @compiled
 def cameras_near(number: Ints, seen: NDArray[np.uint64], place: Ints) -> np.uint64:
-    """Those of the cameras that `seen` (V,) has in a cell, or beside it, bit by bit."""
-    found = np.uint64(0)
+    """The bits of the cameras that `seen` (V,) has in a cell or in its 26 neighbours."""
+    cameras = np.uint64(0)
     for i in range(place[0] - 1, place[0] + 2):
         for j in range(place[1] - 1, place[1] + 2):
             for k in range(place[2] - 1, place[2] + 2):
                 if number[i, j, k] != EMPTY:
-                    found |= seen[number[i, j, k]]
-    return found
+                    cameras |= seen[number[i, j, k]]
+    return cameras
 
 
 @compiled
 def _inside(y: float, z: float, sides: Floats) -> bool:
+    """True if (y, z) lies on the inner side of all `sides` (M, 3)."""
     inside = True
     for m in range(len(sides)):
         inside &= sides[m, 0] * y + sides[m, 1] * z >= sides[m, 2]
@@ -192,7 +211,7 @@ def _hidden(
     x: float, y: float, z: float, dx: float, dy: float, dz: float, origin: Floats, size: Floats,
     solid: NDArray[np.bool_],
 ) -> bool:  # fmt: skip
-    """Whether a cell with points lies on the way (dx, dy, dz) that leads from a point to a camera."""
+    """True if a cell with points lies on the line (dx, dy, dz) from a point to a camera."""
     stride = size[1] / np.sqrt(dx * dx + dy * dy + dz * dz)
     part = CLEARANCE_CELLS * stride
     while part < 1.0:
@@ -212,7 +231,7 @@ def _behind_surface(
     x: float, y: float, z: float, dx: float, dy: float, dz: float, voxels: Voxels,
     seen: NDArray[np.uint64], others: np.uint64,
 ) -> bool:  # fmt: skip
-    """Whether what other cameras saw lies on the way (dx, dy, dz) from a point to the camera that says it saw it."""
+    """True if points of other cameras lie on the line (dx, dy, dz) from a point to the camera that saw it."""
     origin, size, number, _, _ = voxels
     stride = 0.5 * size[1] / np.sqrt(dx * dx + dy * dy + dz * dz)
     part = BEFORE_CELLS * 2.0 * stride
@@ -222,8 +241,8 @@ def _behind_surface(
         c = int((z + part * dz - origin[2]) / size[2])
         if not (0 <= a < number.shape[0] and 0 <= b < number.shape[1] and 0 <= c < number.shape[2]):
             return False
-        found = number[a, b, c]
-        if found != EMPTY and seen[found] & others:
+        cell = number[a, b, c]
+        if cell != EMPTY and seen[cell] & others:
             return True
         part += stride
     return False
@@ -234,10 +253,10 @@ def _sees_behind(
     x: float, y: float, z: float, centre: Floats, camera: int, origin: Floats, size: Floats, number: Ints,
     seen: NDArray[np.uint64],
 ) -> bool:  # fmt: skip
-    """Whether a camera, as it travelled, saw something through a point.
+    """True if a camera saw points behind a point at another place of its travel.
 
-    With the laser's plane at x + s it stands s farther on, and the line of sight through the point arrives at the plane
-    at a place that moves away behind the point with s.
+    With the laser plane at x + s the camera is s farther on. Its line of sight through the point then meets the plane
+    behind the point, the farther away the larger s is.
     """
     towards = centre[0]
     bit = np.uint64(1) << np.uint64(camera)
@@ -251,8 +270,8 @@ def _sees_behind(
         c = int((centre[2] + stretch * (z - centre[2]) - origin[2]) / size[2])
         if not (0 <= a < number.shape[0] and 0 <= b < number.shape[1] and 0 <= c < number.shape[2]):
             return False
-        found = number[a, b, c]
-        if found != EMPTY and seen[found] & bit and (stretch - 1) * distance > BEHIND_CELLS * size[1]:
+        cell = number[a, b, c]
+        if cell != EMPTY and seen[cell] & bit and (stretch - 1) * distance > BEHIND_CELLS * size[1]:
             return True
         s += step
     return False

@@ -1,4 +1,4 @@
-"""Landmarks, lengths, girths, sizes. `footscan.measure(mesh)` is that of `any_mesh`."""
+"""Landmarks, lengths, girths, footprint, volume. `footscan.measure(mesh)` calls `any_mesh.measure`."""
 
 import sys
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""The measures of any foot's mesh: what `footscan.measure(mesh)` calls."""
+"""Measures of any mesh of a foot: the function behind `footscan.measure(mesh)`."""
 
 from pathlib import Path
 
@@ -18,13 +18,13 @@ def measure(
     side: Side = "unknown",
     axis: Axis = "toe2",
 ) -> Measures:
-    """The measures of a foot's mesh, of this scanner or of any other, in any pose.
+    """Measure the mesh of a foot from this scanner or any other, in any pose.
 
     Parameters
     ----------
-    mesh : an STL, PLY or OBJ file, a `Mesh`, or (V, 3) vertices and (F, 3) faces; the unit is
-        found by the size of a foot
-    side : which foot it is; default: found by its form
+    mesh : an STL, PLY or OBJ file, a `Mesh`, or (V, 3) vertices and (F, 3) faces; the unit (mm, cm, m or inches) is
+        inferred from the size of a foot
+    side : which foot it is; default: inferred from its form
     axis : the axis that lengths run along
 
     Raises

@@ -1,4 +1,4 @@
-"""A foot's surface made ready for being measured: sections, landmarks, noise."""
+"""The surface of a foot, prepared for measuring: sections, landmarks, noise."""
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
@@ -14,22 +14,24 @@ from footscan.measure.landmarks.dorsal import CORNER_MM
 from footscan.measure.landmarks.errors import saddle_gradient, summit_gradient
 from footscan.measure.landmarks.sides import FULL_SIZE_MM
 from footscan.measure.outline import Outline, Plane, smooth_outline
-from footscan.measure.quantity import NotThere, Quantity
+from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.measure.roughness import roughness
 from footscan.mesh.sections import Cuttable, Loop, cut, cuttable
 from footscan.mesh.topology import vertex_normals
 
 Floats = NDArray[np.float64]
-_Taken = TypeVar("_Taken")
+_Result = TypeVar("_Result")
 
 ACROSS = np.array([1.0, 0.0, 0.0])
 UP = np.array([0.0, 0.0, 1.0])
 CLOSED_GAP_MM = 5.0
-"""A narrower opening of a section is closed straight."""
+"""A narrower opening of a section is closed by a straight line; chosen by hand."""
 LEAST_LOOP_MM = 60.0
-"""Shorter loops are no section of a foot."""
+"""Shorter loops are no section of a foot; chosen by hand."""
 LEAST_SINE = 0.1
-"""Of the angle between a plane and the normals where it cuts; noise alone makes smaller ones."""
+"""Least sine of the angle between a plane and the normals where it cuts; smaller ones are noise. Chosen by hand."""
+MIDFOOT_SHARE = 0.02
+"""Vertices this near to half the foot length, as a share of it, locate the middle of the section there."""
 FACING = {
     "pternion": (-1.0, 0.0, 0.0),
     "metatarsale_tibiale": (0.0, 1.0, 0.0),
@@ -39,10 +41,10 @@ FACING = {
     "medial_malleolus": (0.0, 1.0, 0.0),
     "lateral_malleolus": (0.0, -1.0, 0.0),
 } | {f"toe_{toe}_tip": (1.0, 0.0, 0.0) for toe in range(1, 6)}
-"""Landmarks that are summits of the surface, and in which direction."""
+"""Direction in which each landmark that is a summit of the surface is outermost; foot frame."""
 
 
-class Place(NamedTuple):
+class LandmarkQuantities(NamedTuple):
     """A landmark as three quantities, mm, in the foot's frame."""
 
     x: Quantity
@@ -56,7 +58,7 @@ class Place(NamedTuple):
 
 
 class FootSurface:
-    """A foot in its own frame, and what is computed of its surface once for all measures."""
+    """A foot in its own frame, with what all measures share: normals, noise, landmarks, sections."""
 
     def __init__(self, foot: FootFrame, landmarks: Mapping[str, Landmark]) -> None:
         self.length_mm = foot.length
@@ -64,9 +66,9 @@ class FootSurface:
         self.normals: Floats = vertex_normals(foot.vertices, foot.faces)
         self.errors, self.noise = roughness(foot.vertices, self.normals, foot.faces)
         self.landmarks = landmarks
-        self._places: dict[str, Place] = {}
+        self._places: dict[str, LandmarkQuantities] = {}
         self._outlines: dict[tuple[float, ...], Outline] = {}
-        self._taken: dict[Callable[[FootSurface], Any], Any] = {}
+        self._results: dict[Callable[[FootSurface], Any], Any] = {}
 
     @cached_property
     def midfoot(self) -> Outline:
@@ -74,13 +76,13 @@ class FootSurface:
 
         Raises
         ------
-        NotThere
-            There is none, or it has a gap.
+        NotMeasurable
+            There is no section, or it has a gap.
         """
         x = 0.5 * self.length_mm
-        near = self.mesh.vertices[np.abs(self.mesh.vertices[:, 0] - x) < 0.02 * self.length_mm]
+        near = self.mesh.vertices[np.abs(self.mesh.vertices[:, 0] - x) < MIDFOOT_SHARE * self.length_mm]
         if not len(near):
-            raise NotThere("the surface has no section here")
+            raise NotMeasurable("the surface has no section here")
         inside = np.array([x, *(near[:, 1:].min(axis=0) + near[:, 1:].max(axis=0)) / 2])
         return self.outline(Plane.across(inside, ACROSS), inside)
 
@@ -89,28 +91,30 @@ class FootSurface:
         """Height of the highest point, mm."""
         return float(self.mesh.vertices[:, 2].max())
 
-    def place(self, name: str) -> Place:
-        """The landmark `name`. How it follows the surface is known of summits, of the junction of foot and leg and of
-        the landing point, which hardly does, and not of one that was set by hand: its derivatives are NaN.
+    def place(self, name: str) -> LandmarkQuantities:
+        """The landmark `name`, with its derivatives by the displacements of the vertices.
+
+        The derivatives are known for summits and for the junction of foot and leg. Those of the landing point are 0,
+        since it hardly follows the surface. Those of all others, such as landmarks set by hand, are NaN.
 
         Raises
         ------
-        NotThere
-            It was not found.
+        NotMeasurable
+            The landmark was not found.
         """
         if name not in self._places:
             if name not in self.landmarks:
-                raise NotThere(f"{name.replace('_', ' ')} was not found")
+                raise NotMeasurable(f"{name.replace('_', ' ')} was not found")
             landmark = self.landmarks[name]
             doubt = f"{name.replace('_', ' ')} by a fallback" if landmark.method == "fallback" else None
             gradient = self._landmark_gradient(name, landmark)
-            self._places[name] = Place(
-                *(Quantity(float(at), of, doubt) for at, of in zip(landmark.point, gradient, strict=True))
+            self._places[name] = LandmarkQuantities(
+                *(Quantity(float(value), row, doubt) for value, row in zip(landmark.point, gradient, strict=True))
             )
         return self._places[name]
 
     def _landmark_gradient(self, name: str, landmark: Landmark) -> Floats:
-        """(3, V) derivatives of its coordinates by the displacements of the vertices."""
+        """Returns (3, V) derivatives of the coordinates by the displacements of the vertices."""
         vertices, normals, point, cap = self.mesh.vertices, self.normals, landmark.point, landmark.cap
         if cap is not None and name in FACING:
             return summit_gradient(vertices, normals, point, np.array(FACING[name]), cap)
@@ -118,11 +122,11 @@ class FootSurface:
             scale = min(1.0, self.length_mm / FULL_SIZE_MM)
             corner = np.array([CORNER_MM[0], 0.0, CORNER_MM[1]]) * scale
             return saddle_gradient(vertices, normals, point, corner, cap)
-        hardly = landmark.method == "geometric" and name == "landing_point"
-        return np.full((3, len(normals)), 0.0 if hardly else np.nan)
+        is_fixed = landmark.method == "geometric" and name == "landing_point"
+        return np.full((3, len(normals)), 0.0 if is_fixed else np.nan)
 
     def station(self, share: float) -> Quantity:
-        """X at this share of the foot length, which is 0 at the rearmost heel point and 1 at the longest toe."""
+        """X at a share of the foot length: 0 at the rearmost heel point, 1 at the longest toe."""
         tips = [self.place(name) for name in self.landmarks if name.startswith("toe_")]
         longest = max((tip.x for tip in tips), key=lambda x: x.value, default=None)
         gradient = np.zeros(len(self.normals)) if longest is None else share * longest.gradient
@@ -135,38 +139,38 @@ class FootSurface:
         return cut(self.mesh, plane.point, plane.normal)
 
     def outline(self, plane: Plane, seed: Floats) -> Outline:
-        """The loop in `plane` around (3,) `seed`, or the one that passes nearest to it, without noise.
+        """The smoothed loop in `plane` around (3,) `seed`, or else the one that passes nearest to it.
 
         Raises
         ------
-        NotThere
-            There is none, or it is open by more than CLOSED_GAP_MM.
+        NotMeasurable
+            There is no loop, or it is open by CLOSED_GAP_MM or more.
         """
-        where = tuple(np.concatenate([plane.point, plane.normal, seed]).tolist())
-        if where not in self._outlines:
+        key = tuple(np.concatenate([plane.point, plane.normal, seed]).tolist())
+        if key not in self._outlines:
             loop = nearest_loop(self.sections(plane), plane, seed)
             if loop is None:
-                raise NotThere("the surface has no section here")
+                raise NotMeasurable("the surface has no section here")
             if loop.gap >= CLOSED_GAP_MM:
-                raise NotThere(f"the surface has a gap of {loop.gap:.0f} mm here")
-            self._outlines[where] = self.smooth(loop, plane)
-        return self._outlines[where]
+                raise NotMeasurable(f"the surface has a gap of {loop.gap:.0f} mm here")
+            self._outlines[key] = self.smooth(loop, plane)
+        return self._outlines[key]
 
-    def once(self, take: "Callable[[FootSurface], _Taken]") -> _Taken:
-        """What `take` makes of this surface, which is taken once."""
-        if take not in self._taken:
-            self._taken[take] = take(self)
-        taken: _Taken = self._taken[take]
-        return taken
+    def once(self, compute: "Callable[[FootSurface], _Result]") -> _Result:
+        """The result of `compute` for this surface; it is computed once and kept."""
+        if compute not in self._results:
+            self._results[compute] = compute(self)
+        result: _Result = self._results[compute]
+        return result
 
     def smooth(self, loop: Loop, plane: Plane) -> Outline:
-        """The loop without noise."""
+        """The loop in `plane`, with the noise of the mesh smoothed away."""
         x, y = self.outwards(plane, loop.edges.ravel()).T
         moves = np.hypot(x, y).reshape(-1, 2)
         return smooth_outline(loop, plane, moves * self.noise[loop.edges])
 
     def gradient(self, outline: Outline, by_points: Floats) -> Floats:
-        """(V,) derivatives by the displacements of the vertices, from (N, 2) those by the points of an outline."""
+        """Returns (V,) derivatives by the displacements of the vertices, from (N, 2) ones by the outline's points."""
         by_points = outline.raw_gradient(by_points)
         shares = (1.0 - outline.loop.shares, outline.loop.shares)
         total = np.zeros(len(self.normals))
@@ -176,13 +180,18 @@ class FootSurface:
         return total
 
     def outwards(self, plane: Plane, vertices: NDArray[np.int64]) -> Floats:
-        """(N, 2) how a section moves where (N,) vertices move outwards by 1: by 1 over the sine of the angle between
-        plane and normal, LEAST_SINE at least."""
+        """Returns (N, 2) displacements of a section where (N,) vertices move outwards by 1.
+
+        Their length is 1 over the sine of the angle between plane and normal, which is taken as at least LEAST_SINE.
+        """
         return _outwards(self.normals, vertices, plane.first, plane.second)
 
 
 def nearest_loop(loops: list[Loop], plane: Plane, seed: Floats, least: float = LEAST_LOOP_MM) -> Loop | None:
-    """The longest loop around (3,) `seed`; where none is, the one that passes nearest to it."""
+    """The longest loop around (3,) `seed`; if there is none, the loop that passes nearest to it.
+
+    Loops shorter than `least` mm are left out.
+    """
     centre = plane.flat(seed[None])[0]
     around, passing = [], []
     for loop in loops:
@@ -193,8 +202,8 @@ def nearest_loop(loops: list[Loop], plane: Plane, seed: Floats, least: float = L
             around.append((length, loop))
         passing.append((nearest, loop))
     if around:
-        return max(around, key=lambda found: found[0])[1]
-    return min(passing, key=lambda found: found[0])[1] if passing else None
+        return max(around, key=lambda candidate: candidate[0])[1]
+    return min(passing, key=lambda candidate: candidate[0])[1] if passing else None
 
 
 @compiled
@@ -210,8 +219,10 @@ def _outwards(normals: Floats, vertices: NDArray[np.int64], first: Floats, secon
 
 @compiled
 def _seen_from_origin(polygon: Floats) -> tuple[float, float, bool]:
-    """Length of the (N, 2) polygon, how near a corner of it is to the origin, and whether the origin is within: a ray
-    from there crosses an odd number of its sides."""
+    """Returns the length of a (N, 2) polygon, the distance of its nearest corner, and whether it surrounds the origin.
+
+    It does if a ray from the origin crosses an odd number of its sides.
+    """
     length, nearest, is_around = 0.0, np.inf, False
     for k in range(len(polygon)):
         x, y = polygon[k]

@@ -1,4 +1,4 @@
-"""The foot's own frame: where its floor and its heel are, and which way its axis runs."""
+"""The frame of a foot: origin on the floor below the heel, X along the axis, Z up."""
 
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
@@ -20,54 +20,62 @@ Floor = Literal["glass", "sole", "resting"]
 Floats = NDArray[np.float64]
 
 STRAY_SHARE = 0.02
-"""Parts of a mesh with less than this share of its triangles are not the foot."""
+"""Parts of a mesh with less than this share of its triangles are not the foot; chosen by hand."""
 SPACING_MM = 4.0
-"""Neighbouring samples are at most about so far apart."""
+"""Largest distance of neighbouring samples, approximately; chosen by hand."""
 DIAGONAL_MM = (110.0, 900.0)
-"""A child's foot without a leg, and a large one with the leg up to the knee."""
+"""Diagonals from a child's foot without a leg to a large foot with the leg up to the knee."""
 LENGTH_MM = (100.0, 380.0)
+"""Foot lengths that are accepted."""
 SLENDERNESS = (1.7, 4.5)
-"""Length over breadth of what can be a foot."""
+"""Range of length over breadth that a foot can have; chosen by hand."""
 TOES, DESCENT = 0.80, 0.75
-"""A foot's toes are lower than this share of its hind part; a block or an egg is not."""
+"""Ahead of the first share of the length, a foot is lower than the second share of the height of its hind part; a block
+or an egg is not. Chosen by hand."""
 CONVEX = 0.9
-"""It fills less of its convex hull."""
+"""A foot fills less than this share of its convex hull; chosen by hand."""
 HEEL_STATION, BALL_STATION, HEEL_OVER_BALL = (0.08, 0.22), (0.55, 0.85), 1.0
-"""Its heel is no broader than its ball, in parts of the length; a pear may be."""
+"""Between these shares of the length, the heel of a foot is no broader than its ball; the narrow end of a pear may be.
+Chosen by hand."""
 GLASS_MM, GLASS_DEG = 3.0, 3.0
-"""A mesh whose lowest point is so near to Z = 0, and whose sole is so nearly level, stands on the glass."""
+"""A mesh stands on the glass if its lowest point is nearer than this to Z = 0 and its sole is level to this angle.
+Chosen by hand."""
 ABOUT_LEVEL_DEG = 20.0
-"""Without a flat sole, which tells its own level, this is near enough."""
+"""Largest tilt on the glass of a foot without a flat sole, whose level is less certain; chosen by hand."""
 CLEAR_SIDE = 0.03
-"""The form tells the side where toes and ball reach so much farther ahead on one than on the other, in lengths."""
+"""The form determines the side if toes and ball reach farther ahead on one side by this share of the length; chosen by
+hand."""
 
 
 class FootFrame(NamedTuple):
-    """A foot in its own frame: mm, +X from heel to toes along the axis, Z up, origin on the floor below the rearmost
-    heel point; a left foot mirrored into a right one, so that +Y is medial."""
+    """A foot in its own frame, in mm.
+
+    +X runs from heel to toes along the axis, Z up; the origin is on the floor below the rearmost heel point. A left
+    foot is mirrored into a right one, so that +Y is medial.
+    """
 
     vertices: Floats
     """(V, 3)"""
     faces: NDArray[np.int32]
-    """(F, 3), strays left out."""
+    """(F, 3), without strays"""
     samples: Floats
-    """(N, 3) the vertices, and points on large triangles, so that neighbours are at most about `SPACING_MM` apart."""
+    """(N, 3) the vertices and points on large triangles, so that neighbours are about `SPACING_MM` apart at most"""
     transform: Floats
-    """(4, 4) from the frame of the mesh to this one."""
+    """(4, 4) from the frame of the mesh to this one"""
     axis: Axis
     length: float
     """Foot length, mm."""
     side: Side = "right"
-    """As which foot it was measured: as was stated, otherwise as its form tells."""
+    """The side as which the foot was measured: the stated one, or else the one inferred from the form."""
     side_note: str | None = None
-    """Where the form contradicts the side that was stated."""
+    """A warning if the form contradicts the stated side."""
     floor: Floor = "sole"
-    """What the floor was taken from: the scanner's glass at Z = 0, a plane through the flat sole, or, where no sole
-    lies flat, the plane on which the foot comes to rest."""
+    """Origin of the floor: the scanner's glass at Z = 0, a plane through the flat sole, or, without a flat sole, the
+    plane on which the foot comes to rest."""
     floor_residual: float = 0.0
-    """Standard deviation of the skin that touches the floor about it, mm."""
+    """Standard deviation of the skin on the floor about it, mm."""
     cut_height: float | None = None
-    """Lowest point of the cut through the leg, mm; None where the leg has no flat end."""
+    """Lowest point of the cut through the leg, mm; None if the leg has no flat end."""
 
     @property
     def low(self) -> float:
@@ -82,24 +90,24 @@ def foot_frame(
     axis: Axis = "toe2",
     marked: Mapping[str, Floats] | None = None,
 ) -> FootFrame:
-    """The frame of a foot in mm, in whatever pose; on the scanner's glass the floor stays Z = 0.
+    """Compute the frame of a foot in any pose; on the scanner's glass the floor stays at Z = 0.
 
     The axis runs from the rearmost heel point to the tip of the second toe ("toe2"), to the middle of the ball
-    ("ball_center"), or along the medial tangent of heel and ball ("brannock"). Where toes cannot be told apart, "toe2"
-    becomes "ball_center".
+    ("ball_center"), or along the medial tangent of heel and ball ("brannock"). Where the second toe cannot be
+    identified, "toe2" becomes "ball_center".
 
     Parameters
     ----------
-    vertices : (V, 3) mm
+    vertices : (V, 3) mm, any frame
     faces : (F, 3), looking outward
-    side : a foot of unknown side is told by its form
-    axis : which one is wished for
-    marked : points that a person has set, (3,) mm in the frame of the mesh; pternion and toe_2_tip count here
+    side : "unknown" is inferred from the form
+    axis : the requested axis
+    marked : (3,) mm, points set by a person, in the frame of the mesh; pternion and toe_2_tip are used here
 
     Raises
     ------
     Finding
-        This is no foot, or not in mm.
+        The surface is no foot, or not in mm.
     """
     places, faces = used_vertices(np.asarray(vertices, np.float64), keep_large_components(faces, STRAY_SHARE))
     _check_size(places)
@@ -118,7 +126,7 @@ def foot_frame(
     low = samples[moved[:, 2] <= low_height(pose.length)]
     forefoot = forefoot_points(apply(transform, places), faces, pose.length, low_height(pose.length))
     forefoot = apply(np.linalg.inv(transform), forefoot)
-    transform, found, length = along_axis(transform, low, forefoot, pose.length, axis, marked or {})
+    transform, actual_axis, length = along_axis(transform, low, forefoot, pose.length, axis, marked or {})
     _check_length(length)
     note = f"toes and ball look like those of a {form} foot"
     return FootFrame(
@@ -126,7 +134,7 @@ def foot_frame(
         faces=faces,
         samples=apply(transform, samples),
         transform=transform,
-        axis=found,
+        axis=actual_axis,
         length=length,
         side=measured,
         side_note=note if measured != form and abs(lead) > CLEAR_SIDE else None,
@@ -137,7 +145,13 @@ def foot_frame(
 
 
 def forefoot_points(vertices: Floats, faces: NDArray[np.integer], length: float, low: float) -> Floats:
-    """Points of the forefoot, close enough together to tell its toes apart; `vertices` in the foot's frame."""
+    """Returns (N, 3) points of the forefoot, dense enough to separate its toes.
+
+    Parameters
+    ----------
+    vertices : (V, 3) mm, in the foot's frame
+    length, low : mm, foot length and height below which there is no leg
+    """
     x, z = vertices[:, 0], vertices[:, 2]
     ahead = (x > FOREFOOT * length) & (z <= low)
     return dense_points(*used_vertices(vertices, faces[ahead[faces].any(axis=1)]), STRIP_MM)
@@ -150,7 +164,10 @@ def _check_size(vertices: Floats) -> None:
 
 
 def _on_floor(vertices: Floats, pose: Pose) -> tuple[Floats, Floor]:
-    """The glass at Z = 0 where the foot stands on it, otherwise the floor of its pose; the heel near X = 0."""
+    """Returns (4, 4) the transform to the glass if the foot stands on it, or else to the floor of its pose.
+
+    The heel comes to lie near X = 0.
+    """
     transform = pose.transform.copy()
     floor: Floor = "sole" if pose.stands else "resting"
     tilt = float(np.degrees(np.arccos(np.clip(transform[2, 2], -1.0, 1.0))))
@@ -165,7 +182,7 @@ def _on_floor(vertices: Floats, pose: Pose) -> tuple[Floats, Floor]:
 
 
 def _check_form(samples: Floats, pose: Pose) -> None:
-    """Refuses what is no foot: `samples` stand on their floor, heel about X = 0."""
+    """Raise `Finding` if the form is not that of a foot; `samples` with the floor at Z = 0 and the heel near X = 0."""
     length = pose.length
     _check_length(length)
     breadth = float(np.ptp(samples[samples[:, 2] <= low_height(length), 1]))
@@ -176,8 +193,8 @@ def _check_form(samples: Floats, pose: Pose) -> None:
     x, z = samples[:, 0], samples[:, 2]
     hind, toes = z[x < (1 - TOES) * length].max(initial=0.0), z[x > TOES * length].max(initial=0.0)
     if not toes < DESCENT * hind:
-        found = f"the surface is {hind:.0f} mm high at one end and {toes:.0f} mm at the other"
-        raise Finding(f"{found}, expected a foot, whose toes are lower than its heel with the leg")
+        heights = f"the surface is {hind:.0f} mm high at one end and {toes:.0f} mm at the other"
+        raise Finding(f"{heights}, expected a foot, whose toes are lower than its heel with the leg")
     low = samples[samples[:, 2] <= low_height(length)]
     heel, ball = (
         float(
@@ -201,7 +218,7 @@ def _range(bounds: tuple[float, float]) -> str:
 
 
 def _medial_lead(samples: Floats, length: float) -> float:
-    """By how much toes and ball reach farther ahead on the +Y side than on the other, in lengths."""
+    """Distance in lengths by which toes and ball reach farther ahead on the +Y side than on the other."""
     low = samples[samples[:, 2] <= low_height(length)]
     toes = low[low[:, 0] > 0.6 * length]
     last, first = float(toes[:, 1].max()), float(toes[:, 1].min())

@@ -1,4 +1,4 @@
-"""Girths: what a tape reads around a foot, and the length along its skin."""
+"""Girths: the reading of a tape around a foot, and the length along its skin."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -6,32 +6,41 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.foot_surface import ACROSS, UP, FootSurface, Place
+from footscan.measure.foot_surface import ACROSS, UP, FootSurface, LandmarkQuantities
 from footscan.measure.hull import hull_corners
 from footscan.measure.outline import Outline, Plane
-from footscan.measure.quantity import NotThere, Quantity, combined
+from footscan.measure.quantity import NotMeasurable, Quantity, combined
 
 Floats = NDArray[np.float64]
 
 NOISE_MM = 0.01
-"""Below this a tape is not lengthened by noise to speak of."""
+"""Smaller noise does not lengthen a tape noticeably; chosen by hand."""
 TRIALS = 2
+"""Bound of time: trials with added noise."""
 EXCESS_POWER = 1.7
-"""With which power of the noise a tape's excess grows: 1 where the foot is flat, 2 where it is round; and that of the
-skin's area, 2 while noise is small beside the triangles."""
+"""Power of the noise with which the excess of a tape grows, between 1 where the foot is flat and 2 where it is round.
+The excess of the skin's area grows with power 2 while noise is small beside the triangles. Chosen by hand."""
 STEP_MM = 1.0
-"""By which a plane is moved to see how its girth follows a landmark."""
+"""Step of the numerical derivative of a girth by the place of its plane."""
 TILTS_DEG = (-30.0, 30.0)
+"""Tilts of the plane among which the least instep girth is sought; part of its definition."""
 TILT_ROUNDS = 9
+"""Rounds of golden section, which locate the tilt to about 0.1 degrees."""
+LIMIT_DEG = 0.5
+"""A least girth nearer than this to a limit of the tilt is uncertain."""
+INSTEP_DEPTH = 0.4
+"""Share of the height of the instep by which a point within the foot lies below it."""
 ANKLE_STEP_MM = 2.0
+"""Distance of the level sections of the leg."""
 ANKLE_CLEARANCE_MM = 10.0
-"""The narrowest place of the leg is sought from so far above the medial malleolus to so far below the cut."""
+"""The narrowest place of the leg is sought from this height above the medial malleolus; chosen by hand."""
 CUT_MARGIN_MM = 3.0
+"""The narrowest place of the leg is sought up to this distance below its end; chosen by hand."""
 LOW_HEEL_MM = 10.0
-"""The rear of the heel is sought below."""
+"""The rear of the heel on the floor is sought below this height; chosen by hand."""
 
 Cut = Callable[[Floats], tuple[Plane, Floats]]
-"""From the values of some quantities to a plane and a point within the foot."""
+"""Function from the values of some quantities to a plane and a point within the foot."""
 
 
 class Tape(NamedTuple):
@@ -40,13 +49,13 @@ class Tape(NamedTuple):
     length: float
     """mm"""
     gradient: Floats
-    """(N, 2) derivatives by the outline's points."""
+    """(N, 2) derivatives of the length by the outline's points"""
     corners: NDArray[np.integer]
-    """The points of the outline at which it touches."""
+    """(K,) numbers of the points at which the tape touches the outline"""
 
 
 def ball_girth(foot: FootSurface) -> Quantity:
-    """In the upright plane through both metatarsal heads."""
+    """Girth in the upright plane through both metatarsal heads."""
     medial, lateral = foot.place("metatarsale_tibiale"), foot.place("metatarsale_fibulare")
 
     def plane(x: Floats) -> tuple[Plane, Floats]:
@@ -56,13 +65,13 @@ def ball_girth(foot: FootSurface) -> Quantity:
 
 
 def straight_ball_girth(foot: FootSurface) -> Quantity:
-    """Across the axis at the head of the first metatarsal."""
+    """Girth across the axis at the head of the first metatarsal."""
     medial, lateral = foot.place("metatarsale_tibiale"), foot.place("metatarsale_fibulare")
     return _across(foot, medial.x, (medial.point + lateral.point) / 2)
 
 
 def waist_girth(foot: FootSurface) -> Quantity:
-    """Across the axis, midway between the middle of the ball and half the foot length."""
+    """Girth across the axis, midway between the middle of the ball and half the foot length."""
     medial, lateral = foot.place("metatarsale_tibiale"), foot.place("metatarsale_fibulare")
     inside = (medial.point + lateral.point) / 2
     half = foot.station(0.5)
@@ -71,18 +80,18 @@ def waist_girth(foot: FootSurface) -> Quantity:
 
 
 def instep_girth(foot: FootSurface) -> Quantity:
-    """Across the axis at half the foot length."""
+    """Girth across the axis at half the foot length."""
     return _across(foot, foot.station(0.5), foot.midfoot.plane.point)
 
 
 def instep_girth_min(foot: FootSurface) -> Quantity:
-    """The least through the instep point, of planes tilted about Y by at most 30 degrees."""
+    """Least girth through the instep point, among planes tilted about Y by at most 30 degrees."""
     top = foot.place("instep_point")
 
     def tilted(degrees: Floats) -> tuple[Plane, Floats]:
         angle = float(np.deg2rad(degrees[0]))
         direction = np.array([np.cos(angle), 0.0, np.sin(angle)])
-        inside = top.point - 0.4 * top.z.value * np.array([-np.sin(angle), 0.0, np.cos(angle)])
+        inside = top.point - INSTEP_DEPTH * top.z.value * np.array([-np.sin(angle), 0.0, np.cos(angle)])
         return Plane.across(top.point, direction), inside
 
     def length(degrees: float) -> float:
@@ -90,22 +99,21 @@ def instep_girth_min(foot: FootSurface) -> Quantity:
         return tape(foot.outline(plane, inside)).length
 
     best = _least(length, *TILTS_DEG, TILT_ROUNDS)
-    found = girth(foot, lambda _: tilted(np.array([best])), [])
-    doubted = combined(found.value, (1.0, found), (0.0, top.x))
-    found = found._replace(gradient=doubted.gradient, doubt=doubted.doubt)
-    at_limit = min(best - TILTS_DEG[0], TILTS_DEG[1] - best) < 0.5
-    doubt = "the least lies at the limit of the tilt" if at_limit else found.doubt
-    return found._replace(doubt=doubt, note=f"tilted by {best:.0f} degrees")
+    least = girth(foot, lambda _: tilted(np.array([best])), [])
+    doubted = combined(least.value, (1.0, least), (0.0, top.x))
+    at_limit = min(best - TILTS_DEG[0], TILTS_DEG[1] - best) < LIMIT_DEG
+    doubt = "the least lies at the limit of the tilt" if at_limit else doubted.doubt
+    return least._replace(gradient=doubted.gradient, doubt=doubt, note=f"tilted by {best:.0f} degrees")
 
 
 def heel_girth(foot: FootSurface) -> Quantity:
-    """Through the landing point and the junction point, containing Y."""
+    """Girth in the plane through the landing point and the junction point that contains Y."""
     junction = foot.place("junction_point")
     return _through(foot, foot.place("landing_point").point, junction)
 
 
 def long_heel_girth(foot: FootSurface) -> Quantity:
-    """Through the rear of the heel where it meets the floor and the instep point, containing Y."""
+    """Girth in the plane through the rear of the heel on the floor and the instep point that contains Y."""
     landing = foot.place("landing_point").point
     low = foot.mesh.vertices[foot.mesh.vertices[:, 2] < LOW_HEEL_MM]
     rear = np.array([float(low[:, 0].min()), landing[1], 0.0])
@@ -113,12 +121,12 @@ def long_heel_girth(foot: FootSurface) -> Quantity:
 
 
 def ankle_girth(foot: FootSurface) -> Quantity:
-    """The least level girth above the malleoli."""
-    malleolus, other = foot.place("medial_malleolus"), foot.place("lateral_malleolus")
-    low, high = malleolus.z.value + ANKLE_CLEARANCE_MM, foot.top - CUT_MARGIN_MM
+    """Least level girth above the malleoli."""
+    medial, lateral = foot.place("medial_malleolus"), foot.place("lateral_malleolus")
+    low, high = medial.z.value + ANKLE_CLEARANCE_MM, foot.top - CUT_MARGIN_MM
     if high - low < 2 * ANKLE_STEP_MM:
-        raise NotThere(f"the surface ends {foot.top - malleolus.z.value:.0f} mm above the medial malleolus")
-    inside = (malleolus.point + other.point) / 2
+        raise NotMeasurable(f"the surface ends {foot.top - medial.z.value:.0f} mm above the medial malleolus")
+    inside = (medial.point + lateral.point) / 2
 
     def level(height: Floats) -> tuple[Plane, Floats]:
         at = np.array([inside[0], inside[1], height[0]])
@@ -128,24 +136,24 @@ def ankle_girth(foot: FootSurface) -> Quantity:
     lengths = np.array([tape(foot.outline(*level(np.array([height])))).length for height in heights])
     best = int(np.argmin(lengths))
     if best == len(heights) - 1:
-        found = girth(foot, level, [Quantity(high, np.zeros(len(foot.normals)), "narrowest where the surface ends")])
+        station = Quantity(high, np.zeros(len(foot.normals)), "narrowest where the surface ends")
     elif best == 0:
-        found = girth(foot, level, [combined(low, (1.0, malleolus.z))])
+        station = combined(low, (1.0, medial.z))
     else:
         before, at, after = lengths[best - 1 : best + 2]
         height = heights[best] + 0.5 * ANKLE_STEP_MM * (before - after) / (before - 2 * at + after)
-        found = girth(foot, level, [Quantity(float(height), np.zeros(len(foot.normals)))])
-    return found._replace(note=f"at a height of {heights[best]:.0f} mm")
+        station = Quantity(float(height), np.zeros(len(foot.normals)))
+    return girth(foot, level, [station])._replace(note=f"at a height of {heights[best]:.0f} mm")
 
 
 def girth(foot: FootSurface, cut: Cut, stations: list[Quantity]) -> Quantity:
-    """The tape around the foot in the plane that `cut` makes of the values of `stations`.
+    """Lay a tape around the foot in the plane that `cut` makes of the values of `stations`.
 
-    Its errors are those of the section and, as far as the girth changes with the plane, those of the stations.
+    Its errors are those of the section and, so far as the girth changes with the plane, those of the stations.
 
     Raises
     ------
-    NotThere
+    NotMeasurable
         The surface has no section there, or a gap.
     """
     at = np.array([station.value for station in stations])
@@ -168,16 +176,16 @@ def girth(foot: FootSurface, cut: Cut, stations: list[Quantity]) -> Quantity:
 
 
 def tape(outline: Outline) -> Tape:
-    """A taut tape around the outline, which bridges hollows: the perimeter of its convex hull.
+    """Lay a taut tape around the outline: the perimeter of its convex hull, since a tape bridges hollows.
 
     Raises
     ------
-    NotThere
-        The outline holds no area.
+    NotMeasurable
+        The outline encloses no area.
     """
     corners = hull_corners(outline.points)
     if len(corners) < 3:
-        raise NotThere("the section of the surface holds no area")
+        raise NotMeasurable("the section of the surface holds no area")
     around = outline.points[corners]
     ahead = around[[*range(1, len(around)), 0]] - around
     length = np.hypot(ahead[:, 0], ahead[:, 1])
@@ -188,10 +196,10 @@ def tape(outline: Outline) -> Tape:
 
 
 def _excess(foot: FootSurface, outline: Outline, length: float) -> float:
-    """By how much what noise is left in the outline makes the tape longer, which lies on its crests, mm.
+    """Excess length of the tape, mm, which lies on the crests of the noise that is left in the outline.
 
-    The noise is doubled, by trials, and the growth extrapolated to none: Cook and Stefanski, "Simulation-extrapolation
-    estimation in parametric measurement error models", J. Am. Stat. Assoc. 89, 1994,
+    Trials double the noise, and the growth of the length is extrapolated to no noise: Cook and Stefanski,
+    "Simulation-extrapolation estimation in parametric measurement error models", J. Am. Stat. Assoc. 89, 1994,
     doi:10.1080/01621459.1994.10476871.
     """
     if outline.noise < NOISE_MM:
@@ -200,7 +208,8 @@ def _excess(foot: FootSurface, outline: Outline, length: float) -> float:
     loop, plane = outline.loop, outline.plane
     lengths = []
     for _ in range(TRIALS):
-        of_vertices = np.sqrt(3.0) * random.normal(size=len(foot.noise)) * foot.noise  # sd 2 with what is there
+        # The added variance is 3 times that of the noise present, which doubles the standard deviation.
+        of_vertices = np.sqrt(3.0) * random.normal(size=len(foot.noise)) * foot.noise
         first, second = (
             share[:, None] * (foot.outwards(plane, vertex) * of_vertices[vertex, None])
             for vertex, share in zip(loop.edges.T, (1 - loop.shares, loop.shares), strict=True)
@@ -215,7 +224,14 @@ def _length(points: Floats) -> float:
 
 
 def upright_plane(medial: Floats, lateral: Floats) -> tuple[Plane, Floats]:
-    """The upright plane through two points, (3,) mm, and the point midway."""
+    """Returns the upright plane through two points, (3,) mm, and the point midway.
+
+    Examples
+    --------
+    >>> plane, middle = upright_plane(np.array([0.0, 2, 0]), np.array([0.0, 0, 0]))
+    >>> plane.normal.tolist(), middle.tolist()
+    ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    """
     middle = (medial + lateral) / 2
     return Plane.across(middle, np.cross(medial - lateral, UP)), middle
 
@@ -228,7 +244,7 @@ def _across(foot: FootSurface, x: Quantity, inside: Floats) -> Quantity:
     return girth(foot, plane, [x])
 
 
-def _through(foot: FootSurface, low: Floats, high: Place) -> Quantity:
+def _through(foot: FootSurface, low: Floats, high: LandmarkQuantities) -> Quantity:
     def plane(at: Floats) -> tuple[Plane, Floats]:
         upper = np.array([at[0], high.y.value, at[1]])
         middle = (low + upper) / 2
@@ -238,7 +254,7 @@ def _through(foot: FootSurface, low: Floats, high: Place) -> Quantity:
 
 
 def _least(function: Callable[[float], float], low: float, high: float, rounds: int) -> float:
-    """Where in a range the function is least: on a coarse grid, then by golden section."""
+    """Place between `low` and `high` where the function is least: by a coarse grid, then by golden section."""
     grid = np.linspace(low, high, 7)
     best = int(np.argmin([function(float(at)) for at in grid]))
     low, high = float(grid[max(best - 1, 0)]), float(grid[min(best + 1, 6)])

@@ -1,4 +1,4 @@
-"""The convex hull of points in a plane; compiled, since a tape is laid around many sections."""
+"""Convex hull of points in a plane; compiled, since a tape is laid around many sections."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,15 +8,21 @@ from footscan.compiled import compiled
 Floats = NDArray[np.float64]
 
 STRAIGHT = 1e-12
-"""Sine of the turn at a corner that is none."""
+"""Sine of the largest turn that rounding gives a straight line; such a corner is left out."""
 
 
 def hull_corners(points: Floats) -> NDArray[np.int64]:
-    """(K,) which of (N, 2) points are the corners of their convex hull, counter-clockwise; less than three where they
-    lie on a line.
+    """Returns (K,) the numbers of the corners of the convex hull of (N, 2) `points`, counter-clockwise.
 
-    Andrew, "Another efficient algorithm for convex hulls in two dimensions", Inf. Process. Lett. 9(5), 1979,
+    There are fewer than three if the points lie on a line.
+
+    A. Andrew, "Another efficient algorithm for convex hulls in two dimensions", Inf. Process. Lett. 9(5), 1979,
     doi:10.1016/0020-0190(79)90072-3.
+
+    Examples
+    --------
+    >>> hull_corners(np.array([[0.0, 0], [2, 0], [1, 1], [2, 2], [0, 2]])).tolist()
+    [0, 1, 3, 4]
     """
     order = np.lexsort((points[:, 1], points[:, 0]))
     return _chains(points, np.stack([order, order[::-1]]))
@@ -24,7 +30,7 @@ def hull_corners(points: Floats) -> NDArray[np.int64]:
 
 @compiled
 def _chains(points: Floats, ways: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The lower chain of corners and the upper one, along (2, N) the points in their order forth and back."""
+    """Returns the lower chain of corners, then the upper one; `ways` are (2, N) the points sorted forth and back."""
     corners = np.empty(ways.size + 1, np.int64)
     count = 0
     for way in ways:
@@ -34,7 +40,7 @@ def _chains(points: Floats, ways: NDArray[np.int64]) -> NDArray[np.int64]:
                 count -= 1
             corners[count] = point
             count += 1
-        count -= 1  # where the other chain begins
+        count -= 1  # the other chain begins at this corner
     return corners[:count]
 
 

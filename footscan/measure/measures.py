@@ -1,4 +1,4 @@
-"""The measures of a foot: what each is, and all of them of a mesh."""
+"""The measures of a foot: their definitions, and their values for a mesh."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -12,29 +12,30 @@ from footscan.measure import girths, linear, plantar, solid
 from footscan.measure.foot_landmarks import Landmark, find_landmarks
 from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame import FootFrame, foot_frame
-from footscan.measure.quantity import NotThere, Quantity
+from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.mesh.rigid_transform import apply
 from footscan.rows import distinct_rows
 from schemas.base.model import Side
-from schemas.measures import Axis, Measure, MeasuredLandmark, Measures, Place, Status, Unit
+from schemas.measures import Axis, Measure, MeasuredLandmark, Measures, Position, Status, Unit
 
 Floats = NDArray[np.float64]
 
 FILLED_SHARE = 0.05
-"""A measure that rests on filled surface by more than this is uncertain."""
+"""A measure of which more than this share rests on filled surface is uncertain; chosen by hand."""
 DIGITS: dict[Unit, int] = {"mm": 3, "mm2": 0, "mm3": 0, "deg": 2, "1": 4}
+"""Decimals of a value, by its unit."""
 
 
 class Definition(NamedTuple):
-    """One measure."""
+    """The unit of a measure, its definition in words, and the function that computes it."""
 
     unit: Unit
     text: str
-    taken: Callable[[FootSurface], Quantity]
+    compute: Callable[[FootSurface], Quantity]
 
 
 def _definitions() -> dict[str, Definition]:
-    """All measures, in the order in which they are shown."""
+    """Definitions of all measures, in the order in which they are shown."""
     along, across, height = linear.along_axis, linear.across_axis, linear.height
     tape = "tape in the plane"
     return {
@@ -188,19 +189,19 @@ def measure_foot(
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
 ) -> Measures:
-    """The measures of a foot, in any pose. A left foot is mirrored and measured as a right one.
+    """Measure a foot in any pose. A left foot is mirrored and measured as a right one.
 
     Parameters
     ----------
-    vertices : (V, 3) mm, any frame; the scanner's glass is at Z = 0
-    faces : (F, 3)
-    axis : the foot axis that is wished for
-    manual : landmarks set by a person, name to (3,) mm in the frame of the mesh
-    errors_mm : (V,) standard deviations of the vertices; where not given, they are told from the mesh's roughness
-    reach_mm : vertices of one cube of this edge share their error, as those of a smoothed surface do; 0 where each has
-        its own
-    filled : (V,) which vertices were filled, not measured
-    calibration : name of a measure to (a, b): a + b times what was measured is reported
+    vertices : (V, 3) mm, any frame; in a scanner frame the glass is at Z = 0
+    faces : (F, 3), looking outward
+    side : "unknown" is inferred from the form
+    axis : the requested foot axis
+    manual : landmarks set by a person: name to (3,) mm in the frame of the mesh
+    errors_mm : (V,) standard deviations of the vertices; default: inferred from the roughness of the mesh
+    reach_mm : vertices in the same cube of this edge share their error, as on a smoothed surface; 0: independent errors
+    filled : (V,) true for vertices that were filled, not measured
+    calibration : name of a measure to (a, b): the reported value is a + b times the measured one
 
     Raises
     ------
@@ -209,7 +210,7 @@ def measure_foot(
     """
     foot = foot_frame(vertices, faces, side, axis, manual)
     landmarks = find_landmarks(foot, manual or {})
-    if errors_mm is not None or filled is not None:  # the foot's vertices are those of the mesh, strays left out
+    if errors_mm is not None or filled is not None:  # the foot's vertices are those of the mesh without its strays
         back = apply(np.linalg.inv(foot.transform), foot.vertices)
         source = KDTree(vertices).query(back)[1]
         errors_mm = None if errors_mm is None else np.asarray(errors_mm, np.float64)[source]
@@ -235,30 +236,33 @@ def take_measures(
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
 ) -> dict[str, Measure]:
-    """All measures of a foot in its own frame; parameters as in `measure_foot`, (V,) of the foot's own vertices."""
+    """Compute all measures of a foot in its own frame.
+
+    Parameters are those of `measure_foot`; arrays (V,) are by the vertices of `foot`.
+    """
     surface = FootSurface(foot, landmarks)
     errors = _Errors(surface.errors if errors_mm is None else errors_mm, _cubes(foot.vertices, reach_mm), filled)
-    known = calibration or {}
+    calibrations = calibration or {}
     to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
     return {
-        name: _measure(definition, surface, errors, known.get(name), to_mesh)
+        name: _measure(definition, surface, errors, calibrations.get(name), to_mesh)
         for name, definition in _definitions().items()
     }
 
 
 class _Errors(NamedTuple):
-    """What is known of the errors of a foot's vertices."""
+    """Errors of the vertices of a foot."""
 
     deviations: Floats
-    """(V,) mm"""
+    """(V,) standard deviations, mm"""
     patch: NDArray[np.int64] | None
-    """(V,) vertices of one patch share their error; None where each has its own."""
+    """(V,) number of a patch whose vertices share their error; None if all errors are independent."""
     filled: NDArray[np.bool_] | None
-    """(V,)"""
+    """(V,) true for vertices that were not measured; None if unknown."""
 
 
 def _cubes(vertices: Floats, edge: float) -> NDArray[np.int64] | None:
-    """(V,) the number of the cube in which each vertex lies."""
+    """Returns (V,) the number of the cube in which each vertex lies; None without cubes."""
     if edge <= 0:
         return None
     return distinct_rows(np.floor(vertices / edge)).number
@@ -272,40 +276,40 @@ def _measure(
     to_mesh: Floats,
 ) -> Measure:
     try:
-        taken = definition.taken(surface)
-    except NotThere as missing:
+        quantity = definition.compute(surface)
+    except NotMeasurable as missing:
         return Measure(
             value=None, unit=definition.unit, status="incomplete", definition=definition.text, note=str(missing)
         )
     offset, factor = calibration or (0.0, 1.0)
     digits = DIGITS[definition.unit]
-    share = None if errors.filled is None else round(taken.share(errors.filled), 3)
-    doubts = [] if taken.doubt is None else [taken.doubt]
+    share = None if errors.filled is None else round(quantity.share(errors.filled), 3)
+    doubts = [] if quantity.doubt is None else [quantity.doubt]
     if share is not None and share > FILLED_SHARE:
         doubts.append(f"{100 * share:.0f} % of it rests on surface that was filled, not measured")
     status: Status = "uncertain" if doubts else "ok"
-    deviation = taken.sd(errors.deviations, errors.patch)
-    notes = [*doubts, *([] if taken.note is None else [taken.note])]
+    deviation = quantity.sd(errors.deviations, errors.patch)
+    notes = [*doubts, *([] if quantity.note is None else [quantity.note])]
     return Measure(
-        value=round(offset + factor * taken.value, digits),
+        value=round(offset + factor * quantity.value, digits),
         unit=definition.unit,
         status=status,
         definition=definition.text,
         note="; ".join(notes) or None,
         uncertainty=None if deviation is None else round(abs(factor) * deviation, digits + 1),
-        surface_length=None if taken.surface_length is None else round(taken.surface_length, 3),
-        plane=None if taken.plane is None else _plane_in_mesh(*taken.plane, to_mesh),
+        surface_length=None if quantity.surface_length is None else round(quantity.surface_length, 3),
+        plane=None if quantity.plane is None else _plane_in_mesh(*quantity.plane, to_mesh),
         filled_share=share,
         calibration=calibration,
     )
 
 
-def _plane_in_mesh(point: Floats, normal: Floats, to_mesh: Floats) -> tuple[Place, Place]:
+def _plane_in_mesh(point: Floats, normal: Floats, to_mesh: Floats) -> tuple[Position, Position]:
     moved, turned = apply(to_mesh, point[None])[0], to_mesh[:3, :3] @ normal
     return _place(moved, 3), _place(turned / np.linalg.norm(turned), 6)
 
 
-def _place(point: Floats, digits: int) -> Place:
+def _place(point: Floats, digits: int) -> Position:
     x, y, z = np.round(point, digits).tolist()
     return x, y, z
 

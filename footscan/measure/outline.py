@@ -1,4 +1,4 @@
-"""A loop in its plane, with the noise of the mesh smoothed away."""
+"""Loops of a section in their plane, with the noise of the mesh smoothed away."""
 
 from typing import NamedTuple, Self
 
@@ -13,12 +13,13 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 STEP_MM = 0.5
-"""Between the places along a loop at which it is smoothed."""
+"""Distance between the samples of a loop at which it is smoothed; chosen by hand."""
 ORDER = 3
-"""Of the low-pass filter: one minus its answer grows with the 2 * ORDER-th power of the frequency, so forms much longer
-than its wavelength stay as they are."""
+"""Order of the low-pass filter, as of Butterworth: one minus the response grows with the 2 * ORDER-th power of the
+frequency, so forms much longer than the wavelength stay as they are. Chosen by hand."""
 SLOPE_VARIANCE = 0.0006
-"""So much noise is left in an outline; around a ball of 40 mm radius it makes a tape 0.08 mm longer."""
+"""Variance of the slopes that noise may leave in an outline; around a ball of 40 mm radius it makes a tape 0.08 mm
+longer. Chosen by hand."""
 
 
 class Plane(NamedTuple):
@@ -44,70 +45,79 @@ class Plane(NamedTuple):
         return cls(point, normal, first, np.array([y * w - z * v, z * u - x * w, x * v - y * u]))
 
     def flat(self, points: Floats) -> Floats:
-        """(N, 2) coordinates in the plane of (N, 3) `points`, mm."""
+        """Returns (N, 2) coordinates in the plane of (N, 3) `points`, mm.
+
+        Examples
+        --------
+        >>> plane = Plane.across(np.array([0.0, 0, 5]), np.array([1.0, 0, 0]))
+        >>> plane.flat(np.array([[0.0, 2, 8]])).tolist()
+        [[2.0, 3.0]]
+        """
         flat: Floats = (points - self.point) @ np.array([self.first, self.second]).T
         return flat
 
     def solid(self, points: Floats) -> Floats:
-        """(N, 3) points of the plane from their (N, 2) coordinates."""
-        there: Floats = self.point + points[:, :1] * self.first + points[:, 1:] * self.second
-        return there
+        """Returns (N, 3) points, mm, from their (N, 2) coordinates in the plane."""
+        solid: Floats = self.point + points[:, :1] * self.first + points[:, 1:] * self.second
+        return solid
 
 
 class Outline(NamedTuple):
     """A smoothed loop."""
 
     points: Floats
-    """(N, 2) mm, in the plane; one for each of the loop's."""
+    """(N, 2) mm, in the plane; one for each point of the loop"""
     plane: Plane
     loop: Loop
     places: Floats
-    """(N,) where they are along the loop, in steps of its even sampling."""
-    answer: Floats | None
-    """(M,) the filter's, at the frequencies of that sampling; None where nothing is filtered."""
+    """(N,) places of the points along the loop, in steps of its even sampling"""
+    response: Floats | None
+    """(M,) response of the filter at the frequencies of that sampling; None if the loop is not filtered"""
     noise: float
-    """Standard deviation of the loop's own points, mm."""
+    """Standard deviation of the points of the loop before smoothing, mm"""
 
     def smoothed(self, displacement: Floats) -> Floats:
-        """(N, 2) what a displacement, (N, 2), of the loop's own points comes to when it is smoothed as they were."""
-        if self.answer is None:
+        """Returns (N, 2) a displacement of the loop's points, (N, 2), smoothed as the points were."""
+        if self.response is None:
             return displacement
-        return _interpolated(_filtered(_sampled(displacement, self.places, len(self.answer)), self.answer), self.places)
+        sampled = _sampled(displacement, self.places, len(self.response))
+        return _interpolated(_filtered(sampled, self.response), self.places)
 
     def raw_gradient(self, gradient: Floats) -> Floats:
-        """(N, 2) derivatives by the loop's own points, from those, (N, 2), by the smoothed ones."""
-        if self.answer is None:
+        """Returns (N, 2) derivatives by the points of the loop, from (N, 2) derivatives by the smoothed points."""
+        if self.response is None:
             return gradient
-        return _sampled_back(_filtered(_spread_back(gradient, self.places, len(self.answer)), self.answer), self.places)
+        spread = _spread_back(gradient, self.places, len(self.response))
+        return _sampled_back(_filtered(spread, self.response), self.places)
 
 
 def smooth_outline(loop: Loop, plane: Plane, noise: Floats) -> Outline:
-    """The loop without the noise of the mesh. A loop without noise stays as it is, with its corners.
+    """Smooth the noise of the mesh out of a loop. A loop without noise stays as it is, with its corners.
 
     Parameters
     ----------
-    noise : (N, 2) standard deviation, in the plane, of the vertices of the loop's edges, mm
+    noise : (N, 2) standard deviations, mm, in the plane, of the two vertices of each edge that the loop crosses
     """
     points = plane.flat(loop.points)
-    usual, along = _usual_noise(loop.shares, noise), _lengths_along(points)
+    median_noise, along = _median_noise(loop.shares, noise), _lengths_along(points)
     count = next_fast_len(max(int(np.ceil(along[-1] / STEP_MM)), 8))
     places = along[:-1] * (count / along[-1])
     frequencies = fftfreq(count, along[-1] / count)
-    wavelength = _wavelength(usual, along[-1] / len(points))
-    answer = 1.0 / (1.0 + (wavelength * frequencies) ** (2 * ORDER)) if wavelength > 2 * STEP_MM else None
-    outline = Outline(points, plane, loop, places, answer, usual)
+    wavelength = _wavelength(median_noise, along[-1] / len(points))
+    response = 1.0 / (1.0 + (wavelength * frequencies) ** (2 * ORDER)) if wavelength > 2 * STEP_MM else None
+    outline = Outline(points, plane, loop, places, response, median_noise)
     return outline._replace(points=outline.smoothed(points))
 
 
 @compiled
-def _usual_noise(shares: Floats, noise: Floats) -> float:
-    """The median of that of points which lie at (N,) shares of edges with (N, 2) noise at their ends, mm."""
+def _median_noise(shares: Floats, noise: Floats) -> float:
+    """Median noise, mm, of points at (N,) shares of edges whose ends have (N, 2) noise."""
     return float(np.median(np.hypot((1 - shares) * noise[:, 0], shares * noise[:, 1])))
 
 
 @compiled
 def _lengths_along(polygon: Floats) -> Floats:
-    """(N + 1,) how far along a closed (N, 2) polygon each of its points is, mm; the first one once more at the end."""
+    """Returns (N + 1,) lengths along a closed (N, 2) polygon to each of its points, mm; the last is its perimeter."""
     along = np.zeros(len(polygon) + 1)
     for k in range(len(polygon)):
         start, end = polygon[k], polygon[(k + 1) % len(polygon)]
@@ -116,17 +126,17 @@ def _lengths_along(polygon: Floats) -> Floats:
 
 
 def _wavelength(noise: float, spacing: float) -> float:
-    """The wavelength, mm, below which noise has to go, of points `spacing` apart, lest a tape lies on its crests.
+    """Cut-off wavelength in mm for points `spacing` apart, so that a tape is not lifted by crests of the noise.
 
     A tape around a circle of radius R that is wavy with slopes of variance s² is longer by pi R s². White noise of
-    variance n² at a spacing d has s² = n² d (2 pi / W)³ / (3 pi) left when all shorter than W is gone.
+    variance n² at a spacing d keeps s² = n² d (2 pi / W)³ / (3 pi) when all waves shorter than W are removed.
     """
     return float(2 * np.pi * np.cbrt(noise**2 * spacing / (3 * np.pi * SLOPE_VARIANCE)))
 
 
 @compiled
 def _sampled(points: Floats, places: Floats, count: int) -> Complex:
-    """(M,) the closed polygon at even places along it, X + iY."""
+    """Returns (M,) even samples along a closed polygon, X + iY."""
     sampled = np.empty(count, np.complex128)
     before, share = _spans(places, count)
     for k in range(count):
@@ -138,7 +148,7 @@ def _sampled(points: Floats, places: Floats, count: int) -> Complex:
 
 @compiled
 def _interpolated(sampled: Complex, places: Floats) -> Floats:
-    """(N, 2) even samples at `places` between them."""
+    """Returns (N, 2) points at `places` between even samples."""
     points = np.empty((len(places), 2))
     for n in range(len(places)):
         before = min(int(places[n]), len(sampled) - 1)
@@ -150,7 +160,7 @@ def _interpolated(sampled: Complex, places: Floats) -> Floats:
 
 @compiled
 def _spans(places: Floats, count: int) -> tuple[NDArray[np.int64], Floats]:
-    """(M,) the point of the polygon before each even place along it, and (M,) the share of the way to the next one."""
+    """Returns (M,) the point of the polygon before each even sample, and (M,) the share of the way to the next."""
     before, share = np.empty(count, np.int64), np.empty(count)
     point = 0
     for k in range(count):
@@ -161,8 +171,8 @@ def _spans(places: Floats, count: int) -> tuple[NDArray[np.int64], Floats]:
     return before, share
 
 
-def _filtered(sampled: Complex, answer: Floats) -> Complex:
-    signal: Complex = ifft(fft(sampled) * answer)
+def _filtered(sampled: Complex, response: Floats) -> Complex:
+    signal: Complex = ifft(fft(sampled) * response)
     return signal
 
 

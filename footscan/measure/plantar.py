@@ -1,6 +1,6 @@
 """The footprint and its indices, from the section of the foot just above the floor.
 
-The contact is where the foot holds the height CONTACT_MM. Sections of the print run across the axis.
+The contact is the section of the foot at the height CONTACT_MM. Sections of the print run across the axis.
 """
 
 from typing import NamedTuple
@@ -11,32 +11,35 @@ from numpy.typing import NDArray
 from footscan.measure.foot_surface import CLOSED_GAP_MM, UP, FootSurface
 from footscan.measure.hull import hull_corners
 from footscan.measure.outline import Outline, Plane
-from footscan.measure.quantity import NotThere, Quantity, combined
+from footscan.measure.quantity import NotMeasurable, Quantity, combined
 
 Floats = NDArray[np.float64]
 
 CONTACT_MM = 1.0
+"""Height above the floor up to which the skin counts as touching it; part of the definition of the print."""
 STEP_MM = 0.5
-"""Between the sections of the print."""
+"""Distance between the sections of the print."""
 APEX_MM = 10.0
-"""To both sides of the deepest point of the arch, over which it is rounded off."""
+"""A parabola is fitted to the print's border this far to both sides of the arch's deepest point; chosen by hand."""
 LEAST_POINTS, LEAST_SLOPE = 5, 1e-6
+"""Least number of points for that parabola; least slope of the line through the metatarsal heads, against rounding."""
 LEAST_MM2 = 20.0
-"""Smaller spots are dust or noise."""
+"""Smaller spots are dust or noise; chosen by hand."""
 TOES, MERGED = 0.13, 0.18
-"""Of the foot length: a print that begins farther ahead of the line through the metatarsal heads is of a toe; one of
-the rest that reaches farther than the second has grown together with toes, and is cut at the first."""
+"""Shares of the length. A part of the print that begins farther than the first ahead of the line through the metatarsal
+heads is a toe. If another part reaches farther than the second, toes have merged with it, and it is cut at the first.
+Chosen by hand."""
 
 
 class Print(NamedTuple):
     """A footprint without its toes."""
 
     outlines: list[Outline]
-    """Its borders, mm; in the axes of the foot."""
+    """Its borders, mm, in the axes of the foot"""
     stations: Floats
-    """(S,) X of its sections, mm, STEP_MM apart, in the middle of strips that cover it."""
+    """(S,) X of its sections, mm, about STEP_MM apart, in the middle of strips that cover the print"""
     widths: Floats
-    """(S,) how much of each lies in the print, mm."""
+    """(S,) width of the print at each section, mm"""
     rear: float
     """X of its rear end, mm."""
     front: float
@@ -45,17 +48,17 @@ class Print(NamedTuple):
 
 
 def footprint(foot: FootSurface) -> Print:
-    """The contact of the foot with the floor, its toes left out.
+    """Compute the contact of the foot with the floor, without its toes.
 
     Raises
     ------
-    NotThere
-        The sole was not seen.
+    NotMeasurable
+        The surface has a gap at the sole, or does not reach the floor.
     """
     plane = Plane.across(np.array([0.0, 0.0, CONTACT_MM]), UP)
     loops = foot.sections(plane)
     if any(loop.gap >= CLOSED_GAP_MM for loop in loops):
-        raise NotThere("the surface has a gap at the sole")
+        raise NotMeasurable("the surface has a gap at the sole")
     outlines = [foot.smooth(loop, plane) for loop in loops]
     ball = _BallLine(foot)
     outlines = [
@@ -64,7 +67,7 @@ def footprint(foot: FootSurface) -> Print:
         if abs(_area(outline.points)) >= LEAST_MM2 and ball.ahead(outline.points).min() < TOES * foot.length_mm
     ]
     if not outlines:
-        raise NotThere("the foot does not reach the floor")
+        raise NotMeasurable("the foot does not reach the floor")
     points = np.concatenate([outline.points for outline in outlines])
     merged = bool(np.any(ball.ahead(points) > MERGED * foot.length_mm))
     limit = TOES * foot.length_mm if merged else np.inf
@@ -77,8 +80,11 @@ def footprint(foot: FootSurface) -> Print:
 
 
 def arch_index(foot: FootSurface) -> Quantity:
-    """Middle third over the whole: Cavanagh and Rodgers, "The arch index: a useful measure from footprints",
-    J. Biomech. 20(5), 1987, doi:10.1016/0021-9290(87)90255-7."""
+    """Area of the middle third of the print over the whole.
+
+    P. Cavanagh and M. Rodgers, "The arch index: a useful measure from footprints", J. Biomech. 20(5), 1987,
+    doi:10.1016/0021-9290(87)90255-7.
+    """
     contact = foot.once(footprint)
     third = (contact.front - contact.rear) / 3
     is_middle = (contact.stations > contact.rear + third) & (contact.stations <= contact.rear + 2 * third)
@@ -106,13 +112,15 @@ def staheli(foot: FootSurface) -> Quantity:
 
 
 def clarke_angle(foot: FootSurface) -> Quantity:
-    """On the medial tangent of the print, beside the head of the first metatarsal: between that tangent and the line to
-    the deepest point of the arch, degrees."""
+    """Angle in degrees between the medial tangent of the print and a line to the deepest point of the arch.
+
+    The line starts on the tangent beside the head of the first metatarsal.
+    """
     contact = foot.once(footprint)
     largest = max(contact.outlines, key=lambda outline: abs(_area(outline.points)))
     points, thirds = largest.points, contact.rear + (contact.front - contact.rear) * np.array([1 / 3, 2 / 3])
     if not (points[:, 0].min() < thirds[0] and points[:, 0].max() > thirds[1]):
-        raise NotThere("the print is in two parts: its medial border does not run from heel to ball")
+        raise NotMeasurable("the print is in two parts: its medial border does not run from heel to ball")
     corners = hull_corners(points)
     start, end = points[corners], points[np.roll(corners, -1)]
     middle = np.mean(thirds)
@@ -127,13 +135,13 @@ def clarke_angle(foot: FootSurface) -> Quantity:
     between = (points[:, 0] > points[heel, 0]) & (points[:, 0] < points[ball, 0])
     between &= points[:, 1] > (points[[heel, ball], 1].min() + points[:, 1].min()) / 2  # not the lateral border
     if not between.any():
-        raise NotThere("the print has no arch")
+        raise NotMeasurable("the print has no arch")
     place = along - along[np.argmax(np.where(between, depth, -np.inf))]
     near = np.flatnonzero(between & (np.abs(place) <= APEX_MM))
     weights = np.linalg.pinv(np.column_stack([place[near] ** k for k in range(3)]))
     level, slope, bend = weights @ depth[near]
     if len(near) < LEAST_POINTS or bend >= 0:
-        raise NotThere("the print has no arch")
+        raise NotMeasurable("the print has no arch")
     apex = float(np.clip(-slope / (2 * bend), -APEX_MM, APEX_MM))
     run, rise = float((along - place)[0]) + apex, float(level + apex * (slope + apex * bend))
     factor = np.rad2deg(1.0 / (run**2 + rise**2))
@@ -157,15 +165,15 @@ class _BallLine:
         self.slope = max(along, LEAST_SLOPE * across) / across  # the first head is ahead of the fifth
 
     def ahead(self, points: Floats) -> Floats:
-        """(N,) how far (N, 2) points lie ahead of it, along X."""
+        """Returns (N,) distances in mm along X by which (N, 2) points lie ahead of the line."""
         x: Floats = points[:, 0] - self.lateral[0] - self.slope * (points[:, 1] - self.lateral[1])
         return x
 
 
 def _widths(outlines: list[Outline], stations: Floats, ball: _BallLine, limit: float) -> Floats:
-    """(S,) of the print at (S,) even `stations`, without what lies more than `limit` ahead of the ball.
+    """Returns (S,) widths of the print at (S,) even `stations`, up to `limit` mm ahead of the ball.
 
-    The border crosses a station at Y up and down in turn: the width is the sum of Y, with that sign.
+    The borders cross a station in alternating directions: the width is the sum of Y with the sign of the direction.
     """
     widths = np.zeros(len(stations))
     step = stations[1] - stations[0]
@@ -194,12 +202,12 @@ def _ratio(foot: FootSurface, contact: Print, third: int) -> Quantity:
     least = _side_quantity(foot, contact, int(np.argmin(np.where(middle, contact.widths, np.inf))))
     most = _side_quantity(foot, contact, int(np.argmax(np.where(other, contact.widths, -np.inf))))
     ratio = least.value / most.value
-    found = combined(ratio, (1 / most.value, least), (-ratio / most.value, most))
-    return found._replace(doubt=contact.doubt, note=_HEIGHT)
+    quantity = combined(ratio, (1 / most.value, least), (-ratio / most.value, most))
+    return quantity._replace(doubt=contact.doubt, note=_HEIGHT)
 
 
 def _end(foot: FootSurface, contact: Print, sign: float) -> Floats:
-    """(V,) derivatives of the X of the print's rear (-1) or front end."""
+    """Returns (V,) derivatives of X at the rear (`sign` -1) or front (1) end of the print."""
     outline = max(contact.outlines, key=lambda outline: float((sign * outline.points[:, 0]).max()))
     by_points = np.zeros_like(outline.points)
     by_points[np.argmax(sign * outline.points[:, 0]), 0] = 1.0
@@ -207,7 +215,7 @@ def _end(foot: FootSurface, contact: Print, sign: float) -> Floats:
 
 
 def _side_quantity(foot: FootSurface, contact: Print, station: int) -> Quantity:
-    """The print's width at one of its stations."""
+    """The width of the print at one of its stations."""
     gradient = np.zeros(len(foot.normals))
     x = contact.stations[station]
     for outline in contact.outlines:
@@ -222,13 +230,13 @@ def _side_quantity(foot: FootSurface, contact: Print, station: int) -> Quantity:
 
 
 def _outwards(polygon: Floats) -> Floats:
-    """(N, 2) derivatives of the area by the points."""
+    """Returns (N, 2) derivatives of the polygon's area by its points."""
     chord = np.roll(polygon, -1, axis=0) - np.roll(polygon, 1, axis=0)
     outwards: Floats = 0.5 * np.sign(_area(polygon)) * np.column_stack([chord[:, 1], -chord[:, 0]])
     return outwards
 
 
 def _area(polygon: Floats) -> float:
-    """Positive where the corners run counter-clockwise."""
+    """Area of a polygon in mm², positive if its corners run counter-clockwise."""
     ahead = np.roll(polygon, -1, axis=0)
     return float(0.5 * np.sum(polygon[:, 0] * ahead[:, 1] - polygon[:, 1] * ahead[:, 0]))

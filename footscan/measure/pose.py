@@ -1,7 +1,7 @@
-"""How a foot lies in space, whatever its pose and its unit: where its sole, its heel and its toes are.
+"""The pose of a foot in any position and unit: where its sole, its heel and its toes are.
 
-A body rests on faces of its convex hull. Those of a foot are the sole, the cut through the leg, both sides and the
-slope from the leg to the toes; of these the sole touches the floor with the largest area of skin.
+A body rests on faces of its convex hull. The large faces of a foot's hull are the sole, the cut through the leg, both
+sides and the slope from the leg to the toes. Of these the sole touches the floor with the largest area of skin.
 """
 
 from typing import NamedTuple
@@ -18,53 +18,64 @@ from schemas.base.errors import Finding
 Floats = NDArray[np.float64]
 
 CANDIDATES, LARGEST = 12, 7
-"""Parts of the hull that are looked at; the largest ones may be the sole."""
+"""Number of flat parts of the hull that are considered; the first so many of them, the largest, may be the sole. Chosen
+by hand."""
 COARSE, SAME_FACE_DEG = 8, 8.0
-"""Faces of the hull that are so nearly parallel rest on one floor."""
+"""Grid of directions in which faces of the hull are first grouped; largest angle between faces of one flat part. Chosen
+by hand."""
 FACING = 0.85
-"""Skin faces the floor where its normal does, by this cosine."""
+"""Skin faces the floor if the cosine between its normal and the downward direction exceeds this; chosen by hand."""
 TOUCHING = 0.02
-"""Skin so near to the floor touches it, in parts of the footprint's length: 5 mm on a foot of 260 mm."""
+"""Skin nearer than this to the floor touches it, as a share of the footprint's length: 5 mm on a foot of 260 mm. Chosen
+by hand."""
 LOW = 0.24
-"""Below this height, in parts of the footprint's length, there is foot and no leg."""
+"""Height below which there is foot and no leg, as a share of the footprint's length; chosen by hand."""
 TOES = 0.85
+"""Share of the length ahead of which the toes lie; chosen by hand."""
 SLENDER, UNLIKELY = 1.5, 0.05
-"""A footprint is longer than broad by this; another face of the hull counts as little."""
+"""A footprint is longer than broad by the first factor; the score of any other face is multiplied by the second. Chosen
+by hand."""
 FLAT = 0.004
-"""A sole that scatters less about its floor stands on it, in parts of the length: 1 mm on 260 mm."""
+"""Largest scatter about the floor of a foot that stands on its sole, as a share of the length: 1 mm on 260 mm.
+Chosen by hand."""
 SOLE_LENGTH, SOLE_BREADTH = 0.5, 0.2
-"""It reaches so far along and across, in parts of the length."""
+"""Least extent of a sole along and across the foot, as shares of the length; chosen by hand."""
 LEAST_REACH = 2e-4
-"""0.05 mm on 260 mm"""
+"""Least distance from the floor at which skin counts, as a share of the length: 0.05 mm on 260 mm. Chosen by hand."""
 SCATTERS_WIDE = 4.0
-"""Skin farther from the floor than so many standard deviations of what lies on it is off it."""
+"""Skin farther from the floor than this number of standard deviations does not count; chosen by hand."""
 FLOOR_ROUNDS = 60
+"""Bound of time: rounds of the fit of the floor."""
 LID_FACING, LID_FLAT, LID_AREA, LID_HEIGHT = 0.6, 0.004, 0.012, 0.15
-"""The end of a leg looks up by this cosine, is so flat in parts of the length, and so large in parts of its square (800
-mm² on a foot of 260 mm), and lies above the toes."""
+"""The end of a leg looks up by more than this cosine, is flat to this share of the length, has at least this share of
+the squared length as area (800 mm² on a foot of 260 mm), and lies at least this share of the length above the floor.
+Chosen by hand."""
 
 
 class Pose(NamedTuple):
     """A foot on its floor."""
 
     transform: Floats
-    """(4, 4) from the mesh's frame: floor at Z = 0, Z up, X from heel to toes along the footprint; the unit is kept."""
+    """(4, 4) from the mesh's frame: floor at Z = 0, Z up, X from heel to toes along the footprint; in the same unit"""
     length: float
-    """About the foot's length."""
+    """Approximate foot length."""
     residual: float
     """Standard deviation of the skin on the floor about it."""
     stands: bool
-    """Whether a sole lies on the floor; otherwise the foot touches it in some points only."""
+    """True if a flat sole lies on the floor; False if the foot touches it at some points only."""
     convexity: float
-    """Volume over that of the convex hull: 1 of a ball, a block, an egg."""
+    """Volume over that of the convex hull: 1 for a ball, a block or an egg."""
     leg_end: Floats | None
-    """(N, 3) the flat end of the leg, which was cut, in the mesh's frame; None where there is none."""
+    """(N, 3) vertices of the flat end of the cut leg, in the mesh's frame; None without such an end."""
 
 
 def find_pose(vertices: Floats, faces: NDArray[np.integer]) -> Pose:
-    """The pose of a foot's mesh, (V, 3) and (F, 3), that may lie any way round and be in any unit.
+    """Find the pose of a foot's mesh in any position and unit. Left and right feet are treated alike.
 
-    Faces look all outward or all inward. Left and right feet are treated alike.
+    Parameters
+    ----------
+    vertices : (V, 3) float64, any unit
+    faces : (F, 3), all looking outward or all inward
 
     Raises
     ------
@@ -87,7 +98,14 @@ def find_pose(vertices: Floats, faces: NDArray[np.integer]) -> Pose:
 
 
 def volume(vertices: Floats, faces: NDArray[np.integer]) -> float:
-    """Of a closed mesh, below 0 where its faces look inwards; of an open one about what it encloses."""
+    """Volume of a closed mesh, negative if its faces look inwards; for an open mesh, about the volume it encloses.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> round(volume(corners, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])), 6)
+    0.166667
+    """
     return _volume(vertices - vertices.mean(axis=0), np.ascontiguousarray(faces, np.int64))
 
 
@@ -106,9 +124,9 @@ class _Skin(NamedTuple):
     normals: Floats
     """(V, 3) unit"""
     areas: Floats
-    """(V,) a third of the triangles around each vertex"""
+    """(V,) a third of the area of the triangles around each vertex"""
     rims: Floats
-    """(E, 2, 3) open edges, the surface on their left"""
+    """(E, 2, 3) ends of open edges, the surface on their left"""
 
 
 def _skin(vertices: Floats, faces: NDArray[np.integer]) -> _Skin:
@@ -122,7 +140,7 @@ def _rims(vertices: Floats, faces: NDArray[np.integer]) -> Floats:
 
 
 def _open_area(rims: Floats, up: Floats, reach: float) -> float:
-    """Area of the openings that the floor closes: where a scanner could not see the sole."""
+    """Area of the openings at the floor, where a scanner could not see the sole."""
     if not len(rims):
         return 0.0
     height = rims @ up
@@ -134,12 +152,12 @@ def _open_area(rims: Floats, up: Floats, reach: float) -> float:
 
 
 def _hull_faces(vertices: Floats, hull: ConvexHull) -> list[tuple[Floats, float]]:
-    """Outward normals of the largest nearly flat parts of the hull, and their areas."""
+    """Returns the outward normals and areas of the largest nearly flat parts of the hull."""
     corners = vertices[hull.simplices]
     crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.sqrt(np.einsum("ni,ni->n", crosses, crosses)) / 2
     normals = hull.equations[:, :3]
-    # A flat part is cut into many triangles: those of about one direction count together.
+    # A flat part is cut into many triangles, which are grouped by their direction.
     coarse = (np.rint(normals * COARSE) + COARSE).astype(np.int64) @ (2 * COARSE + 1) ** np.arange(3)
     left, faces = areas.copy(), []
     for _ in range(CANDIDATES):
@@ -158,12 +176,12 @@ class _Standing(NamedTuple):
     score: float
     up: Floats
     along: Floats
-    """Unit vectors, the latter along the footprint."""
+    """(3,) unit vector along the footprint, from heel to toes"""
     length: float
 
 
 def _standing(vertices: Floats, skin: _Skin, up: Floats) -> _Standing:
-    """How well a foot would stand with `up` upwards: by the skin that touches the floor, and by its form."""
+    """Score how well a foot would stand with `up` upwards, by the skin that touches the floor and by its form."""
     height = vertices @ up
     height = height - height.min()
     flat = vertices @ _across(up)
@@ -187,7 +205,7 @@ def _standing(vertices: Floats, skin: _Skin, up: Floats) -> _Standing:
 
 
 def _across(up: Floats) -> Floats:
-    """(3, 2) unit vectors at right angles to `up` and to each other, as they make a right-handed frame with it."""
+    """Returns (3, 2) two unit vectors that form a right-handed frame with `up`."""
     first = np.cross(np.eye(3)[np.argmin(np.abs(up))], up)
     first /= np.linalg.norm(first)
     return np.column_stack([first, np.cross(up, first)])
@@ -195,7 +213,7 @@ def _across(up: Floats) -> Floats:
 
 @compiled
 def _spread(points: Floats, weights: Floats) -> tuple[Floats, Floats]:
-    """(D,) mean and (D, D) covariance of (N, D) points by their (N,) weights, which are not all 0."""
+    """Returns the weighted mean (D,) and covariance (D, D) of (N, D) points; some of the (N,) weights are not 0."""
     size = points.shape[1]
     middle, covariance, total = np.zeros(size), np.zeros((size, size)), weights.sum()
     for k in range(len(points)):
@@ -211,10 +229,11 @@ def _spread(points: Floats, weights: Floats) -> tuple[Floats, Floats]:
 
 
 def _floor(vertices: Floats, skin: _Skin, hull: ConvexHull, standing: _Standing) -> tuple[Floats, float, float, bool]:
-    """Upward normal, height of the floor along it, scatter of the skin on it, and whether a sole lies there.
+    """Returns the upward normal of the floor, its height, the scatter of the skin on it, and whether a sole lies there.
 
-    A plane is fitted to the skin that faces down, nearer and nearer to it: the rounded edge of a sole and its arch drop
-    out. Where what remains is no area as large as a sole, the floor is the face of the hull that the foot rests on.
+    A plane is fitted to the skin that faces down, in an ever narrower range about it, so that the arch and the rounded
+    edge of the sole drop out. If the remaining skin is too small for a sole, the floor is the face of the hull on which
+    the foot rests.
     """
     up, length = standing.up, standing.length
     facing = skin.normals @ up < -0.5  # a few degrees of tilt do not matter here
@@ -243,7 +262,7 @@ def _floor(vertices: Floats, skin: _Skin, hull: ConvexHull, standing: _Standing)
 
 
 def _is_sole(places: Floats, standing: _Standing, scatter: float) -> bool:
-    """Whether the points on the floor lie flat and reach from the heel to the ball and over its breadth."""
+    """True if the points on the floor lie flat and reach from the heel to the ball and over its breadth."""
     if len(places) < 3 or scatter > FLAT * standing.length:
         return False
     x, y = places @ standing.along, places @ np.cross(standing.up, standing.along)
@@ -251,7 +270,10 @@ def _is_sole(places: Floats, standing: _Standing, scatter: float) -> bool:
 
 
 def _resting(hull: ConvexHull, vertices: Floats, standing: _Standing) -> tuple[Floats, float]:
-    """The face of the hull on which the foot comes to rest: under the middle of its lower part."""
+    """Returns the upward normal and the height of the face of the hull on which the foot comes to rest.
+
+    It is the face under the middle of the foot's lower part.
+    """
     up, height = standing.up, vertices @ standing.up
     middle = vertices[height <= height.min() + LOW * standing.length].mean(axis=0)
     normals, offsets = hull.equations[:, :3], hull.equations[:, 3]
@@ -266,7 +288,7 @@ def _resting(hull: ConvexHull, vertices: Floats, standing: _Standing) -> tuple[F
 
 
 def _standing_transform(vertices: Floats, up: Floats, offset: float, standing: _Standing) -> Floats:
-    """X along the footprint towards the toes, Z up from the floor."""
+    """Returns (4, 4) the transform to a frame with X along the footprint towards the toes and Z up from the floor."""
     along = standing.along - (standing.along @ up) * up
     along /= np.linalg.norm(along)
     transform = np.eye(4)
@@ -279,7 +301,10 @@ def _standing_transform(vertices: Floats, up: Floats, offset: float, standing: _
 def _leg_end(
     vertices: Floats, candidates: list[tuple[Floats, float]], transform: Floats, length: float
 ) -> Floats | None:
-    """A leg that was cut ends in a flat face of the hull that looks up, whether it is closed by a lid or open."""
+    """Returns (N, 3) vertices of the flat face of the hull, looking up, in which a cut leg ends, with a lid or without.
+
+    None if there is no such face.
+    """
     up = transform[2, :3]
     for normal, area in candidates:
         if normal @ up > LID_FACING and area > LID_AREA * length**2:

@@ -1,4 +1,4 @@
-"""A number measured on a mesh, and how it follows the errors of the vertices."""
+"""Numbers measured on a mesh, with their derivatives by the displacements of its vertices."""
 
 from typing import NamedTuple, Self
 
@@ -8,32 +8,47 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-class NotThere(Exception):
-    """What a measure needs cannot be had; says what, for the note of the measure."""
+class NotMeasurable(Exception):
+    """Raised where a measure cannot be taken; the message names what is missing and becomes the note of the measure."""
 
 
 class Quantity(NamedTuple):
-    """A value and its derivatives, which carry the errors of the mesh through to every measure.
+    """A value and its derivatives, which propagate the errors of the mesh to every measure.
 
-    Independent errors of (V,) standard deviations sd at the vertices give the value one of sqrt(sum (gradient * sd)^2):
-    first-order propagation, JCGM 100:2008, 5.1.2.
+    Independent errors of standard deviations sd, (V,), at the vertices give the value the standard deviation
+    sqrt(sum (gradient * sd)^2): first-order propagation, JCGM 100:2008, 5.1.2.
     """
 
     value: float
     gradient: Floats
-    """(V,) change of the value by each vertex's displacement outwards, per mm; NaN where that is not known."""
+    """(V,) change of the value per mm of each vertex's displacement outwards; NaN where unknown"""
     doubt: str | None = None
-    """Why the value is uncertain, where it is."""
+    """Why the value is uncertain; None if it is not."""
     surface_length: float | None = None
-    """Of a girth, along the surface, mm."""
+    """Length along the skin, mm; only of a girth."""
     note: str | None = None
-    """What else is worth knowing of it."""
+    """A remark for the reader of the measure."""
     plane: tuple[Floats, Floats] | None = None
-    """Of a girth, a point (3,) mm and the normal (3,) of its plane, in the foot's frame."""
+    """Plane of a girth: a point (3,) mm and its normal (3,), in the foot's frame."""
 
     def sd(self, errors: Floats, patch: NDArray[np.int64] | None = None) -> float | None:
-        """Standard deviation by the (V,) standard deviations of the vertices; None where it is not known. Vertices are
-        independent of each other, or share their error with others of the same (V,) `patch`."""
+        """Standard deviation of the value; None where it is unknown.
+
+        Parameters
+        ----------
+        errors : (V,) standard deviations of the vertices, mm
+        patch : (V,) vertices of one patch share their error; default: all errors are independent
+
+        Examples
+        --------
+        Independent errors of 0.3 and 0.4 mm at two vertices, or one error that both share:
+
+        >>> difference = Quantity(10.0, np.array([1.0, -1.0]))
+        >>> difference.sd(np.array([0.3, 0.4]))
+        0.5
+        >>> difference.sd(np.array([0.3, 0.3]), patch=np.array([0, 0]))
+        0.0
+        """
         moves = self.gradient * errors
         if patch is not None:
             moves = np.bincount(patch, moves).astype(np.float64)
@@ -41,21 +56,30 @@ class Quantity(NamedTuple):
         return deviation if np.isfinite(deviation) else None
 
     def share(self, of: NDArray[np.bool_]) -> float:
-        """How far the value rests on those of the (V,) vertices: their part, 0 to 1, of its variance where all have the
-        same error."""
+        """Share of the variance, 0 to 1, that comes from the vertices `of`, (V,), if all have the same error."""
         weight = np.nan_to_num(self.gradient) ** 2
         total = float(weight.sum())
         return float(weight[of].sum()) / total if total > 0 else 0.0
 
     def minus(self, other: Self) -> "Quantity":
-        """The difference to another one, with the doubts of both."""
+        """The difference of two quantities, with the doubts of both."""
         doubts = [doubt for doubt in (self.doubt, other.doubt) if doubt is not None]
         gradient = self.gradient - other.gradient
         return Quantity(self.value - other.value, gradient, "; ".join(dict.fromkeys(doubts)) or None)
 
 
 def combined(value: float, *terms: tuple[float, Quantity]) -> Quantity:
-    """`value` with the gradient of the sum of factor times quantity, and the doubts of all."""
+    """A quantity with the gradient of the sum of factor times quantity, and the doubts of all terms.
+
+    Examples
+    --------
+    The mean of two quantities:
+
+    >>> first, second = Quantity(1.0, np.array([1.0, 0.0])), Quantity(3.0, np.array([0.0, 1.0]), "fallback")
+    >>> mean = combined(2.0, (0.5, first), (0.5, second))
+    >>> mean.gradient.tolist(), mean.doubt
+    ([0.5, 0.5], 'fallback')
+    """
     gradient: Floats = np.sum([factor * quantity.gradient for factor, quantity in terms], axis=0)
     doubts = [quantity.doubt for _, quantity in terms if quantity.doubt is not None]
     return Quantity(value, gradient, "; ".join(dict.fromkeys(doubts)) or None)

@@ -1,4 +1,4 @@
-"""Intake of meshes that other scanners made: their unit, their strays, which side is outside, whether ends are cut."""
+"""Preparation of meshes from other scanners: unit, stray parts, orientation, and whether heel and toes are whole."""
 
 from typing import Literal, NamedTuple
 
@@ -21,60 +21,64 @@ MeshUnit = Literal["mm", "cm", "m", "in"]
 
 MILLIMETRES: dict[MeshUnit, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 FOOT_MM = (115.0, 335.0), (100.0, 380.0)
-"""By its length a foot tells its unit: from a child of one year to the largest in common use; then the extremes."""
+"""Ranges of foot length from which the unit is inferred: first from a child of one year to the largest size in common
+use, then the extremes."""
 LEAST_FACES = 40
+"""A mesh with fewer triangles is refused; chosen by hand."""
 STRAY_SHARE = 0.02
-"""Parts with less than this share of the triangles are strays, ..."""
+"""Parts with less than this share of the triangles are strays; chosen by hand."""
 BODY_SHARE = 0.5
-"""... those of more than this share of the largest part's extent may be another body."""
-SOME, APART = 200, 0.2
-"""Of so many points of another body less than this share lies within the hull of the first; layers of one surface share
-it."""
+"""Parts of more than this share of the largest part's extent may be a second body; chosen by hand."""
+HULL_SAMPLES, APART = 200, 0.2
+"""A part is a second body if less than the share APART of about so many of its points lies within the hull of the
+first; layers of one surface lie within the same hull. Chosen by hand."""
 OPEN_EDGES = 0.001
-"""A surface with a greater share of open edges is told to be open."""
+"""A surface with a greater share of open edges is reported as open; with a smaller one, as having small holes.
+Chosen by hand."""
 COARSE_MM = 0.02
-"""Coordinates that single precision rounds by more are told."""
+"""A larger rounding of coordinates by single precision is reported; chosen by hand."""
 END, LOW, BLUNT, ROUNDED = 0.06, 0.15, 0.97, 0.4
-"""Heel and toes are round: in the last part of the length, up to this height in lengths, skin that faces ahead, but not
-by more than this cosine as a flat cut does, covers more than this share. Whole feet have 0.65 to 0.95, cut ones up to
-0.2."""
+"""Test of a whole heel or toes: in the last END of the length and up to LOW lengths high, skin that faces ahead, but by
+less than the cosine BLUNT (a flat cut faces ahead by more), covers more than the share ROUNDED. Whole feet have 0.65 to
+0.95, cut ones up to 0.2."""
 BALL_STATION, GAPS = 0.70, 0.05
-"""There, in parts of the length, a foot is of one piece, even with toes spread; between a hand's fingers is more than
-this of its breadth."""
+"""At this share of the length a foot is one piece, even with its toes spread; the gaps between the fingers of a hand
+take more than this share of its breadth. Chosen by hand."""
 
 
 class RawMesh(NamedTuple):
-    """A mesh in mm that may be a foot, looking outward, and what was done to it."""
+    """A mesh in mm that may be a foot, its triangles looking outward, with a record of the changes."""
 
     vertices: Floats
     """(V, 3) mm"""
     faces: Faces
     """(F, 3), counter-clockwise as seen from outside"""
     unit: MeshUnit
-    """That of the vertices that were given, ..."""
+    """Unit of the input"""
     factor: float
-    """... and what they were multiplied by."""
+    """Factor from that unit to mm"""
     is_closed: bool
     notes: tuple[str, ...]
-    """What a user should know, a sentence each without a full stop."""
+    """Remarks for the user, each a sentence without a full stop"""
 
 
 def take_in(vertices: NDArray[np.floating], faces: NDArray[np.integer], unit: MeshUnit | None = None) -> RawMesh:
-    """A mesh from elsewhere made ready for `foot_frame`.
+    """Prepare a mesh from elsewhere for `foot_frame`.
 
-    Vertices that repeat are merged, triangles without area and small stray parts are left out, triangles are made to
-    look outward, and the unit is told by the size of the foot unless it is given. The pose is not changed.
+    Repeated vertices are merged, triangles without area and small stray parts are left out, triangles are turned to
+    look outward, and the unit is inferred from the size of the foot unless it is stated. The pose is not changed.
 
     Parameters
     ----------
     vertices : (V, 3) in mm, cm, m or inches
     faces : (F, 3)
+    unit : of the vertices; default: inferred
 
     Raises
     ------
     Finding
         The mesh has hardly any triangles, coordinates that are no numbers, or several bodies; its size is that of a
-        foot in no unit, or in two; or it has no heel, no toes, or gaps at the ball.
+        foot in no unit or in two; or it has no heel, no toes, or gaps at the ball.
     """
     if not np.all(np.isfinite(vertices)):
         raise Finding("the surface has coordinates that are no numbers, expected a foot")
@@ -85,21 +89,21 @@ def take_in(vertices: NDArray[np.floating], faces: NDArray[np.integer], unit: Me
     is_closed = _is_closed(meetings, notes)
     faces = _outward(vertices, faces, meetings, notes)
     pose = find_pose(vertices, faces)
-    known = _unit(pose.length, unit)
-    if pose.convexity < CONVEX:  # what is not, foot_frame tells to be no foot at all
+    mesh_unit = _unit(pose.length, unit)
+    if pose.convexity < CONVEX:  # foot_frame refuses a more convex body
         _check_whole(apply(pose.transform, vertices) / pose.length, faces)
-    factor = MILLIMETRES[known]
-    if known != "mm":
-        told = "given" if unit is not None else f"told by the length of {pose.length:.3g}"
-        notes.append(f"coordinates in {known}, {told}, were multiplied by {factor:g} to have mm")
-    _tell_rounding(vertices, factor, notes)
-    return RawMesh(vertices * factor, faces, known, factor, is_closed, tuple(notes))
+    factor = MILLIMETRES[mesh_unit]
+    if mesh_unit != "mm":
+        origin = "as stated" if unit is not None else f"inferred from the length of {pose.length:.3g}"
+        notes.append(f"coordinates in {mesh_unit}, {origin}, were multiplied by {factor:g} to obtain mm")
+    _report_rounding(vertices, factor, notes)
+    return RawMesh(vertices * factor, faces, mesh_unit, factor, is_closed, tuple(notes))
 
 
 def _clean(vertices: Floats, faces: Faces) -> tuple[Floats, Faces]:
-    """Without vertices that stand twice and triangles without area."""
+    """Merge repeated vertices and drop triangles without area."""
     if len(faces):
-        if np.any(_meetings(faces).counts == 1):  # a closed surface has none that stand twice
+        if np.any(_meetings(faces).counts == 1):  # a closed surface repeats no vertices
             merged = distinct_rows(vertices)
             if len(merged.rows) < len(vertices):
                 vertices, faces = merged.rows, merged.number[faces].astype(np.int32)
@@ -113,7 +117,7 @@ def _clean(vertices: Floats, faces: Faces) -> tuple[Floats, Faces]:
 
 
 def _one_body(vertices: Floats, faces: Faces, notes: list[str]) -> tuple[Floats, Faces]:
-    """Without stray parts; a second body is refused."""
+    """Drop stray parts; raises `Finding` if there is a second body."""
     component = face_components(faces)
     counts = np.bincount(component)
     large = np.flatnonzero(counts >= STRAY_SHARE * len(faces))
@@ -134,7 +138,7 @@ def _extent(body: Floats) -> float:
 
 
 def _is_flat(body: Floats) -> bool:
-    """Such as a plate on which a foot stands."""
+    """True for a flat part, such as a plate on which a foot stands."""
     spread = np.linalg.eigvalsh(np.cov(body.T))
     return bool(spread[0] < 1e-6 * spread[-1])
 
@@ -145,19 +149,19 @@ def _inside(points: Floats, body: Floats) -> float:
         planes = ConvexHull(body).equations
     except QhullError:
         return 1.0
-    some = points[:: len(points) // SOME + 1]
-    return float(np.mean([np.all(planes[:, :3] @ point + planes[:, 3] <= 0) for point in some]))
+    tested = points[:: len(points) // HULL_SAMPLES + 1]
+    return float(np.mean([np.all(planes[:, :3] @ point + planes[:, 3] <= 0) for point in tested]))
 
 
 class _Meetings(NamedTuple):
-    """Edges at which faces meet."""
+    """Sides of faces, grouped by the edges at which they meet."""
 
     order: NDArray[np.intp]
-    """(3F,) sides of faces, numbered as `directed_edges` has them; those of one edge stand together."""
+    """(3F,) sides of faces, numbered as in `directed_edges`, sorted by edge"""
     first: NDArray[np.intp]
-    """(E,) where in `order` each edge begins, ..."""
+    """(E,) place in `order` where each edge begins"""
     counts: NDArray[np.intp]
-    """... and how many faces it has."""
+    """(E,) number of faces of each edge"""
 
 
 def _meetings(faces: Faces) -> _Meetings:
@@ -179,34 +183,34 @@ def _is_closed(meetings: _Meetings, notes: list[str]) -> bool:
 
 
 def _outward(vertices: Floats, faces: Faces, meetings: _Meetings, notes: list[str]) -> Faces:
-    """(F, 3) faces that all look outward."""
+    """Returns (F, 3) faces that all look outward."""
     against = _against(faces, meetings)
     if against.any():
         faces = np.where(against[:, None], faces[:, ::-1], faces)
         turned = np.count_nonzero(against)
-        notes.append(f"{turned} triangles looked otherwise than those beside them and were turned over")
+        notes.append(f"{turned} triangles faced against their neighbours and were turned over")
     if volume(vertices, faces) < 0:
         faces = faces[:, ::-1].copy()
-        notes.append("the surface looked inward and was turned over")
+        notes.append("the surface faced inward and was turned over")
     return faces
 
 
 def _against(faces: Faces, meetings: _Meetings) -> NDArray[np.bool_]:
-    """(F,) faces that look to the other side than most of the part that they are joined to by edges.
+    """Returns (F,) which faces look to the other side than most faces of the part that edges join them to.
 
-    Each face is twice in a graph, as it is and turned over. Two faces that run an edge in opposite directions look to
+    A graph holds each face twice, as it is and turned over. Two faces that run an edge in opposite directions look to
     the same side.
     """
     count = len(faces)
     pairs = meetings.first[meetings.counts == 2]
-    one, other = meetings.order[pairs], meetings.order[pairs + 1]
+    first, second = meetings.order[pairs], meetings.order[pairs + 1]
     rises = np.diff(directed_edges(faces), axis=1)[:, 0] > 0
-    turned = rises[one] == rises[other]
+    turned = rises[first] == rises[second]
     if not turned.any():
         return np.zeros(count, np.bool_)
-    one, other = one % count, other % count
-    rows = np.concatenate([one, one + count])
-    columns = np.concatenate([other + count * turned, other + count * ~turned])
+    first, second = first % count, second % count
+    rows = np.concatenate([first, first + count])
+    columns = np.concatenate([second + count * turned, second + count * ~turned])
     graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(2 * count, 2 * count))
     _, side = connected_components(graph, directed=False)
     as_is, over = side[:count], side[count:]
@@ -215,13 +219,13 @@ def _against(faces: Faces, meetings: _Meetings) -> NDArray[np.bool_]:
     return against
 
 
-def _unit(length: float, given: MeshUnit | None) -> MeshUnit:
-    """The unit in which a foot is so long."""
-    if given is not None:
-        if not FOOT_MM[1][0] <= MILLIMETRES[given] * length <= FOOT_MM[1][1]:
-            told = f"the surface is {length:.3g} long, which is {MILLIMETRES[given] * length:.3g} mm if in {given}"
-            raise Finding(f"{told}, expected a foot of {FOOT_MM[1][0]:.0f} to {FOOT_MM[1][1]:.0f} mm")
-        return given
+def _unit(length: float, stated: MeshUnit | None) -> MeshUnit:
+    """The stated unit, or the only unit in which a foot has this length."""
+    if stated is not None:
+        if not FOOT_MM[1][0] <= MILLIMETRES[stated] * length <= FOOT_MM[1][1]:
+            size = f"the surface is {length:.3g} long, which is {MILLIMETRES[stated] * length:.3g} mm if in {stated}"
+            raise Finding(f"{size}, expected a foot of {FOOT_MM[1][0]:.0f} to {FOOT_MM[1][1]:.0f} mm")
+        return stated
     for least, greatest in FOOT_MM:
         fitting = [unit for unit, factor in MILLIMETRES.items() if least <= factor * length <= greatest]
         if len(fitting) == 1:
@@ -234,7 +238,12 @@ def _unit(length: float, given: MeshUnit | None) -> MeshUnit:
 
 
 def _check_whole(places: Floats, faces: Faces) -> None:
-    """Refuses a foot without heel or toes, and a hand; `places` on the floor, heel to toes along X, in lengths."""
+    """Refuse a foot without heel or toes, and a hand.
+
+    Parameters
+    ----------
+    places : (V, 3) vertices in foot lengths, floor at Z = 0, heel to toes along X
+    """
     corners = places[faces]
     low = corners[corners[:, :, 2].mean(axis=1) < LOW]
     if not len(low):
@@ -250,7 +259,7 @@ def _check_whole(places: Floats, faces: Faces) -> None:
 
 
 def _rounded(triangles: Floats, ahead: float) -> float:
-    """How much of an end, seen along X from `ahead`, is skin that is no flat cut: 0 to 1 of the hull of its outline."""
+    """Share of an end's outline, seen along X from `ahead`, that is skin and no flat cut: 0 to 1 of its hull."""
     if len(triangles) < 3:
         return 1.0
     crosses = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
@@ -260,7 +269,7 @@ def _rounded(triangles: Floats, ahead: float) -> float:
 
 
 def _parted(triangles: Floats) -> float:
-    """The share of the breadth of a section across the ball that lies between its parts."""
+    """Share of the breadth of the section across the ball that lies between its parts."""
     is_ahead = triangles[:, :, 0] > BALL_STATION
     crossing = triangles[is_ahead.any(axis=1) & ~is_ahead.all(axis=1)]
     if not len(crossing):
@@ -276,8 +285,8 @@ def _parted(triangles: Floats) -> float:
     return float(gaps.sum() / (reached[-1] - first.min()))
 
 
-def _tell_rounding(vertices: Floats, factor: float, notes: list[str]) -> None:
-    """Far from the origin single precision is coarse."""
+def _report_rounding(vertices: Floats, factor: float, notes: list[str]) -> None:
+    """Add a note where coordinates lie so far from the origin that single precision is coarse."""
     step = float(np.abs(vertices).max()) * 2.0**-24 * factor
     if step > COARSE_MM and np.array_equal(vertices, vertices.astype(np.float32)):
         notes.append(f"the surface lies so far from the origin that its coordinates are rounded by up to {step:.2g} mm")

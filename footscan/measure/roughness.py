@@ -1,4 +1,4 @@
-"""How rough a mesh is: the scatter of its vertices about smooth patches, and what of it is noise."""
+"""Roughness of a mesh: the scatter of its vertices about smooth patches, and the part of it that is noise."""
 
 from typing import NamedTuple
 
@@ -11,47 +11,62 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MOST_NEIGHBOURS = 40
+"""Bound of memory and time: vertices of a patch."""
 SMOOTH = 0.2
-"""Cosine of the angle between two normals of one patch, at least."""
+"""Least cosine of the angle between two normals of one patch; chosen by hand."""
 QUADRATIC, CUBIC = 6, 10
-"""Terms of polynomials in two variables."""
+"""Numbers of terms of polynomials in two variables."""
 MISFIT_FALLS = 3.0
-"""By so much less in square than the quadratic a cubic misses the form of coarse triangles, at least."""
+"""Least factor by which the squared misfit to the form of coarse triangles falls from a quadratic to a cubic. Chosen by
+hand."""
 
 
 class Roughness(NamedTuple):
-    """How far vertices lie off smooth patches."""
+    """Scatter of the vertices of a mesh about smooth patches."""
 
     deviation: Floats
-    """(V,) standard deviation of the surface around each vertex, mm."""
+    """(V,) standard deviation of the surface around each vertex, mm"""
     noise: Floats
-    """(V,) what of it is noise, mm; the rest is form that the triangles are too coarse for."""
+    """(V,) part of it that is noise, mm; the rest is form that the triangles are too coarse for"""
 
 
 def roughness(vertices: Floats, normals: Floats, faces: NDArray[np.integer]) -> Roughness:
-    """The scatter of the surface around each vertex.
+    """Estimate the scatter of the surface around each vertex.
 
-    Cubics are fitted, along the normal of a vertex, to it, its neighbours and theirs, for so many vertices that all
-    are a neighbour of one; the root of the mean square of the residuals over the degrees of freedom left is that of the
-    patch, and of its vertices, which may be in several. Patches with an edge in them, as a cut leaves one, are left
-    out; vertices in no other have the median of all. Quadratics miss noise by as much, but form by more.
+    A cubic is fitted, along the normal of a vertex, to a patch: the vertex, its neighbours and their neighbours. Enough
+    patches are fitted that every vertex is the middle of a patch or next to one. The scatter of a patch is the root of
+    the sum of squared residuals over its degrees of freedom; a vertex takes the mean square of its patches. Patches
+    with an edge in them, such as the rim of a cut, are left out, and vertices without a patch take the median. Noise
+    scatters as much about quadratics as about cubics; form scatters more, and so the two are separated.
 
     Parameters
     ----------
-    vertices, normals : (V, 3) mm, (V, 3) unit vectors
+    vertices : (V, 3) float64, mm
+    normals : (V, 3) unit vectors
     faces : (F, 3)
+
+    Examples
+    --------
+    A plane of points, 1 mm apart, is smooth:
+
+    >>> x, y = np.meshgrid(np.arange(9.0), np.arange(9.0))
+    >>> plane = np.column_stack([x.ravel(), y.ravel(), np.zeros(81)])
+    >>> low = np.array([k for k in range(72) if k % 9 < 8])
+    >>> faces = np.concatenate([np.stack([low, low + 1, low + 9], 1), np.stack([low + 1, low + 10, low + 9], 1)])
+    >>> bool(roughness(plane, np.tile([0.0, 0, 1], (81, 1)), faces).deviation.max() < 1e-9)
+    True
     """
     corners = faces.astype(np.int64)
     variance, ratios = _fits(vertices, normals, corners, *_faces_around(corners, len(vertices)))
-    known = variance >= 0
-    deviation = np.sqrt(np.where(known, variance, np.median(variance[known]) if known.any() else 0.0))
+    fitted = variance >= 0
+    deviation = np.sqrt(np.where(fitted, variance, np.median(variance[fitted]) if fitted.any() else 0.0))
     misfit = (np.median(ratios) - 1.0) / (MISFIT_FALLS - 1.0) if len(ratios) else 0.0
     return Roughness(deviation, deviation * np.sqrt(np.clip(1.0 - misfit, 0.0, 1.0)))
 
 
 @compiled
 def _faces_around(faces: Ints, count: int) -> tuple[Ints, Ints]:
-    """(V + 1,) where those of each of `count` vertices start, and (3F,) the faces around all vertices in turn."""
+    """Returns (V + 1,) starts and (3F,) faces: those around vertex v are faces[starts[v] : starts[v + 1]]."""
     starts = np.zeros(count + 1, np.int64)
     for vertex in faces.ravel():
         starts[vertex + 1] += 1
@@ -66,8 +81,12 @@ def _faces_around(faces: Ints, count: int) -> tuple[Ints, Ints]:
 
 @compiled
 def _fits(vertices: Floats, normals: Floats, faces: Ints, starts: Ints, around: Ints) -> tuple[Floats, Floats]:
-    """(V,) variance, -1 where it is not known, and (P,) of each patch, quadratic over cubic. `around`: the faces of all
-    vertices, one vertex after another, each from its place in `starts` on."""
+    """Returns (V,) variances, mm², -1 where unknown, and (P,) ratios of quadratic to cubic variance of each patch.
+
+    Parameters
+    ----------
+    starts, around : as `_faces_around` returns them
+    """
     variance, patches = np.zeros(len(vertices)), np.zeros(len(vertices))
     ratios = np.empty(len(vertices))
     fitted = 0
@@ -95,7 +114,7 @@ def _fits(vertices: Floats, normals: Floats, faces: Ints, starts: Ints, around: 
 
 @compiled
 def _patch(vertex: int, faces: Ints, starts: Ints, around: Ints, seen: Ints, patch: Ints) -> tuple[int, int]:
-    """Fills in `vertex`, its neighbours and theirs; returns how many are the first two, and all."""
+    """Write `vertex`, its neighbours and theirs to `patch`; returns the counts up to the neighbours and of all."""
     patch[0] = vertex
     seen[vertex] = vertex
     near = count = 1
@@ -118,7 +137,7 @@ def _patch(vertex: int, faces: Ints, starts: Ints, around: Ints, seen: Ints, pat
 
 @compiled
 def _residual_variances(vertices: Floats, vertex: int, normal: Floats, patch: Ints) -> tuple[float, float]:
-    """Variance of the patch about its quadratic and about its cubic, mm²; -1 where that is undetermined."""
+    """Returns the variances of a patch about its quadratic and its cubic, mm²; -1 if they are undetermined."""
     axis = np.argmin(np.abs(normal))
     across = np.zeros(3)
     across[axis] = 1.0
@@ -146,7 +165,7 @@ def _residual_variances(vertices: Floats, vertex: int, normal: Floats, patch: In
                 matrix[i, j] += terms[i] * terms[j]
     if not _eliminated(matrix, right):
         return -1.0, -1.0
-    # Of orthogonal terms each takes its own square off the residuals: what Cholesky's method makes of them.
+    # Cholesky's method makes the terms orthogonal: each reduces the sum of squares by its own square.
     quadratic = squares - np.sum(right[:QUADRATIC] ** 2)
     cubic = max(quadratic - np.sum(right[QUADRATIC:] ** 2), 0.0)
     return quadratic / (len(patch) - QUADRATIC), cubic / (len(patch) - CUBIC)
@@ -154,14 +173,14 @@ def _residual_variances(vertices: Floats, vertex: int, normal: Floats, patch: In
 
 @compiled
 def _dot(first: Floats, second: Floats) -> float:
-    """Of (3,) vectors, for which a call of BLAS takes longer."""
+    """Dot product of (3,) vectors, for which a call of BLAS takes longer."""
     product: float = first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
     return product
 
 
 @compiled
 def _eliminated(matrix: Floats, right: Floats) -> bool:
-    """Turns the normal equations into triangular ones in place; False where they leave the fit undetermined."""
+    """Make the normal equations triangular in place; returns False if they leave the fit undetermined."""
     for i in range(len(right)):
         for j in range(i + 1):
             value = matrix[i, j]

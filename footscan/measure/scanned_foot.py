@@ -1,4 +1,4 @@
-"""The measures of a foot that this scanner has scanned: its errors are known, and which surface was filled."""
+"""Measures of a foot from this scanner, whose errors and filled parts are known."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,18 +10,19 @@ from schemas.base.model import Side
 from schemas.measures import Measures
 
 ERROR_MM, ERROR_GROWS, REACH_MM = 0.03, 0.04, 10.0
-"""Standard deviation of a measured vertex, and by how much it grows per mm where the surface was filled; vertices of a
-smooth surface that lie so near to each other share theirs. From virtual feet: docs/surface.md."""
-FORETOLD_MM = 5.0
-"""So near to what was measured a smooth surface goes on as foretold."""
+"""Standard deviation of a measured vertex, its growth per mm into filled surface, and the edge of the cubes whose
+vertices share their error. Tuned on virtual feet: docs/surface.md."""
+RELIABLE_MM = 5.0
+"""Filled surface nearer than this to measured surface counts as measured: a smooth surface hardly errs there. Chosen by
+hand."""
 
 
 def measure_scanned_foot(mesh: Mesh, side: Side) -> Measures:
-    """The measures of a scanned surface, with the uncertainty that follows from the scanner's errors.
+    """Measure a scanned surface; the uncertainties follow from the errors of the scanner.
 
     Parameters
     ----------
-    mesh : in mm, scanner frame; `filled` is known
+    mesh : mm, scanner frame; without `filled`, all vertices count as measured
 
     Raises
     ------
@@ -36,13 +37,16 @@ def measure_scanned_foot(mesh: Mesh, side: Side) -> Measures:
         side,
         errors_mm=ERROR_MM + ERROR_GROWS * gap_mm,
         reach_mm=REACH_MM,
-        filled=gap_mm > FORETOLD_MM,
+        filled=gap_mm > RELIABLE_MM,
     )
 
 
 def _gaps(vertices: NDArray[np.float64], filled: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """(V,) mm that each vertex lies from what was measured. The caps of heel and toes beyond the outermost stripes are
-    broad, but less than a step high: there it is the distance along the travel that counts."""
+    """Returns (V,) distances in mm of the vertices from measured surface.
+
+    The caps of heel and toes beyond the outermost stripes are broad, but less than one step high. Their distance is
+    taken along the travel.
+    """
     measured = vertices[~filled]
     gaps: NDArray[np.float64] = np.asarray(KDTree(measured).query(vertices)[0])
     beyond = np.maximum(measured[:, 0].min() - vertices[:, 0], vertices[:, 0] - measured[:, 0].max())

@@ -1,1 +1,1 @@
-"""Triangle meshes and grids, as several rooms need them."""
+"""Triangle meshes, their files, sections and samples, and grids of points."""

@@ -1,4 +1,4 @@
-"""Points sorted into cubes, so that compiled loops find those around a place."""
+"""Points sorted into cubes, so that compiled loops find the points around a place."""
 
 from typing import NamedTuple
 
@@ -6,25 +6,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 MAX_CUBES = 20_000_000
-"""Cubes grow where there would be more."""
+"""Bound of memory: cubes are made larger where there would be more."""
 
 
 class Buckets(NamedTuple):
     """The points in cube (a, b, c) are `order[start[k] : start[k + 1]]` with k = (a * dims[1] + b) * dims[2] + c."""
 
     edge: float
-    """Of a cube, mm."""
+    """Edge of a cube, mm"""
     low: NDArray[np.float64]
     """(3,) corner of cube (0, 0, 0), mm"""
     dims: NDArray[np.int64]
-    """(3,) how many cubes there are along each axis"""
+    """(3,) number of cubes along each axis"""
     start: NDArray[np.int64]
+    """(K + 1,) place in `order` where the points of each cube begin"""
     order: NDArray[np.int64]
     """(N,) numbers of the points, rising within a cube"""
 
 
 def sort_into_cubes(points: NDArray[np.float64], edge: float) -> Buckets:
-    """Sorts (N, 3) `points` into cubes with an `edge` in mm, or larger ones where these would be too many."""
+    """Sort (N, 3) `points` into cubes with an `edge` in mm; the edge grows if there would be too many cubes.
+
+    Examples
+    --------
+    >>> buckets = sort_into_cubes(np.array([[0.0, 0, 0], [0, 0, 5], [0, 0, 1]]), edge=2.0)
+    >>> buckets.dims.tolist(), buckets.start.tolist(), buckets.order.tolist()
+    ([1, 1, 3], [0, 2, 2, 3], [0, 2, 1])
+    """
     low = points.min(axis=0)
     extent = points.max(axis=0) - low
     while np.prod(np.floor(extent / edge) + 1) > MAX_CUBES:

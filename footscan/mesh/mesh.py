@@ -1,4 +1,4 @@
-"""A mesh with what is known of each vertex."""
+"""Meshes and clouds with properties of their vertices."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -6,15 +6,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-KNOWN_OF_A_MESH = ("patient", "scan", "side", "frame", "unit", "software")
-"""Keys of metadata that files bear and that are read back."""
+METADATA_KEYS = ("patient", "scan", "side", "frame", "unit", "software")
+"""Keys of metadata that are read back from files."""
 
-OF_VERTICES = ("normals", "colours", "camera", "filled")
+VERTEX_ARRAYS = ("normals", "colours", "camera", "filled")
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """Triangles in mm; without faces it is a cloud. What is None is not known."""
+    """Triangles in mm, or a cloud if there are no faces. None marks a property that is unknown."""
 
     vertices: NDArray[np.float64]
     """(V, 3) mm"""
@@ -23,16 +23,16 @@ class Mesh:
     normals: NDArray[np.float64] | None = None
     """(V, 3) unit vectors, outward"""
     colours: NDArray[np.uint8] | None = None
-    """(V, 3) red, green and blue as a picture has them (sRGB)"""
+    """(V, 3) red, green and blue, sRGB"""
     camera: NDArray[np.uint8] | None = None
     """(V,) camera of origin; 0 where the surface was filled"""
     filled: NDArray[np.bool_] | None = None
-    """(V,) whether the surface was filled here, not measured"""
+    """(V,) true where the surface was filled, not measured"""
     metadata: Mapping[str, str] = field(default_factory=dict)
-    """Such as patient, scan, side and software; a key is one word."""
+    """Patient, scan, side, software and others; a key is one word"""
 
     def __post_init__(self) -> None:
-        for name in OF_VERTICES:
+        for name in VERTEX_ARRAYS:
             values = getattr(self, name)
             if values is not None and len(values) != len(self.vertices):
                 raise ValueError(f"{name} of {len(values)} vertices, expected {len(self.vertices)}")
@@ -42,21 +42,29 @@ class Mesh:
 
 
 def used(mesh: Mesh) -> Mesh:
-    """The mesh without vertices that have no triangle."""
+    """Drop the vertices that have no triangle."""
     kept, faces = np.unique(mesh.faces, return_inverse=True)
-    of_vertices = {name: getattr(mesh, name) for name in OF_VERTICES}
-    known = {name: values[kept] for name, values in of_vertices.items() if values is not None}
-    return replace(mesh, vertices=mesh.vertices[kept], faces=faces.reshape(-1, 3).astype(np.int32), **known)
+    arrays = {name: getattr(mesh, name) for name in VERTEX_ARRAYS}
+    kept_arrays = {name: values[kept] for name, values in arrays.items() if values is not None}
+    return replace(mesh, vertices=mesh.vertices[kept], faces=faces.reshape(-1, 3).astype(np.int32), **kept_arrays)
 
 
 def signed_volume(mesh: Mesh) -> float:
-    """Volume in mm³ of a closed mesh, below 0 where its faces look inwards; of an open one about what it encloses."""
+    """Volume of a closed mesh in mm³, negative if its faces look inwards; for an open mesh, about what it encloses.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], np.int32)
+    >>> round(signed_volume(Mesh(corners, faces)), 6)
+    0.166667
+    """
     corners = (mesh.vertices - mesh.vertices.mean(axis=0))[mesh.faces]
     return float(np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6)
 
 
 def outward(mesh: Mesh) -> Mesh:
-    """The mesh, its faces and normals turned over together where they look inwards."""
+    """Turn faces and normals over if the faces look inwards."""
     if signed_volume(mesh) >= 0:
         return mesh
     normals = None if mesh.normals is None else -mesh.normals
@@ -64,12 +72,12 @@ def outward(mesh: Mesh) -> Mesh:
 
 
 def on_floor(mesh: Mesh) -> Mesh:
-    """The mesh, lifted or lowered until its lowest vertex stands at Z = 0."""
+    """Move the mesh along Z until its lowest vertex is at Z = 0."""
     return replace(mesh, vertices=mesh.vertices - [0.0, 0.0, mesh.vertices[:, 2].min()])
 
 
 def with_normals(mesh: Mesh) -> Mesh:
-    """The mesh, with those of its vertices where it has none: the mean of the faces around each, by their angles.
+    """Add normals of the vertices if there are none: means of the faces around each vertex, weighted by their angles.
 
     G. Thürmer and C. A. Wüthrich, "Computing vertex normals from polygonal facets", 1998.
     """
@@ -87,7 +95,7 @@ def with_normals(mesh: Mesh) -> Mesh:
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 3) the vectors with length 1; those of length 0 stay."""
+    """Returns (N, 3) vectors of length 1; zero vectors stay zero."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     unit: NDArray[np.float64] = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
     return unit

@@ -1,4 +1,4 @@
-"""Moving of points, and how high a foot reaches below its leg."""
+"""Rigid transforms of points, points within a box, and the height of a foot below its leg."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,35 +7,42 @@ from footscan.compiled import compiled
 
 Floats = NDArray[np.float64]
 Bounds = tuple[float, float]
-"""Lower and upper, mm."""
+"""Lower and upper bound, mm."""
 
 FREE = (-np.inf, np.inf)
-"""Bounds of everything."""
+"""No bounds"""
 
 LOW_MM, LOW_SHARE = 60.0, 0.24
-"""Below this height, and this part of the length, there is foot and no leg; the pternion is at 0.06 to 0.13 of it."""
+"""Below this height and this share of the length there is foot and no leg. The pternion is at a height of 0.06 to 0.13
+of the length. Chosen by hand."""
 
 
 def apply(transform: NDArray[np.floating], points: NDArray[np.floating]) -> Floats:
-    """(N, 3) `points` moved by a (4, 4) `transform`."""
+    """Returns (N, 3) `points` moved by a (4, 4) `transform`.
+
+    Examples
+    --------
+    >>> apply(turn_about_z(np.pi / 2), np.array([[1.0, 0, 5]])).round(6).tolist()
+    [[0.0, 1.0, 5.0]]
+    """
     return _moved(np.ascontiguousarray(transform, np.float64), np.ascontiguousarray(points, np.float64))
 
 
 def turn_about_z(angle: float) -> Floats:
-    """(4, 4) rotation by `angle` in radians."""
+    """Returns the (4, 4) rotation about Z by `angle` in radians, from X towards Y."""
     transform = np.eye(4)
     transform[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     return transform
 
 
 def low_height(length: float) -> float:
-    """Height in mm below which there is foot and no leg."""
+    """Height in mm below which a foot of this length in mm is foot and no leg."""
     return min(LOW_MM, LOW_SHARE * length)
 
 
 @compiled
 def _moved(transform: Floats, points: Floats) -> Floats:
-    """Faster than a product of matrices so thin."""
+    """Move the points in a loop, which is faster than a product of such thin matrices."""
     moved = np.empty((len(points), 3))
     for axis in range(3):
         x, y, z, shift = transform[axis, 0], transform[axis, 1], transform[axis, 2], transform[axis, 3]
@@ -45,7 +52,7 @@ def _moved(transform: Floats, points: Floats) -> Floats:
 
 
 def points_within(points: Floats, x: Bounds = FREE, y: Bounds = FREE, z: Bounds = FREE) -> Floats:
-    """Those of (N, 3) `points` that lie within a box, its bounds included."""
+    """Returns those of (N, 3) `points` that lie within a box, bounds included; mm."""
     low, high = np.array([x, y, z], np.float64).T.copy()
     return _within(points, low, high)
 

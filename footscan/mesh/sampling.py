@@ -5,9 +5,14 @@ from numpy.typing import NDArray
 
 
 def sample_surface(vertices: NDArray[np.floating], faces: NDArray[np.integer], count: int) -> NDArray[np.float64]:
-    """(count, 3) points spread evenly over the area of a mesh, the same at every call.
+    """Returns (count, 3) points spread evenly over the area of a mesh, the same at every call.
 
-    Vertices would not do: they crowd where triangles are small.
+    The vertices themselves are denser where triangles are small.
+
+    Parameters
+    ----------
+    vertices : (V, 3) mm
+    faces : (F, 3)
     """
     corners = np.asarray(vertices, np.float64)[faces]
     cumulative = np.cumsum(_triangle_areas(corners))
@@ -23,7 +28,13 @@ def sample_surface(vertices: NDArray[np.floating], faces: NDArray[np.integer], c
 
 
 def surface_area(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> float:
-    """Area in mm² of a mesh of (V, 3) `vertices` in mm and (F, 3) `faces`."""
+    """Area in mm² of a mesh of (V, 3) `vertices` in mm and (F, 3) `faces`.
+
+    Examples
+    --------
+    >>> surface_area(np.array([[0.0, 0, 0], [2, 0, 0], [0, 3, 0]]), np.array([[0, 1, 2]]))
+    3.0
+    """
     return float(_triangle_areas(np.asarray(vertices, np.float64)[faces]).sum())
 
 

@@ -14,40 +14,52 @@ Ints = NDArray[np.int64]
 
 
 class Cuttable(NamedTuple):
-    """A mesh that knows which faces lie side by side."""
+    """A mesh with the neighbours of its faces."""
 
     vertices: Floats
     """(V, 3) mm"""
     faces: Ints
     """(F, 3)"""
     neighbours: Ints
-    """(F, 3) face beyond the edge from corner k to the next; -1 where the mesh ends."""
+    """(F, 3) face beyond the edge from corner k to the next; -1 where the mesh ends"""
 
 
 class Loop(NamedTuple):
     """A closed curve in which a plane cuts a mesh."""
 
     points: Floats
-    """(N, 3) where the plane cuts edges of the mesh, mm, in order."""
+    """(N, 3) points where the plane cuts edges of the mesh, mm, in order"""
     edges: Ints
-    """(N, 2) the vertices of these edges."""
+    """(N, 2) vertices of these edges"""
     shares: Floats
-    """(N,) where on its edge each point is: 0 at the first vertex, 1 at the second."""
+    """(N,) place of each point on its edge: 0 at the first vertex, 1 at the second"""
     gap: float
-    """Length of the widest opening of the mesh that the loop runs straight over, mm; 0 where it is closed."""
+    """Length of the widest opening of the mesh that the loop bridges, mm; 0 if the loop is closed"""
 
 
 def cuttable(vertices: Floats, faces: NDArray[np.integer]) -> Cuttable:
-    """The mesh, (V, 3) mm and (F, 3), ready for `cut`."""
+    """Prepare a mesh, (V, 3) mm and (F, 3), for `cut`."""
     corners = np.ascontiguousarray(faces, np.int64)
     return Cuttable(np.ascontiguousarray(vertices, np.float64), corners, face_neighbours(corners, len(vertices)))
 
 
 @compiled
 def face_neighbours(faces: Ints, count: int) -> Ints:
-    """(F, 3) the face beyond the edge from each corner of (F, 3) faces to the next, -1 where there is none; `count`
-    is that of the vertices. Of more than two faces at an edge the first two belong together."""
-    last, before = np.full(count, -1), np.full(faces.size, -1)  # of the edges known by their lower vertex
+    """Returns (F, 3) the face beyond the edge from each corner to the next; -1 if there is none.
+
+    If more than two faces meet at an edge, the first two are neighbours.
+
+    Parameters
+    ----------
+    faces : (F, 3)
+    count : number of vertices
+
+    Examples
+    --------
+    >>> face_neighbours(np.array([[0, 1, 2], [0, 2, 3]]), count=4).tolist()
+    [[-1, -1, 1], [0, -1, -1]]
+    """
+    last, before = np.full(count, -1), np.full(faces.size, -1)  # linked lists of edges, by their lower vertex
     neighbours = np.full(faces.shape, -1)
     for face in range(len(faces)):
         for k in range(3):
@@ -69,9 +81,19 @@ def face_neighbours(faces: Ints, count: int) -> Ints:
 
 
 def cut(mesh: Cuttable, point: Floats, normal: Floats) -> list[Loop]:
-    """The loops in which the plane through (3,) `point` across the unit vector (3,) `normal` cuts the mesh.
+    """Cut a mesh by the plane through (3,) `point`, mm, with the unit normal (3,) `normal`.
 
-    Where the mesh is open, ends of curves are joined straight, the nearest first.
+    Where the mesh is open, the ends of curves are joined by straight lines, the nearest first.
+
+    Examples
+    --------
+    The section of a tetrahedron of height 2 at half its height:
+
+    >>> corners = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]])
+    >>> mesh = cuttable(corners, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
+    >>> [loop] = cut(mesh, np.array([0.0, 0, 1]), np.array([0.0, 0, 1]))
+    >>> sorted(loop.points.tolist()), loop.gap
+    ([[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 0.0, 1.0]], 0.0)
     """
     height = mesh.vertices @ normal - point @ normal
     edges, ends, closed = _traced(mesh.faces, mesh.neighbours, height >= 0)
@@ -87,7 +109,7 @@ def _loop(vertices: Floats, height: Floats, edges: Ints, gap: float) -> Loop:
 
 @compiled
 def _crossings(vertices: Floats, height: Floats, edges: Ints) -> tuple[Floats, Ints, Floats]:
-    """(N, 3) where (N, 2) edges run through height 0, the edges, and (N,) the shares of them there."""
+    """Returns (N, 3) the points where (N, 2) edges cross height 0, the edges, and (N,) the shares on the edges."""
     points, shares = np.empty((len(edges), 3)), np.empty(len(edges))
     for k in range(len(edges)):
         first, second = edges[k]
@@ -98,14 +120,14 @@ def _crossings(vertices: Floats, height: Floats, edges: Ints) -> tuple[Floats, I
 
 
 def _joined(vertices: Floats, height: Floats, curves: list[Ints]) -> list[Loop]:
-    """Open curves, joined end to end."""
+    """Join open curves end to end."""
     if not curves:
         return []
     ends = np.concatenate([_loop(vertices, height, curve[[0, -1]], 0.0).points for curve in curves])
     partner, distance = _nearest_pairs(ends)
     loops, unused = [], set(range(len(curves)))
     while unused:
-        pieces, widest, end = [], 0.0, 2 * min(unused)  # an even number is where a curve begins, the next its end
+        pieces, widest, end = [], 0.0, 2 * min(unused)  # curve k begins at end 2 k and ends at end 2 k + 1
         while end // 2 in unused:
             unused.remove(end // 2)
             curve = curves[end // 2]
@@ -118,7 +140,7 @@ def _joined(vertices: Floats, height: Floats, curves: list[Ints]) -> list[Loop]:
 
 
 def _nearest_pairs(points: Floats) -> tuple[Ints, Floats]:
-    """Of (E, 3) `points`, E even, the partner of each and how far it is; the nearest pair first, then the rest."""
+    """Returns for each of (E, 3) `points`, E even, its partner and their distance; nearest pairs are formed first."""
     apart = cdist(points, points)
     np.fill_diagonal(apart, np.inf)
     partner, distance = np.zeros(len(points), np.int64), np.zeros(len(points))
@@ -132,9 +154,9 @@ def _nearest_pairs(points: Floats) -> tuple[Ints, Floats]:
 
 @compiled
 def _traced(faces: Ints, neighbours: Ints, above: NDArray[np.bool_]) -> tuple[Ints, Ints, NDArray[np.bool_]]:
-    """Follows the curves that part the vertices `above`, (V,), from the others, from face to face: open ones first.
+    """Trace the curves between the vertices `above`, (V,), and the others from face to face, open curves first.
 
-    Returns (N, 2) the vertices of the edges crossed, (C,) where each curve ends in them, (C,) whether it is closed.
+    Returns (N, 2) the vertices of the edges crossed, (C,) the end of each curve among these, (C,) whether it is closed.
     """
     crossing, crossed = np.zeros(len(faces), np.bool_), np.empty(len(faces), np.int64)
     count = 0
@@ -179,7 +201,7 @@ def _traced(faces: Ints, neighbours: Ints, above: NDArray[np.bool_]) -> tuple[In
 
 @compiled
 def _edge(faces: Ints, face: int, a: int, b: int) -> int:
-    """Which edge of the face joins the vertices `a` and `b`; -1 where there is no face."""
+    """Number of the edge of the face that joins the vertices `a` and `b`; -1 if there is no face."""
     for k in range(3):
         c, d = faces[face, k], faces[face, (k + 1) % 3]
         if face >= 0 and ((c == a and d == b) or (c == b and d == a)):
@@ -189,7 +211,7 @@ def _edge(faces: Ints, face: int, a: int, b: int) -> int:
 
 @compiled
 def _crossed(faces: Ints, above: NDArray[np.bool_], face: int, other_than: int) -> int:
-    """The first edge of the face that is crossed, `other_than` one left out."""
+    """Number of the first edge of the face that is crossed, other than the edge `other_than`."""
     for k in range(3):
         if k != other_than and above[faces[face, k]] != above[faces[face, (k + 1) % 3]]:
             return k

@@ -12,18 +12,25 @@ Faces = NDArray[np.integer]
 
 
 def directed_edges(faces: Faces) -> NDArray[np.int64]:
-    """(3F, 2) the edges of (F, 3) `faces`, each in the direction in which its face runs through it."""
+    """Returns (3F, 2) the edges of (F, 3) `faces`, each in the direction in which its face runs through it."""
     return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
 
 
 def edge_counts(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(E, 2) the edges of (F, 3) `faces`, smaller vertex first, and (E,) how many faces meet at each."""
+    """Returns (E, 2) the edges of (F, 3) `faces`, smaller vertex first, and (E,) the number of faces at each.
+
+    Examples
+    --------
+    >>> edges, counts = edge_counts(np.array([[0, 1, 2], [0, 2, 3]]))
+    >>> dict(zip(map(tuple, edges.tolist()), counts.tolist()))
+    {(0, 1): 1, (0, 2): 2, (0, 3): 1, (1, 2): 1, (2, 3): 1}
+    """
     edges = distinct_rows(np.sort(directed_edges(faces), axis=1))
     return edges.rows, edges.counts.astype(np.int64)
 
 
 def drop_tangles(faces: Faces) -> NDArray[np.int32]:
-    """`faces` without those at edges where more than two meet, or where two run the same way."""
+    """Drop the faces at edges where more than two meet, or where two run in the same direction."""
     edges = directed_edges(faces)
     _, _, undirected, meeting = distinct_rows(np.sort(edges, axis=1))
     _, _, directed, same_way = distinct_rows(edges)
@@ -32,7 +39,7 @@ def drop_tangles(faces: Faces) -> NDArray[np.int32]:
 
 
 def face_components(faces: Faces) -> NDArray[np.int32]:
-    """(F,) number of the part, joined by vertices, that each of (F, 3) `faces` belongs to."""
+    """Returns (F,) the number of the part, joined by vertices, to which each of (F, 3) `faces` belongs."""
     if not len(faces):
         return np.zeros(0, np.int32)
     size = int(faces.max()) + 1
@@ -43,27 +50,30 @@ def face_components(faces: Faces) -> NDArray[np.int32]:
 
 
 def largest_component(faces: Faces) -> NDArray[np.int32]:
-    """`faces` of the part that has most of them."""
+    """Returns the faces of the part that has the most."""
     component = face_components(faces)
     largest: NDArray[np.bool_] = component == np.argmax(np.bincount(component))
     return faces[largest].astype(np.int32)
 
 
 def keep_large_components(faces: Faces, share: float) -> NDArray[np.int32]:
-    """`faces` without the parts that hold less than `share` of them."""
+    """Drop the parts that hold less than the `share` of all faces."""
     component = face_components(faces)
     keep = np.bincount(component)[component] >= share * len(faces) if len(faces) else np.zeros(0, np.bool_)
     return faces[keep].astype(np.int32)
 
 
 def used_vertices(vertices: NDArray[np.float64], faces: Faces) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """The vertices that `faces` use, in their order, and the faces renumbered to them."""
+    """Returns the vertices that `faces` use, in their order, and the faces renumbered to them."""
     used, renumbered = _renumbered(faces)
     return vertices[used], renumbered
 
 
 def _renumbered(numbers: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Which numbers there are, from 0 on, in their order, and the place of each among these: `np.unique`, unsorted."""
+    """Returns the distinct numbers in rising order, and the place of each number among them, as `np.unique` does.
+
+    The numbers are small and not negative, so that no sorting is needed.
+    """
     is_used = np.zeros(int(numbers.max(initial=-1)) + 1, np.bool_)
     is_used[numbers] = True
     place = np.cumsum(is_used, dtype=np.int32) - np.int32(1)
@@ -71,14 +81,14 @@ def _renumbered(numbers: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArra
 
 
 def vertex_normals(vertices: NDArray[np.float64], faces: Faces) -> NDArray[np.float64]:
-    """(V, 3) unit vectors: the mean of the faces around each vertex, by their areas; 0 where there is none."""
+    """Returns (V, 3) unit normals: means of the faces around each vertex, weighted by area; 0 without faces."""
     return vertex_normals_and_areas(vertices, faces)[0]
 
 
 def vertex_normals_and_areas(
     vertices: NDArray[np.float64], faces: Faces
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The normals of `vertex_normals`, and (V,) a third of the area of the faces around each vertex."""
+    """Returns the normals of `vertex_normals`, and (V,) a third of the area of the faces around each vertex."""
     return _normals_and_areas(np.ascontiguousarray(vertices, np.float64), np.ascontiguousarray(faces, np.int64))
 
 

@@ -1,4 +1,4 @@
-"""Points by the cells of a grid."""
+"""Points grouped by the cells of a grid."""
 
 from typing import NamedTuple
 
@@ -10,30 +10,44 @@ from footscan.compiled import compiled
 Floats = NDArray[np.float64]
 
 EMPTY = -1
+"""Number of a cell without points."""
 BORDER = 4
-"""So many cells less one around those of the points are empty: neighbours so far away need no look at the border."""
+"""Width of the border of the grid in cells. At least this number less one are empty, so that neighbours within that
+distance need no test against the bounds."""
 MOST_CELLS = 20_000_000
-"""Cells become larger where there would be more of them."""
+"""Bound of memory: cells are made larger where there would be more."""
 
 
 class Voxels(NamedTuple):
-    """The cells that hold points, and which of these each holds."""
+    """The cells of a grid that hold points."""
 
     origin: Floats
-    """(3,) mm: the lower corner of the first cell. The lowest points stand in the middle of theirs, so that planes a
-    cell apart have cells of their own however they are rounded."""
+    """(3,) mm, the lower corner of the first cell. The lowest points lie in the middle of their cells, so that rounding
+    does not move points in planes one cell apart into the same cell."""
     size: Floats
-    """(3,) mm: the edges of a cell."""
+    """(3,) mm, the edges of a cell"""
     number: NDArray[np.int32]
-    """(A, B, C): the cell's number among those that hold points, or `EMPTY`."""
+    """(A, B, C) the number of the cell among those that hold points, or `EMPTY`"""
     voxel: NDArray[np.int32]
-    """(N,): the number of the cell that holds each point."""
+    """(N,) the number of the cell that holds each point"""
     place: NDArray[np.int32]
-    """(V, 3): where each numbered cell stands in the grid."""
+    """(V, 3) the place of each numbered cell in the grid"""
 
 
 def voxelise(xyz: Floats, size: tuple[float, float, float]) -> Voxels:
-    """`xyz` (N, 3), finite, N >= 1, by cells with edges `size`, mm; numbered by X, then Y, then Z of their places."""
+    """Group points by cells, which are numbered by X, then Y, then Z of their places.
+
+    Parameters
+    ----------
+    xyz : (N, 3) float64, mm, finite, N >= 1
+    size : edges of a cell, mm; they grow if there would be too many cells
+
+    Examples
+    --------
+    >>> voxels = voxelise(np.array([[0.0, 0, 0], [0, 0, 9], [0.1, 0, 0]]), (1.0, 1.0, 1.0))
+    >>> voxels.voxel.tolist(), len(voxels.place)
+    ([0, 1, 0], 2)
+    """
     edges = np.array(size)
     low = xyz.min(axis=0)
     extent = xyz.max(axis=0) - low
@@ -49,7 +63,7 @@ def voxelise(xyz: Floats, size: tuple[float, float, float]) -> Voxels:
 
 @compiled
 def _mark(xyz: Floats, origin: Floats, edges: Floats, number: NDArray[np.int32]) -> NDArray[np.int64]:
-    """(N,) the flat index of each point's cell; cells with points are set to 0."""
+    """Returns (N,) the flat index of each point's cell; sets cells with points to 0 in `number`."""
     cells = np.empty(len(xyz), np.int64)
     flat = number.reshape(-1)
     _, columns, rows = number.shape
@@ -64,7 +78,7 @@ def _mark(xyz: Floats, origin: Floats, edges: Floats, number: NDArray[np.int32])
 
 @compiled
 def _count_off(number: NDArray[np.int32]) -> NDArray[np.int32]:
-    """(V, 3) places of the cells that are not empty; they are given their numbers."""
+    """Number the cells that are not empty in place; returns (V, 3) their places."""
     count = 0
     for cell in number.reshape(-1):
         if cell != EMPTY:

@@ -1,1 +1,1 @@
-"""What a person looks at."""
+"""Pages, figures and pictures that a person looks at."""

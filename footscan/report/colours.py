@@ -1,4 +1,4 @@
-"""Colours of signed distances, and the bar that explains them."""
+"""Colours of signed distances, and their colour bar."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,17 +9,25 @@ _STOPS = np.array(
     [[24, 62, 140], [67, 133, 196], [158, 202, 225], [244, 244, 240], [250, 190, 140], [224, 100, 68], [150, 22, 38]],
     np.float64,
 )
-"""Blue inside, nearly white at zero, red outside: lightness falls to both ends, so colour-blind eyes see it too."""
+"""Blue inside, nearly white at zero, red outside; lightness falls to both ends, for colour-blind readers too."""
 _UNKNOWN = np.array([165, 165, 165], np.uint8)
+"""Grey of an unknown distance."""
 _LEAST_LIMIT_MM = 0.5
+"""Shortest scale; chosen by hand."""
+_SHARE = 0.98
+"""Share of the distances that the scale covers at least; chosen by hand."""
 
 
 def colour_limit(distance: NDArray[np.floating]) -> float:
-    """Where the colours of (V,) signed distances in mm end: in halves of a mm, at or above 98 % of them."""
-    known = np.abs(distance[np.isfinite(distance)])
-    if not known.size:
+    """End of the colour scale of (V,) signed distances, mm: a multiple of 0.5 mm that covers 98 % of them.
+
+    >>> colour_limit(np.array([0.2, -0.9, np.nan]))
+    1.0
+    """
+    finite = np.abs(distance[np.isfinite(distance)])
+    if not finite.size:
         return _LEAST_LIMIT_MM
-    return max(_LEAST_LIMIT_MM, float(np.ceil(np.quantile(known, 0.98) * 2)) / 2)
+    return max(_LEAST_LIMIT_MM, float(np.ceil(np.quantile(finite, _SHARE) * 2)) / 2)
 
 
 def distance_colours(distance: NDArray[np.floating], limit: float) -> NDArray[np.uint8]:
@@ -32,7 +40,7 @@ def distance_colours(distance: NDArray[np.floating], limit: float) -> NDArray[np
 
 
 def colour_bar(limit: float, *, signed: bool = True) -> str:
-    """The colours from -`limit` to +`limit` mm, or from 0 where no distance has a sign, as SVG with figures below."""
+    """Draw the colours from -`limit` to +`limit` mm as SVG with figures below; unsigned distances begin at 0."""
     steps = 100
     least = -limit if signed else 0.0
     colours = distance_colours(least + (np.arange(steps) + 0.5) / steps * (limit - least), limit)

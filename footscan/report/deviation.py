@@ -1,4 +1,4 @@
-"""Distances of one shape to another as colours: a file, and pictures from four sides."""
+"""Distances from one shape to another, drawn as colours: a PLY file, and pictures from four sides."""
 
 from typing import NamedTuple
 
@@ -16,12 +16,13 @@ from schemas.base.errors import RefusedInput
 from schemas.base.model import Side
 
 SEEN_MM = (1.0, 2000.0)
-"""How large a thing may be that is drawn three pixels a mm."""
+"""Smallest and largest extent of a shape that is drawn at three pixels per mm: a bound of memory."""
 DOTS = 60_000
-"""So many points of a cloud are drawn: on a foot one for each 1.3 mm²."""
+"""Most points of a cloud that are drawn; on a foot one per 1.3 mm²."""
 DOT_SPACINGS, LARGEST_DOT = 0.8, 1 / 50
-"""Radius of a dot, beside the spacing that as many points had on the box around them, and its largest share of the box:
-dots then close up."""
+"""Radius of a dot in spacings of as many points on the bounding box, so that dots touch; its largest share of the box.
+
+Chosen by hand."""
 PICTURES = ("above", "below", "left", "right")
 """The first four of `views_of`."""
 _OCTAHEDRON = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float64)
@@ -30,26 +31,27 @@ _OCTAHEDRON_FACES = np.array(
 )
 _INK = (70, 70, 70)
 _BAR_PX, _ABOVE_PX, _BELOW_PX = 240, 30, 52
+"""Width of the colour bar; room above a picture for its title, and below for the bar."""
 
 
 class Deviation(NamedTuple):
-    """A shape and the distance of each of its vertices to another."""
+    """A shape, and the distance of each of its vertices to another shape."""
 
     vertices: NDArray[np.float64]
     """(V, 3) mm; a foot stands in its own frame: X from heel to toes, Y to its own left, Z up."""
     faces: NDArray[np.integer]
-    """(F, 3), none in a cloud."""
+    """(F, 3), empty for a cloud."""
     distance: NDArray[np.floating]
-    """(V,) mm, positive outside where it has a sign."""
+    """(V,) mm; if signed, positive outside."""
     signed: bool
     side: Side | None
-    """Which foot it is; None for another thing."""
+    """Which foot it is; None if the shape is not a foot."""
 
 
 def deviation_of(shape: Shape, distances: Distances, regions: FootRegions | None) -> Deviation:
-    """What is shown of `shape`: a foot in the frame of its `regions`, another thing (None) as it lies.
+    """Combine a shape with the distances of its vertices; a foot is moved into the frame of its `regions`.
 
-    `distances` are those of its vertices.
+    `regions` : None if the shape is not a foot; it is then not moved
     """
     vertices, faces = shape
     return Deviation(
@@ -62,7 +64,7 @@ def deviation_of(shape: Shape, distances: Distances, regions: FootRegions | None
 
 
 def deviation_ply(shape: Shape, distance: NDArray[np.floating]) -> bytes:
-    """A binary PLY file of a mesh or cloud with a colour and a `distance` at each of its V vertices.
+    """Write a mesh or cloud as a binary PLY file with a colour and a `distance` at each of its V vertices.
 
     `distance` : (V,) mm
     """
@@ -87,12 +89,12 @@ def deviation_ply(shape: Shape, distance: NDArray[np.floating]) -> bytes:
 
 
 def drawn(deviation: Deviation) -> tuple[NDArray[np.float64], NDArray[np.integer], NDArray[np.uint8]]:
-    """Vertices, faces and colours of what is drawn: the mesh itself, or small octahedra at points of the cloud.
+    """Vertices, faces and colours of the drawn mesh: the mesh itself, or small octahedra at the points of a cloud.
 
     Raises
     ------
     RefusedInput
-        It is too small or too large for a picture in mm.
+        The shape is smaller or larger than `SEEN_MM`.
     """
     vertices, faces, distance, _, _ = deviation
     box = np.ptp(vertices, axis=0)
@@ -114,7 +116,7 @@ def drawn(deviation: Deviation) -> tuple[NDArray[np.float64], NDArray[np.integer
 
 
 def deviation_pictures(deviation: Deviation) -> dict[str, bytes]:
-    """PNG pictures from above, from below and from both sides, each with a bar of its colours in mm, by name.
+    """Draw PNG pictures from above, below and both sides, each with a colour bar in mm; by file name.
 
     Errors as in `drawn`.
     """
@@ -137,7 +139,7 @@ def deviation_pictures(deviation: Deviation) -> dict[str, bytes]:
 def draw_colour_bar(
     pen: ImageDraw.ImageDraw, corner: tuple[int, int], width: int, limit: float, *, signed: bool
 ) -> None:
-    """The colours of distances up to `limit` mm, `width` pixels wide from `corner`, three figures below them."""
+    """Draw the colours of distances up to `limit` mm, `width` pixels wide from `corner`, with three figures below."""
     x, y = corner
     least = -limit if signed else 0.0
     for step, colour in enumerate(distance_colours(np.linspace(least, limit, width), limit).tolist()):
@@ -151,5 +153,5 @@ def draw_colour_bar(
 
 
 def write(pen: ImageDraw.ImageDraw, corner: tuple[int, int], line: str) -> None:
-    """A line of text with its upper left corner at `corner`."""
+    """Draw a line of text with its upper left corner at `corner`."""
     pen.text(corner, line, fill=_INK, font=ImageFont.load_default(14))

@@ -1,4 +1,4 @@
-"""Which parts of a surface were measured, and which were filled, as colours."""
+"""Colours of the measured and the filled parts of a surface."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,15 +7,15 @@ from footscan.report.markup import key, number
 from schemas.quality import MeshQuality
 
 MEASURED, FILLED, CUT = (224, 198, 178), (92, 107, 192), (176, 182, 188)
-"""Skin, and what no skin has."""
+"""RGB: measured parts have the colour of skin, the others a colour that skin never has."""
 
 
 def filled_colours(
     vertices: NDArray[np.float64], filled: NDArray[np.bool_] | None, cut_mm: float | None
 ) -> NDArray[np.uint8]:
-    """(V, 3) colours of (V, 3) `vertices`, mm, scanner frame: measured, filled, or on the flat cut above the ankle.
+    """RGB, (V, 3), of (V, 3) `vertices`, mm, scanner frame: measured, filled, or on the flat cut above the ankle.
 
-    `filled` : (V,), None where it is not known; then all is shown as measured. `cut_mm` : Z of the flat cut, if any
+    `filled` : (V,); None if unknown, then all vertices count as measured. `cut_mm` : Z of the flat cut, if any
     """
     colours = np.tile(np.array(MEASURED, np.uint8), (len(vertices), 1))
     if filled is not None:
@@ -26,7 +26,7 @@ def filled_colours(
 
 
 def filled_key(mesh: MeshQuality) -> str:
-    """What the colours mean, with their shares of the area; nothing where it is not known what was filled."""
+    """Legend of the colours with their shares of the area; empty if it is unknown which parts are filled."""
     if mesh.filled_share is None:
         return ""
     cut = mesh.cut_share or 0.0

@@ -1,41 +1,55 @@
-"""Small pieces of HTML. Whatever comes from a scan passes through `text`, which makes it data and never markup."""
+"""Small pieces of HTML. All data of a scan pass through `text`, which escapes them."""
 
 import base64
 from collections.abc import Iterable, Sequence
 from html import escape
 
+UNITS = {"mm": ("mm", 1), "mm2": ("mm²", 0), "mm3": ("mm³", 0), "deg": ("°", 1), "1": ("", 3)}
+"""How the unit of a measure is written, and the decimals of its values."""
 NARROW_SPACE = "\N{NARROW NO-BREAK SPACE}"
 
 
 def text(value: object) -> str:
-    """`value` escaped, for use between tags and within quoted attributes; control characters are replaced."""
+    """Escape `value` for use between tags and within quoted attributes; control characters are replaced.
+
+    >>> text("<b>&")
+    '&lt;b&gt;&amp;'
+    """
     return escape("".join(c if c.isprintable() or c in "\n\t" else "\N{REPLACEMENT CHARACTER}" for c in str(value)))
 
 
 def number(value: float, decimals: int = 0) -> str:
-    """`value` with a fixed number of decimals, a minus sign and narrow spaces between thousands."""
+    """Write `value` with a fixed number of decimals, a minus sign and narrow spaces between thousands.
+
+    >>> number(265.14, 1)
+    '265.1'
+    """
     digits = f"{abs(value):,.{decimals}f}".replace(",", NARROW_SPACE)
     return f"\N{MINUS SIGN}{digits}" if value < 0 and digits.strip("0.") else digits
 
 
 def words(name: str) -> str:
-    """The identifier `name` as a phrase: `ball_girth` becomes "Ball girth"."""
+    """Write the identifier `name` as a phrase.
+
+    >>> words("ball_girth")
+    'Ball girth'
+    """
     phrase = name.replace("_", " ")
     return phrase[:1].upper() + phrase[1:]
 
 
 def breakable(name: str) -> str:
-    """The identifier `name`, escaped, which may be broken behind its dots and underscores."""
+    """Escape the identifier `name`, and let lines break after its dots and underscores."""
     return text(name).replace("_", "_<wbr>").replace(".", ".<wbr>")
 
 
 def table(
     headings: Sequence[str], rows: Iterable[Sequence[str]], numeric: Iterable[int] = (), kind: str = "plain"
 ) -> str:
-    """A table of cells that are markup already; the columns in `numeric` are set to the right.
+    """A table of cells that are markup already; the columns in `numeric` are right-aligned.
 
-    The first cell of every row is its heading. `kind` is what the style sheet knows the table by.
-    It stands in a box of its own that scrolls where a screen is too narrow for it.
+    The first cell of each row is its heading. `kind` is the CSS class of the table.
+    On a narrow screen the table scrolls in a box of its own.
     """
     right = set(numeric)
     marks = [' class="n"' if column in right else "" for column in range(len(headings))]
@@ -51,12 +65,12 @@ def table(
 
 
 def facts(pairs: Iterable[tuple[str, str]]) -> str:
-    """Names and values side by side, as many in a row as fit; both are markup already."""
+    """Pairs of name and value, as many in a row as fit; both are markup already."""
     return '<dl class="facts">' + "".join(f"<div><dt>{n}</dt><dd>{v}</dd></div>" for n, v in pairs) + "</dl>"
 
 
 def key(meanings: Iterable[tuple[str, tuple[int, int, int]]]) -> str:
-    """What colours mean: pairs of markup and red, green, blue."""
+    """A legend of colours: pairs of markup and RGB."""
     marks = (f'<span><i style="background:rgb{colour}"></i>{meaning}</span>' for meaning, colour in meanings)
     return f'<p class="key">{"".join(marks)}</p>'
 
@@ -67,5 +81,5 @@ def section(title: str, *parts: str) -> str:
 
 
 def data_uri(kind: str, content: bytes) -> str:
-    """`content` of the media type `kind` as an address that needs no network."""
+    """Encode `content` of the media type `kind` as a data URI."""
     return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"

@@ -1,4 +1,4 @@
-"""A page that stands alone: what it shows is in it, and a browser is told to load nothing else."""
+"""A self-contained HTML page, whose content security policy lets a browser load nothing else."""
 
 import base64
 import hashlib
@@ -24,9 +24,9 @@ def page(
     ----------
     title, kicker : any text; the kicker stands above the heading
     heading, parts : markup
-    scripts : JavaScript that runs once the page is there; a browser admits these, by their digests, and no other
-    style : CSS beside that of all pages
-    pictures : from where a browser may take pictures, as a content security policy says it; the page alone as a rule
+    scripts : JavaScript that runs once the page is loaded; a browser runs only these scripts, by their digests
+    style : CSS in addition to that of all pages
+    pictures : permitted sources of pictures, as in a content security policy; default: the page itself
     """
     digests = "".join(f" 'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in scripts)
     return _PAGE.format(

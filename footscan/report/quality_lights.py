@@ -1,4 +1,4 @@
-"""How good a scan is at a glance: four lights, each with the figure that decides it."""
+"""Quality of a scan at a glance: four lights, each with the figure that decides it."""
 
 import math
 from typing import Literal, NamedTuple
@@ -12,14 +12,19 @@ LEVELS: tuple[Level, ...] = ("good", "fair", "unknown", "poor")
 """From the best to the worst."""
 
 LOST_SHARE = 0.05
-"""Of a scan's frames: with more lost, stripes are missing side by side, and the surface is filled between them."""
+"""Largest share of lost frames that is still fair; chosen by hand.
+
+If more frames are lost, neighbouring stripes are missing, and the surface is filled between them."""
 AGREE_MM = (0.1, 0.25)
-"""Of a camera from the others: the noise of a stripe point, and the accuracy that a whole scan is to have."""
+"""Largest distance of a camera from the others that is good, and fair: the noise of a stripe point, and the accuracy
+that is expected of a whole scan."""
 FILLED_SHARES = (0.1, 0.25)
-"""Of the surface: toes hide some 5 % from all cameras of a whole scan."""
+"""Largest filled share of the surface that is good, and fair; chosen by hand.
+
+In a whole scan, toes hide some 5 % of the surface from all cameras."""
 
 
-class Light(NamedTuple):
+class TrafficLight(NamedTuple):
     """One judgement."""
 
     name: str
@@ -27,14 +32,17 @@ class Light(NamedTuple):
     why: str
 
 
-def quality_lights(measures: Measures, quality: Quality) -> list[Light]:
-    """Of the frames, the agreement of the cameras, the surface and the measures."""
+def quality_lights(measures: Measures, quality: Quality) -> list[TrafficLight]:
+    """Judge the frames, the agreement of the cameras, the surface and the measures."""
     return [_frames(quality), _cameras(quality), _surface(quality), _measures(measures)]
 
 
 def apart_mm(quality: Quality) -> dict[int, float]:
-    """How far each camera sees the skin from where the others see it, mm: the root mean square of offset and scatter of
-    its pairs, by robust figures, each weighted with the places at which both see it."""
+    """Distance between the skin as each camera sees it and as the others see it, mm, by camera.
+
+    It is the root mean square over the camera's pairs of median offset and robust scatter, weighted by the number of
+    places that both cameras see.
+    """
     squares: dict[int, float] = {}
     places: dict[int, int] = {}
     for pair in quality.fusion.pairs:
@@ -45,45 +53,47 @@ def apart_mm(quality: Quality) -> dict[int, float]:
     return {camera: math.sqrt(squares[camera] / places[camera]) for camera in sorted(squares) if places[camera]}
 
 
-def worst(lights: list[Light]) -> Level:
-    """The level of the worst of them; unknown where there is none."""
+def worst(lights: list[TrafficLight]) -> Level:
+    """The worst level of all lights; unknown without lights."""
     return max((light.level for light in lights), key=LEVELS.index, default="unknown")
 
 
-def _frames(quality: Quality) -> Light:
+def _frames(quality: Quality) -> TrafficLight:
     frames, lost = (sum(getattr(camera, name) for camera in quality.cameras) for name in ("frames", "frames_lost"))
     blind = [str(camera.camera) for camera in quality.cameras if not camera.points]
     why = f"{lost} of {frames} frames lost" + (f", no stripe in camera {', '.join(blind)}" if blind else "")
-    return Light("Frames", "poor" if blind or lost > LOST_SHARE * frames else "fair" if lost else "good", why)
+    return TrafficLight("Frames", "poor" if blind or lost > LOST_SHARE * frames else "fair" if lost else "good", why)
 
 
-def _cameras(quality: Quality) -> Light:
+def _cameras(quality: Quality) -> TrafficLight:
     apart = apart_mm(quality)
     if not apart:
-        return Light("Cameras", "unknown", "no two cameras see the same skin")
-    camera = max(apart, key=lambda one: apart[one])
+        return TrafficLight("Cameras", "unknown", "no two cameras see the same skin")
+    camera = max(apart, key=lambda camera_id: apart[camera_id])
     why = f"camera {camera} is the farthest from the others, by {number(apart[camera], 2)} mm"
-    return Light("Cameras", _level(apart[camera], AGREE_MM), why)
+    return TrafficLight("Cameras", _level(apart[camera], AGREE_MM), why)
 
 
-def _surface(quality: Quality) -> Light:
+def _surface(quality: Quality) -> TrafficLight:
     mesh = quality.mesh
     if mesh.open_edges or mesh.non_manifold_edges:
-        return Light("Surface", "poor", f"open, {number(mesh.holes)} holes")
+        return TrafficLight("Surface", "poor", f"open, {number(mesh.holes)} holes")
     if mesh.filled_share is None:
-        return Light("Surface", "unknown", "closed; it is not known what was filled")
-    return Light("Surface", _level(mesh.filled_share, FILLED_SHARES), f"{number(100 * mesh.filled_share, 1)} % filled")
+        return TrafficLight("Surface", "unknown", "closed; it is not known what was filled")
+    return TrafficLight(
+        "Surface", _level(mesh.filled_share, FILLED_SHARES), f"{number(100 * mesh.filled_share, 1)} % filled"
+    )
 
 
-def _measures(measures: Measures) -> Light:
+def _measures(measures: Measures) -> TrafficLight:
     if measures.finding is not None:
-        return Light("Measures", "poor", f"none: {measures.finding}")
+        return TrafficLight("Measures", "poor", f"none: {measures.finding}")
     missing, doubted = (
         sum(measure.status == status for measure in measures.measures.values())
         for status in ("incomplete", "uncertain")
     )
     why = f"{missing} of {len(measures.measures)} not taken, {doubted} uncertain"
-    return Light("Measures", "poor" if missing else "fair" if doubted else "good", why)
+    return TrafficLight("Measures", "poor" if missing else "fair" if doubted else "good", why)
 
 
 def _level(value: float, limits: tuple[float, float]) -> Level:

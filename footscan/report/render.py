@@ -9,15 +9,18 @@ from PIL import Image
 from footscan.compiled import compiled
 from footscan.mesh.topology import vertex_normals
 
-_SAMPLES = 2  # a pixel is the mean of 2 x 2 samples: smooth outlines
+_SAMPLES = 2
+"""Side of the block of samples that a pixel is the mean of, for smooth outlines."""
 _LIGHT = np.array([-0.35, 0.5, 0.79]) / np.linalg.norm([-0.35, 0.5, 0.79])
-"""Towards the light: from above the viewer's left shoulder."""
+"""Unit vector towards the light, which stands above the viewer's left shoulder."""
 _AMBIENT, _FILL, _KEY = 0.30, 0.24, 0.46
-"""How much light comes from everywhere, from the viewer (it shapes what lies in shadow) and from the lamp."""
+"""Shares of the light from all directions, from the viewer (it shapes surfaces in shadow) and from the lamp.
+
+Chosen by hand."""
 _COMPRESSION = 3
-"""Of PNG, 0 to 9: half the time of the usual 6, for a file that is a tenth larger."""
+"""Level of PNG compression, 0 to 9: half the time of the default 6, for a file that is a tenth larger."""
 _INNER_SIDE = 0.45
-"""How bright the inner side of a surface is shown beside its outer side, so that a hole is seen as one."""
+"""Brightness of the inner side of a surface relative to its outer side, so that a hole is visible; chosen by hand."""
 
 
 def render_mesh(
@@ -28,13 +31,13 @@ def render_mesh(
     pixels_per_mm: float,
     normals: NDArray[np.floating] | None = None,
 ) -> NDArray[np.uint8]:
-    """The mesh as it is seen from +Z, shaded, on a transparent ground.
+    """Render a mesh as seen from +Z, shaded, on a transparent ground.
 
     Parameters
     ----------
     vertices : (V, 3) float, mm, viewer's frame
-        X to the right, Y up, Z towards the viewer; the origin is the upper left corner of the picture, so what is in
-        the picture has X >= 0 and Y <= 0.
+        X to the right, Y up, Z towards the viewer; the origin is the upper left corner of the picture, so points
+        in the picture have X >= 0 and Y <= 0.
     faces : (F, 3) int
         Rows of `vertices`, counter-clockwise as seen from outside.
     colours : (V, 3) uint8
@@ -42,7 +45,7 @@ def render_mesh(
     shape : (rows, columns) of the picture
     pixels_per_mm : float
     normals : (V, 3) float
-        Unit vectors, outward, in the viewer's frame, where they are known already.
+        Outward unit vectors in the viewer's frame; computed by default.
 
     Returns
     -------
@@ -80,12 +83,12 @@ def rasterise(
     inner: NDArray[np.float64],
     shape: tuple[int, int],
 ) -> NDArray[np.float32]:
-    """Red, green, blue of the nearest triangle at every sample, and 255; zeros where there is none.
+    """RGB of the nearest triangle at each sample, and 255; zeros at samples without a triangle.
 
-    The result has the shape (rows, columns, 4), where `shape` is (rows, columns). `projected` holds (column, row,
-    depth towards the viewer) of each vertex; `outer` and `inner` its (V, 3) colours, 0 to 255, on the side from which
-    the corners of a triangle run counter-clockwise, and on the other. Colours and depth run linearly over a triangle,
-    as the projection is orthographic. Of triangles at one depth the first stays.
+    The result has the shape (rows, columns, 4), where `shape` is (rows, columns). `projected`, (V, 3), holds column,
+    row and depth towards the viewer of each vertex; `outer` and `inner` hold its (V, 3) colours, 0 to 255, on the side
+    from which the corners of a triangle run counter-clockwise, and on the other side. Colours and depth are linear over
+    a triangle, as the projection is orthographic. Among triangles at the same depth the first wins.
     """
     rows, columns = shape
     samples = np.zeros((rows, columns, 4), np.float32)
@@ -123,7 +126,7 @@ def rasterise(
 
 @compiled
 def _mean_of_samples(samples: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """RGBA pixels of `_SAMPLES` x `_SAMPLES` samples: colour is the mean of those covered, alpha the share of them."""
+    """RGBA pixels of `_SAMPLES` x `_SAMPLES` samples: colour is the mean of the covered samples, alpha their share."""
     rows, columns = samples.shape[0] // _SAMPLES, samples.shape[1] // _SAMPLES
     pixels = np.zeros((rows, columns, 4), np.uint8)
     for row in range(rows):
@@ -145,7 +148,7 @@ def _mean_of_samples(samples: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def png_bytes(pixels: NDArray[np.uint8]) -> bytes:
-    """(rows, columns, 3 or 4) pixels as PNG."""
+    """Encode (rows, columns, 3 or 4) pixels as PNG."""
     buffer = io.BytesIO()
     Image.fromarray(pixels).save(buffer, "PNG", compress_level=_COMPRESSION)
     return buffer.getvalue()

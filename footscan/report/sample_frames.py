@@ -1,4 +1,4 @@
-"""Frames of each camera along the travel, with the stripe points found in them, to be gone through by a slider."""
+"""Frames of each camera along the travel with their stripe points, browsed by a slider."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ from footscan.report.markup import data_uri, number
 _MARGIN_PX = 20
 _ASPECT = 4 / 3
 _LEAST_WIDTH_PX = 160
+"""Margin around the stripe points, aspect and least width of a cut; chosen by hand."""
 _SHOWN_PX = 320
-"""A wider cut is scaled down to this: some 6 kB, and a scan shows a hundred."""
+"""Width to which a wider cut is scaled down: some 6 kB each, and the page of a scan shows a hundred."""
 _MOST_DOTS = 150
-"""Of the points of a frame so many are drawn, one of every few."""
-
+"""Most points of a frame that are drawn, for the size of the page."""
 _DOTS_ACROSS = 160
-"""So many dots side by side are as wide as a cut, however large that is."""
+"""Width of a cut in dots; the dots scale with the cut. Chosen by hand."""
 
 
 @dataclass(frozen=True)
 class FrameSample:
-    """A frame and the stripe points found in it."""
+    """A frame and its stripe points."""
 
     camera: int
     frame: int
@@ -37,7 +37,7 @@ class FrameSample:
 
 
 def sample_frames(samples: Sequence[FrameSample]) -> str:
-    """A group of figures for each frame, one of them seen at a time once `FRAMES_SCRIPT` has run.
+    """Groups of figures, one group per frame; `FRAMES_SCRIPT` shows one group at a time.
 
     Each figure is a cut around all stripes of its camera, as SVG with the points drawn over the pixels.
     """
@@ -72,9 +72,9 @@ FRAMES_SCRIPT = """\
 
 
 def _cut_of(samples: Iterable[FrameSample], camera: int) -> tuple[int, int, int, int]:
-    """The cut that shows the stripes of all samples of a camera: the picture stays where it is from frame to frame."""
-    own = [sample for sample in samples if sample.camera == camera]
-    return crop(own[0].image.shape, *(np.concatenate([getattr(one, axis) for one in own]) for axis in "ij"))
+    """The cut around the stripes of all samples of a camera, so that the picture does not move from frame to frame."""
+    of_camera = [sample for sample in samples if sample.camera == camera]
+    return crop(of_camera[0].image.shape, *(np.concatenate([getattr(s, axis) for s in of_camera]) for axis in "ij"))
 
 
 def _figure(sample: FrameSample, cut: tuple[int, int, int, int]) -> str:
@@ -101,9 +101,12 @@ def _figure(sample: FrameSample, cut: tuple[int, int, int, int]) -> str:
 
 
 def crop(shape: tuple[int, ...], i: NDArray[np.floating], j: NDArray[np.floating]) -> tuple[int, int, int, int]:
-    """First row, rows, first column and columns of the part of an image that shows the points (i, j) best.
+    """First row, number of rows, first column and number of columns of the cut around the points (i, j), px.
 
-    It is 4:3 where the image allows, and the whole image where there are no points.
+    Its aspect is 4:3 as far as the image allows. Without points it is the whole image.
+
+    >>> crop((480, 640), np.array([300.0, 340.0]), np.array([200.0, 260.0]))
+    (170, 120, 240, 160)
     """
     rows, columns = shape[:2]
     if not len(i):

@@ -1,4 +1,4 @@
-"""How the page looks: on a screen, on a phone and on paper."""
+"""The style sheet of all pages: for screens, phones and paper."""
 
 STYLE = """\
 :root { --ink: #1c2530; --soft: #5b6672; --rule: #dde2e7; --accent: #1f6f8b; --ground: #f5f7f8; }

@@ -1,4 +1,4 @@
-"""The surface from its six sides, over a grid in mm."""
+"""Pictures of a surface from six sides, over a grid in mm."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,15 +13,17 @@ from schemas.base.model import Side
 
 PIXELS_PER_MM = 3.0
 _MARGIN_MM = 8.0
+"""Resolution and margin of the pictures; chosen by hand."""
 _LABELS_LEFT_MM, _LABELS_BELOW_MM = 17.0, 13.0
 """Room for the figures of the grid."""
 _GRID_MM = 10
 _LABELLED_MM = 50
+"""Spacing of the lines of the grid, and of the labelled lines."""
 
 
 @dataclass(frozen=True)
 class View:
-    """Where a picture is seen from. `right` and `up` are the axes to the right and up in it: sign, then 0 to 2."""
+    """The direction of a picture. `right` and `up` are the axes that point right and up: sign, then axis 0 to 2."""
 
     title: str
     right: tuple[int, int]
@@ -29,10 +31,11 @@ class View:
 
 
 X, Y, Z = range(3)
+"""Axes of the foot's frame."""
 
 
 def views_of(side: Side | None) -> list[View]:
-    """The six sides of a foot in its own frame, named for which foot it is; of another thing (None), for its axes.
+    """The six views of a foot in its own frame, named for its side; without a side they are named for the axes.
 
     A foot has X from heel to toes, Y to its own left, Z up.
     """
@@ -56,10 +59,10 @@ def views_of(side: Side | None) -> list[View]:
 def upright(
     vertices: NDArray[np.float64], transform: Sequence[Sequence[float]] | NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(V, 3) vertices in mm, moved from the scanner's frame to the foot's by the 4 x 4 `transform` of its measures.
+    """Move (V, 3) vertices, mm, from the scanner's frame to the foot's by the 4 x 4 `transform` of its measures.
 
-    X runs from heel to toes, Y to the foot's own left, Z up. The transform mirrors left feet into right ones; a picture
-    shows the foot as it is, so this is undone.
+    X runs from heel to toes, Y to the foot's own left, Z up. The transform mirrors left feet into right feet; this
+    mirror is undone here, so that pictures show the foot as it is.
     """
     matrix = np.array(transform, np.float64)
     if np.linalg.det(matrix[:3, :3]) < 0:
@@ -75,15 +78,15 @@ def surface_views(
     side: Side | None,
     last: str = "",
 ) -> str:
-    """Six pictures of a surface as SVG, as `views_of` names them, and the figure `last` behind them.
+    """Draw the six views of `views_of` as SVG, followed by the figure `last`.
 
     Parameters
     ----------
     vertices : (V, 3) float64, mm, foot's frame
     faces : (F, 3) int
     colours : (V, 3) uint8, RGB
-    side : which foot it is; None for another thing
-    last : markup, if anything
+    side : which foot it is; None if the surface is not a foot
+    last : markup; default: none
     """
     views = views_of(side)
     widest = max(float(np.ptp(vertices[:, view.right[1]])) for view in views) + 2 * _MARGIN_MM + _LABELS_LEFT_MM
@@ -99,9 +102,9 @@ def render_view(
     colours: NDArray[np.uint8],
     normals: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.uint8], float, float]:
-    """The picture of a view, (rows, columns, 4) RGBA, `PIXELS_PER_MM` large, and its left and lower edge in mm.
+    """Render a view as (rows, columns, 4) uint8, RGBA, at `PIXELS_PER_MM`; also return its left and lower edge in mm.
 
-    Parameters are those of `surface_views`; `normals` : (V, 3) unit vectors, outward, where they are known already.
+    Parameters as in `surface_views`; `normals` : (V, 3) outward unit vectors, computed by default
     """
     right, up = (sign * vertices[:, axis] for sign, axis in (view.right, view.up))
     towards = np.cross(_unit(*view.right), _unit(*view.up))
@@ -125,7 +128,7 @@ def _figure(
     picture = data_uri("image/png", png_bytes(pixels))
     box = f"{-_LABELS_LEFT_MM:g} 0 {width + _LABELS_LEFT_MM:.2f} {height + _LABELS_BELOW_MM:.2f}"
     grid = "".join(_grid_lines(view, left, bottom, width, height))
-    share = min(1.0, (width + _LABELS_LEFT_MM) / widest)  # whole pixels make it wider, and two must fit side by side
+    share = min(1.0, (width + _LABELS_LEFT_MM) / widest)  # two must fit side by side, rounded to pixels
     return (
         f'<figure class="view" style="--share:{share:.4f}"><figcaption>{text(view.title)}</figcaption>'
         f'<svg viewBox="{box}" role="img" aria-label="{text(view.title)}">{grid}'
@@ -140,7 +143,7 @@ def _unit(sign: int, axis: int) -> NDArray[np.float64]:
 
 
 def _grid_lines(view: View, left: float, bottom: float, width: float, height: float) -> Iterator[str]:
-    """Lines every `_GRID_MM`, figures on every `_LABELLED_MM`, in the foot's own coordinates."""
+    """Grid lines every `_GRID_MM`, with figures every `_LABELLED_MM`, in the foot's own coordinates."""
     for at in range(_multiple_above(left), int(np.floor(left + width)) + 1, _GRID_MM):
         place = f"{at - left:.2f}"
         labelled = at % _LABELLED_MM == 0

@@ -1,4 +1,4 @@
-"""A foot as a small picture, from above."""
+"""A small picture of a foot from above."""
 
 from collections.abc import Sequence
 
@@ -10,13 +10,13 @@ from footscan.report.render import png_bytes, render_mesh
 from footscan.report.surface_views import upright
 
 WIDTH_PX, HEIGHT_PX = 192, 80
-"""Twice what is shown, for fine screens."""
+"""Twice the size at which it is shown, for screens of high resolution."""
 _LONGEST_MM = 320.0
-"""All feet are drawn to one scale, in which this fills the width; a longer one is drawn smaller."""
+"""Length that fills the width. All feet have this scale, so that sizes compare; a longer foot is drawn smaller."""
 
 
 def thumbnail(vertices: NDArray[np.float64], faces: NDArray[np.integer], transform: Sequence[Sequence[float]]) -> bytes:
-    """A PNG on a clear ground, the toes to the right.
+    """Draw a foot with its toes to the right, as PNG on a transparent ground.
 
     Parameters
     ----------

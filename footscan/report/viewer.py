@@ -1,4 +1,4 @@
-"""The surface in 3D, to be turned by hand: a small mesh on the page, in colours and with sections to choose."""
+"""An interactive 3D view of a surface: a decimated mesh in the page, with a choice of colours and sections."""
 
 import base64
 import json
@@ -14,30 +14,30 @@ from footscan.surface.collapse import collapse_edges
 from footscan.surface.decimate import outermost
 
 _MOST_TRIANGLES = 12_000
-"""They have no more than 36,000 corners, so 16 bits number them; some 150 kB on the page."""
+"""Bound of memory: their corners have 16-bit numbers, and they take some 150 kB of the page."""
 _VIEWS = {"above": "Above", "below": "Below", "left": "Left", "right": "Right", "front": "Front", "back": "Back"}
 
 Floats = NDArray[np.float64]
 
 
 class Colouring(NamedTuple):
-    """Colours of a surface that a person may choose."""
+    """Colours of a surface that a reader may choose."""
 
     name: str
     """Any text."""
     colours: NDArray[np.uint8]
-    """(V, 3) RGB"""
+    """(V, 3) RGB."""
     meaning: str = ""
-    """What they mean; markup."""
+    """Legend; markup."""
 
 
 class Drawing(NamedTuple):
-    """What is drawn over a surface, in its frame, mm."""
+    """Lines and points that are drawn over a surface, mm, in its frame."""
 
     lines: Sequence[Floats] = ()
-    """(N, 3) each"""
+    """(N, 3) each."""
     points: Sequence[Floats] = ()
-    """(3,) each"""
+    """(3,) each."""
 
 
 def viewer(
@@ -47,18 +47,18 @@ def viewer(
     drawings: Mapping[str, Drawing] | None = None,
     landmarks: Mapping[str, Floats] | None = None,
 ) -> str:
-    """A canvas that shows the surface once `footscan.report.viewer_script.SCRIPT` has run, and is not seen without it.
+    """A canvas that shows the surface; it is hidden until `footscan.report.viewer_script.SCRIPT` has run.
 
     Parameters
     ----------
     vertices : (V, 3) float64, mm, foot's frame, Z up
     faces : (F, 3) int, counter-clockwise as seen from outside
-    colourings : one at least; the first is shown until another is chosen
-    drawings : by name; shown by a click in a row of a table that holds an element with the name as `data-shows` and
-        what is to be told as `data-told`
-    landmarks : (3,) places by name, any text, which a person may have shown
+    colourings : at least one; the first is shown until the reader chooses another
+    drawings : by name; a drawing is shown by a click in a table row with an element that has the name as `data-shows`
+        and a caption as `data-told`
+    landmarks : (3,) positions by name (any text), shown on demand
     """
-    places, corners, colours = _smaller(vertices, faces, np.hstack([one.colours for one in colourings]))
+    places, corners, colours = _smaller(vertices, faces, np.hstack([colouring.colours for colouring in colourings]))
     middle = (places.min(axis=0) + places.max(axis=0)) / 2
     radius = max(float(np.linalg.norm(places - middle, axis=1).max()), np.finfo(np.float64).tiny)
 
@@ -67,7 +67,7 @@ def viewer(
 
     arrays = {
         "points": scaled(places).astype("<i2"),
-        # Of a surface in thousands of shreds, which has no smaller form, what 16 bits cannot number is not shown.
+        # A surface in thousands of shreds cannot be decimated: faces whose corners exceed 16 bits are left out.
         "faces": corners[(corners < 2**16).all(axis=1)].astype("<u2"),
         "colours": np.concatenate(np.split(colours, len(colourings), axis=1)),
     }
@@ -92,7 +92,7 @@ def viewer(
 def _smaller(
     vertices: Floats, faces: NDArray[np.integer], colours: NDArray[np.uint8]
 ) -> tuple[Floats, NDArray[np.integer], NDArray[np.uint8]]:
-    """The surface with fewer triangles, its (V, K) colours interpolated."""
+    """Decimate the surface; its (V, K) colours are interpolated."""
     kept = np.unique(faces)
     whole = used(Mesh(vertices, np.asarray(faces, np.int32)))
     if len(faces) <= _MOST_TRIANGLES:
@@ -114,14 +114,14 @@ def _choices(colourings: Sequence[Colouring]) -> str:
         return ""
     choices = "".join(
         f'<label><input type="radio" name="colouring" value="{number}"{"" if number else " checked"}>'
-        f"<span>{text(one.name)}</span></label>"
-        for number, one in enumerate(colourings)
+        f"<span>{text(colouring.name)}</span></label>"
+        for number, colouring in enumerate(colourings)
     )
     return f'<div class="choices" role="radiogroup" aria-label="Colours">{choices}</div>'
 
 
 def _controls(with_landmarks: bool) -> str:
-    views = "".join(f'<button type="button" data-view="{name}">{said}</button>' for name, said in _VIEWS.items())
+    views = "".join(f'<button type="button" data-view="{name}">{label}</button>' for name, label in _VIEWS.items())
     marks = '<label><input id="landmarks" type="checkbox"> Landmarks</label>' if with_landmarks else ""
     return (
         f'<div class="controls">{views}<input id="zoom" type="range" min="0.8" max="4" step="any" value="1" '
@@ -131,7 +131,7 @@ def _controls(with_landmarks: bool) -> str:
 
 def _meanings(colourings: Sequence[Colouring]) -> str:
     return "".join(
-        f'<div data-meaning="{number}"{" hidden" if number else ""}>{one.meaning}</div>'
-        for number, one in enumerate(colourings)
-        if one.meaning
+        f'<div data-meaning="{number}"{" hidden" if number else ""}>{colouring.meaning}</div>'
+        for number, colouring in enumerate(colourings)
+        if colouring.meaning
     )

@@ -1,4 +1,4 @@
-"""What makes the canvas of a page turn: plain JavaScript, no library, no graphics card."""
+"""The script that turns the canvas of a page: plain JavaScript, without library or graphics card."""
 
 SCRIPT = """\
 (() => {

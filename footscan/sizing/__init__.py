@@ -1,1 +1,1 @@
-"""What shoes a foot takes: sizes, widths, pairs, change over time, lasts."""
+"""Sizes and widths of shoes for a foot; pairs of feet, change over time, lasts."""

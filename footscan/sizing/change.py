@@ -1,4 +1,4 @@
-"""One foot at two times: what has changed, and what may be chance."""
+"""Changes between two measurements of one foot, and which of them may be chance."""
 
 import math
 
@@ -10,16 +10,16 @@ from schemas.pairs import Change, ChangeRow
 from schemas.sizes import Repeatability, SizeTable
 
 CONFIDENCE_95 = 1.96
-"""Standard deviations of a normal distribution that 95 % lie within."""
+"""95 % of a normal distribution lie within this number of standard deviations."""
 
 
 def change_over_time(earlier: Foot, later: Foot, table: SizeTable) -> Change:
-    """Differences of two measurements of one foot, later minus earlier, each beside the least that is none by chance.
+    """Compare two measurements of one foot: later minus earlier, each with the smallest real change.
 
     Raises
     ------
     RefusedInput
-        One is a left and one a right foot, or `earlier` is the later one.
+        One foot is a left and one a right foot, or `earlier` is the later one.
     """
     refuse_other_foot(earlier, later)
     days = (later.date - earlier.date).days if earlier.date and later.date else None
@@ -33,9 +33,9 @@ def change_over_time(earlier: Foot, later: Foot, table: SizeTable) -> Change:
 
 
 def smallest_real_change(name: str, unit: str, uncertainty: float | None, repeatability: Repeatability) -> float | None:
-    """The MDC95: 1.96 sqrt(2) times the standard error of one measurement, with both measurements' own on top.
+    """The MDC95 in mm: 1.96 sqrt(2) times the standard error of one measurement, plus the uncertainty of both meshes.
 
-    None where the scatter from scan to scan is not known: how well a mesh was made says nothing of how the foot stood.
+    None if the scatter from scan to scan is unknown: the uncertainty of a mesh does not include how the foot stood.
     """
     sem = repeatability.girths_mm if name.endswith("_girth") else repeatability.lengths_mm
     if unit != "mm" or sem is None:
@@ -45,22 +45,22 @@ def smallest_real_change(name: str, unit: str, uncertainty: float | None, repeat
 
 def _row(name: str, earlier: Foot, later: Foot, repeatability: Repeatability) -> ChangeRow:
     a, b = earlier.measures.get(name), later.measures.get(name)
-    found = difference(name, a, b, ("earlier", "later"))
+    change = difference(name, a, b, ("earlier", "later"))
     unit = unit_of(a, b)
-    limit = None if found.value is None else smallest_real_change(name, unit, found.uncertainty, repeatability)
-    otherwise = a is not None and b is not None and a.definition != b.definition
+    limit = None if change.value is None else smallest_real_change(name, unit, change.uncertainty, repeatability)
+    is_redefined = a is not None and b is not None and a.definition != b.definition
     return ChangeRow(
         measure=name,
         unit=unit,
         earlier=a.value if a else None,
         later=b.value if b else None,
-        difference=found.value,
-        uncertainty=found.uncertainty,
+        difference=change.value,
+        uncertainty=change.uncertainty,
         limit=limit,
-        significant=None if otherwise else _is_real(found, limit),
-        note=notes(found.note, "defined otherwise then and now" if otherwise and found.value is not None else None),
+        significant=None if is_redefined else _is_real(change, limit),
+        note=notes(change.note, "the definition changed" if is_redefined and change.value is not None else None),
     )
 
 
-def _is_real(found: Difference, limit: float | None) -> bool | None:
-    return None if found.value is None or limit is None else abs(found.value) > limit
+def _is_real(change: Difference, limit: float | None) -> bool | None:
+    return None if change.value is None or limit is None else abs(change.value) > limit

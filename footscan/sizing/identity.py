@@ -1,4 +1,4 @@
-"""Whose feet they are: what may stand side by side, and what is a mix-up."""
+"""Identity of measured feet: refusal of mixed-up patients, sides and dates."""
 
 from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
@@ -6,16 +6,17 @@ from schemas.pairs import Sighting
 
 
 def sighting(foot: Foot) -> Sighting:
-    """What identifies a measurement."""
+    """Source, patient, scan, side and date of a measurement."""
     return Sighting(source=foot.source, patient=foot.patient, scan=foot.scan, side=foot.side, date=foot.date)
 
 
 def refuse_other_patient(first: Foot, second: Foot) -> None:
-    """Refuses feet of two people, as far as the patients are known.
+    """Refuse feet of two patients, if both patients are known.
 
     Raises
     ------
     RefusedInput
+        The patients differ.
     """
     if first.patient and second.patient and first.patient != second.patient:
         problem = f"is of patient {second.patient}, expected {first.patient} as {first.source} is"
@@ -23,11 +24,12 @@ def refuse_other_patient(first: Foot, second: Foot) -> None:
 
 
 def refuse_sides(left: Foot, right: Foot) -> None:
-    """Refuses a pair whose left foot is a right one, or the other way round; an unknown side is taken as said.
+    """Refuse a pair whose left foot is a right one, or vice versa; an unknown side is assumed as stated.
 
     Raises
     ------
     RefusedInput
+        A foot is of the other side.
     """
     if left.side == "right" and right.side == "left":
         raise RefusedInput(left.source, "is a right foot, expected the left one first")
@@ -37,11 +39,12 @@ def refuse_sides(left: Foot, right: Foot) -> None:
 
 
 def refuse_other_foot(earlier: Foot, later: Foot) -> None:
-    """Refuses a left foot beside a right one, and a later measurement before an earlier one.
+    """Refuse a comparison of a left with a right foot, or of a later measurement with an earlier one.
 
     Raises
     ------
     RefusedInput
+        The sides differ, or the dates are in the wrong order.
     """
     if {earlier.side, later.side} == {"left", "right"}:
         raise RefusedInput(
@@ -52,13 +55,14 @@ def refuse_other_foot(earlier: Foot, later: Foot) -> None:
 
 
 def doubts(first: Foot, second: Foot) -> list[str]:
-    """What cannot be told of two measurements that should be of one person and alike."""
-    told = [f"{foot.source}: side unknown, taken as said" for foot in (first, second) if foot.side == "unknown"]
-    told += [f"{foot.source}: {foot.side_note}" for foot in (first, second) if foot.side_note]
+    """Reasons to doubt that two measurements are of one person and comparable."""
+    feet = (first, second)
+    reasons = [f"{foot.source}: side unknown, assumed as stated" for foot in feet if foot.side == "unknown"]
+    reasons += [f"{foot.source}: {foot.side_note}" for foot in feet if foot.side_note]
     if not (first.patient and second.patient):
-        told.append("patient not known of both, taken as one")
+        reasons.append("patient unknown for one or both, assumed to be the same")
     elif first.patient != second.patient:
-        told.append(f"of two patients: {first.patient} and {second.patient}")
+        reasons.append(f"of two patients: {first.patient} and {second.patient}")
     if first.axis != second.axis:
-        told.append(f"measured along other axes: {first.axis} and {second.axis}")
-    return told
+        reasons.append(f"measured along different axes: {first.axis} and {second.axis}")
+    return reasons

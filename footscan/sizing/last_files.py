@@ -1,4 +1,4 @@
-"""Tables of lasts: CSV files, a last a row."""
+"""Tables of lasts: CSV files with one last per row."""
 
 import difflib
 from collections.abc import Iterator, Sequence
@@ -19,19 +19,19 @@ RANGES_MM: dict[str, tuple[float, float]] = {
     "heel_height_mm": (0.0, 200.0),
     "toe_spring_mm": (0.0, 100.0),
 }
-"""Columns of numbers and what is taken for mm: a last in cm, or in inches, lies outside."""
+"""Columns of numbers and the ranges accepted as mm: a last in cm or inches lies outside. Chosen by hand."""
 TEXTS = ("last", "article", "size", "fullness", "side")
 COLUMNS = (*TEXTS, *RANGES_MM)
 
 
 def read_lasts(place: Path) -> list[Last]:
-    """All lasts in the CSV files of a folder and the folders below it, or in one file; in the order of their names.
+    """Read all lasts in the CSV files of a folder and the folders below it, or in one file, sorted by file name.
 
     Raises
     ------
     RefusedInput
-        No last is there, a last stands twice, or a cell is not as it should be; one line names file, row, column and
-        expectation.
+        There is no last, a last is listed twice, or a cell is not valid; the message names file, row, column and
+        expectation in one line.
     """
     files = [place] if place.is_file() else sorted(file for file in place.rglob("*") if file.suffix.lower() == ".csv")
     if not place.exists():
@@ -42,12 +42,12 @@ def read_lasts(place: Path) -> list[Last]:
             key = (last.name, last.article, last.size, last.fullness, last.side)
             if key in lasts:
                 raise RefusedInput(
-                    last.place, f"last {last.name!r} stands in {lasts[key].place} already, expected once"
+                    last.place, f"last {last.name!r} is listed in {lasts[key].place} already, expected once"
                 )
             lasts[key] = last
             refuse_beyond("lasts", len(lasts), place)
     if not lasts:
-        raise RefusedInput(place, "no lasts here, expected CSV files with a last a row")
+        raise RefusedInput(place, "no lasts here, expected CSV files with one last per row")
     return list(lasts.values())
 
 
@@ -63,13 +63,13 @@ def _lasts_of(file: Path) -> Iterator[Last]:
 
 
 def _check_header(file: Path, line: int, header: Sequence[str]) -> None:
-    for parted, name in ((";", "';'"), ("\t", "tabs")):
-        if len(header) == 1 and parted in header[0]:
-            problem = f"cells are parted by {name}, expected ',' between them and a decimal point in numbers"
+    for separator, name in ((";", "';'"), ("\t", "tabs")):
+        if len(header) == 1 and separator in header[0]:
+            problem = f"cells are separated by {name}, expected ',' between them and a decimal point in numbers"
             raise RefusedInput(file, problem, field=f"row {line}")
     for index, column in enumerate(header):
         if column in header[:index]:
-            raise RefusedInput(file, "stands twice, expected each column once", field=f"row {line}, column {column}")
+            raise RefusedInput(file, "is listed twice, expected each column once", field=f"row {line}, column {column}")
         if column not in COLUMNS:
             near = difflib.get_close_matches(column, COLUMNS, n=1)
             instead = f"did you mean {near[0]!r}?" if near else f"expected some of {', '.join(COLUMNS)}"
@@ -80,7 +80,7 @@ def _check_header(file: Path, line: int, header: Sequence[str]) -> None:
 
 
 def _last(file: Path, line: int, row: dict[str, str], *, alone: bool) -> Last:
-    """A row of a table; one that is `alone` in its file may be named by it."""
+    """The last of one row; a last that is `alone` in its file may take its name from the file."""
     numbers = {column: _number(file, line, column, row.get(column, "")) for column in RANGES_MM}
     texts = {column: row.get(column) or None for column in TEXTS}
     parts = [part for part in (texts["article"], texts["size"], texts["fullness"]) if part]
@@ -118,6 +118,6 @@ def _number(file: Path, line: int, column: str, cell: str) -> float | None:
 def _side(file: Path, line: int, cell: str | None) -> LastSide:
     for side in get_args(LastSide):
         if (cell or "both").lower() == side:
-            found: LastSide = side
-            return found
+            valid_side: LastSide = side
+            return valid_side
     raise RefusedInput(file, f"expected left, right or both, found {cell!r}", field=f"row {line}, column side")

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from footscan.sizing.readings import Known, known
+from footscan.sizing.readings import UsableMeasure, usable_measure
 from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
 from schemas.lasts import Allowance, Deviation, Last, LastFit, LastMeasure, LastRules, LastSide, RankedLast, Ranking
 
-OF_FOOT: dict[LastMeasure, str] = {
+FOOT_MEASURES: dict[LastMeasure, str] = {
     "length": "foot_length",
     "ball_length": "ball_length",
     "ball_girth": "ball_girth",
@@ -15,28 +15,29 @@ OF_FOOT: dict[LastMeasure, str] = {
     "instep_girth": "instep_girth",
     "heel_girth": "heel_girth",
 }
+"""Measure of the foot for each measure of a last"""
 INDISPENSABLE: tuple[LastMeasure, ...] = ("length", "ball_girth")
-"""Without these of the foot no last can be chosen."""
+"""Measures of the foot without which no last can be chosen"""
 PREFERRED: dict[str, tuple[LastSide, ...]] = {
     "left": ("left", "both", "right"),
     "right": ("right", "both", "left"),
     "foot": ("both", "right", "left"),
 }
-"""Which last of a group is for a foot of which side."""
+"""Preferred lasts of a group, in order, for a foot of each side"""
 Allowances = Mapping[LastMeasure, Allowance]
 SidedLasts = Mapping[LastSide, Last]
 """A last, or the left and the right one of a pair of lasts."""
-Measured = Mapping[LastMeasure, Known]
-"""Of a foot."""
+Measured = Mapping[LastMeasure, UsableMeasure]
+"""Measures of a foot, under the names of a last's measures"""
 
 
 def rank_lasts(feet: Sequence[Foot], lasts: Iterable[Last], rules: LastRules, purpose: str) -> Ranking:
-    """Lasts for one foot or both feet of a person, the best first, those that are out at the end.
+    """Rank lasts for one foot or both feet of a person, the best first, rejected ones at the end.
 
-    Each is held beside each foot; what lies outside what the purpose allows counts with weight times its square, and of
-    a pair the worse foot counts. Among lasts that fit alike the one of which more was compared is first, then the one
-    nearest to the middle of what is allowed.
-    A last of the other side is mirrored, unless its partner is there.
+    The score of a last is the sum, over its measures, of weight times squared distance from the range that the purpose
+    allows; for a pair, the score of the worse foot counts. Of equal scores, the last with more measures compared comes
+    first, then the one nearest to the middle of the allowed ranges. A last of the other side is mirrored, unless its
+    partner is in the table.
 
     Raises
     ------
@@ -48,11 +49,11 @@ def rank_lasts(feet: Sequence[Foot], lasts: Iterable[Last], rules: LastRules, pu
     allowances = rules.purposes[purpose]
     by_side = _by_side(feet)
     measured = {side: _measured(foot) for side, foot in by_side.items()}
-    beside = [
+    fits_of_groups = [
         {side: _fit(side, group, foot, allowances, rules) for side, foot in measured.items()}
         for group in _groups(lasts)
     ]
-    beside.sort(key=_order)
+    fits_of_groups.sort(key=_order)
     return Ranking(
         purpose=purpose,
         sides=[foot.side for foot in feet],
@@ -62,7 +63,7 @@ def rank_lasts(feet: Sequence[Foot], lasts: Iterable[Last], rules: LastRules, pu
             for name, measure in foot.items()
             if measure.mm is None and name in allowances
         ],
-        lasts=[_ranked(fits, place) for place, fits in enumerate(beside, 1)],
+        lasts=[_ranked(fits, place) for place, fits in enumerate(fits_of_groups, 1)],
     )
 
 
@@ -77,7 +78,7 @@ def _by_side(feet: Sequence[Foot]) -> dict[str, Foot]:
 
 
 def _groups(lasts: Iterable[Last]) -> list[SidedLasts]:
-    """Lasts of one name, article, size and fullness together: its left and its right one may differ."""
+    """Group lasts of one name, article, size and fullness, whose left and right one may differ."""
     groups: dict[tuple[str | None, ...], dict[LastSide, Last]] = {}
     for last in lasts:
         groups.setdefault((last.name, last.article, last.size, last.fullness), {})[last.side] = last
@@ -85,7 +86,7 @@ def _groups(lasts: Iterable[Last]) -> list[SidedLasts]:
 
 
 def _measured(foot: Foot) -> Measured:
-    measured = {name: known(foot, of_foot) for name, of_foot in OF_FOOT.items()}
+    measured = {name: usable_measure(foot, of_foot) for name, of_foot in FOOT_MEASURES.items()}
     for name in INDISPENSABLE:
         if measured[name].mm is None:
             raise RefusedInput(foot.source, f"{measured[name].note}, expected it to choose a last by")
@@ -93,8 +94,8 @@ def _measured(foot: Foot) -> Measured:
 
 
 def _fit(side: str, group: SidedLasts, foot: Measured, allowances: Allowances, rules: LastRules) -> LastFit:
-    """The last of a group that is for `side`, beside that foot."""
-    last = next(group[one] for one in PREFERRED[side] if one in group)
+    """Compare the last of a group that is for `side` with that foot."""
+    last = next(group[last_side] for last_side in PREFERRED[side] if last_side in group)
     deviations: dict[LastMeasure, Deviation] = {}
     score = distance = 0.0
     for name, allowance in allowances.items():
@@ -120,18 +121,18 @@ def _fit(side: str, group: SidedLasts, foot: Measured, allowances: Allowances, r
 
 
 def _rejections(last: Last, foot: Measured, rules: LastRules) -> list[str]:
-    found = []
+    rejections = []
     for name, least in rules.reject_below_mm.items():
         of_foot = foot[name].mm
         if of_foot is None or name not in last.measures:
             continue
         if (difference := last.measures[name] - of_foot) < least:
-            found.append(f"{name} minus the foot's is {difference:+.1f} mm, expected at least {least:+g}")
-    return found
+            rejections.append(f"{name} minus the foot's is {difference:+.1f} mm, expected at least {least:+g}")
+    return rejections
 
 
 def _order(fits: Mapping[str, LastFit]) -> tuple[bool, float, int, float, str, str]:
-    """By the worse foot; of equal scores the one first that rests on more measures."""
+    """Sort key: by the worse foot; of equal scores, the last with more measures compared comes first."""
     last = next(iter(fits.values())).last
     is_out = any(fit.rejected for fit in fits.values())
     score = max(fit.score for fit in fits.values())

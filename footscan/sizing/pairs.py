@@ -1,8 +1,8 @@
-"""Both feet of a person: how they differ, and the sizes that fit both."""
+"""Both feet of a person: their differences, and the sizes that fit both."""
 
 from footscan.sizing.differences import difference, measures_of, unit_of
 from footscan.sizing.identity import doubts, refuse_sides, sighting
-from footscan.sizing.readings import Known, known, notes
+from footscan.sizing.readings import UsableMeasure, notes, usable_measure
 from footscan.sizing.sizes import NEEDED, sizes_of
 from schemas.base.model import Side
 from schemas.feet import Foot
@@ -11,9 +11,9 @@ from schemas.sizes import Asymmetry, People, SizeTable
 
 
 def compare_pair(left: Foot, right: Foot, table: SizeTable, people: People | None = None) -> Pair:
-    """Differences of both feet, right minus left, and the sizes of shoes for both.
+    """Compare both feet, right minus left, and compute the sizes of shoes for both.
 
-    The longer foot decides the size, the wider one the width: of every measure the larger one is taken.
+    The longer foot decides the size, the wider one the width: the larger value of every measure is taken.
 
     Raises
     ------
@@ -32,33 +32,36 @@ def compare_pair(left: Foot, right: Foot, table: SizeTable, people: People | Non
     )
 
 
-def _larger(name: str, left: Foot, right: Foot) -> tuple[Known, Side | None]:
-    """The larger of both feet's measures, and whose it is where they differ; none where one foot has none, for it may
-    be larger."""
-    ours: dict[Side, Known] = {"left": known(left, name), "right": known(right, name)}
-    missing = [f"{side} foot: {one.note}" for side, one in ours.items() if one.mm is None]
+def _larger(name: str, left: Foot, right: Foot) -> tuple[UsableMeasure, Side | None]:
+    """Returns the larger value of a measure, and the side that has it if the values differ.
+
+    Without a value of one foot there is no larger one, since the missing value may be it.
+    """
+    by_side: dict[Side, UsableMeasure] = {"left": usable_measure(left, name), "right": usable_measure(right, name)}
+    missing = [f"{side} foot: {measure.note}" for side, measure in by_side.items() if measure.mm is None]
     if missing:
-        return Known(None, notes(*missing)), None
-    side = max(ours, key=lambda one: ours[one].mm or 0.0)
-    note = ours[side].note
-    larger = Known(ours[side].mm, f"{side} foot: {note}" if note else None)
-    return larger, None if ours["left"].mm == ours["right"].mm else side
+        return UsableMeasure(None, notes(*missing)), None
+    side = max(by_side, key=lambda side: by_side[side].mm or 0.0)
+    note = by_side[side].note
+    larger = UsableMeasure(by_side[side].mm, f"{side} foot: {note}" if note else None)
+    return larger, None if by_side["left"].mm == by_side["right"].mm else side
 
 
 def _row(name: str, left: Foot, right: Foot, asymmetry: Asymmetry) -> PairRow:
     a, b = left.measures.get(name), right.measures.get(name)
-    found = difference(name, a, b, ("left foot", "right foot"))
+    right_minus_left = difference(name, a, b, ("left foot", "right foot"))
     sd = asymmetry.sd_mm.get(name)
-    sds = None if found.value is None or sd is None else round(abs(found.value) / sd, 2)
+    sds = None if right_minus_left.value is None or sd is None else round(abs(right_minus_left.value) / sd, 2)
     is_unusual = sds is not None and sds > asymmetry.unusual_beyond
+    unusual = f"unusual: {sds:.1f} standard deviations over people" if is_unusual else None
     return PairRow(
         measure=name,
         unit=unit_of(a, b),
         left=a.value if a else None,
         right=b.value if b else None,
-        difference=found.value,
-        uncertainty=found.uncertainty,
-        larger=None if not found.value else "right" if found.value > 0 else "left",
+        difference=right_minus_left.value,
+        uncertainty=right_minus_left.uncertainty,
+        larger=None if not right_minus_left.value else "right" if right_minus_left.value > 0 else "left",
         usual_sds=sds,
-        note=notes(found.note, f"unusual: {sds:.1f} standard deviations over people" if is_unusual else None),
+        note=notes(right_minus_left.note, unusual),
     )

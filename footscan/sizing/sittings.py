@@ -1,4 +1,4 @@
-"""Which scans of a person belong together: both feet of one day, and one foot on two days."""
+"""Scans of a person that belong together: both feet of one day, or one foot on two days."""
 
 from collections.abc import Iterable, Sequence
 from datetime import date
@@ -8,19 +8,19 @@ from schemas.feet import Foot
 
 
 def latest_pair(patient: str, feet: Sequence[Foot]) -> tuple[Foot, Foot]:
-    """The left and the right foot of the latest day that has both; without any days, the only ones that there are.
+    """Find the left and the right foot of the latest day that has both; without dates, the only left and right foot.
 
-    A scan that was not measured does not count, nor one without a day where others have one. `patient` is what a
-    message calls them.
+    Scans that were not measured are left out, and so are scans without a date if others have one. Messages name
+    `patient`.
 
     Raises
     ------
     RefusedInput
-        No day has both feet, or that day has one of them twice.
+        No day has both feet, or the latest such day has several scans of one foot.
     """
     days = _days(feet)
-    told: list[date | None] = [*sorted((day for day in days if day), reverse=True)]
-    for day in told or [None]:
+    latest_first: list[date | None] = [*sorted((day for day in days if day), reverse=True)]
+    for day in latest_first or [None]:
         left, right = (_of_side(days.get(day, []), side) for side in ("left", "right"))
         if left and right:
             return _only(patient, left), _only(patient, right)
@@ -28,12 +28,12 @@ def latest_pair(patient: str, feet: Sequence[Foot]) -> tuple[Foot, Foot]:
 
 
 def latest_changes(patient: str, feet: Sequence[Foot]) -> list[tuple[Foot, Foot]]:
-    """Earlier and later of the last two days on which the left, and on which the right foot was measured.
+    """Find for each side the earlier and the later foot of the last two days on which it was measured.
 
     Raises
     ------
     RefusedInput
-        Neither foot has two days that the names of its scans tell, or one of those days has the foot twice.
+        Neither foot has scans of two days, by the dates in their names, or one of those days has several scans of it.
     """
     changes = []
     for side in ("left", "right"):
@@ -47,8 +47,8 @@ def latest_changes(patient: str, feet: Sequence[Foot]) -> list[tuple[Foot, Foot]
     return changes
 
 
-def passed_over(feet: Iterable[Foot], taken: Sequence[Foot]) -> list[Foot]:
-    """Those that a user may wonder about: they are no older than what was `taken`, or have no day."""
+def feet_left_out(feet: Iterable[Foot], taken: Sequence[Foot]) -> list[Foot]:
+    """Feet that were not `taken` although they are no older than the oldest one taken, or have no date."""
     oldest = min((foot.date for foot in taken if foot.date), default=None)
     return [foot for foot in feet if foot not in taken and (foot.date is None or oldest is None or foot.date >= oldest)]
 

@@ -3,26 +3,26 @@
 import math
 from typing import NamedTuple
 
-from footscan.sizing.readings import Known, KnownMeasures, known, notes
+from footscan.sizing.readings import UsableMeasure, UsableMeasures, notes, usable_measure
 from schemas.feet import Foot
 from schemas.sizes import ArchRule, FoundSize, FoundWidth, People, Sizes, SizeScale, SizeTable, WidthScale
 
 NEEDED = ("foot_length", "ball_length", "foot_breadth", "ball_girth")
-"""Measures that sizes and widths are made of."""
+"""Measures from which sizes and widths are computed"""
 NOISE = 1e-9
-"""Of a step: a size that is a step but for the arithmetic is that step."""
+"""Rounding error of a size, in steps: a size that differs from a step by less is that step."""
 
 
 def foot_sizes(foot: Foot, table: SizeTable, people: People | None = None) -> Sizes:
-    """The sizes and widths that one foot takes, for `people` or for all.
+    """Compute the sizes and widths of one foot, on the scales for `people` or on all.
 
-    What cannot be told for want of a measure has no size and a note that says why.
+    A size that lacks a measure is None, with a note that says why.
     """
-    return sizes_of({name: known(foot, name) for name in NEEDED}, table, people)
+    return sizes_of({name: usable_measure(foot, name) for name in NEEDED}, table, people)
 
 
-def sizes_of(measures: KnownMeasures, table: SizeTable, people: People | None = None) -> Sizes:
-    """The same for measures that may be those of two feet. `measures` has all that are `NEEDED`."""
+def sizes_of(measures: UsableMeasures, table: SizeTable, people: People | None = None) -> Sizes:
+    """Compute sizes and widths from measures, which may be those of two feet; `measures` has all of `NEEDED`."""
     sizes = [
         _size(name, scale, measures, table.arch)
         for name, scale in table.sizes.items()
@@ -37,14 +37,15 @@ def sizes_of(measures: KnownMeasures, table: SizeTable, people: People | None = 
 
 
 class _Deciding(NamedTuple):
-    """The size that a foot's length, or its arch, comes to."""
+    """The unrounded size by the length of a foot or by its arch."""
 
     value: float | None
     measure: str | None
+    """The measure that decides the size"""
     note: str | None
 
 
-def _size(name: str, scale: SizeScale, measures: KnownMeasures, arch: ArchRule) -> FoundSize:
+def _size(name: str, scale: SizeScale, measures: UsableMeasures, arch: ArchRule) -> FoundSize:
     deciding = _deciding(scale, measures, arch)
     rounded, note = None, deciding.note
     value = deciding.value
@@ -74,8 +75,8 @@ def _size(name: str, scale: SizeScale, measures: KnownMeasures, arch: ArchRule) 
     )
 
 
-def _deciding(scale: SizeScale, measures: KnownMeasures, arch: ArchRule) -> _Deciding:
-    """By the foot's length; by its arch where the scale has that rule and the arch asks for more (Brannock)."""
+def _deciding(scale: SizeScale, measures: UsableMeasures, arch: ArchRule) -> _Deciding:
+    """The size by the length of the foot, or by its arch if the scale has that rule and it gives more (Brannock)."""
     length, ball = measures["foot_length"], measures["ball_length"]
     if length.mm is None:
         return _Deciding(None, None, length.note)
@@ -92,12 +93,12 @@ def _deciding(scale: SizeScale, measures: KnownMeasures, arch: ArchRule) -> _Dec
 
 
 def unrounded_size(length_mm: float, scale: SizeScale) -> float:
-    """The size of a foot length, on the running scale."""
+    """The unrounded size of a foot length in mm, on the scale without its restart."""
     return (length_mm + scale.allowance_mm) / scale.unit_mm - scale.zero
 
 
 def round_size(value: float, scale: SizeScale) -> float:
-    """The step that an unrounded size is marked by: the one above where more than `up_beyond` is left over.
+    """Round a size to a step of the scale: down, or up if more than `up_beyond` is left over.
 
     >>> from footscan.sizing.table import read_table
     >>> uk = read_table().sizes["uk"]
@@ -117,7 +118,7 @@ def _beyond(rounded: float, scale: SizeScale) -> str | None:
     return f"above the scale, which ends at {scale.largest:g}" if rounded > scale.largest else None
 
 
-def _width(name: str, scale: WidthScale, measures: KnownMeasures) -> FoundWidth:
+def _width(name: str, scale: WidthScale, measures: UsableMeasures) -> FoundWidth:
     length, measured = measures["foot_length"], measures[scale.measure]
     steps = width_steps(length, measured, scale)
     width, limit = (None, None) if steps is None else _name_of(steps, scale)
@@ -138,8 +139,8 @@ def _width(name: str, scale: WidthScale, measures: KnownMeasures) -> FoundWidth:
     )
 
 
-def width_steps(length: Known, measured: Known, scale: WidthScale) -> float | None:
-    """Unrounded steps from the scale's middle width; None where a measure is missing."""
+def width_steps(length: UsableMeasure, measured: UsableMeasure, scale: WidthScale) -> float | None:
+    """Unrounded steps from the scale's middle width; None if a measure is missing."""
     if length.mm is None or measured.mm is None:
         return None
     middle = scale.middle_mm + scale.per_mm * (length.mm - scale.at_length_mm)
@@ -147,7 +148,7 @@ def width_steps(length: Known, measured: Known, scale: WidthScale) -> float | No
 
 
 def _name_of(steps: float, scale: WidthScale) -> tuple[str | None, str | None]:
-    """The nearest width, or why there is none."""
+    """Returns the nearest width, or the reason why there is none."""
     place = scale.names.index(scale.middle) + _nearest(steps)
     if place < 0:
         return None, f"narrower than {scale.names[0]}"
@@ -157,5 +158,5 @@ def _name_of(steps: float, scale: WidthScale) -> tuple[str | None, str | None]:
 
 
 def _nearest(value: float) -> int:
-    """Nearest whole number; the larger of two equally near, as JIS S 5037 has it (-3 to +2 mm of a step of 6)."""
+    """Nearest whole number; the larger of two equally near, as in JIS S 5037 (-3 to +2 mm of a step of 6)."""
     return math.floor(value + 0.5 + NOISE)

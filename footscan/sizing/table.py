@@ -1,4 +1,4 @@
-"""The table of sizes, widths and lasts: the one that comes along, or a user's edited copy."""
+"""The table of sizes, widths and lasts: the built-in one, or an edited copy of it."""
 
 from pathlib import Path
 
@@ -9,11 +9,11 @@ TABLE = Path(__file__).with_name("sizes.yaml")
 
 
 def read_table(file: Path | None = None) -> SizeTable:
-    """The table in `file`, or the one that comes along.
+    """Read the table in `file`, or the built-in one.
 
     Raises
     ------
     RefusedInput
-        It breaks the format; one line names file, field and expectation.
+        The file breaks the format; the message names file, field and expectation in one line.
     """
     return read_yaml(file or TABLE, SizeTable)

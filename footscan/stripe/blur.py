@@ -1,38 +1,41 @@
-"""What a film tells of a piece of one frame: whether the laser has lit it, or the room, which lights the skin's rim.
+"""Rejection of pieces that the room has lit, not the laser: rims of skin.
 
-In a bright room the rim of the skin is lighter and redder than what lies behind it, as a stripe is, and a frame that
-the laser does not reach has nothing to hold against it. But the laser's line is narrow, smooth and red, all through a
-film. A rim is wide; its place, which the shading of the skin gives, is uncertain; and it is hardly redder than what is
-beside it.
+In a bright room the rim of the skin is lighter and redder than its background, as a stripe is. A frame that the laser
+does not reach has no stripe to compare the rim with. But the laser line is narrow, smooth and red throughout a film. A
+rim is wide, its place is uncertain (it follows the shading of the skin), and it is hardly redder than its surroundings.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from footscan.stripe.clutter import FEWEST_FRAMES
-from footscan.stripe.extract import FOUND, RED
+from footscan.stripe.extract import CROSSING_COLUMNS, RED
 from schemas.parameters.extraction import ExtractionParameters
 
-WIDTH, SIGMA = FOUND.index("width"), FOUND.index("sigma")
+WIDTH, SIGMA = CROSSING_COLUMNS.index("width"), CROSSING_COLUMNS.index("sigma")
 HARDLY_RED = 1.5
-"""Thresholds of redness: what is as wide and as uncertain as a rim and below so many is one. Where a tip of the foot
-makes the laser's line as wide, it mostly is twice as red."""
+"""Redness below which a wide and uncertain crossing is blurred, in units of `red_threshold`. Where a tip of the foot
+widens the laser line, the line is mostly twice as red. Chosen by hand."""
 BLURRED_SHARE = 0.5
-"""A piece with more than this share of its crossings blurred is."""
+"""A piece with more than this share of blurred crossings is blurred. Chosen by hand."""
 
 
 def is_laser_light(
     crossings: NDArray[np.float64], piece: NDArray[np.int32], frames: int, parameters: ExtractionParameters
 ) -> NDArray[np.bool_]:
-    """Which of the crossings of a film are of pieces that the laser has lit.
+    """Select the crossings of a film that lie in pieces lit by the laser.
 
-    The others are of pieces most of whose crossings exceed `largest_blur` times the film's median width, and as many
-    times its median uncertainty, and are hardly red. In films of few frames all are the laser's.
+    A piece is rejected if most of its crossings exceed `largest_blur` times the film's median width and `largest_blur`
+    times its median uncertainty, and are hardly red. In films of fewer than `FEWEST_FRAMES` frames all pieces are kept.
 
     Parameters
     ----------
-    crossings : (N, 10) of all `frames` frames, as `find_stripe` gives them.
-    piece : (N,) which piece of the film each is of.
+    crossings : (N, 10) float64, the crossings of all `frames` frames, in the columns of `find_stripe`.
+    piece : (N,) int32, the number of each crossing's piece in the film, from 0.
+
+    Returns
+    -------
+    (N,) bool, True for crossings of pieces that are kept.
     """
     if frames < FEWEST_FRAMES or not len(crossings):
         return np.ones(len(crossings), np.bool_)

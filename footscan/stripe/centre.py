@@ -1,10 +1,10 @@
 """The centre of one profile, to a fraction of a sample, by the method that the parameters name.
 
 threshold-median : the median of the samples above half height, as in the thesis
-gravity : the centre of gravity of what lies above a level
-gaussian : the Gaussian through the samples that are not saturated, their logarithms a parabola; where too few are
-    left, as `gravity` (H. Guo, "A simple algorithm for fitting a Gaussian function", IEEE Signal Processing Magazine
-    28(5), 2011, doi:10.1109/MSP.2011.941846)
+gravity : the centre of gravity of the part of the profile above a level
+gaussian : a Gaussian fitted to the samples that are not saturated, as a parabola through their logarithms; `gravity`
+    where too few samples are left (H. Guo, "A simple algorithm for fitting a Gaussian function", IEEE Signal
+    Processing Magazine 28(5), 2011, doi:10.1109/MSP.2011.941846)
 ridge : where the first derivative of the profile, smoothed by a Gaussian as wide as the stripe, is zero (Steger 1998)
 fir : the zero crossing of a difference of two boxes, each as long as the stripe is wide (F. Blais and M. Rioux,
     "Real-time numerical peak detector", Signal Processing 11(2), 1986, doi:10.1016/0165-1684(86)90033-2)
@@ -19,15 +19,24 @@ from footscan.compiled import compiled
 from footscan.stripe.limits import FIR, GAUSSIAN, GRAVITY, RIDGE, Limits
 
 SCALE = 0.5
-"""Standard deviation of the smoothing of `ridge`, in widths of the stripe: 1.18 times that of a Gaussian profile, and
-where the flanks of a saturated one are. Steger asks for 0.29 at least."""
+"""Standard deviation of the smoothing of `ridge`, in widths of the stripe: 1.18 times that of a Gaussian profile, so
+that it reaches the flanks of a saturated stripe. Steger (1998) requires 0.29 at least. Chosen by hand."""
 CUT = 2.6
-"""Where the smoothing of `ridge` ends, in its standard deviations."""
+"""Half length of the smoothing window of `ridge`, in its standard deviations. Chosen by hand."""
 PASSES = 3
+"""Newton steps of `ridge` at most: a bound of time."""
+SMALLEST_MOVE = 1e-3
+"""Newton step of `ridge`, in samples, below which the iteration ends."""
 CAP = 0.9
-"""Of the height of a saturated stripe, what `gravity` counts no more: its top is cut off, and may be so askew."""
+"""Part of the height of a saturated stripe above which `gravity` ignores the profile: its top is cut off, and may be
+skewed by that. Chosen by hand."""
 LEAST, BEYOND, FEWEST = 0.2, 1.5, 4
-"""Of the fit of a Gaussian: what it counts of the height, how many samples beyond half height, and how few will do."""
+"""Samples that the fit of a Gaussian uses: their least height, relative to the stripe; how far beyond half height they
+may lie, in samples; how few are enough. A parabola needs three; the rest is chosen by hand."""
+SINGULAR = 1e-9
+"""Determinant of the normal equations of that fit, relative to the product of their diagonal, that counts as zero."""
+FIR_REACH = 2
+"""How far from the middle of the stripe `fir` searches for a zero crossing, in samples. Chosen by hand."""
 
 
 @compiled
@@ -42,15 +51,29 @@ def centre_of(
     contrast: float,
     limits: Limits,
 ) -> float:
-    """The centre in samples; not a number where the method finds none.
+    """Find the centre of a profile.
 
     Parameters
     ----------
-    samples : levels across the stripe, of which those from `first` to `last` are there.
-    left, right : where the profile falls to half height.
-    clipped : which samples around these are saturated.
-    base : the level beside the stripe, on the side where it is higher.
-    contrast : height of the profile above it.
+    samples : (K,) float64, levels across the stripe; those from `first` to `last` (included) are valid.
+    clipped : (K,) bool, True for saturated samples; valid between `left` and `right` and a little beyond.
+    left, right : where the profile falls to half height, in samples.
+    base : level beside the stripe, on the side where it is higher.
+    contrast : height of the profile above `base`.
+
+    Returns
+    -------
+    The centre in samples from the first of `samples`; NaN if the method finds none.
+
+    Examples
+    --------
+    >>> from schemas.parameters.extraction import ExtractionParameters
+    >>> from footscan.stripe.limits import limits_of
+    >>> samples = np.array([0.0, 0.0, 10.0, 20.0, 10.0, 0.0, 0.0])
+    >>> clipped = np.zeros(7, np.bool_)
+    >>> limits = limits_of(ExtractionParameters(centre_method="gravity"))
+    >>> print(round(centre_of(samples, clipped, 0, 6, 2.0, 4.0, 0.0, 20.0, limits), 6))
+    3.0
     """
     if limits.method == GAUSSIAN:
         fitted = _gaussian(samples, clipped, first, last, left, right, base, contrast)
@@ -77,7 +100,7 @@ def _gravity(
     contrast: float,
     level: float,
 ) -> float:
-    """Of what lies above a level around the stripe; where it is saturated, also below another: of its flanks."""
+    """Centre of gravity of the profile above a level; of its flanks alone, below `CAP`, where it is saturated."""
     a, b = math.floor(left), math.ceil(right)
     while a > first and samples[a] > base + level * contrast:
         a -= 1
@@ -93,7 +116,7 @@ def _gravity(
 
 @compiled
 def _above(samples: NDArray[np.float64], a: int, b: int, level: float, origin: float) -> tuple[float, float]:
-    """Area above a level of the polygon through samples a to b, and its first moment around `origin`, exactly."""
+    """Exact area of the polygon through samples `a` to `b` above a level, and its first moment about `origin`."""
     area = moment = 0.0
     for k in range(a, b):
         low, high = samples[k] - level, samples[k + 1] - level
@@ -109,7 +132,7 @@ def _above(samples: NDArray[np.float64], a: int, b: int, level: float, origin: f
         length = end - start
         part = 0.5 * length * (low + high)
         area += part
-        # Of a trapezoid: the middle of its base, and off it by the difference of its sides.
+        # The centroid of a trapezoid lies off the middle of its base in proportion to the difference of its sides.
         moment += part * (k + 0.5 * (start + end) - origin) + length * length * (high - low) / 12
     return area, moment
 
@@ -125,7 +148,7 @@ def _gaussian(
     base: float,
     contrast: float,
 ) -> float:
-    """Not a number where fewer than `FEWEST` samples are left, or where they are no Gaussian."""
+    """Centre of the fitted Gaussian; NaN if fewer than `FEWEST` samples are left or the parabola has no maximum."""
     reach = 0.5 * (right - left)
     count = 0
     origin = 0.5 * (left + right)
@@ -147,7 +170,7 @@ def _gaussian(
         t1 += weight * x * log
         t2 += weight * x * x * log
     determinant = s0 * (s2 * s4 - s3 * s3) - s1 * (s1 * s4 - s2 * s3) + s2 * (s1 * s3 - s2 * s2)
-    if count < FEWEST or not abs(determinant) > 1e-9 * s0 * s2 * s4:
+    if count < FEWEST or not abs(determinant) > SINGULAR * s0 * s2 * s4:
         return math.nan
     linear = (s0 * (t1 * s4 - s3 * t2) - t0 * (s1 * s4 - s2 * s3) + s2 * (s1 * t2 - s2 * t1)) / determinant
     square = (s0 * (s2 * t2 - s3 * t1) - s1 * (s1 * t2 - s2 * t1) + t0 * (s1 * s3 - s2 * s2)) / determinant
@@ -156,11 +179,13 @@ def _gaussian(
 
 @compiled
 def _ridge(samples: NDArray[np.float64], first: int, last: int, left: float, right: float) -> float:
+    """Zero of the smoothed profile's first derivative, by Newton's method from the middle; NaN if there is none."""
     sigma = SCALE * (right - left)
     centre = 0.5 * (left + right)
     for _ in range(PASSES):
         reach = min(CUT * sigma, centre - first, last - centre)
-        # The window falls to zero at its ends with its slope: a Gaussian cut off hard would jump from sample to sample.
+        # The window and its slope fall to zero at its ends: with a truncated Gaussian the centre would jump from
+        # sample to sample.
         ratio = 1 / (reach * reach)
         first_derivative = second_derivative = 0.0
         for k in range(math.ceil(centre - reach), math.floor(centre + reach) + 1):
@@ -174,19 +199,19 @@ def _ridge(samples: NDArray[np.float64], first: int, last: int, left: float, rig
         centre += move
         if not first + 1 < centre < last - 1:
             return math.nan
-        if abs(move) < 1e-3:
+        if abs(move) < SMALLEST_MOVE:
             break
     return centre
 
 
 @compiled
 def _fir(samples: NDArray[np.float64], first: int, last: int, left: float, right: float) -> float:
-    """Of the zero crossings of the filtered profile, the one nearest to the middle of the stripe."""
+    """Zero crossing of the filtered profile that is nearest to the middle of the stripe; NaN if there is none."""
     order = max(2, math.ceil(right - left))
     middle = round(0.5 * (left + right))
     order = min(order, middle - first - 1, last - middle - 1)
     best = math.nan
-    for k in range(middle - 2, middle + 2):
+    for k in range(middle - FIR_REACH, middle + FIR_REACH):
         if k - order + 1 < first or k + 1 + order > last:
             continue
         before = _boxes(samples, k, order)
@@ -200,7 +225,7 @@ def _fir(samples: NDArray[np.float64], first: int, last: int, left: float, right
 
 @compiled
 def _boxes(samples: NDArray[np.float64], k: int, order: int) -> float:
-    """What lies before sample k less what lies after it."""
+    """Sum of the `order` samples before sample `k`, minus that of the `order` samples after it."""
     total = 0.0
     for n in range(1, order + 1):
         total += samples[k - n] - samples[k + n]

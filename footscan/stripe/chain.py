@@ -1,7 +1,6 @@
-"""How the points of a frame hang together: which crosses the stripe again, which comes next along it, which piece.
+"""Links between the points of a frame: duplicates across the stripe, neighbours along it, chains and pieces.
 
-Points are found by square cells: `Cells` holds for each the number of a point in it, and for each point that of the
-next in its cell.
+Points are looked up by square cells: `Cells` holds a linked list of point numbers for each cell.
 """
 
 from typing import NamedTuple
@@ -14,33 +13,34 @@ from footscan.stripe.profile import CONTRAST, WIDTH
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SHARPNESS, I, J
 
 NONE = -1
+"""Point number that stands for no point."""
 CELL_PX = 8
-"""Side of the cells: a little more than a gap or half a stripe."""
+"""Side of the cells: a little more than the default gap, or half a stripe. Chosen for speed."""
 SECTION_PX = 0.5
-"""Half thickness in px of the cross-section of a point."""
+"""Half thickness in px of the cross-section of a point. Chosen by hand."""
 SPUR, BESIDE = 0.5, 0.2
-"""A spur that noise puts on the shoulder of the stripe has less than this part of its contrast, and lies at least this
-part of its width beside it."""
+"""A spur is a point that noise makes on the shoulder of the stripe: it has less than this part of the stripe's
+contrast, and lies more than this part of its width beside it. Chosen by hand."""
 BEHIND, AHEAD = range(2)
-"""Columns of what `neighbours` gives: the sides of a point along the stripe, which is which by its own normal."""
+"""Columns of `neighbours`: the two sides of a point along the stripe, named with respect to the point's normal."""
 MOST_ASIDE = 1.5
-"""How much farther aside than on its neighbour may lie."""
+"""Largest ratio of the distance of a neighbour across the stripe to that along it. Chosen by hand."""
 SAME_WAY = 0.5
-"""Cosine of the largest angle by which the stripe turns from a point to its neighbour."""
+"""Cosine of the largest angle by which the stripe turns from a point to its neighbour: 60 degrees. Chosen by hand."""
 
 
 class Cells(NamedTuple):
-    """Points by square cells of the frame."""
+    """Linked lists of the points in each square cell of a frame."""
 
     heads: NDArray[np.int32]
-    """(rows, columns) of cells: the number of a point, or `NONE`."""
+    """(cell rows, cell columns): the first point of each cell, or `NONE`."""
     others: NDArray[np.int32]
     """(N,): the next point in the same cell, or `NONE`."""
 
 
 @compiled
 def place(profiles: NDArray[np.float64], rows: int, columns: int) -> Cells:
-    """(N, ...) points of a frame of so many rows and columns by the cell they lie in."""
+    """Sort the points (N, ...) of a frame of `rows` x `columns` px into cells."""
     heads = np.full((rows // CELL_PX + 1, columns // CELL_PX + 1), NONE, np.int32)
     others = np.empty(len(profiles), np.int32)
     for a in range(len(profiles)):
@@ -52,7 +52,10 @@ def place(profiles: NDArray[np.float64], rows: int, columns: int) -> Cells:
 
 @compiled
 def _window(i: float, j: float, reach: float, rows: int, columns: int) -> tuple[int, int, int, int]:
-    """Of so many rows and columns of cells those, from and before, whose points may be within reach of (i, j)."""
+    """The cells, of `rows` x `columns`, whose points may be within reach of (i, j): top, bottom, left, right.
+
+    `bottom` and `right` are excluded.
+    """
     return (
         max(int(j - reach), 0) // CELL_PX,
         min(max(int(j + reach), 0) // CELL_PX + 1, rows),
@@ -63,7 +66,10 @@ def _window(i: float, j: float, reach: float, rows: int, columns: int) -> tuple[
 
 @compiled
 def is_sharpest(profiles: NDArray[np.float64], cells: Cells) -> NDArray[np.bool_]:
-    """Which points lie neither in the cross-section of a sharper one nor on its shoulder: a stripe is crossed once."""
+    """Select the points (N,) that lie neither in the cross-section of a sharper point nor on its shoulder.
+
+    So the stripe is crossed once at each place.
+    """
     heads, others = cells
     sharpest = np.ones(len(profiles), np.bool_)
     for b in range(len(profiles)):
@@ -77,7 +83,7 @@ def is_sharpest(profiles: NDArray[np.float64], cells: Cells) -> NDArray[np.bool_
             for column in range(left, right):
                 a = heads[row, column]
                 while a != NONE:
-                    # Of equals, the one that was found first.
+                    # Of equally sharp points the first is kept.
                     other = profiles[a, SHARPNESS]
                     if sharp > other or (sharp == other and b < a):
                         d_i, d_j = profiles[a, I] - i, profiles[a, J] - j
@@ -96,7 +102,24 @@ def is_sharpest(profiles: NDArray[np.float64], cells: Cells) -> NDArray[np.bool_
 
 @compiled
 def neighbours(profiles: NDArray[np.float64], gap: float, cells: Cells) -> NDArray[np.int32]:
-    """(N, 2): the nearest point on either side along the stripe, at most `gap` px away; `NONE` at its ends."""
+    """Find the nearest points on both sides along the stripe, at most `gap` px away.
+
+    Returns
+    -------
+    (N, 2) int32, point numbers in the columns `BEHIND` and `AHEAD`; `NONE` at the ends of the stripe.
+
+    Examples
+    --------
+    Three points in a row, with normals along j:
+
+    >>> from footscan.stripe.profile import COLUMNS
+    >>> profiles = np.zeros((3, COLUMNS))
+    >>> profiles[:, I], profiles[:, J], profiles[:, NORMAL_J] = [4.0, 6.0, 8.0], 5.0, 1.0
+    >>> print(neighbours(profiles, 3.0, place(profiles, 16, 16)))
+    [[ 1 -1]
+     [ 2  0]
+     [-1  1]]
+    """
     heads, others = cells
     nearest = np.full((len(profiles), 2), NONE, np.int32)
     for a in range(len(profiles)):
@@ -110,7 +133,7 @@ def neighbours(profiles: NDArray[np.float64], gap: float, cells: Cells) -> NDArr
                     d_i, d_j = profiles[b, I] - i, profiles[b, J] - j
                     along = d_j * normal_i - d_i * normal_j
                     across = d_i * normal_i + d_j * normal_j
-                    # What lies aside is farther than what lies straight on.
+                    # A point aside counts as farther than one straight ahead.
                     distance = along * along + 2 * across * across
                     if b != a and abs(across) <= MOST_ASIDE * abs(along) and distance < max(least_behind, least_ahead):
                         turn = normal_i * profiles[b, NORMAL_I] + normal_j * profiles[b, NORMAL_J]
@@ -128,7 +151,13 @@ def neighbours(profiles: NDArray[np.float64], gap: float, cells: Cells) -> NDArr
 
 @compiled
 def in_order(profiles: NDArray[np.float64], nearest: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """The points (N,) along each chain from one end to the other, and for each (N,) the number of its chain."""
+    """Order the points (N,) along their chains, each from one end to the other.
+
+    Returns
+    -------
+    order : (N,) int32, the numbers of the points, chain by chain.
+    chain : (N,) int32, the number of the chain of each point in `order`.
+    """
     chain = np.empty(len(profiles), np.int32)
     order = np.empty(len(profiles), np.int32)
     taken = np.zeros(len(profiles), np.bool_)
@@ -136,14 +165,14 @@ def in_order(profiles: NDArray[np.float64], nearest: NDArray[np.int32]) -> tuple
     for seed in range(len(profiles)):
         if taken[seed]:
             continue
-        # To one end of its chain; a closed chain is cut open at the seed.
+        # Walk to one end of the chain; a closed chain is cut open at the seed.
         end, side = seed, BEHIND
         for _ in range(len(profiles)):
             b, onward = _step_from(profiles, nearest, end, side)
             if b in (NONE, seed) or taken[b]:
                 break
             end, side = b, onward
-        # And back through it. Where chains branch, the way back may miss the seed, which then begins one of its own.
+        # Walk back through it. Where chains branch, the way back may miss the seed, which then starts another chain.
         for start, way in ((end, 1 - side), (seed, AHEAD)):
             a, side = start, way
             while a != NONE and not taken[a]:
@@ -157,7 +186,7 @@ def in_order(profiles: NDArray[np.float64], nearest: NDArray[np.int32]) -> tuple
 
 @compiled
 def _step_from(profiles: NDArray[np.float64], nearest: NDArray[np.int32], a: int, side: int) -> tuple[int, int]:
-    """The next point along the stripe beyond point `a` on its `side`, and that point's own side to go on by."""
+    """The next point along the stripe from point `a` on its `side`, and the side of that point on which to go on."""
     b = nearest[a, side]
     if b == NONE:
         return NONE, side
@@ -167,9 +196,21 @@ def _step_from(profiles: NDArray[np.float64], nearest: NDArray[np.int32], a: int
 
 @compiled
 def pieces_of(profiles: NDArray[np.float64], gap: float, cells: Cells) -> tuple[NDArray[np.int32], int]:
-    """A number (N,) for each point, the same for points linked by steps of at most `gap` px; how many numbers.
+    """Number the pieces: points linked by steps of at most `gap` px, or half the stripe's width if that is larger.
 
-    Of two points of a wide stripe, by steps of at most half its width.
+    Returns
+    -------
+    piece : (N,) int32, the number of each point's piece, from 0.
+    count : the number of pieces.
+
+    Examples
+    --------
+    >>> from footscan.stripe.profile import COLUMNS
+    >>> profiles = np.zeros((3, COLUMNS))
+    >>> profiles[:, I], profiles[:, J] = [4.0, 6.0, 14.0], 5.0
+    >>> piece, count = pieces_of(profiles, 3.0, place(profiles, 16, 16))
+    >>> print(piece, count)
+    [0 0 1] 2
     """
     heads, others = cells
     piece = np.full(len(profiles), NONE, np.int32)

@@ -1,4 +1,4 @@
-"""What frames tell of each other: glints stand still while the heads travel, and noise appears in one frame alone."""
+"""Clutter of a film: glints, which stand still while the heads travel, and noise, which appears in one frame only."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,15 +7,17 @@ from footscan.compiled import compiled
 from schemas.parameters.extraction import ExtractionParameters
 
 CELL_PX = 4
-"""A glint's flicker moves its points by less than this."""
+"""Side of the cells in which a glint is recognised again: its flicker moves its points by less. Chosen by hand."""
 FEWEST_FRAMES = 8
-"""In fewer frames nothing has stood still."""
+"""Films of fewer frames are not searched for glints, and a glint appears in so many frames at least. Chosen by
+hand."""
 FEWEST_NEIGHBOURS = 3
-"""Of fewer frames none is held against those beside it."""
+"""Films of fewer frames are not searched for lonely pieces: an inner frame needs one on either side."""
 STATIC_SHARE = 0.5
-"""A piece with more than this share of its points in static places is static."""
+"""A piece with more than this share of its points in static places is static. Chosen by hand."""
 FOLLOWED_SHARE = 0.25
-"""A piece with less than this share of its points near the stripe of the frame before or after is alone."""
+"""A piece with less than this share of its points near the stripe of the frame before or after is lonely. Chosen by
+hand."""
 
 
 def is_moving_stripe(
@@ -25,18 +27,32 @@ def is_moving_stripe(
     frames: int,
     parameters: ExtractionParameters,
 ) -> NDArray[np.bool_]:
-    """Which of the points of a film belong to a stripe that moves, and moves on.
+    """Select the points of a film that belong to a moving stripe.
 
-    A glint is a short piece whose place holds short pieces in many frames. A long piece may stand still: so does the
-    stripe on a prism; and a toe's short stripe may run where that of the forefoot stood before. A place through which
-    long pieces turn, as around the bend of an ankle, is no glint's either, for it is pieces that are judged. A short
-    piece that has none beside it in the frame before nor in the one after is noise.
+    A glint is a short piece whose place holds short pieces in many frames. Long pieces do not count: the stripe on a
+    prism stands still, and the short stripe of a toe may run where that of the forefoot was before. Whole pieces are
+    judged, so that a place through which long pieces turn, as around the bend of an ankle, is not taken for a glint.
+    Noise is a short piece without a neighbour in the frame before or after.
 
     Parameters
     ----------
-    centres : (N, 2) i, j, px.
-    frame : (N,) which frame each is of, ascending from 0; of so many `frames`.
-    piece : (N,) which piece, numbered through the film.
+    centres : (N, 2) float64, i and j, px.
+    frame : (N,) int32, the frame of each point, ascending from 0, less than `frames`.
+    piece : (N,) int32, the piece of each point, numbered through the film.
+
+    Returns
+    -------
+    (N,) bool, True for points that are kept.
+
+    Examples
+    --------
+    A piece of three points in one frame of three is short and has no neighbour:
+
+    >>> from schemas.parameters.extraction import ExtractionParameters
+    >>> centres = np.array([[50.0, 60.0], [51.0, 60.0], [52.0, 60.0]])
+    >>> frame, piece = np.zeros(3, np.int32), np.zeros(3, np.int32)
+    >>> print(is_moving_stripe(centres, frame, piece, 3, ExtractionParameters()))
+    [False False False]
     """
     if not len(centres):
         return np.zeros(0, np.bool_)
@@ -57,18 +73,33 @@ def is_moving_stripe(
 
 @compiled
 def number_pieces(frame: NDArray[np.int32], piece: NDArray[np.float64]) -> NDArray[np.int32]:
-    """The pieces (N,) of each frame (N,), ascending, numbered through the film without a gap."""
+    """Number the pieces through the film, without a gap.
+
+    Parameters
+    ----------
+    frame : (N,) int32, ascending.
+    piece : (N,) float64, the number of each point's piece within its frame.
+
+    Returns
+    -------
+    (N,) int32, from 0.
+
+    Examples
+    --------
+    >>> print(number_pieces(np.array([0, 0, 1], np.int32), np.array([0.0, 1.0, 0.0])))
+    [0 1 2]
+    """
     numbers = np.empty(len(frame), np.int32)
-    known = np.full(int(piece.max()) + 1 if len(piece) else 0, -1, np.int32)
-    of_frame = known.copy()
+    film_number = np.full(int(piece.max()) + 1 if len(piece) else 0, -1, np.int32)
+    latest_frame = film_number.copy()
     count = 0
     for a in range(len(frame)):
-        own = int(piece[a])
-        if of_frame[own] != frame[a]:
-            of_frame[own] = frame[a]
-            known[own] = count
+        number_in_frame = int(piece[a])
+        if latest_frame[number_in_frame] != frame[a]:
+            latest_frame[number_in_frame] = frame[a]
+            film_number[number_in_frame] = count
             count += 1
-        numbers[a] = known[own]
+        numbers[a] = film_number[number_in_frame]
     return numbers
 
 
@@ -90,7 +121,7 @@ def _extents(centres: NDArray[np.float64], piece: NDArray[np.int32], pieces: int
 def _frames_in_place(
     centres: NDArray[np.float64], frame: NDArray[np.int32], counted: NDArray[np.bool_], side: float
 ) -> NDArray[np.int32]:
-    """For each point, in how many frames there is a counted one in its square cell or in one beside it."""
+    """Count the frames in which each point's square cell, or one beside it, holds a counted point; (N,)."""
     cells = _cells(centres, side)
     shape = cells[:, 0].max() + 2, cells[:, 1].max() + 2
     latest, frames = np.full(shape, -1, np.int32), np.zeros(shape, np.int32)
@@ -112,7 +143,7 @@ def _frames_in_place(
 def _is_followed(
     centres: NDArray[np.float64], frame: NDArray[np.int32], kept: NDArray[np.bool_], frames: int, side: float
 ) -> NDArray[np.bool_]:
-    """Which points have a kept one of the frame before or after in their square cell or in one beside it."""
+    """Select the points with a kept point of the frame before or after in their square cell or in one beside it."""
     cells = _cells(centres, side)
     occupied = np.zeros((frames + 2, cells[:, 0].max() + 2, cells[:, 1].max() + 2), np.bool_)
     for a in range(len(centres)):
@@ -129,7 +160,7 @@ def _is_followed(
 
 @compiled
 def _cells(centres: NDArray[np.float64], side: float) -> NDArray[np.int32]:
-    """(N, 2) row and column of the square cell of each point; the first ones are at 1."""
+    """(N, 2) row and column of the square cell of each point, from 1: a border of empty cells is left."""
     cells = np.empty(centres.shape, np.int32)
     for a in range(len(centres)):
         cells[a, 0] = max(int(centres[a, 1] / side), 0) + 1

@@ -1,4 +1,4 @@
-"""The laser stripe of one frame: what is red against what is merely bright, as sub-pixel points."""
+"""The laser stripe of one frame, as sub-pixel points."""
 
 import math
 import threading
@@ -22,43 +22,57 @@ from schemas.parameters.extraction import ExtractionParameters
 def extract_stripe(
     image: NDArray[np.uint8], parameters: ExtractionParameters, background: NDArray[np.uint8] | None = None
 ) -> StripePoints:
-    """The points of the laser stripe in a frame.
+    """Extract the points of the laser stripe from a frame.
 
     Parameters
     ----------
     image : (rows, columns, 3) uint8, RGB.
-    background : the same view with the laser off, of the same shape.
+    background : the same view with the laser off, of the same shape and type.
 
     Returns
     -------
-    (N,) of `STRIPE_DTYPE`, frame 0, about one point for each px of the stripe's length, piece by piece from one end to
-    the other; empty where there is no stripe. The stripe may run in any direction, round corners, and in several
-    pieces.
+    (N,) of `STRIPE_DTYPE`, frame 0: about one point for each px of the stripe's length, piece by piece from one end to
+    the other; empty if there is no stripe. The stripe may run in any direction, round corners, and in several pieces.
 
     Notes
     -----
-    Pixels that are redder than their surroundings, and the white core of a saturated stripe, are searched for ridges of
-    the Gaussian-smoothed signal (`ridge`); the centre is that of the profile along the ridge's normal (`profile`,
-    `centre`); pieces that are short, weak and far off, or ghosts of a stronger one, are dropped (`pieces`); what
-    remains is smoothed along the stripe, except at corners (`smoothing`).
+    Ridges of the Gaussian-smoothed signal are searched for among the pixels that are redder than their surroundings and
+    those of the white core of a saturated stripe (`ridge`). The centre is that of the profile along the ridge's normal
+    (`profile`, `centre`). Pieces that are short, weak and far off, or ghosts of a stronger piece are dropped
+    (`pieces`). The remaining points are smoothed along the stripe, except at corners (`smoothing`).
+
+    Examples
+    --------
+    A red stripe of three rows, its middle row 30:
+
+    >>> image = np.zeros((64, 64, 3), np.uint8)
+    >>> image[29:32, :, 0] = [[100], [200], [100]]
+    >>> points = extract_stripe(image, ExtractionParameters())
+    >>> print(len(points), bool(np.all(np.abs(points["j"] - 30.0) < 0.01)))
+    64 True
     """
-    found = find_stripe(image, parameters, background)
-    return as_points(found, np.zeros(len(found), np.int32))
+    crossings = find_stripe(image, parameters, background)
+    return as_points(crossings, np.zeros(len(crossings), np.int32))
 
 
-FOUND = ("i", "j", "width", "peak", "score", "saturation", "sigma")
-"""The first columns of what `find_stripe` gives."""
-PIECE, CHAIN, RED = range(len(FOUND), len(FOUND) + 3)
-"""Its others: the numbers of the piece and of the chain, and how many grey levels redder than its feet a stripe is."""
+CROSSING_COLUMNS = ("i", "j", "width", "peak", "score", "saturation", "sigma")
+"""The first columns of `find_stripe`, named as the fields of `STRIPE_DTYPE`."""
+PIECE, CHAIN, RED = range(len(CROSSING_COLUMNS), len(CROSSING_COLUMNS) + 3)
+"""The other columns of `find_stripe`: the numbers of the piece and of the chain, and by how many grey levels the stripe
+is redder than its feet."""
 MEASURED = RED + 1
+"""Number of columns of `find_stripe`."""
 
 
 def find_stripe(
     image: NDArray[np.uint8], parameters: ExtractionParameters, background: NDArray[np.uint8] | None = None
 ) -> NDArray[np.float64]:
-    """(N, 10): where the stripe of a frame was measured, in the columns of `FOUND`, `PIECE`, `CHAIN` and `RED`.
+    """Measure the crossings of a frame's stripe, two pixels apart; parameters as for `extract_stripe`.
 
-    Crossings of one chain follow each other along the stripe; chains of one piece lie close to each other.
+    Returns
+    -------
+    (N, 10) float64, one crossing a row, in the columns of `CROSSING_COLUMNS`, `PIECE`, `CHAIN` and `RED`. Crossings of
+    one chain follow each other along the stripe; chains of one piece lie close to each other.
     """
     rows, columns, _ = image.shape
     if rows == 0 or columns == 0:
@@ -90,32 +104,47 @@ def find_stripe(
     )
 
 
-def as_points(found: NDArray[np.float64], frame: NDArray[np.int32]) -> StripePoints:
-    """Points from the crossings (N, 10) that `find_stripe` gave for each frame (N,).
+def as_points(crossings: NDArray[np.float64], frame: NDArray[np.int32]) -> StripePoints:
+    """Convert crossings to stripe points at whole columns or rows.
 
-    Crossings lie two pixels apart between two columns, or rows, or four where one was missed; points are put onto the
-    straight line from each to the next where that passes a column, or row.
+    Crossings lie between two columns, or rows, and two pixels apart, or four where one was missed. Points are put where
+    the straight line from one crossing to the next passes a column, or row.
+
+    Parameters
+    ----------
+    crossings : (N, 10) float64, of one frame or several, in the columns of `find_stripe`.
+    frame : (N,) int32, the frame of each crossing, ascending.
+
+    Returns
+    -------
+    (M,) of `STRIPE_DTYPE`.
     """
-    filled, frames = _on_lines(found, frame)
+    filled, frames = _on_lines(crossings, frame)
     points = np.empty(len(filled), STRIPE_DTYPE)
     points["frame"] = frames
-    for column, name in enumerate(FOUND):
+    for column, name in enumerate(CROSSING_COLUMNS):
         points[name] = filled[:, column]
     return points
 
 
+RIDGES_A_LINE = 8
+"""Ridge crossings for which memory is kept, a row and a column of the half-size image: a bound of memory. A frame with
+more of them gets memory of its own."""
+
+
 class Memory(NamedTuple):
-    """What a frame of (rows, columns) is worked out in."""
+    """Working memory for a frame of (rows, columns)."""
 
     excess: NDArray[np.uint16]
+    """(ceil(rows / 2), ceil(columns / 2)): the redness of `halve`."""
     signal: NDArray[np.uint16]
-    """Both (ceil(rows / 2), ceil(columns / 2))."""
+    """(ceil(rows / 2), ceil(columns / 2)): the signal of `halve`."""
     ridges: NDArray[np.float64]
-    """(M, 5)."""
+    """(M, 5): the columns of `find_ridges`."""
 
 
 class _Buffers(threading.local):
-    """Working memory of one thread, used again for every frame of one size."""
+    """Working memory of one thread, reused for all frames of one size."""
 
     def __init__(self) -> None:
         self.allocate(0, 0)
@@ -123,7 +152,8 @@ class _Buffers(threading.local):
     def allocate(self, rows: int, columns: int) -> None:
         self.shape = rows, columns
         half = math.ceil(rows / 2), math.ceil(columns / 2)
-        self.memory = Memory(np.empty(half, np.uint16), np.empty(half, np.uint16), np.empty((8 * sum(half), 5)))
+        ridges = np.empty((RIDGES_A_LINE * sum(half), 5))
+        self.memory = Memory(np.empty(half, np.uint16), np.empty(half, np.uint16), ridges)
 
 
 _BUFFERS = _Buffers()
@@ -180,60 +210,62 @@ def _rows(
     chain: NDArray[np.int32],
     faintest: float,
 ) -> NDArray[np.float64]:
-    """(N, 10): the columns of `FOUND`, `PIECE`, `CHAIN` and `RED`."""
-    found = np.empty((len(profiles), MEASURED))
+    """(N, 10): the columns of `CROSSING_COLUMNS`, `PIECE`, `CHAIN` and `RED`."""
+    crossings = np.empty((len(profiles), MEASURED))
     rows, columns = words.shape
     for a in range(len(profiles)):
         i, j = profiles[a, I], profiles[a, J]
-        # Short of the border by a little: the line half a pixel on is still one of the image's.
-        found[a, 0] = min(max(i + moves[a] * profiles[a, NORMAL_I], -0.49), columns - 0.51)
-        found[a, 1] = min(max(j + moves[a] * profiles[a, NORMAL_J], -0.49), rows - 0.51)
-        found[a, 2] = profiles[a, WIDTH]
-        found[a, 3] = red_of(words[min(max(round(j), 0), rows - 1), min(max(round(i), 0), columns - 1)])
-        found[a, 4] = profiles[a, CONTRAST] / (profiles[a, CONTRAST] + faintest) * profiles[a, SYMMETRY]
-        found[a, 5] = profiles[a, SATURATION]
-        found[a, 6] = sigmas[a]
-        found[a, PIECE] = piece[a]
-        found[a, CHAIN] = chain[a]
-        found[a, RED] = profiles[a, REDNESS]
-    return found
+        # A hundredth of a pixel inside the border, so that rounding gives a pixel of the image.
+        crossings[a, 0] = min(max(i + moves[a] * profiles[a, NORMAL_I], -0.49), columns - 0.51)
+        crossings[a, 1] = min(max(j + moves[a] * profiles[a, NORMAL_J], -0.49), rows - 0.51)
+        crossings[a, 2] = profiles[a, WIDTH]
+        crossings[a, 3] = red_of(words[min(max(round(j), 0), rows - 1), min(max(round(i), 0), columns - 1)])
+        crossings[a, 4] = profiles[a, CONTRAST] / (profiles[a, CONTRAST] + faintest) * profiles[a, SYMMETRY]
+        crossings[a, 5] = profiles[a, SATURATION]
+        crossings[a, 6] = sigmas[a]
+        crossings[a, PIECE] = piece[a]
+        crossings[a, CHAIN] = chain[a]
+        crossings[a, RED] = profiles[a, REDNESS]
+    return crossings
 
 
 @compiled
-def _on_lines(found: NDArray[np.float64], frame: NDArray[np.int32]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Crossings, each chain of them taken at the whole columns, or rows, that it passes; the frame of each point."""
-    count = len(found)
+def _on_lines(
+    crossings: NDArray[np.float64], frame: NDArray[np.int32]
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Interpolate each chain of crossings at the whole columns, or rows, that it passes; points and their frames."""
+    count = len(crossings)
     most = 0
     for a in range(count):
         most += 2
-        if _follows(found, frame, a):
-            most += int(max(abs(found[a, 0] - found[a - 1, 0]), abs(found[a, 1] - found[a - 1, 1])))
-    points, frames = np.empty((most, len(FOUND))), np.empty(most, np.int32)
+        if _follows(crossings, frame, a):
+            most += int(max(abs(crossings[a, 0] - crossings[a - 1, 0]), abs(crossings[a, 1] - crossings[a - 1, 1])))
+    points, frames = np.empty((most, len(CROSSING_COLUMNS))), np.empty(most, np.int32)
     filled = 0
     for a in range(count):
-        is_last = a + 1 == count or not _follows(found, frame, a + 1)
-        if not _follows(found, frame, a):
+        is_last = a + 1 == count or not _follows(crossings, frame, a + 1)
+        if not _follows(crossings, frame, a):
             if is_last:
-                points[filled] = found[a, : len(FOUND)]
+                points[filled] = crossings[a, : len(CROSSING_COLUMNS)]
                 frames[filled] = frame[a]
                 filled += 1
             continue
-        axis = 0 if abs(found[a, 0] - found[a - 1, 0]) >= abs(found[a, 1] - found[a - 1, 1]) else 1
-        start, end = found[a - 1, axis], found[a, axis]
+        axis = 0 if abs(crossings[a, 0] - crossings[a - 1, 0]) >= abs(crossings[a, 1] - crossings[a - 1, 1]) else 1
+        start, end = crossings[a - 1, axis], crossings[a, axis]
         way = 1.0 if end >= start else -1.0
-        # A crossing stands for half a pixel beyond it, where the chain ends.
-        is_first = not _follows(found, frame, a - 1)
+        # A chain reaches half a pixel beyond its first and its last crossing.
+        is_first = not _follows(crossings, frame, a - 1)
         reach_from = start - 0.5 * way if is_first else start
         reach_to = end + 0.5 * way if is_last else end
         line = math.ceil(reach_from) if way > 0 else math.floor(reach_from)
         if line == reach_from and not is_first:
-            line += way  # that line had its point
+            line += way  # the previous pair of crossings put a point on this line
         while (reach_to - line) * way >= 0 and start != end:
             part = (line - start) / (end - start)
             frames[filled] = frame[a]
-            for column in range(len(FOUND)):
+            for column in range(len(CROSSING_COLUMNS)):
                 inside = part if column < 2 else min(max(part, 0.0), 1.0)
-                points[filled, column] = (1 - inside) * found[a - 1, column] + inside * found[a, column]
+                points[filled, column] = (1 - inside) * crossings[a - 1, column] + inside * crossings[a, column]
             points[filled, axis] = line
             filled += 1
             line += way
@@ -241,6 +273,6 @@ def _on_lines(found: NDArray[np.float64], frame: NDArray[np.int32]) -> tuple[NDA
 
 
 @compiled
-def _follows(found: NDArray[np.float64], frame: NDArray[np.int32], a: int) -> bool:
-    """Whether crossing `a` comes next after the one before it."""
-    return a > 0 and frame[a] == frame[a - 1] and found[a, CHAIN] == found[a - 1, CHAIN]
+def _follows(crossings: NDArray[np.float64], frame: NDArray[np.int32], a: int) -> bool:
+    """Whether crossing `a` continues the chain of the crossing before it."""
+    return a > 0 and frame[a] == frame[a - 1] and crossings[a, CHAIN] == crossings[a - 1, CHAIN]

@@ -15,6 +15,7 @@ from footscan.stripe.points import StripePoints
 from schemas.parameters.extraction import ExtractionParameters
 
 CSV_COLUMNS = ["frame", "i", "j", "width", "peak", "score"]
+"""Fields of `STRIPE_DTYPE` in the CSV text."""
 
 
 def extract_film(
@@ -22,26 +23,40 @@ def extract_film(
     parameters: ExtractionParameters,
     backgrounds: Iterable[Rgb | None] | None = None,
 ) -> StripePoints:
-    """The stripe points of all frames of one camera.
+    """Extract the stripe points from all frames of one camera.
 
     Parameters
     ----------
-    frames : (rows, columns, 3) uint8 RGB each, valid until the next; a lost frame (None) has no points.
-    backgrounds : for each frame the same view with the laser off; None where there is none.
+    frames : (rows, columns, 3) uint8 RGB each, valid until the next one is read; a lost frame (None) has no points.
+    backgrounds : for each frame the same view with the laser off; None for a frame without background.
 
     Returns
     -------
-    (N,) of `STRIPE_DTYPE`, frame by frame, without what is blurred and hardly red beside the film's stripe (`blur`),
-    what stands still while the heads travel, and what appears in one frame alone (`clutter`).
+    (N,) of `STRIPE_DTYPE`, frame by frame. Pieces are dropped that are blurred and hardly red compared with the film's
+    stripe (`blur`), that stand still while the heads travel, or that appear in one frame only (`clutter`).
+
+    Examples
+    --------
+    A stripe that moves down by four rows a frame; the second frame was lost:
+
+    >>> frames = []
+    >>> for row in (20, 24, 28, 32):
+    ...     frame = np.zeros((64, 64, 3), np.uint8)
+    ...     frame[row - 1 : row + 2, :, 0] = [[100], [200], [100]]
+    ...     frames.append(frame)
+    >>> frames[1] = None
+    >>> points = extract_film(frames, ExtractionParameters())
+    >>> print(np.unique(points["frame"]))
+    [0 2 3]
     """
-    found = [np.empty((0, MEASURED))]
+    crossings_by_frame = [np.empty((0, MEASURED))]
     read: list[int] = []
     for number, (frame, background) in enumerate(zip(frames, backgrounds or repeat(None), strict=False)):
         if frame is not None:
-            found.append(find_stripe(frame, parameters, background))
+            crossings_by_frame.append(find_stripe(frame, parameters, background))
             read.append(number)
-    crossings = np.concatenate(found)
-    order = np.repeat(np.arange(-1, len(read), dtype=np.int32), [len(part) for part in found])
+    crossings = np.concatenate(crossings_by_frame)
+    order = np.repeat(np.arange(-1, len(read), dtype=np.int32), [len(part) for part in crossings_by_frame])
     piece = number_pieces(order, crossings[:, PIECE])
     lit = is_laser_light(crossings, piece, len(read), parameters)
     crossings, order, piece = crossings[lit], order[lit], piece[lit]
@@ -53,7 +68,15 @@ def extract_film(
 
 
 def points_csv(points: StripePoints) -> str:
-    """Stripe points as CSV text: frame,i,j,width,peak,score, three decimals."""
+    """Write stripe points as CSV text: the header frame,i,j,width,peak,score, then a row a point with three decimals.
+
+    >>> from footscan.stripe.points import STRIPE_DTYPE
+    >>> points = np.zeros(1, STRIPE_DTYPE)
+    >>> points["i"], points["j"], points["peak"] = 3.0, 30.25, 200.0
+    >>> print(points_csv(points), end="")
+    frame,i,j,width,peak,score
+    0,3.000,30.250,0.000,200.000,0.000
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(CSV_COLUMNS)

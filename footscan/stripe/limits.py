@@ -1,15 +1,17 @@
-"""The parameters of the extraction as compiled loops take them."""
+"""The parameters of the extraction in the form that compiled loops take."""
 
 from typing import NamedTuple
 
 from schemas.parameters.extraction import ExtractionParameters
 
 METHODS = ("threshold-median", "gravity", "gaussian", "ridge", "fir")
+"""The values of `centre_method`."""
 THRESHOLD_MEDIAN, GRAVITY, GAUSSIAN, RIDGE, FIR = range(len(METHODS))
+"""Their numbers."""
 
 
 class Limits(NamedTuple):
-    """What `ExtractionParameters` say; grey levels and px."""
+    """Values of `ExtractionParameters` that pixels and profiles are compared with, in grey levels and px."""
 
     red_threshold: int
     saturation: int
@@ -20,7 +22,12 @@ class Limits(NamedTuple):
 
 
 def limits_of(parameters: ExtractionParameters) -> Limits:
-    """The part of `parameters` that pixels are held against."""
+    """Select the limits from `parameters`.
+
+    >>> limits = limits_of(ExtractionParameters(centre_method="gaussian"))
+    >>> limits.method == GAUSSIAN
+    True
+    """
     return Limits(
         parameters.red_threshold,
         parameters.saturation,

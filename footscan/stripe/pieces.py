@@ -1,4 +1,4 @@
-"""Which pieces of a frame's points are the stripe: not spots, not ghosts of it, not far and weak reflections."""
+"""Selection of the pieces of a frame that are the stripe: no spots, no ghosts, no far and weak reflections."""
 
 import math
 
@@ -10,13 +10,18 @@ from footscan.stripe.profile import CONTRAST, LIGHT, WIDTH
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SPACING_PX, I, J
 
 BESIDE_PX = 1.5
-"""How far from the normal of a point a point of the stripe beside it may lie."""
+"""How far from the normal of a point of a ghost, in px, the corresponding point of the stripe may lie. Chosen by
+hand."""
 COPY = 0.5
-"""A ghost has less than this part of the stripe's light, as far as that is not saturated."""
+"""Part of the stripe's light, as far as that is not saturated, below which a piece may be a ghost. Chosen by hand."""
 APART_PX, APART = 1.0, 0.05
-"""Standard deviation of a ghost's distance from the stripe, px and as a part of that distance."""
+"""Largest standard deviation of a ghost's distance from the stripe: a constant part in px and a part relative to the
+mean distance. Chosen by hand."""
 LENGTH_TO_WIDTH = 2.0
-"""A piece that is not longer than this many widths is a spot."""
+"""A piece shorter than this many widths is a spot. Chosen by hand."""
+MAJORITY = 0.5
+"""Share of a piece's points that decides for the piece, and of the shortest length that must be strong. Chosen by
+hand."""
 
 
 @compiled
@@ -31,9 +36,19 @@ def keep_stripe(
     group_gap: float,
     smallest_group: float,
 ) -> NDArray[np.bool_]:
-    """Which of (N, 10) profiles, each in one of `count` pieces, belong to the stripe.
+    """Select the profiles that belong to the stripe.
 
-    Contrasts in levels of the signal, the rest in px and shares, as `ExtractionParameters` have it.
+    Parameters
+    ----------
+    profiles : (N, 11) float64, in the columns of `measure_profiles`.
+    piece : (N,) int32, the piece of each profile, from 0 to `count` - 1.
+    smallest_contrast : contrast of a strong point, in levels of the signal (`SIGNAL_SCALE` a grey level).
+    shortest, ghost_reach, group_gap : px, as in `ExtractionParameters`.
+    ghost_strength, smallest_group : shares, as in `ExtractionParameters`.
+
+    Returns
+    -------
+    (N,) bool, True for profiles that are kept.
     """
     length, strong, width = np.zeros(count), np.zeros(count), np.zeros(count)
     for a in range(len(profiles)):
@@ -42,8 +57,10 @@ def keep_stripe(
         width[piece[a]] += SPACING_PX * profiles[a, WIDTH]
     kept = np.empty(count, np.bool_)
     for p in range(count):
-        # Faint ends hang on a piece that is strong somewhere.
-        kept[p] = length[p] >= max(shortest, LENGTH_TO_WIDTH * width[p] / length[p]) and strong[p] >= 0.5 * shortest
+        # A piece keeps its faint ends if it is strong elsewhere.
+        kept[p] = (
+            length[p] >= max(shortest, LENGTH_TO_WIDTH * width[p] / length[p]) and strong[p] >= MAJORITY * shortest
+        )
     if kept.sum() > 1:
         _drop_ghosts(profiles, piece, kept, length / SPACING_PX, ghost_reach, ghost_strength)
     if kept.sum() > 1:
@@ -60,10 +77,10 @@ def _drop_ghosts(
     reach: float,
     part: float,
 ) -> None:
-    """Drops pieces most of which runs beside a stronger one: with less than `part` of its light, or parallel to it.
+    """Drop the ghosts: pieces that mostly run beside a stronger one, with less than `part` of its light or parallel.
 
-    Both the stripe and its ghost may be saturated, so that their true light is not known; but a ghost is a copy, and
-    lies at one distance all along.
+    Both the stripe and its ghost may be saturated, so that their true light is not known. But a ghost is a copy: it
+    keeps the same distance from the stripe throughout.
     """
     distance, weaker = _beside_stronger(profiles, piece, kept, reach, part)
     for p in range(len(kept)):
@@ -71,8 +88,8 @@ def _drop_ghosts(
             continue
         own = piece == p
         apart = distance[own & (distance <= reach)]
-        parallel = apart.size > 0.5 * points[p] and apart.std() <= APART_PX + APART * apart.mean()
-        if parallel or weaker[own].sum() > 0.5 * points[p]:
+        parallel = apart.size > MAJORITY * points[p] and apart.std() <= APART_PX + APART * apart.mean()
+        if parallel or weaker[own].sum() > MAJORITY * points[p]:
             kept[p] = False
 
 
@@ -80,9 +97,12 @@ def _drop_ghosts(
 def _beside_stronger(
     profiles: NDArray[np.float64], piece: NDArray[np.int32], kept: NDArray[np.bool_], reach: float, part: float
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """For each point, how far the nearest one across the stripe is that a ghost would be a copy of; infinite for none.
+    """Find for each point the points of stronger pieces across the stripe, of which it may be a copy.
 
-    And whether there is one of which it has less than `part` of the light.
+    Returns
+    -------
+    distance : (N,) float64, px, of the nearest one; infinite if there is none.
+    weaker : (N,) bool, True if the point has less than `part` of the light of one of them.
     """
     distance, weaker = np.full(len(profiles), math.inf), np.zeros(len(profiles), np.bool_)
     most = 0.0
@@ -112,7 +132,7 @@ def _beside_stronger(
 def _drop_weak_groups(
     profiles: NDArray[np.float64], piece: NDArray[np.int32], kept: NDArray[np.bool_], gap: float, smallest: float
 ) -> None:
-    """Drops pieces that lie far from the stripe and are weak beside it."""
+    """Drop groups of pieces that lie far from the stripe and have less than `smallest` of its light."""
     count = len(kept)
     order, start, across = _grid(profiles, piece, kept, gap)
     group = np.arange(count)
@@ -143,6 +163,7 @@ def _drop_weak_groups(
 
 @compiled
 def _root(parent: NDArray[np.intp], a: int) -> int:
+    """The representative of the group of `a` (union-find); shortens the path to it."""
     while parent[a] != a:
         parent[a] = parent[parent[a]]
         a = parent[a]
@@ -153,9 +174,13 @@ def _root(parent: NDArray[np.intp], a: int) -> int:
 def _grid(
     profiles: NDArray[np.float64], piece: NDArray[np.int32], kept: NDArray[np.bool_], side: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], int]:
-    """The points of kept pieces by square cells: their numbers, where each cell begins, and the cells of a row.
+    """Sort the points of kept pieces into square cells, with a border of empty cells around them.
 
-    A border of empty cells runs around, so that every point's cell has eight neighbours.
+    Returns
+    -------
+    order : the numbers of the points, cell by cell.
+    start : where each cell begins in `order`.
+    across : the number of cells in a row.
     """
     least_i = least_j = math.inf
     most_i = most_j = -math.inf

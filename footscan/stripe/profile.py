@@ -1,8 +1,8 @@
-"""The profile across the stripe: what stands out of it, how wide, how even, and where its centre is.
+"""The profile across the stripe: its height, width, symmetry, redness and centre.
 
-A profile is sampled where the normal meets the rows (or the columns, where the stripe runs along these): there it lies
-between pixels of one line alone, and the stripe is not smeared across itself. It begins midway between two columns, and
-so is the mean of both where the stripe runs along the rows.
+A profile is sampled where the normal meets the rows (or the columns, if the stripe runs along the columns). A sample is
+then interpolated between pixels of one line only, which does not smear the stripe across itself. A profile begins
+midway between two columns. If the stripe runs along the rows, each sample is therefore the mean of both columns.
 """
 
 import math
@@ -18,68 +18,70 @@ from footscan.stripe.redness import SIGNAL_SCALE, WHITE_SCALE, light_of, lights_
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SHARPNESS, I, J
 
 WIDTH, CONTRAST, SYMMETRY, SATURATION, LIGHT, REDNESS = range(SHARPNESS + 1, SHARPNESS + 7)
-"""Columns of what `measure_profiles` writes, after those of the ridge."""
+"""Columns of the profiles of `measure_profiles`, after those of `find_ridges`."""
 COLUMNS = REDNESS + 1
+"""Number of columns of a profile."""
 VALLEY = 0.3
-"""Rise, relative to the fall before it, at which the foot of the stripe is passed."""
-FLAT = 0.1
-"""Fall over `FLAT_SAMPLES`, relative to that from the top, that is the foot of the stripe."""
-FLAT_SAMPLES = 4
+"""Rise, relative to the fall before it, at which the walk has passed the foot of the stripe. Chosen by hand."""
+FLAT, FLAT_SAMPLES = 0.1, 4
+"""Fall, relative to that from the top, over so many samples, below which the foot is reached. Chosen by hand."""
 RINGING = 0.06
-"""What compression makes of a saturated level is less than this part of it, and no foot."""
+"""Fall, relative to the top, that compression may cause within a saturated stripe; it is no foot. Chosen by hand."""
 PART_BITS = 12
 PARTS = 1 << PART_BITS
-"""Of a pixel, to which the place of a sample is known."""
+"""Resolution of a sample's place: parts of a pixel. 12 bits keep the interpolation in whole numbers."""
 LEVEL_SAMPLES = 8
-"""What has not fallen after so many samples is no stripe, unless it is saturated."""
+"""A profile that has not fallen after so many samples is no stripe, unless it is saturated. Chosen by hand."""
 EDGE = 0.25
-"""Difference of the feet, relative to the height of the stripe, from which an edge runs along it."""
+"""Difference of the feet, relative to the height of the stripe, from which an edge runs along it. Chosen by hand."""
 NEARLY = 40
-"""Levels below saturation at which red has no room left to tell a laser from a lamp."""
+"""Grey levels below saturation within which red has no range left to tell a laser from a lamp. Chosen by hand."""
 WHITE_RISE = 60.0
-"""Levels of R + 3 G + B by which a core must be whiter than its rim, and than what lies beside it, to count."""
+"""Levels of R + 3 G + B (12 grey levels) by which a white core exceeds rim and feet at least. Chosen by hand."""
 BESIDE = 1.5
-"""Samples beyond half height that still belong to the stripe when its redness is held against that beside it."""
+"""Samples beyond half height that still count as stripe when redness is compared with the feet. Chosen by hand."""
 FOOT_SAMPLES = 4
-"""So many samples at the foot tell how red it is."""
+"""Samples at each foot from which its redness is taken. Chosen by hand."""
+NO_LEVEL = 255
+"""Redness of a foot that has no samples."""
 
 
 class Way(NamedTuple):
-    """The normal of a stripe through the pixels of a picture (rows * columns,), line by line."""
+    """The normal of a stripe in the flattened image. Lines are rows if the stripe runs along rows, else columns."""
 
     line: int
     pixel: int
-    """How far apart, in the picture, two lines are and two pixels of one."""
+    """Distances, in the flattened image, of two lines and of two pixels of one line."""
     at: int
     """The line on which the ridge is."""
     beside: float
     """Where the normal meets that line, px."""
     slope: float
-    """How far that moves on from line to line, px."""
+    """By how much that place moves from line to line, px."""
     back: int
     ahead: int
-    """How many lines it may be followed."""
+    """How many lines the normal may be followed in either direction."""
 
 
 class Samples(NamedTuple):
-    """Memory for the samples of one profile, the ridge in the middle of it."""
+    """Memory for the samples of one profile, (K,) each, with the ridge in the middle."""
 
     signal: NDArray[np.float64]
     white: NDArray[np.float64]
     cells: NDArray[np.int64]
-    """The pixel nearest to each."""
+    """The nearest pixel, in the flattened image."""
     clipped: NDArray[np.bool_]
 
 
 class Feet(NamedTuple):
-    """Where a profile begins and ends."""
+    """The feet of a profile: its first and its last sample."""
 
     first: int
     last: int
     base: float
     """The level of the higher foot."""
     is_even: bool
-    """Whether both feet are even."""
+    """True if both feet are flat, not valleys before other light."""
 
 
 @compiled
@@ -90,11 +92,15 @@ def measure_profiles(
     limits: Limits,
     profiles: NDArray[np.float64],
 ) -> int:
-    """Writes what stands out from both its sides, of `ridges` (N, 5), into `profiles` (N, 11); how many these are.
+    """Measure the profiles across the ridges, and keep those that stand out from both their sides.
 
-    `words` are the frame's pixels, (rows, columns), and `light` the same without what the room lights, if known.
-    Contrasts are in levels of the signal; i, j and widths in px; the laser's light, summed over the width, in px of the
-    light that a white pixel has; redness in grey levels, the reddest of the stripe over the redder of its feet.
+    Parameters
+    ----------
+    words, light : (rows, columns) uint32, the pixels of the frame, and the same less its background, if it has one.
+    ridges : (N, 5) float64, the columns of `find_ridges`.
+    profiles : (at least N, 11) float64, filled with the columns of `find_ridges`, then width (px), contrast (levels of
+        the signal), symmetry and saturation (0 to 1), light of the laser summed over the width (px of a white pixel's
+        light), redness (grey levels by which the reddest pixel exceeds the redder foot). Returns how many are filled.
     """
     rows, columns = words.shape
     reach = math.ceil(limits.largest_width)
@@ -105,7 +111,6 @@ def measure_profiles(
     for n in range(len(ridges)):
         normal_i, normal_j = ridges[n, NORMAL_I], ridges[n, NORMAL_J]
         upright = abs(normal_j) >= abs(normal_i)
-        # Lines are the rows where the stripe runs along these, otherwise the columns.
         lines, pixels = (rows, columns) if upright else (columns, rows)
         line, pixel = (columns, 1) if upright else (1, columns)
         across, along = (normal_j, normal_i) if upright else (normal_i, normal_j)
@@ -132,12 +137,12 @@ def measure_profiles(
 
 @compiled
 def _steps_inside(at: int, lines: int, beside: float, pixels: int, slope: float, reach: int) -> tuple[int, int]:
-    """How many steps back and ahead, at most `reach`, stay inside the image; -1 where the ridge itself is outside."""
+    """Count the steps back and ahead, at most `reach`, that stay inside the image; -1 if the ridge is outside."""
     if not (0 <= at < lines and 0 <= beside <= pixels - 1):
         return -1, -1
     back, ahead = min(at, reach), min(lines - 1 - at, reach)
     if slope != 0:
-        # A hundredth of a pixel short of the border, for `_walk` rounds.
+        # A hundredth of a pixel inside the border, since `_walk` rounds.
         to_start = int(max(beside - 0.01, 0) / abs(slope))
         to_end = int(max(pixels - 1.01 - beside, 0) / abs(slope))
         back = min(back, to_start if slope > 0 else to_end)
@@ -147,10 +152,9 @@ def _steps_inside(at: int, lines: int, beside: float, pixels: int, slope: float,
 
 @compiled
 def _walk(light: NDArray[np.uint32], way: Way, limits: Limits, memory: Samples) -> tuple[int, int, float, bool]:
-    """Samples outward from the ridge to both feet of the stripe; the first and the last one, equal where there is none.
+    """Sample the profile from the ridge to both feet, into `memory`; returns the fields of `Feet`.
 
-    And the level of the higher foot: what lies above it is the laser's, whatever edge runs beside the stripe; and
-    whether both feet are even, not valleys before other light.
+    Without a stripe first and last are equal. The laser's light lies above the higher foot, even beside an edge.
     """
     line, pixel, at, beside, slope, back, ahead = way
     samples, white, cells, _ = memory
@@ -164,7 +168,7 @@ def _walk(light: NDArray[np.uint32], way: Way, limits: Limits, memory: Samples) 
     for direction in (-1, 1):
         lowest = math.inf
         end = start = middle if direction < 0 else middle + 1
-        # Where the normal meets each line, in parts of a pixel: whole numbers are several times as fast.
+        # The place on each line in parts of a pixel: whole numbers are several times as fast.
         across = round(beside * PARTS) + (start - middle) * round(slope * PARTS)
         turn = direction * round(slope * PARTS)
         offset = (at + start - middle) * line
@@ -213,7 +217,7 @@ def _measure(
     profiles: NDArray[np.float64],
     n: int,
 ) -> float:
-    """The centre in samples; NaN where it is no stripe. What the profile is like goes into row `n` of `profiles`."""
+    """Measure one profile into row `n` of `profiles`; returns its centre in samples, NaN if it is no stripe."""
     samples, white, cells, clipped = memory
     first, last, base, is_even = feet
     middle = samples.size // 2
@@ -248,9 +252,9 @@ def _measure(
 
 @compiled
 def _level(samples: NDArray[np.float64], first: int, top: int, last: int, base: float) -> float:
-    """Takes the slope of the room's light out of the samples; the level of the feet then.
+    """Subtract the slope of the room's light from the samples; returns the level of the feet afterwards.
 
-    Where the room is darker than the stripe it is left alone: a slope is an edge there, or light of another stripe.
+    In a room darker than the stripe the samples remain: a slope is then an edge, or light of another stripe.
     """
     rise, height = samples[last] - samples[first], samples[top] - base
     if base < height or abs(rise) >= EDGE * height:
@@ -272,9 +276,9 @@ def _white_centre(
     is_even: bool,
     limits: Limits,
 ) -> float:
-    """The centre of the white core of a stripe whose red is saturated from `left` to `right`; NaN where it has none.
+    """Centre of the white core of a stripe whose red is saturated from `left` to `right`; NaN if there is no core.
 
-    Around the core the light that skin and lens scatter saturates red as well, more on one side than on the other.
+    Light scattered by skin and lens saturates red around the core, farther on one side than on the other.
     """
     top = max(math.ceil(left), first)
     for k in range(top + 1, min(math.floor(right), last) + 1):
@@ -297,6 +301,7 @@ def _white_centre(
 
 @compiled
 def _lowest(samples: NDArray[np.float64], first: int, last: int) -> float:
+    """The lowest of the samples from `first` to `last`, both included."""
     lowest: float = samples[first]
     for k in range(first + 1, last + 1):
         lowest = min(lowest, samples[k])
@@ -307,7 +312,7 @@ def _lowest(samples: NDArray[np.float64], first: int, last: int) -> float:
 def _half_height(
     samples: NDArray[np.float64], middle: int, level: float, first: int, last: int
 ) -> tuple[float, float, float]:
-    """Where the profile falls to the level on either side, in samples, -1 where it does not; the highest between."""
+    """Find where the profile falls to `level` on both sides, in samples, -1 if it does not; and the top between."""
     left, right = middle, middle
     top = samples[middle]
     while left > first and samples[left] > level:
@@ -336,7 +341,7 @@ def _saturation(
     right: float,
     limits: Limits,
 ) -> float:
-    """The part of the stripe's width in which red is saturated; fills `clipped` with where it is."""
+    """The part of the stripe's width in which red is saturated; marks the saturated samples in `clipped`."""
     saturated = inside = 0
     for k in range(*_stripe_samples(first, last, left, right)):
         clipped[k] = red_of(words[cells[k]]) >= limits.saturation
@@ -358,36 +363,35 @@ def _redness(
     right: float,
     limits: Limits,
 ) -> tuple[int, bool]:
-    """By how much the reddest of the stripe is redder than the redder one of its feet; whether its light is a laser's.
+    """By how much the reddest pixel of the stripe exceeds the redder foot; and True if its light may be a laser's.
 
-    The laser's light is redder than what lies beside it, in the flanks at least. On a side where red has no room left
-    above it, any light may be the laser's.
+    The laser's light is redder than its surroundings, at least in the flanks, but for a foot that is nearly saturated.
     """
     reddest = 0
     for k in range(*_stripe_samples(first, last, left, right)):
         reddest = max(reddest, redness_of(light[cells[k]]))
-    if saturation > 0.5:  # the flanks are whitish, and reddest is the halo around them
+    if saturation > 0.5:  # the flanks are whitish, and the halo around them is the reddest part
         for k in range(first + FOOT_SAMPLES, last - FOOT_SAMPLES + 1):
             reddest = max(reddest, redness_of(light[cells[k]]))
     least, is_laser = reddest, True
     for end, direction in ((first, 1), (last, -1)):
-        redness, level = 255, 0
+        redness, level = NO_LEVEL, 0
         for n in range(FOOT_SAMPLES):
             k = end + direction * n
             if left - BESIDE <= k <= right + BESIDE:
                 break
             redness = min(redness, redness_of(light[cells[k]]))
             level = max(level, red_of(words[cells[k]]))
-        if redness == 255:
+        if redness == NO_LEVEL:
             continue
         least = min(least, reddest - redness)
-        has_no_room = saturation > 0.5 and level >= limits.saturation - NEARLY
-        if reddest - redness < limits.red_threshold and not has_no_room:
+        is_foot_saturated = saturation > 0.5 and level >= limits.saturation - NEARLY
+        if reddest - redness < limits.red_threshold and not is_foot_saturated:
             is_laser = False
     return least, is_laser
 
 
 @compiled
 def _stripe_samples(first: int, last: int, left: float, right: float) -> tuple[int, int]:
-    """From which sample on, and before which, a profile is the stripe's."""
+    """The range of samples that belong to the stripe, as arguments of `range`."""
     return max(first, math.ceil(left - BESIDE)), min(last, math.floor(right + BESIDE)) + 1

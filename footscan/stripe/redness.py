@@ -1,6 +1,6 @@
-"""What a pixel says of the laser: how bright it is, and how much redder than white.
+"""Signal and redness of pixels.
 
-A pixel is one word here, red in its lowest byte, then green, blue and one that counts for nothing: one load tells all.
+A pixel is one 32-bit word, with red in its lowest byte, then green, blue and an unused byte, so that one load reads it.
 """
 
 import sys
@@ -12,19 +12,28 @@ from footscan.compiled import compiled
 from footscan.frames.image import padded_pixels
 
 SIGNAL_SCALE = 4
-"""Levels of the signal for one grey level: it is 2 R + G + B, for the laser's red and a saturated core's white."""
+"""Levels of the signal 2 R + G + B for one grey level. It shows the laser's red and the white of a saturated core."""
 WHITE_SCALE = 5
-"""The same of R + 3 G + B."""
+"""Levels of R + 3 G + B for one grey level."""
 SUMMED = 4
-"""Pixels that one of the half-size image is the sum of."""
+"""Pixels whose sum is one pixel of the half-size image."""
 SATURATED = np.int32(1 << 12)
-"""More than the redness of these."""
+"""Mark of saturated red, added to the redness of a pixel of the half-size image: more than that can be (4 * 255)."""
 _BYTE, _TWO_BYTES, _RED_AND_BLUE = np.uint32(0xFF), np.uint32(0xFFFF), np.uint32(0x00FF00FF)
 _EIGHT, _SIXTEEN = np.uint32(8), np.uint32(16)
 
 
 def as_words(image: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """(rows, columns) of words: the memory of an image that lies in a `pixel_buffer`, otherwise a copy."""
+    """View an image as words: its own memory if it lies in a `pixel_buffer`, otherwise a copy.
+
+    Parameters
+    ----------
+    image : (rows, columns, 3) uint8, RGB.
+
+    Returns
+    -------
+    (rows, columns) uint32.
+    """
     padded = padded_pixels(image)
     if padded is None:
         padded = np.empty((*image.shape[:2], 4), np.uint8)
@@ -35,22 +44,30 @@ def as_words(image: NDArray[np.uint8]) -> NDArray[np.uint32]:
 
 @compiled
 def red_of(word: np.uint32) -> int:
-    """The level of red."""
-    return int(np.int64(word & _BYTE))  # of the word itself, int() would be without a sign
+    """The level of red, 0 to 255."""
+    return int(np.int64(word & _BYTE))  # int() of the word itself would be unsigned
 
 
 @compiled
 def redness_of(word: np.uint32) -> int:
-    """R - max(G, B), not below 0."""
+    """The redness R - max(G, B) of a pixel, at least 0.
+
+    >>> redness_of(np.uint32(0x20_50_C8))  # blue 32, green 80, red 200
+    120
+    """
     red, green, blue = word & _BYTE, (word >> _EIGHT) & _BYTE, (word >> _SIXTEEN) & _BYTE
     return max(int(np.int64(red)) - int(np.int64(max(green, blue))), 0)
 
 
 @compiled
 def lights_of(word: np.uint32) -> int:
-    """The signal 2 R + G + B, and in the upper half R + 3 G + B.
+    """The signal 2 R + G + B in the lower 32 bits, and R + 3 G + B in the upper 32 bits.
 
-    The second tells the core of an over-exposed stripe: green is saturated last, and the mosaic samples it most.
+    The second shows the core of an over-exposed stripe: green saturates last, and the mosaic samples it most.
+
+    >>> lights = lights_of(np.uint32(0x20_50_C8))
+    >>> lights & 0xFFFFFFFF, lights >> 32
+    (512, 472)
     """
     red, green, blue = np.int64(word & _BYTE), np.int64((word >> _EIGHT) & _BYTE), np.int64((word >> _SIXTEEN) & _BYTE)
     return int((2 * red + green + blue) | ((red + 3 * green + blue) << 32))
@@ -58,24 +75,34 @@ def lights_of(word: np.uint32) -> int:
 
 @compiled
 def light_of(word: np.uint32) -> float:
-    """The light of a pixel, 1 for white: a camera's levels are about its root."""
+    """The light of a pixel, 1 for white. A camera's levels are about the square root of the light.
+
+    >>> light_of(np.uint32(0xFF_FF_FF))
+    1.0
+    """
     red, green, blue = float(word & _BYTE), float((word >> _EIGHT) & _BYTE), float((word >> _SIXTEEN) & _BYTE)
     return (red * red + green * green + blue * blue) / (3.0 * 255.0 * 255.0)
 
 
 @compiled
 def take_away(image: NDArray[np.uint8], background: NDArray[np.uint8], light: NDArray[np.uint8]) -> None:
-    """Fills `light` with what `image` has more than `background`, byte by byte; all (N,)."""
+    """Subtract `background` from `image` into `light`, byte by byte, at least 0; all (N,) uint8."""
     for n in range(image.size):
         light[n] = image[n] - min(image[n], background[n])
 
 
 @compiled
 def halve(words: NDArray[np.uint32], saturation: int, excess: NDArray[np.uint16], signal: NDArray[np.uint16]) -> None:
-    """Fills redness and signal, both (ceil(rows / 2), ceil(columns / 2)), each of the sum of four pixels.
+    """Compute redness and signal of the half-size image, each pixel of which is the sum of four.
 
-    Where red is saturated in all four, `SATURATED` is added to the redness. What lies outside an image of odd size is
-    as its last row and column.
+    Where red is saturated in all four pixels, `SATURATED` is added to the redness. An image of odd size is continued by
+    its last row and column.
+
+    Parameters
+    ----------
+    words : (rows, columns) uint32, the pixels of an image.
+    saturation : grey level of red from which a pixel is saturated.
+    excess, signal : (ceil(rows / 2), ceil(columns / 2)) uint16, filled with redness and signal.
     """
     rows, columns = words.shape
     whole = columns // 2
@@ -91,7 +118,7 @@ def halve(words: NDArray[np.uint32], saturation: int, excess: NDArray[np.uint16]
 
 @compiled
 def _of_four(a: np.uint32, b: np.uint32, c: np.uint32, d: np.uint32, full: np.int32) -> tuple[np.uint16, np.uint16]:
-    """Redness and signal of the sum of four pixels; red and blue are added side by side in one word."""
+    """Redness and signal of the sum of four pixels. Red and blue are added side by side in one word."""
     red_blue = (a & _RED_AND_BLUE) + (b & _RED_AND_BLUE) + (c & _RED_AND_BLUE) + (d & _RED_AND_BLUE)
     green = np.int32(
         ((a >> _EIGHT) & _BYTE) + ((b >> _EIGHT) & _BYTE) + ((c >> _EIGHT) & _BYTE) + ((d >> _EIGHT) & _BYTE)
@@ -103,7 +130,7 @@ def _of_four(a: np.uint32, b: np.uint32, c: np.uint32, d: np.uint32, full: np.in
 
 @compiled
 def mark_saturated(words: NDArray[np.uint32], saturation: int, excess: NDArray[np.uint16]) -> None:
-    """Adds `SATURATED` to the redness of `halve` where red is saturated in another image, that of all light."""
+    """Add `SATURATED` to the redness `excess` of `halve` where red is saturated in `words`, the image of all light."""
     rows, columns = words.shape
     for y in range(excess.shape[0]):
         below = min(2 * y + 1, rows - 1)

@@ -1,7 +1,7 @@
-"""The ridge of the stripe: where the smoothed signal is highest across it, and which way across is.
+"""The ridge of the stripe: where the smoothed signal is highest across the stripe, and the normal there.
 
 C. Steger, "An unbiased detector of curvilinear structures", IEEE TPAMI 20(2), 1998, doi:10.1109/34.659930. The Hessian
-gives the normal; the centre is left to the profile along it (`footscan.stripe.profile`).
+gives the normal; the profile along the normal gives the centre (`footscan.stripe.profile`).
 """
 
 import math
@@ -15,34 +15,43 @@ from footscan.stripe.limits import Limits
 from footscan.stripe.redness import SATURATED, SIGNAL_SCALE, SUMMED
 
 SIDE = 16
-"""Blocks and a border of one pixel, in px of the half-size image: as many numbers as the widest instructions take."""
+"""Side of a block and its border of one pixel, in px of the half-size image: 16 float32 fill the widest vector
+register (512 bit)."""
 BLOCK = SIDE - 2
-"""Side of the blocks whose own light a pixel must exceed: wider than a stripe, narrower than a red thing."""
+"""Side of the blocks whose background redness a pixel must exceed: wider than a stripe, narrower than a red object."""
 RADIUS = 4
+"""Half length of the smoothing in px of the half-size image: at least twice its standard deviation."""
 PATCH = SIDE + 2 * RADIUS
-"""Pixels that the smoothed block and its border are made of."""
+"""Side of the patch from which a block and its border are smoothed."""
 TAPS = 2 * RADIUS + 1
-"""Weights of the smoothing: a number that the compiler knows lets it unroll the loops."""
+"""Number of weights of the smoothing: a constant, so that the compiler unrolls the loops."""
 BACKGROUND_PART = 0.1
-"""The quantile of its pixels that is a block's own light: the widest stripe leaves more of the block uncovered."""
+"""Quantile of a block's redness that is its background: the widest stripe leaves more of the block uncovered."""
 SAMPLED = 2
-"""One pixel in so many of a row, and one row in so many, tell a block's own light."""
+"""Step in rows and columns of the pixels from which a block's background is taken: a bound of time."""
 OBLIQUE = 0.9
-"""Near 45 degrees a ridge is looked for along rows and along columns, lest one direction leave it to the other."""
+"""Ratio of the normal's components from which a ridge is searched for in a direction. Below 1, so that near 45 degrees
+rows and columns are both searched and no crossing is lost between them. Chosen by hand."""
 ROUND = 0.5
-"""Curvature along the ridge, relative to that across, from which it is a spot or the end of a stripe."""
+"""Curvature along the ridge, relative to that across, from which it is a spot or the end of a stripe. Chosen by
+hand."""
 DOWN, ACROSS = 1, 2
-"""Of a summit: highest down its column, across its row."""
+"""Flags of a summit: the highest of its neighbours in its column, in its row."""
 SPACING_PX = 2
-"""Distance of crossings along the stripe, as far as that runs along rows or columns."""
+"""Distance of crossings along a stripe that runs along rows or columns: one pixel of the half-size image."""
 I, J, NORMAL_I, NORMAL_J, SHARPNESS = range(5)  # noqa: E741 (the name of the axis)
-"""Columns of what `find_ridges` writes."""
+"""Columns of `find_ridges`."""
 
 
 @lru_cache
 def gaussian(sigma: float) -> NDArray[np.float32]:
-    """The `TAPS` weights of a Gaussian, `sigma` in px, at most half of `RADIUS`."""
-    # By the C library: NumPy's exp differs in its last digits from processor to processor.
+    """The weights (`TAPS`,) of a Gaussian; `sigma` in px of the half-size image, at most half of `RADIUS`.
+
+    >>> weights = gaussian(1.0)
+    >>> print(len(weights), round(float(weights.sum()), 5), bool(weights[4] == weights.max()))
+    9 1.0 True
+    """
+    # The C library's exp: NumPy's differs in its last digits from processor to processor.
     weights = np.array([math.exp(-0.5 * (k / sigma) ** 2) for k in range(-RADIUS, RADIUS + 1)])
     return np.asarray(weights / weights.sum(), np.float32)
 
@@ -55,14 +64,23 @@ def find_ridges(
     limits: Limits,
     ridges: NDArray[np.float64],
 ) -> int:
-    """Writes the ridge crossings of a frame into `ridges`, (capacity, 5); how many there are.
+    """Find the ridge crossings of a frame.
 
-    Ridges are looked for in the half-size image of `halve`, which `kernel` smooths: mosaic and JPEG tell the colour of
-    four pixels together. A stripe that runs along the rows is crossed once in two columns of the whole image, between
-    these, and one that runs along the columns once in two rows. Looked at are pixels that are redder than the block
-    they lie in by the red threshold, and those whose red is saturated and can tell nothing.
-    Of the rows written, i and j are the crossing in px, then the unit normal and the curvature across, levels of the
-    signal per px^2. Crossings beyond the capacity are counted and not written.
+    Ridges are searched for in the half-size image of `halve`, smoothed with `kernel`, since mosaic and JPEG give colour
+    for four pixels together. A stripe along the rows is crossed once in two columns of the full-size image, midway
+    between them; a stripe along the columns is crossed once in two rows. Searched are the pixels that are redder than
+    the background of their block by the red threshold, and those whose red is saturated.
+
+    Parameters
+    ----------
+    excess, signal : (R, C) uint16, redness and signal of the half-size image.
+    kernel : (`TAPS`,) float32, the weights of the smoothing.
+    ridges : (capacity, 5) float64, filled with the crossings: i, j (px of the full-size image), the unit normal
+        (i, j), and the curvature across (levels of the signal per px^2).
+
+    Returns
+    -------
+    The number of crossings. Crossings beyond the capacity are counted but not written.
     """
     patch = np.empty((PATCH, PATCH), np.float32)
     along = np.empty((PATCH, SIDE), np.float32)
@@ -71,7 +89,7 @@ def find_ridges(
     counts = np.empty(SUMMED * 255 + 1, np.int32)
     crossing = np.empty(5)
     threshold, brighter = SUMMED * limits.red_threshold, SUMMED * SIGNAL_SCALE * limits.faintest
-    # A parabola's second derivative, in half-size pixels.
+    # The second derivative of a parabola of that height and width, in half-size pixels.
     least = 4 * 8 * SUMMED * SIGNAL_SCALE * limits.faintest / limits.largest_width**2
     lowest_red, highest_red = np.empty(excess.shape[1], np.uint16), np.empty(excess.shape[1], np.uint16)
     count = 0
@@ -111,7 +129,7 @@ def find_ridges(
 
 @compiled
 def _measure_range(band: NDArray[np.integer], lowest: NDArray[np.integer], highest: NDArray[np.integer]) -> None:
-    """The lowest and the highest value of each column of a band of rows."""
+    """Compute the lowest and the highest value of each column of a band of rows."""
     lowest[:] = band[0]
     highest[:] = band[0]
     for j in range(1, band.shape[0]):
@@ -123,6 +141,7 @@ def _measure_range(band: NDArray[np.integer], lowest: NDArray[np.integer], highe
 
 @compiled
 def _contrast(block: NDArray[np.uint16]) -> int:
+    """The difference of a block's highest and lowest value."""
     least = most = block[0, 0]
     for v in range(block.shape[0]):
         for u in range(block.shape[1]):
@@ -132,7 +151,7 @@ def _contrast(block: NDArray[np.uint16]) -> int:
 
 @compiled
 def _own_redness(block: NDArray[np.uint16], counts: NDArray[np.int32]) -> int:
-    """The redness that a small part of the block's pixels do not exceed."""
+    """The background redness of a block: the `BACKGROUND_PART` quantile."""
     counts[:] = 0
     total = 0
     for v in range(0, block.shape[0], SAMPLED):
@@ -149,7 +168,7 @@ def _own_redness(block: NDArray[np.uint16], counts: NDArray[np.int32]) -> int:
 
 @compiled
 def _cut_out(signal: NDArray[np.uint16], top: int, left: int, patch: NDArray[np.float32]) -> None:
-    """The part of the half-size image that begins at (top, left); what lies outside is as its border."""
+    """Copy the part of the half-size image at (top, left) into `patch`; its border pixels continue beyond the image."""
     rows, columns = signal.shape
     if 0 <= top <= rows - PATCH and 0 <= left <= columns - PATCH:
         for y in range(PATCH):
@@ -165,6 +184,7 @@ def _cut_out(signal: NDArray[np.uint16], top: int, left: int, patch: NDArray[np.
 def _smooth(
     patch: NDArray[np.float32], kernel: NDArray[np.float32], along: NDArray[np.float32], smooth: NDArray[np.float32]
 ) -> None:
+    """Smooth a patch along its rows, then along its columns."""
     for y in range(PATCH):
         for x in range(SIDE):
             total = np.float32(0)
@@ -181,6 +201,7 @@ def _smooth(
 
 @compiled
 def _mark_summits(smooth: NDArray[np.float32], summits: NDArray[np.uint8]) -> None:
+    """Mark the pixels inside the border that are the highest `DOWN` their column or `ACROSS` their row."""
     for y in range(1, SIDE - 1):
         for x in range(1, SIDE - 1):
             here = smooth[y, x]
@@ -198,9 +219,9 @@ def _cross(
     least: float,
     crossing: NDArray[np.float64],
 ) -> bool:
-    """Whether a ridge crosses the pixel, which is a `summit` down its column or across its row.
+    """True if a ridge crosses the pixel, whose flags of `_mark_summits` are `summit`.
 
-    The offset (i, j) of the crossing, its unit normal and its curvature go into `crossing`.
+    Writes the offset (i, j) of the crossing, its unit normal and its curvature into `crossing`.
     """
     here = smooth[y, x]
     d_i = 0.5 * (smooth[y, x + 1] - smooth[y, x - 1])
@@ -213,7 +234,7 @@ def _cross(
     curvature = 0.5 * (d_ii + d_jj) - root  # the lower eigenvalue of the Hessian
     if curvature > -least or curvature + 2 * root < ROUND * curvature:
         return False
-    # Its eigenvector, from the row of the Hessian that is the longer one.
+    # Its eigenvector, from the longer row of the Hessian.
     if half_difference < 0:
         normal_i, normal_j = root - half_difference, -d_ij
     else:

@@ -1,10 +1,10 @@
-"""Noise of the centres along the stripe: how large it is, and smoothing that does not round corners.
+"""Noise of the centres along the stripe, and smoothing that does not round corners.
 
-Each centre is moved to the parabola through its neighbours along the stripe, as many on either side as still agree with
-it: the window grows until the confidence intervals of its estimates have no common point (A. Goldenshluger and
-A. Nemirovski, "On spatially adaptive estimation of nonparametric regression", Mathematical Methods of Statistics 6(2),
-1997; V. Katkovnik, "A new method for varying adaptive bandwidth selection", IEEE Transactions on Signal Processing
-47(9), 1999, doi:10.1109/78.782208). At a corner the window is short, and nothing is smoothed.
+Each centre is moved to a parabola through its neighbours along the stripe. The window grows until the confidence
+intervals of its estimates have no common point (A. Goldenshluger and A. Nemirovski, "On spatially adaptive estimation
+of nonparametric regression", Mathematical Methods of Statistics 6(2), 1997; V. Katkovnik, "A new method for varying
+adaptive bandwidth selection", IEEE Transactions on Signal Processing 47(9), 1999, doi:10.1109/78.782208). At a corner
+the window is short, and hardly anything is smoothed.
 """
 
 import math
@@ -18,31 +18,54 @@ from footscan.stripe.profile import WIDTH
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SPACING_PX, I, J
 
 JOINED = 1.5
-"""So many neighbours tell as much as one that stood apart."""
+"""Factor on the variance of an estimate, since neighbours are correlated: so many count as one independent point.
+Chosen by hand."""
 INTERVAL = 1.6
-"""Half width of a confidence interval, in standard deviations."""
+"""Half width of a confidence interval, in standard deviations. Chosen by hand."""
 SHORTEST, GROWTH = 2, 1.4
-"""Steps on either side of the first window, and how much longer the next ones are."""
+"""Steps on either side of the first window, and the ratio of the next window to the last. Chosen by hand."""
 STRAIGHT = 0.9
-"""Cosine of the angle to which the stripe may turn within a window: a parabola follows no more."""
+"""Cosine of the largest angle by which the stripe turns within a window: 26 degrees, which a parabola still follows.
+Chosen by hand."""
 FLOOR_PX = 0.02
-"""What remains when all noise is smoothed away: sampling, lens and compression."""
+"""Standard deviation that remains when all noise is smoothed away: sampling, lens and compression. Chosen by hand."""
 PRIOR_PX = 0.06
-"""Noise of a centre, for a stripe of one px width, where too few points tell."""
+"""Noise of the centre of a stripe 1 px wide, used where too few points show it. Chosen by hand."""
+LEAST_NOISE_PX = 1e-3
+"""Lowest noise of the centre of a stripe 1 px wide: keeps the confidence intervals from vanishing."""
 FEWEST = 12
+"""Third differences from which the noise is taken at least. Chosen by hand."""
 
 
 @compiled
 def smooth_along(
     profiles: NDArray[np.float64], chain: NDArray[np.int32], widths: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How far each point is to be moved along its normal, px (N,), and its standard deviation then, px (N,).
+    """Smooth the centres along the stripe.
 
     Parameters
     ----------
-    profiles : (N, 10), in their order along the stripe.
-    chain : (N,) a number for each point, the same for those that follow each other.
-    widths : how many widths of the stripe are looked at on either side; 0 moves nothing.
+    profiles : (N, 11) float64, the columns of `measure_profiles`, in their order along the stripe.
+    chain : (N,) int32, the number of each point's chain.
+    widths : half length of the longest window, in widths of the stripe; 0 moves no point.
+
+    Returns
+    -------
+    moves : (N,) float64, by how much each point is to be moved along its normal, px.
+    sigmas : (N,) float64, the standard deviation of its centre afterwards, px.
+
+    Examples
+    --------
+    The centre of a straight stripe that lies 0.3 px off is moved back:
+
+    >>> from footscan.stripe.profile import COLUMNS
+    >>> profiles = np.zeros((21, COLUMNS))
+    >>> profiles[:, I], profiles[:, J], profiles[:, NORMAL_J] = np.arange(0, 42, 2), 100.0, 1.0
+    >>> profiles[:, WIDTH] = 6.0
+    >>> profiles[10, J] += 0.3
+    >>> moves, sigmas = smooth_along(profiles, np.zeros(21, np.int32), 3.0)
+    >>> print(bool(moves[10] < -0.1), bool(np.all(np.abs(moves[[0, -1]]) < 0.01)))
+    True True
     """
     count = len(profiles)
     unit = _noise(profiles, chain)
@@ -79,7 +102,7 @@ def smooth_along(
             if m < window:
                 continue
             window = min(math.ceil(m * GROWTH), reach)
-            # The parabola's value at 0, and its variance for unit noise: the first row of the inverse normal matrix.
+            # The inverse normal matrix's first row gives the parabola's value at 0 and its variance for unit noise.
             c0, c1, c2 = s2 * s4 - s3 * s3, s2 * s3 - s1 * s4, s1 * s3 - s2 * s2
             determinant = n * c0 + s1 * c1 + s2 * c2
             if not determinant > 0:
@@ -96,10 +119,10 @@ def smooth_along(
 
 @compiled
 def _noise(profiles: NDArray[np.float64], chain: NDArray[np.int32]) -> float:
-    """Standard deviation of the centres, px, for a stripe 1 px wide; it grows with the root of the width.
+    """Standard deviation of the centres, px, for a stripe 1 px wide; it grows with the square root of the width.
 
-    From third differences of points two steps apart, in which a line and an even bend leave nothing but the noise of
-    four (1, 9, 9 and 1 parts of its variance): a median, for corners are few.
+    It is taken from third differences of points two steps apart. A line and an even bend cancel in them, and the noise
+    of four points remains (1, 9, 9 and 1 times its variance). The median is not affected by the few corners.
     """
     off = np.empty(len(profiles))
     count = 0
@@ -116,4 +139,4 @@ def _noise(profiles: NDArray[np.float64], chain: NDArray[np.int32]) -> float:
             count += 1
     if count < FEWEST:
         return PRIOR_PX
-    return max(MAD_TO_SD * float(np.median(off[:count])), 1e-3)
+    return max(MAD_TO_SD * float(np.median(off[:count])), LEAST_NOISE_PX)

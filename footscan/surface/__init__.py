@@ -1,1 +1,1 @@
-"""Cloud to mesh; export."""
+"""Cloud to closed mesh; decimation; texture."""

@@ -1,4 +1,4 @@
-"""The opening above the ankle, where no camera saw an end of the leg: cut flat and closed by a lid."""
+"""The opening above the ankle, where no camera saw the end of the leg: the leg is cut flat and closed by a lid."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,26 +11,33 @@ Floats = NDArray[np.float64]
 Faces = NDArray[np.int32]
 
 LEAST_AREA_MM2 = 800.0
-"""Of an opening, seen from above: an ankle of the smallest foot has 1,500."""
+"""Least area of an opening, seen from above: the ankle of the smallest foot has 1,500 mm². Chosen by hand."""
 LEVEL_MM = 1.0
-"""Heights are looked at in slices of this."""
+"""Thickness of the slices in which the measured share is counted."""
 STILL_SEEN = 0.8
-"""The cut lies where so much of the outline is measured, against what is below. Where the leg's front and back run
-along X, no stripe may have met them at any height; that alone is no end."""
-
+"""The cut lies at the highest slice whose measured share is this part of the share below. Front and back of the leg run
+along X and may not be met by stripes at any height; that alone is no end of the leg. Chosen by hand."""
+BEST_SEEN = 0.75
+"""Quantile of the slices' measured shares that stands for the share below; chosen by hand."""
 SNAP_MM = 0.1
-"""Vertices so near to the cut are moved onto it, for splitting their edges would leave slivers."""
+"""Vertices nearer than this to the cut are moved onto it, since splitting their edges would leave slivers."""
 
 
 def opening_height(vertices: Floats, faces: Faces, filled: NDArray[np.bool_]) -> float | None:
-    """Z in mm at which the leg is to be cut; None where the surface was measured at its top.
+    """Find the Z in mm at which to cut the leg; None where the surface was measured at its top.
 
-    An opening is filled, looks up, lies in the upper half and is as large as a leg.
+    An opening is filled, faces up, lies in the upper half and is as large as a leg.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64, mm, scanner frame (Z up)
+    faces : (F, 3)
+    filled : (V,) true for vertices that were not measured
     """
     level = np.floor((vertices[:, 2] - vertices[:, 2].min()) / LEVEL_MM).astype(np.intp)
     seen = np.bincount(level, ~filled) / np.maximum(np.bincount(level), 1)
     upper = seen[len(seen) // 2 :]
-    highest = int(np.flatnonzero(upper >= STILL_SEEN * np.quantile(upper, 0.75)).max()) + len(seen) // 2
+    highest = int(np.flatnonzero(upper >= STILL_SEEN * np.quantile(upper, BEST_SEEN)).max()) + len(seen) // 2
     height = float(vertices[:, 2].min() + LEVEL_MM * highest)
     corners = vertices[faces[filled[faces].all(axis=1)]]
     upward = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
@@ -39,12 +46,28 @@ def opening_height(vertices: Floats, faces: Faces, filled: NDArray[np.bool_]) ->
 
 
 def cut_flat(vertices: Floats, faces: Faces, height: float, spacing: float) -> tuple[Floats, Faces, NDArray[np.intp]]:
-    """A closed mesh without what is above `height`, closed by a flat lid.
+    """Cut a closed mesh at Z = `height` and close it by a flat lid.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64, mm, Z up
+    faces : (F, 3) int32
+    height, spacing : mm, of the cut and of the edges of the lid
 
     Returns
     -------
-    vertices, faces : kept ones in their order, then those on the cut, then those of the lid
-    origin : (V,) number that each vertex had; -1 for new ones
+    vertices, faces : those kept in their order, then those on the cut, then those of the lid
+    origin : (W,) earlier number of each vertex; -1 for new ones
+
+    Examples
+    --------
+    A tetrahedron of height 2, cut at half its height: the apex gives way to the three corners of the lid.
+
+    >>> vertices = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]])
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], np.int32)
+    >>> cut_vertices, cut_faces, origin = cut_flat(vertices, faces, height=1.0, spacing=2.0)
+    >>> cut_vertices[:, 2].tolist(), len(cut_faces), origin.tolist()
+    ([0.0, 0.0, 0.0, 1.0, 1.0, 1.0], 8, [0, 1, 2, -1, -1, -1])
     """
     vertices = vertices.copy()
     near = np.abs(vertices[:, 2] - height) < SNAP_MM
@@ -69,7 +92,14 @@ def cut_flat(vertices: Floats, faces: Faces, height: float, spacing: float) -> t
 
 
 def faces_on_cut(vertices: NDArray[np.floating], faces: NDArray[np.integer], cut_mm: float | None) -> NDArray[np.bool_]:
-    """(F,) which faces are the lid at Z = `cut_mm`: no skin, and so neither measured nor filled."""
+    """Returns (F,) which faces are the lid at Z = `cut_mm`; the lid is no skin, so neither measured nor filled.
+
+    Examples
+    --------
+    >>> vertices = np.array([[0.0, 0, 5], [1, 0, 5], [0, 1, 5], [0, 0, 4]])
+    >>> faces_on_cut(vertices, np.array([[0, 1, 2], [0, 1, 3]]), cut_mm=5.0)
+    array([ True, False])
+    """
     if cut_mm is None:
         return np.zeros(len(faces), np.bool_)
     return np.asarray((vertices[faces, 2] == cut_mm).all(axis=1))
@@ -78,7 +108,7 @@ def faces_on_cut(vertices: NDArray[np.floating], faces: NDArray[np.integer], cut
 def _split(
     vertices: Floats, faces: Faces, above: NDArray[np.bool_], on_cut: NDArray[np.bool_], height: float
 ) -> tuple[Floats, Faces]:
-    """The parts of faces with one or two corners above the cut that are not above it, and the vertices that are new."""
+    """Returns the new vertices on the cut, and the parts below it of faces with one or two corners above it."""
     made: dict[tuple[int, int], int] = {}
     new: list[Floats] = []
 

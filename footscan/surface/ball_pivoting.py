@@ -1,4 +1,4 @@
-"""A cloud to a triangle mesh, by ball pivoting (Bernardini et al. 1999, doi:10.1109/2945.817351)."""
+"""Triangle mesh of a cloud by ball pivoting (Bernardini et al. 1999, doi:10.1109/2945.817351)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +12,16 @@ from schemas.base.errors import Finding
 from schemas.parameters.surface import SurfaceParameters
 
 REPAIRS = (0.0, 0.0)
-"""Slits after the first closing. A patch may meet the surface beside its hole: what is tangled is taken out, and the
-holes that this leaves are closed again."""
+"""Largest slits, in mm, of the repeated closings. A patch may meet the surface beside its hole: tangled faces are
+removed, and the holes that they leave are closed again."""
+LEAST_MEAN_NORMAL = 0.1
+"""Length below which a mean of unit normals has no direction: two sides of a thin part have met. Chosen by hand."""
 
 
 def mesh_cloud(
     points: NDArray[np.floating], normals: NDArray[np.floating], step_mm: float, parameters: SurfaceParameters
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """The surface through `points`.
+    """Mesh a cloud by ball pivoting and close its small holes.
 
     Parameters
     ----------
@@ -60,17 +62,22 @@ def mesh_cloud(
 def nearest_points(
     vertices: NDArray[np.floating], points: NDArray[np.floating], gap_mm: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-    """Which vertices were filled: those of a patch that lie farther than `gap_mm` from all points.
+    """Find the nearest point of each vertex, and the vertices that lie farther than `gap_mm` from all points.
 
     Parameters
     ----------
     vertices : (V, 3) mm
-    points : (N, 3) mm, that the surface was made of
+    points : (N, 3) mm, the cloud that was meshed
 
     Returns
     -------
-    filled : (V,)
-    nearest : (V,) number of the point that is nearest to each vertex
+    filled : (V,) true where no point is within `gap_mm`
+    nearest : (V,) int64, number of the point nearest to each vertex
+
+    Examples
+    --------
+    >>> nearest_points(np.array([[0.0, 0, 0], [9, 0, 0]]), np.array([[1.0, 0, 0], [2, 0, 0]]), gap_mm=3.0)
+    (array([False,  True]), array([0, 1]))
     """
     distance, nearest = KDTree(points).query(vertices)
     return np.asarray(distance > gap_mm), np.asarray(nearest, np.int64)
@@ -79,11 +86,11 @@ def nearest_points(
 def _space_evenly(
     points: NDArray[np.float64], normals: NDArray[np.float64], spacing: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Means of points and normals within cubes of `spacing`; ball pivoting wants one spacing everywhere."""
+    """Returns means of points and normals within cubes of `spacing` mm; ball pivoting needs an even spacing."""
     if not len(points):
         raise Finding("no points, expected a cloud to mesh")
     order, starts = group_by_cell(points, np.full(3, spacing))
     both = cell_means(np.hstack([points, normals]), order, starts, np.ones(len(points)))
     length = np.linalg.norm(both[:, 3:], axis=1)
-    both = both[length > 0.1]  # else two sides of something thin have met, and there is no outside
+    both = both[length > LEAST_MEAN_NORMAL]
     return both[:, :3], both[:, 3:] / np.linalg.norm(both[:, 3:], axis=1, keepdims=True)

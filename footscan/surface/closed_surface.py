@@ -16,13 +16,16 @@ from schemas.base.errors import Finding
 from schemas.parameters.surface import SurfaceParameters
 
 LEAST_GRID_MM = 1.0
+"""Bound of memory and time: least spacing of the grid."""
 EVENING_ROUNDS = 2
-"""Of moving vertices along the surface to the middle of those around them; marching cubes leaves slivers."""
+"""Rounds that move each vertex along the surface to the mean of its neighbours, since marching cubes leaves slivers.
+Chosen by hand."""
 LEAST_SECTORS = 7
-"""Of eight directions, in how many there must be points around a vertex that counts as measured."""
+"""A measured vertex has points in at least this many of eight directions; chosen by hand."""
 LEAST_POINTS = 50
+"""Fewer points are refused; chosen by hand."""
 LEAST_MEASURED = 0.5
-"""Share of the vertices below which a surface would be more guessed than seen."""
+"""Least share of measured vertices: below it, more of the surface would be guessed than seen."""
 
 Floats = NDArray[np.float64]
 Faces = NDArray[np.int32]
@@ -43,21 +46,21 @@ def close_surface(
     step_mm: float,
     parameters: SurfaceParameters,
 ) -> Mesh:
-    """A closed mesh through `points`, its vertices told apart into measured and filled ones.
+    """Compute a closed mesh through `points`, with each vertex marked as measured or filled.
 
-    Where the leg was cut flat, the metadata say at which Z: `cut_mm`.
+    Where the leg was cut flat, the metadata name the Z of the cut: `cut_mm`.
 
     Parameters
     ----------
-    points : (N, 3) mm
+    points : (N, 3) mm, scanner frame
     normals : (N, 3) unit vectors, outward
-    camera : (N,) camera of origin
-    step_mm : distance from one stripe plane to the next
+    camera : (N,) uint8, camera of origin
+    step_mm : distance from one stripe plane to the next, along X
 
     Raises
     ------
     Finding
-        There are no points, or no surface runs through them.
+        There are too few points, or no closed surface runs through them.
     """
     usable = np.isfinite(points).all(axis=1) & np.isfinite(normals).all(axis=1)
     if usable.sum() < LEAST_POINTS or step_mm <= 0:
@@ -76,7 +79,7 @@ def close_surface(
     is_measured = (on_cloud.gap_steps <= parameters.gap_steps) & (on_cloud.sectors >= LEAST_SECTORS)
     if is_measured.mean() < LEAST_MEASURED:
         raise Finding(
-            f"{len(xyz)} points do not go around something: {100 * is_measured.mean():.0f} % of a closed surface would "
+            f"{len(xyz)} points do not surround a solid: {100 * is_measured.mean():.0f} % of a closed surface would "
             f"be measured, expected {100 * LEAST_MEASURED:.0f} % at least"
         )
     origin = np.where(is_measured & (on_cloud.nearest >= 0), cloud.camera[on_cloud.nearest], 0).astype(np.uint8)
@@ -102,7 +105,7 @@ def _project(points: Floats, faces: Faces, cloud: _Cloud, parameters: SurfacePar
 
 
 def _evened(placed: Projection, faces: Faces) -> Floats:
-    """The points, each moved within its tangent plane to the middle of its neighbours."""
+    """Returns (N, 3) the points, each moved within its tangent plane to the mean of its neighbours."""
     edges = directed_edges(faces)
     total = np.zeros_like(placed.points)
     for axis in range(3):

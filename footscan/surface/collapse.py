@@ -2,8 +2,8 @@
 
 M. Garland and P. Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH 1997,
 doi:10.1145/258734.258849. No edge is contracted that would change how the surface hangs together (the link condition:
-T. Dey, H. Edelsbrunner, S. Guha and D. Nekhayev, "Topology preserving edge contraction", 1999), which libraries that
-are as quick do not promise; nor do they leave chosen vertices where they are.
+T. Dey, H. Edelsbrunner, S. Guha and D. Nekhayev, "Topology preserving edge contraction", 1999). Libraries as fast as
+this do not guarantee that, and they cannot keep chosen vertices in place.
 """
 
 import heapq
@@ -16,11 +16,12 @@ from footscan.compiled import compiled
 from footscan.mesh.topology import directed_edges, edge_counts
 
 TOWARDS_EVEN = 1e-7
-"""Weight of a vertex's own place against the planes of its triangles: where the surface is flat, it decides."""
+"""Weight of a vertex's own place against the planes of its triangles; it decides where the surface is flat. Chosen by
+hand."""
 RIM_WEIGHT = 10.0
-"""Of the planes that keep an open edge where it is, against those of the triangles."""
+"""Weight of the planes that hold an open edge, against the planes of the triangles; chosen by hand."""
 MOST_TURN = 0.2
-"""Cosine of the angle by which a triangle may turn in one contraction: some 78 degrees."""
+"""Cosine of the largest angle by which a triangle may turn in one contraction, some 78 degrees; chosen by hand."""
 XX, XY, XZ, X, YY, YZ, Y, ZZ, Z, ONE = range(10)
 """Columns of a quadric, the upper half of its symmetric matrix."""
 
@@ -31,21 +32,32 @@ Integers = NDArray[np.int64]
 def collapse_edges(
     vertices: Floats, faces: NDArray[np.integer], values: Floats, fixed: NDArray[np.bool_], triangles: int
 ) -> tuple[Floats, NDArray[np.int32], Floats, NDArray[np.int64]]:
-    """The mesh with at most `triangles`, or with as few as its shape allows.
+    """Reduce a mesh to at most `triangles`, or to as few as its shape allows.
 
     A closed manifold mesh stays one, with as many parts and handles. Vertices without a triangle are dropped.
 
     Parameters
     ----------
-    vertices : (V, 3) mm
+    vertices : (V, 3) float64, mm
     faces : (F, 3)
-    values : (V, K), interpolated along the edges
-    fixed : (V,) vertices that stay, in their place
+    values : (V, K) float64, interpolated along the edges
+    fixed : (V,) true for vertices that are kept in their place
 
     Returns
     -------
-    vertices, faces, values : of the smaller mesh
-    source : a given vertex for each that is left, near it
+    vertices, faces, values : arrays of the smaller mesh: (W, 3) mm, (G, 3), (W, K)
+    source : (W,) for each vertex that is left, the number of an input vertex near it
+
+    Examples
+    --------
+    A flat square of four triangles around its centre needs only two:
+
+    >>> vertices = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 1, 0]])
+    >>> faces = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    >>> corners = np.array([True, True, True, True, False])
+    >>> kept, triangles, _, source = collapse_edges(vertices, faces, np.zeros((5, 0)), corners, triangles=2)
+    >>> len(triangles), source.tolist()
+    (2, [0, 1, 2, 3])
     """
     middle = vertices.mean(axis=0) if len(vertices) else np.zeros(3)
     places, corners, values = vertices - middle, faces.astype(np.int64), values.astype(np.float64)
@@ -56,13 +68,13 @@ def collapse_edges(
     source = np.arange(len(vertices))
     alive = _collapse(places, corners, values, quadrics, edges, on_rim, held, source, triangles)
     used, renumbered = np.unique(corners[alive], return_inverse=True)
-    # One that stays is its own source; to add the middle again would cost a last digit.
+    # A fixed vertex is its own source: adding the middle again would change its last digit.
     kept = np.where(held[used, None], vertices[source[used]], places[used] + middle)
     return kept, renumbered.reshape(-1, 3).astype(np.int32), values[used], source[used]
 
 
 def _quadrics(vertices: Floats, faces: Integers) -> Floats:
-    """(V, 10) squared distances to the planes around each vertex, weighted by area, and to its own place."""
+    """Returns (V, 10) quadrics: squared distances to the planes around each vertex, by area, and to its own place."""
     a, b, c = vertices[faces].transpose(1, 0, 2)
     units, doubled = _unit(np.cross(b - a, c - a))
     quadrics = _sums(faces, _planes(units, a) * doubled[:, None] / 6, len(vertices))
@@ -83,20 +95,20 @@ def _quadrics(vertices: Floats, faces: Integers) -> Floats:
 
 
 def _sums(groups: Integers, values: Floats, count: int) -> Floats:
-    """(count, 10) the sums of (N, 10) `values` at all the vertices of their (N, K) `groups`."""
+    """Returns (count, 10) sums of (N, 10) `values` over the vertices of their (N, K) `groups`."""
     corners = groups.ravel()
     repeated = np.repeat(values, groups.shape[1], axis=0)
     return np.column_stack([np.bincount(corners, column, count) for column in repeated.T])
 
 
 def _unit(vectors: Floats) -> tuple[Floats, Floats]:
-    """(N, 3) vectors of length 1, or 0 where they have none, and (N,) their lengths."""
+    """Returns (N, 3) vectors of length 1 (zero vectors stay zero) and (N,) their lengths."""
     length = np.linalg.norm(vectors, axis=1)
     return np.divide(vectors, length[:, None], out=np.zeros_like(vectors), where=length[:, None] > 0), length
 
 
 def _planes(units: Floats, points: Floats) -> Floats:
-    """(N, 10) squared distances to the planes through `points` across `units`."""
+    """Returns (N, 10) quadrics of the planes through `points` with unit normals `units`."""
     plane = np.column_stack([units, -np.sum(units * points, axis=1)])
     return np.column_stack([plane[:, i] * plane[:, j] for i in range(4) for j in range(i, 4)])
 
@@ -113,7 +125,7 @@ def _collapse(
     source: Integers,
     triangles: int,
 ) -> NDArray[np.bool_]:
-    """Contracts edges in all these arrays; which of the faces are left."""
+    """Contract edges in place in all these arrays; returns (F,) which faces are left."""
     count = len(faces)
     alive, gone = np.ones(count, np.bool_), np.zeros(len(vertices), np.bool_)
     first, following = _corner_lists(faces, len(vertices))
@@ -123,11 +135,11 @@ def _collapse(
     queue = [(_cost(vertices, quadrics, fixed, edge[0], edge[1], place), edge[0], edge[1], 0) for edge in edges]
     heapq.heapify(queue)
     while count > triangles and queue:
-        cost, u, v, known = heapq.heappop(queue)
+        cost, u, v, changes_then = heapq.heappop(queue)
         if cost == math.inf:
             break
-        if gone[u] or gone[v] or changes[u] + changes[v] != known:
-            continue  # an entry of before one of the two moved
+        if gone[u] or gone[v] or changes[u] + changes[v] != changes_then:
+            continue  # the entry is older than a change of one of the two
         mark += 2
         if not _keeps_topology(faces, alive, first, following, on_rim, marks, mark, u, v):
             continue
@@ -164,7 +176,10 @@ def _collapse(
 
 @compiled
 def _corner_lists(faces: Integers, count: int) -> tuple[Integers, Integers]:
-    """For each vertex its first corner, three times the face and 0 to 2, and for each corner its vertex's next; -1."""
+    """Returns linked lists: the first corner of each vertex, and for each corner the next of its vertex; -1 is the end.
+
+    The number of a corner is three times its face plus 0 to 2.
+    """
     first, following = np.full(count, -1), np.empty(faces.size, np.int64)
     for corner in range(faces.size - 1, -1, -1):
         vertex = faces[corner // 3, corner % 3]
@@ -175,13 +190,13 @@ def _corner_lists(faces: Integers, count: int) -> tuple[Integers, Integers]:
 
 @compiled
 def _cost(vertices: Floats, quadrics: Floats, fixed: NDArray[np.bool_], u: int, v: int, place: Floats) -> float:
-    """Writes where the two vertices of an edge meet best; what it costs, in mm^4 (squared distance times area)."""
+    """Write to `place` where an edge contracts best; returns the cost in mm^4 (squared distance times area)."""
     if fixed[u] and fixed[v]:
         return math.inf
     p, q = quadrics[u], quadrics[v]
     a, b, c, d, e, f = p[XX] + q[XX], p[XY] + q[XY], p[XZ] + q[XZ], p[YY] + q[YY], p[YZ] + q[YZ], p[ZZ] + q[ZZ]
     g, h, i = p[X] + q[X], p[Y] + q[Y], p[Z] + q[Z]
-    # The cofactors of the symmetric matrix; a vertex's own place keeps it regular, if it has any area.
+    # The cofactors of the symmetric matrix; `TOWARDS_EVEN` keeps it regular where the faces have any area.
     aa, ab, ac, bb, bc, cc = d * f - e * e, c * e - b * f, b * e - c * d, a * f - c * c, b * c - a * e, a * d - b * b
     determinant = a * aa + b * ab + c * ac
     if fixed[u] or fixed[v] or determinant <= 0:
@@ -210,7 +225,7 @@ def _keeps_topology(
     u: int,
     v: int,
 ) -> bool:
-    """Whether the neighbours that `u` and `v` share are just those of their common faces, of which there are 1 or 2.
+    """True if `u` and `v` share no neighbours but those of their common faces, of which there are 1 or 2.
 
     Writes `mark` and `mark` + 1 into `marks`.
     """
@@ -238,8 +253,8 @@ def _keeps_topology(
     if common != common_faces or not 1 <= common_faces <= 2:
         return False
     if common_faces == 1:
-        return of_u > 1 or of_v > 1  # a triangle on its own stays
-    return not (on_rim[u] and on_rim[v]) and not (of_u == 3 and of_v == 3)  # nor does a tetrahedron fall in
+        return of_u > 1 or of_v > 1  # a single triangle stays
+    return not (on_rim[u] and on_rim[v]) and not (of_u == 3 and of_v == 3)  # so does a tetrahedron
 
 
 @compiled
@@ -253,7 +268,7 @@ def _turns(
     v: int,
     place: Floats,
 ) -> bool:
-    """Whether a face at `u` that outlives the edge to `v` would turn far, or lose its area, with `u` at `place`."""
+    """True if a face at `u` that is not at `v` would turn too far or lose its area with `u` moved to `place`."""
     corner = first[u]
     while corner >= 0:
         f, k = corner // 3, corner % 3
@@ -271,7 +286,7 @@ def _turns(
 
 @compiled
 def _normal(a: Floats, b: Floats, c: Floats) -> tuple[float, float, float]:
-    """Normal of a triangle, twice its area long."""
+    """Normal of a triangle; its length is twice the area."""
     x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     u, v, w = c[0] - a[0], c[1] - a[1], c[2] - a[2]
     return y * w - z * v, z * u - x * w, x * v - y * u
@@ -279,7 +294,7 @@ def _normal(a: Floats, b: Floats, c: Floats) -> tuple[float, float, float]:
 
 @compiled
 def _share(start: Floats, end: Floats, place: Floats) -> float:
-    """How far along the edge a place is, 0 to 1."""
+    """Position of a place along an edge, from 0 to 1."""
     along, squared = 0.0, 0.0
     for k in range(3):
         along += (place[k] - start[k]) * (end[k] - start[k])
@@ -291,7 +306,7 @@ def _share(start: Floats, end: Floats, place: Floats) -> float:
 def _join(
     faces: Integers, alive: NDArray[np.bool_], first: Integers, following: Integers, around: Integers, u: int, v: int
 ) -> tuple[int, int]:
-    """Puts `u` in the place of `v`; writes the faces that are left around it. How many those are, and how many went."""
+    """Replace `v` by `u` and write the faces left around it to `around`; returns how many stay and how many vanish."""
     dropped = 0
     corner = first[v]
     while corner >= 0:

@@ -1,4 +1,4 @@
-"""How far a decimated mesh is from the one it was made of."""
+"""Differences between a decimated mesh and the mesh it was made of."""
 
 from typing import NamedTuple
 
@@ -14,8 +14,9 @@ from footscan.surface.decimate import footprint_axes
 STATIONS = (0.25, 0.50, 0.62, 0.75)
 """Shares of the length, from the heel, where girths are compared: behind the ankle's front, instep, waist, ball."""
 SAMPLES = 100_000
+"""Bound of time: points of each surface whose distance to the other is computed."""
 EXTREMES_MM, GIRTHS_MM = 0.05, 0.1
-"""What decimation may change a measure by."""
+"""Largest changes that decimation may cause; chosen by hand."""
 
 
 class Fidelity(NamedTuple):
@@ -25,18 +26,18 @@ class Fidelity(NamedTuple):
     """Largest distance between the surfaces, of either to the other."""
     surface_mean: float
     extremes: float
-    """Largest change of a place where the mesh ends, or a section at one of `STATIONS` does, aside, above or below."""
+    """Largest change of an end of the mesh along its axes, or of a section at `STATIONS` aside, above or below."""
     girths: float
     """Largest change of a tape's length around the sections at `STATIONS`."""
 
     @property
     def kept(self) -> bool:
-        """Whether extremes and girths are within what decimation may change."""
+        """True if extremes and girths changed by no more than `EXTREMES_MM` and `GIRTHS_MM`."""
         return self.extremes <= EXTREMES_MM and self.girths <= GIRTHS_MM
 
 
 def fidelity(full: Mesh, decimated: Mesh) -> Fidelity:
-    """Compares the two, which lie in one frame."""
+    """Compare a mesh with its decimated form; both are in mm, in the same frame."""
     to_full = _distances(_points(decimated), full)
     to_decimated = _distances(_points(full), decimated)
     along, across = footprint_axes(full.vertices[np.unique(full.faces)])
@@ -52,7 +53,7 @@ def fidelity(full: Mesh, decimated: Mesh) -> Fidelity:
 def _profile(
     mesh: Mesh, full: Mesh, along: NDArray[np.float64], across: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Ends of `mesh` and of its sections in mm, and the girths of these, at stations of `full`."""
+    """Returns the ends of `mesh` and of its sections at the stations of `full`, and the girths there; mm."""
     frame = np.column_stack([along, across, [0.0, 0.0, 1.0]])
     places = mesh.vertices[np.unique(mesh.faces)] @ frame
     ends, girths = [places.min(axis=0), places.max(axis=0)], []
@@ -67,16 +68,16 @@ def _profile(
 
 
 def _points(mesh: Mesh) -> NDArray[np.float64]:
-    """Points all over a surface, its corners among them."""
+    """Returns (N, 3) points spread evenly over a surface, and its vertices; mm."""
     even = sample_surface(mesh.vertices, mesh.faces, SAMPLES)
     return np.concatenate([mesh.vertices[np.unique(mesh.faces)], even])
 
 
 def _distances(points: NDArray[np.float64], mesh: Mesh) -> NDArray[np.float64]:
-    """(N,) distances in mm of (N, 3) points to the surface."""
+    """Returns (N,) distances in mm of (N, 3) points to the surface."""
     import open3d as o3d
 
-    middle = mesh.vertices.mean(axis=0)  # single precision: 0.00001 mm that far from the middle
+    middle = mesh.vertices.mean(axis=0)  # single precision errs by 0.00001 mm at such distances from the middle
     tensor = o3d.core.Tensor.from_numpy
     scene = o3d.t.geometry.RaycastingScene(nthreads=1)
     scene.add_triangles(tensor((mesh.vertices - middle).astype(np.float32)), tensor(mesh.faces.astype(np.uint32)))

@@ -13,33 +13,34 @@ Vertices = NDArray[np.float64]
 Faces = NDArray[np.int32]
 
 MAX_RIM = 4000
-"""Vertices of a rim in which slits are sought; the search compares all pairs."""
+"""Bound of memory: slits are sought in rims of up to this many vertices, since the search compares all pairs."""
 SLIT_RATIO = 4.0
-"""A slit's rim is at least this many times as long as its mouth is wide; around half a circle it is 1.6 times."""
+"""The rim of a slit is at least this many times as long as its mouth is wide (half a circle: 1.6 times). Chosen by
+hand."""
 
 
 def close_holes(
     vertices: Vertices, faces: Faces, max_perimeter: float, max_width: float, spacing: float
 ) -> tuple[Vertices, Faces]:
-    """A mesh with every small hole closed by a patch that continues the surface around it.
+    """Close every small hole of a mesh by a patch that continues the surface around it.
 
-    Stripe planes miss up to one step of heel and toes, and graze what is steep there: a flat lid would make a foot
-    shorter. The gap that is left behind heel and leg often runs up into the opening at the ankle: of a hole that is
-    too large the slits are closed.
+    Stripe planes miss up to one step of heel and toes and graze the steep surface there: a flat lid would make a foot
+    shorter. The gap behind heel and leg often runs up into the opening at the ankle. Therefore the slits of a hole that
+    is too large are closed, too.
 
     Parameters
     ----------
-    vertices : (V, 3) mm
-    faces : (F, 3), all with the same sense of rotation
-    max_perimeter : of holes that are closed, mm
-    max_width : of slits that are closed, at their mouth, mm
-    spacing : edges of the patches are about so long, mm
+    vertices : (V, 3) float64, mm
+    faces : (F, 3) int32, all with the same sense of rotation
+    max_perimeter : mm, of holes that are closed
+    max_width : mm, of slits that are closed, at their mouth
+    spacing : mm, length of the edges of the patches
 
     Returns
     -------
-    vertices, faces : the given ones first
+    vertices, faces : the input arrays, followed by the vertices and faces of the patches
     """
-    given = count = len(vertices)
+    first_new = count = len(vertices)
     added, patches, closed = [vertices], [faces], list[int]()
     joined: defaultdict[int, set[int]] = defaultdict(set)
     holes = rims(faces)
@@ -57,13 +58,19 @@ def close_holes(
     whole = np.concatenate(patches)
     still_open = [vertex for rim in rims(whole) for vertex in rim]
     inner = np.setdiff1d(np.array(closed, np.intp), still_open)
-    return fair(np.concatenate(added), whole, inner, np.arange(given, count)), whole
+    return fair(np.concatenate(added), whole, inner, np.arange(first_new, count)), whole
 
 
 def rims(faces: NDArray[np.integer]) -> list[list[int]]:
-    """The closed loops of edges with a face on one side only, each in the direction that a face covering it runs.
+    """Find the closed loops of edges that have a face on one side only.
 
-    Loops that touch at a vertex are told apart; what does not close is left out.
+    Each loop runs in the direction of a face that would cover it. Loops that touch at a vertex are separated. Chains of
+    edges that do not close are left out.
+
+    Examples
+    --------
+    >>> rims(np.array([[0, 1, 2], [0, 2, 3]]))
+    [[0, 3, 2, 1]]
     """
     edges = directed_edges(faces)
     size = int(faces.max()) + 1 if faces.size else 1
@@ -86,16 +93,16 @@ def rims(faces: NDArray[np.integer]) -> list[list[int]]:
 
 
 def _join(joined: defaultdict[int, set[int]], faces: Faces) -> None:
-    """Notes in `joined` which vertices the edges of `faces` join."""
+    """Add to `joined` which vertices the edges of `faces` join."""
     for a, b in directed_edges(faces).tolist():
         joined[a].add(b)
         joined[b].add(a)
 
 
 def _slits(vertices: Vertices, hole: list[int], max_width: float) -> list[list[int]]:
-    """Parts of the rim of a `hole` that run in and out again, the corners of their mouth at most `max_width` apart.
+    """Find the slits in the rim of a `hole`, whose mouths are at most `max_width` wide.
 
-    At each mouth the hole falls in two; the part with the smaller area is the slit.
+    Each mouth divides the hole into two parts; the part with the smaller area is the slit.
     """
     slits = []
     while 3 < len(hole) <= MAX_RIM:
@@ -117,11 +124,17 @@ def _slits(vertices: Vertices, hole: list[int], max_width: float) -> list[list[i
 
 
 def perimeter(corners: Vertices) -> float:
-    """Length in mm of the closed line through (N, 3) `corners`."""
+    """Length in mm of the closed line through (N, 3) `corners`.
+
+    Examples
+    --------
+    >>> perimeter(np.array([[0.0, 0, 0], [3, 0, 0], [3, 4, 0]]))
+    12.0
+    """
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).sum())
 
 
 def _area(corners: Vertices) -> float:
-    """Area in mm² of a closed polygon, of its projection along its mean normal where it is not flat."""
+    """Area in mm² of a closed polygon; for one that is not flat, the area of its projection along the mean normal."""
     centred = corners - corners.mean(axis=0)
     return float(np.linalg.norm(np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)) / 2)

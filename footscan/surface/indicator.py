@@ -1,9 +1,9 @@
 """A rough closed surface: the level of a function that is 1 inside and 0 outside.
 
-The gradient of that function, smoothed, is the sum of the points' normals, each times the area that the point stands
-for; so it solves a Poisson equation (Kazhdan, Bolitho and Hoppe 2006, doi:10.2312/SGP/SGP06/061-070), here on an even
-grid, where cosine transforms do it at once. It closes what no camera saw; how close it comes to the points matters
-little, for `projection` moves it onto them.
+The smoothed gradient of that function is the sum of the points' normals, each times the area that the point stands
+for. So the function solves a Poisson equation (Kazhdan, Bolitho and Hoppe 2006, doi:10.2312/SGP/SGP06/061-070), here on
+an even grid, where cosine transforms solve it directly. The level surface also closes what no camera saw. Its distance
+from the points matters little, since `projection` moves it onto them.
 """
 
 from dataclasses import dataclass
@@ -19,16 +19,16 @@ from footscan.mesh.topology import largest_component, used_vertices
 from schemas.base.errors import Finding
 
 MARGIN_BLURS = 8.0
-"""Room around the points, where the function falls to that of the outside."""
+"""Margin of the grid around the points, in blurs, in which the function falls to its value outside; chosen by hand."""
 MAX_CELLS = 12_000_000
-"""The grid is made coarser where it would have more; it bounds the memory, to 100 bytes a cell."""
+"""Bound of memory, at 100 bytes a cell: a grid with more cells is made coarser."""
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Indicator:
-    """Values at the points of a grid, low + spacing * (a, b, c)."""
+    """Values of the function at the points low + spacing * (a, b, c) of a grid."""
 
     values: NDArray[np.float32]
     low: Floats
@@ -36,17 +36,18 @@ class Indicator:
     spacing: float
     """mm"""
     level: float
-    """Where the surface is."""
+    """Value of the function on the surface."""
 
 
 def indicator(points: Floats, normals: Floats, spacing: float, blur: float) -> Indicator:
-    """The function of a cloud.
+    """Compute the indicator function of a cloud.
 
     Parameters
     ----------
-    points, normals : (N, 3) mm, unit vectors, outward
-    spacing : of the grid, mm
-    blur : standard deviation in mm of what smooths the normals; about the distance of neighbouring points
+    points : (N, 3) float64, mm
+    normals : (N, 3) unit vectors, outward
+    spacing : mm, of the grid
+    blur : mm, standard deviation of the Gaussian that smooths the normals; about the distance of neighbouring points
     """
     low, high = points.min(axis=0) - MARGIN_BLURS * blur, points.max(axis=0) + MARGIN_BLURS * blur
     while np.prod((high - low) / spacing + 1) > MAX_CELLS:
@@ -72,26 +73,48 @@ def indicator(points: Floats, normals: Floats, spacing: float, blur: float) -> I
 
 
 def level_surface(field: Indicator, x_mm: tuple[float, float]) -> tuple[Floats, NDArray[np.int32]]:
-    """The closed surface of largest extent at the level: (V, 3) vertices in mm, (F, 3) faces, seen from outside.
+    """Extract the closed level surface of largest extent.
 
-    Nothing lies beyond `x_mm`, least and greatest X in mm: there the surface is cut off flat.
+    Parameters
+    ----------
+    x_mm : least and greatest X of the surface, which is cut off flat there
+
+    Returns
+    -------
+    vertices : (V, 3) float64, mm
+    faces : (F, 3) int32, counter-clockwise seen from outside
+
+    Raises
+    ------
+    Finding
+        No surface runs through the points.
     """
     values = field.values.copy()
     x = field.low[0] + field.spacing * np.arange(len(values))
     within = np.minimum(x - x_mm[0], x_mm[1] - x) / field.spacing * (values.max() - field.level)
     np.minimum(values, field.level + within.astype(np.float32)[:, None, None], out=values)
-    for axis in range(3):  # nothing reaches the border, so the surface is closed
+    for axis in range(3):  # the function is least at the border, so the surface is closed
         np.moveaxis(values, axis, 0)[[0, -1]] = values.min()
     if not values.min() < field.level < values.max():
         raise Finding("no surface through the points, expected normals that point outward")
     vertices, faces, _, _ = marching_cubes(values, field.level, allow_degenerate=False)
-    faces = np.ascontiguousarray(faces[:, ::-1], np.int32)  # its triangles run clockwise around what is higher
+    faces = np.ascontiguousarray(faces[:, ::-1], np.int32)  # marching cubes orders corners clockwise seen from outside
     corners, faces = used_vertices(vertices.astype(np.float64), largest_component(faces))
     return field.low + field.spacing * corners, faces
 
 
 def areas(points: Floats, radius: float) -> Floats:
-    """(N,) the area in mm² of the surface that each of (N, 3) `points` stands for, by how dense they lie around it."""
+    """Returns (N,) areas in mm² of the surface that each of (N, 3) `points` stands for, from the density around it.
+
+    Examples
+    --------
+    Points of a plane, 1 mm apart; the one in the middle stands for 1 mm²:
+
+    >>> x, y = np.meshgrid(np.arange(21.0), np.arange(21.0))
+    >>> plane = np.column_stack([x.ravel(), y.ravel(), np.zeros(441)])
+    >>> float(areas(plane, radius=2.0)[220].round(1))
+    1.0
+    """
     buckets = sort_into_cubes(points, 2 * radius)
     return 1.0 / _densities(points, radius, buckets.edge, buckets.low, buckets.dims, buckets.start, buckets.order)
 
@@ -106,7 +129,7 @@ def _densities(
     start: NDArray[np.int64],
     order: NDArray[np.int64],
 ) -> Floats:
-    """(N,) points a mm², weighed by a Gaussian that is cut off at two standard deviations."""
+    """Returns (N,) points per mm², weighted by a Gaussian that is cut off at two standard deviations."""
     density = np.zeros(len(points))
     whole = 2.0 * np.pi * radius * radius * (1.0 - np.exp(-2.0))
     for n in range(len(points)):
@@ -114,7 +137,7 @@ def _densities(
         for axis in range(3):
             cube = int((points[n, axis] - low[axis]) / edge)
             first[axis], last[axis] = max(cube - 1, 0), min(cube + 1, dims[axis] - 1)
-        found = 0.0
+        weights = 0.0
         for a in range(first[0], last[0] + 1):
             for b in range(first[1], last[1] + 1):
                 row = (a * dims[1] + b) * dims[2]
@@ -124,14 +147,14 @@ def _densities(
                     for axis in range(3):
                         squared += (points[near, axis] - points[n, axis]) ** 2
                     if squared < 4.0 * radius * radius:
-                        found += np.exp(-0.5 * squared / (radius * radius))
-        density[n] = found / whole
+                        weights += np.exp(-0.5 * squared / (radius * radius))
+        density[n] = weights / whole
     return density
 
 
 @compiled
 def _spread(grid: NDArray[np.float32], places: Floats, vectors: Floats) -> None:
-    """Adds vectors to the eight corners of the grid around each of their places, by how near they are."""
+    """Add each vector to the eight grid points around its place, with trilinear weights."""
     for n in range(len(places)):
         a, b, c = int(places[n, 0]), int(places[n, 1]), int(places[n, 2])
         u, v, w = places[n, 0] - a, places[n, 1] - b, places[n, 2] - c

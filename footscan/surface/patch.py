@@ -16,28 +16,37 @@ Edge = tuple[int, int]
 Point = tuple[float, float, float]
 
 MAX_PASSES = 20
+"""Bound of time: rounds of halving and exchanging edges."""
 TOO_LONG = 1.5
-"""Edges of this many times the spacing are halved."""
+"""Edges longer than this multiple of the spacing are halved; chosen by hand."""
 FAIRING_ROUNDS = 3
-"""The Laplacian is that of the shape before; the first is that of a flat patch."""
+"""Each round takes the Laplacian of the shape before; the first takes that of a flat patch. Chosen by hand."""
 RIDGE = 1e-9
-"""Lets a vertex stay that nothing else holds."""
+"""Keeps the normal equations regular: a vertex that no face holds stays in its place."""
 COTANGENTS = (-2.0, 5.0)
-"""Limits for slivers."""
+"""Bounds of a cotangent, so that slivers do not outweigh the other triangles; chosen by hand."""
 
 
 def patch_over(rim: Vertices, spacing: float, taken: set[Edge]) -> tuple[Vertices, Faces]:
-    """A patch over a hole, its inner edges about `spacing` long.
+    """Triangulate a hole with inner edges about `spacing` long.
 
     Parameters
     ----------
-    rim : (R, 3) mm, in the direction in which the patch's triangles run
-    taken : pairs of rim vertices, lower first, that an edge of the mesh joins, so that none of the patch may
+    rim : (R, 3) float64, mm, in the direction in which the patch's triangles run
+    spacing : mm
+    taken : pairs of rim vertices, lower first, that an edge of the mesh already joins; the patch has no such edge
 
     Returns
     -------
-    new : (N, 3) vertices within the patch
-    triangles : (T, 3) of them; numbers below R are of the rim, those from R on of `new`
+    new : (N, 3) float64, mm, vertices within the patch
+    triangles : (T, 3) int32; numbers below R are vertices of the rim, those from R on are vertices of `new`
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> new, triangles = patch_over(square, spacing=2.0, taken=set())
+    >>> len(new), triangles.tolist()
+    (0, [[0, 1, 3], [1, 2, 3]])
     """
     points: list[Point] = [tuple(corner) for corner in rim.tolist()]
     across: dict[Edge, int] = {}  # directed edge -> the third vertex of its triangle
@@ -45,7 +54,7 @@ def patch_over(rim: Vertices, spacing: float, taken: set[Edge]) -> tuple[Vertice
         _add(across, *triangle)
     for _ in range(MAX_PASSES):
         inner = [(a, b) for a, b in across if a < b and (b, a) in across]
-        long = [e for e in inner if e in taken or math.dist(points[e[0]], points[e[1]]) > TOO_LONG * spacing]
+        long = [edge for edge in inner if edge in taken or math.dist(*(points[n] for n in edge)) > TOO_LONG * spacing]
         if not long:
             break
         for a, b in long:
@@ -58,11 +67,21 @@ def patch_over(rim: Vertices, spacing: float, taken: set[Edge]) -> tuple[Vertice
 
 
 def fair(vertices: Vertices, faces: Faces, rim: NDArray[np.intp], new: NDArray[np.intp]) -> Vertices:
-    """`vertices` with the `new` ones moved to where the patches bend least, tangents at their rims kept.
+    """Move the `new` vertices to where the patches bend least; tangents at the rims are kept.
 
-    That is the least integral, over patches and their rims (those vertices of them that have faces all around), of the
-    squared Laplacian of the position, in the cotangent form of Pinkall and Polthier 1993,
+    This minimises the integral of the squared Laplacian of the position over the patches and those vertices of their
+    rims that have faces all around, in the cotangent form of Pinkall and Polthier 1993,
     doi:10.1080/10586458.1993.10504266.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64, mm
+    faces : (F, 3)
+    rim, new : numbers of vertices
+
+    Returns
+    -------
+    (V, 3) float64, mm; all vertices but the `new` ones as they were
     """
     if not len(new):
         return vertices
@@ -97,7 +116,7 @@ def _laplacian(vertices: Vertices, faces: Faces) -> csr_array:
 
 
 def _cut_ears(rim: Vertices) -> list[tuple[int, int, int]]:
-    """R - 2 triangles over a rim of R corners; each cuts the corner whose new edge is shortest."""
+    """Triangulate a rim of R corners with R - 2 triangles; each cuts the corner whose new edge is shortest."""
     rest = list(range(len(rim)))
     triangles = []
     while len(rest) > 3:
@@ -110,7 +129,7 @@ def _cut_ears(rim: Vertices) -> list[tuple[int, int, int]]:
 
 
 def _halve(across: dict[Edge, int], points: list[Point], a: int, b: int) -> None:
-    """Puts a new vertex in the middle of edge a-b; its two triangles become four."""
+    """Split edge a-b by a new vertex in its middle; its two triangles become four."""
     left, right, middle = across[a, b], across[b, a], len(points)
     (ax, ay, az), (bx, by, bz) = points[a], points[b]
     points.append(((ax + bx) / 2, (ay + by) / 2, (az + bz) / 2))
@@ -121,7 +140,7 @@ def _halve(across: dict[Edge, int], points: list[Point], a: int, b: int) -> None
 
 
 def _exchange(across: dict[Edge, int], points: list[Point], a: int, b: int) -> None:
-    """Exchanges the diagonal a-b of its two triangles for the other where the angles across it exceed 180 degrees."""
+    """Flip the edge a-b of its two triangles where the angles opposite to it exceed 180 degrees together."""
     if (a, b) not in across or (b, a) not in across:
         return
     left, right = across[a, b], across[b, a]
@@ -136,7 +155,7 @@ def _exchange(across: dict[Edge, int], points: list[Point], a: int, b: int) -> N
 
 
 def _angle(points: list[Point], apex: int, a: int, b: int) -> float:
-    """At `apex` between a and b, by the law of cosines."""
+    """Angle in radians at `apex` between a and b, by the law of cosines."""
     p, q, r = math.dist(points[apex], points[a]), math.dist(points[apex], points[b]), math.dist(points[a], points[b])
     return math.acos(max(-1.0, min(1.0, (p * p + q * q - r * r) / (2 * p * q)))) if p * q else 0.0
 

@@ -1,8 +1,8 @@
-"""Moving of points onto the smooth surface through the points around them (moving least squares).
+"""Projection of points onto the smooth surface through the points around them (moving least squares).
 
 Alexa et al., "Computing and rendering point set surfaces", 2003, doi:10.1109/TVCG.2003.1175093, with quadratic height
-fields over planes whose normal follows the surface. A quadratic follows what is curved; a plane or a mean would shrink
-toes and heel.
+fields over planes whose normal follows the surface. A quadratic follows a curved surface; a plane or a mean would
+shrink toes and heel.
 """
 
 from dataclasses import dataclass
@@ -14,32 +14,33 @@ from footscan.compiled import compiled
 from footscan.mesh.buckets import Buckets, sort_into_cubes
 
 STEEPEST = 0.35
-"""Sine of the angle between surface and stripe planes below which neighbouring stripes count as no farther apart: what
-is farther away says little of a toe, which is no quadric."""
+"""Sine of the least angle between surface and stripe planes by which neighbourhoods grow: a toe is no quadric, and
+points farther away say little about it. Chosen by hand."""
 SAME_SIDE = 0.3
-"""Neighbours whose normals agree less than this (cosine) lie on another side of something thin, as the next toe."""
+"""Neighbours whose normals agree less than this cosine lie on another surface, such as the next toe; chosen by hand."""
 RIDGE = 1e-3
-"""Keeps curvature small where the neighbours do not tell it, as along a single stripe."""
+"""Keeps the curvature small where the neighbours do not determine it, as along a single stripe; chosen by hand."""
 SECTORS = 8
+"""Directions in the tangent plane in which neighbours are counted."""
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Projection:
-    """Where points have moved to, and what held them there."""
+    """Points moved onto the surface, with the evidence around them."""
 
     points: Floats
     """(N, 3) mm"""
     normals: Floats
-    """(N, 3) unit vectors of the surface there"""
+    """(N, 3) unit normals of the surface there"""
     gap_steps: Floats
     """(N,) distance along the surface to the nearest point of the cloud, in distances from stripe to stripe there;
-    infinite where there was none."""
+    infinite where no point is within reach"""
     sectors: NDArray[np.int64]
-    """(N,) in how many of eight directions there are points."""
+    """(N,) number of the eight directions in which there are points"""
     nearest: NDArray[np.int64]
-    """(N,) number of the nearest point of the cloud; -1 where there was none."""
+    """(N,) number of the nearest point of the cloud; -1 where none is within reach"""
 
 
 def project(
@@ -51,18 +52,29 @@ def project(
     reach_steps: float,
     rounds: int = 2,
 ) -> Projection:
-    """Moves points along their normals onto the surface through a cloud.
+    """Move points along their normals onto the surface through a cloud.
 
-    Where the surface is steep, stripes lie farther apart along it, and neighbours are sought as much farther.
+    Where the surface is steep, stripes lie farther apart along it, and the neighbourhoods grow in proportion.
 
     Parameters
     ----------
-    points, normals : (N, 3) mm, unit vectors
-    cloud, cloud_normals : (M, 3) mm, unit vectors
+    points, normals : (N, 3) float64, mm, and (N, 3) unit vectors
+    cloud, cloud_normals : (M, 3) float64, mm, and (M, 3) unit vectors, in the same frame
     step_mm : distance from one stripe plane to the next, along X
-    reach_steps : radius of the neighbourhoods, in distances from stripe to stripe; weights fall to zero there. Points
-        move by half of it at most in a round
-    rounds : each starts from where the one before has moved to, with the normal found there
+    reach_steps : radius of the neighbourhoods, in distances from stripe to stripe; weights fall to zero there. A point
+        moves by at most half of it in a round
+    rounds : each round starts from the points and normals of the round before
+
+    Examples
+    --------
+    A point 0.3 mm above a plane of points 1 mm apart:
+
+    >>> x, y = np.meshgrid(np.arange(11.0), np.arange(11.0))
+    >>> plane = np.column_stack([x.ravel(), y.ravel(), np.zeros(121)])
+    >>> up = np.array([[0.0, 0.0, 1.0]])
+    >>> placed = project(np.array([[5.2, 5.0, 0.3]]), up, plane, np.repeat(up, 121, axis=0), 1.0, reach_steps=3.0)
+    >>> placed.points.round(2).tolist(), placed.nearest.tolist(), placed.sectors.tolist()
+    ([[5.2, 5.0, 0.0]], [60], [8])
     """
     buckets = sort_into_cubes(cloud, reach_steps * step_mm)
     moved = _project(points, normals, cloud, cloud_normals, step_mm, reach_steps, rounds, buckets)
@@ -70,7 +82,7 @@ def project(
 
 
 @compiled
-def _project(  # noqa: PLR0912, PLR0915 (a call a neighbour would cost more than what it does)
+def _project(  # noqa: PLR0912, PLR0915 (one call per neighbour would cost more than its arithmetic)
     points: Floats,
     normals: Floats,
     cloud: Floats,

@@ -1,4 +1,4 @@
-"""How whole a mesh is."""
+"""Quality of a mesh: open edges, holes, parts, filled area and the shape of its triangles."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,6 +7,9 @@ from footscan.mesh.topology import edge_counts, face_components
 from footscan.surface.ankle import faces_on_cut
 from footscan.surface.holes import perimeter, rims
 from schemas.quality import MeshQuality
+
+WORST_QUANTILE = 0.01
+"""Quantile of the triangles' shapes that stands for the worst ones."""
 
 Floats = NDArray[np.float64]
 
@@ -17,14 +20,24 @@ def mesh_quality(
     filled: NDArray[np.bool_] | None = None,
     cut_mm: float | None = None,
 ) -> MeshQuality:
-    """Counts and shares of what a mesh consists of; a closed one has no open and no non-manifold edges.
+    """Compute the quality of a mesh; a closed mesh has no open and no non-manifold edges.
 
     Parameters
     ----------
     vertices : (V, 3) mm
     faces : (F, 3)
-    filled : (V,) what was not measured, where that is known; a triangle is filled where one of its corners is
-    cut_mm : Z of the flat cut above the ankle, where there is one
+    filled : (V,) true for vertices that were not measured; None where that is unknown. A triangle is filled if one of
+        its corners is
+    cut_mm : Z of the flat cut above the ankle; None without a cut
+
+    Examples
+    --------
+    A square of two triangles has four open edges, which form one hole 4 mm long:
+
+    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> quality = mesh_quality(square, np.array([[0, 1, 2], [0, 2, 3]]))
+    >>> quality.open_edges, quality.holes, quality.largest_hole_mm, quality.components
+    (4, 1, 4.0, 1)
     """
     points = np.asarray(vertices, np.float64)
     _, counts = edge_counts(faces)
@@ -44,12 +57,15 @@ def mesh_quality(
         filled_share=None if is_filled is None else float(area[is_filled].sum()) / total,
         cut_share=None if filled is None else float(area[on_cut].sum()) / total,
         triangle_quality=float(shape.mean()) if len(faces) else None,
-        worst_triangles=float(np.quantile(shape, 0.01)) if len(faces) else None,
+        worst_triangles=float(np.quantile(shape, WORST_QUANTILE)) if len(faces) else None,
     )
 
 
 def _areas_and_shapes(corners: Floats) -> tuple[Floats, Floats]:
-    """(F,) areas in mm² and how even triangles are, from 0 to 1 (Bank and Smith, "Mesh smoothing", 1997)."""
+    """Returns (F,) areas in mm² and (F,) shapes, 1 for equilateral triangles and 0 for slivers.
+
+    R. Bank and R. Smith, "Mesh smoothing using a posteriori error estimates", 1997, doi:10.1137/S0036142994265292.
+    """
     sides = corners - np.roll(corners, 1, axis=1)
     area = 0.5 * np.linalg.norm(np.cross(sides[:, 1], sides[:, 2]), axis=1)
     squared = np.einsum("nki,nki->n", sides, sides)

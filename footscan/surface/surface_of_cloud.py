@@ -12,7 +12,7 @@ from schemas.parameters.surface import SurfaceParameters
 
 
 def surface_of_cloud(cloud: NDArray[np.void], normals: NDArray[np.float64], parameters: SurfaceParameters) -> Mesh:
-    """Mesh a fused cloud.
+    """Mesh a fused cloud, by `close_surface` or by `mesh_cloud`.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def surface_of_cloud(cloud: NDArray[np.void], normals: NDArray[np.float64], para
 
     Returns
     -------
-    Mesh with normals, camera of origin and what was filled.
+    Mesh with normals, camera of origin and filled vertices; mm, scanner frame
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Where the surface ends along the travel: at heel and toes, which no stripe meets squarely."""
+"""The ends of the surface along the travel, at heel and toes, which no stripe meets squarely."""
 
 from dataclasses import dataclass
 
@@ -8,20 +8,23 @@ from numpy.typing import NDArray
 from footscan.cloud.points import PLANE_MM
 
 BEHIND_MM = 0.3
-"""A tip that lies no farther behind the last stripe is lit by the edge of the laser's sheet, or just by its middle, and
-the points lie on the sheet's middle nevertheless."""
+"""A tip no farther than this behind the last stripe is lit by the edge of the laser sheet, or just by its middle. The
+points are placed on the middle of the sheet nevertheless. Chosen by hand."""
 BEFORE_MM = 0.5
-"""The edge of the sheet lights a tip that its middle passes so far off."""
+"""The edge of the sheet lights a tip that the middle of the sheet misses by up to this distance; chosen by hand."""
 LARGEST_SPOT = 0.25
-"""What the edge of the sheet draws of a tip is smaller than this share of the section one step before."""
+"""A spot lit by the edge of the sheet is smaller than this share of the section one step before; chosen by hand."""
 AROUND_MM = 8.0
-"""How far to either side of a stripe its toe may reach one step before; its neighbour's tip lies farther away."""
+"""A toe reaches at most this far to either side of its stripe one step before; the tip of the next toe lies farther
+away. Chosen by hand."""
 APART_MM = 2.5
-"""Stripes with such a gap between them in Y are of two toes."""
+"""Stripes of one plane with a larger gap between them in Y are of two toes; chosen by hand."""
 FEWEST = 3
+"""Least number of points of a section."""
 NEAREST_STEPS = 0.01
+"""Bounds the weight of a tip that lies nearly in the last stripe."""
 SECTIONS = 4
-"""How many are looked at: three tell the tip, and the stripe beyond them whether it is one."""
+"""Sections used: three locate the tip, and the outermost stripe is tested against them."""
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -35,37 +38,52 @@ class TravelEnd:
     outward: int
     """-1 where the travel starts, 1 at its end."""
     last_mm: float
-    """The outermost stripe that tells where the surface is."""
+    """X of the outermost stripe that is a section of the surface."""
     least_mm: float
-    """How far beyond it the tip lies at least, ..."""
+    """Least distance of the tip beyond that stripe."""
     most_mm: float
-    """... at most, ..."""
+    """Largest distance of the tip beyond that stripe."""
     tip_mm: float | None
-    """... and by what the sections foretell; None where there are too few of them."""
+    """Distance of the tip beyond that stripe as the sections predict it; None where there are too few of them."""
 
     @property
     def limit(self) -> float:
-        """X beyond which nothing is."""
+        """X beyond which there is no surface."""
         return self.last_mm + self.outward * self.most_mm
 
 
 def travel_ends(points: Floats, step_mm: float) -> tuple[Mask, tuple[TravelEnd, TravelEnd]]:
-    """Points of a cloud that only graze a tip, and where the surface ends.
+    """Find the points of a cloud that only graze a tip, and where the surface ends.
 
-    Across and in height, the squared extents of an ellipsoid's or a paraboloid's sections at even distances lie on a
-    parabola that does not bend up; where it falls to nothing is the tip. Beyond the last stripe it is within a step,
-    for there would be another one. The last stripe itself is no section where the tip is about there: the edge of the
-    sheet then draws a spot, which is seen where the middle of the sheet would be. It is told by its size: no larger
-    than such a tip's section, or small where the sections before foretell such a tip.
+    The squared extents in Y and in Z of the sections of an ellipsoid or a paraboloid at even distances lie on a
+    parabola that does not bend up. The tip is where the parabola falls to zero. The tip lies less than one step beyond
+    the last stripe, since there would be another stripe otherwise. Where the tip lies about in the plane of the last
+    stripe, that stripe is no section: the edge of the sheet lights a spot, whose points are placed in the middle of
+    the sheet. A spot is recognised by its size: it is no larger than the section of such a tip, or it is small and the
+    sections before predict such a tip.
 
     Parameters
     ----------
-    points : (N, 3) mm, in stripe planes of constant X
+    points : (N, 3) float64, mm, scanner frame, in stripe planes of constant X
+    step_mm : distance from one stripe plane to the next
 
     Returns
     -------
-    grazing : (N,) points of such stripes
-    ends : at the least and at the greatest X
+    grazing : (N,) true for the points of such spots
+    ends : the end at the least X and the end at the greatest X
+
+    Examples
+    --------
+    Stripes 1 mm apart over a sphere of radius 5 mm, the last of them half a millimetre before its tips:
+
+    >>> angles = np.linspace(0, 2 * np.pi, 100)
+    >>> ring = np.column_stack([np.zeros(100), np.cos(angles), np.sin(angles)])
+    >>> stripes = [[x, 0, 0] + np.sqrt(25 - x**2) * ring for x in np.arange(-4.5, 5)]
+    >>> grazing, ends = travel_ends(np.concatenate(stripes), step_mm=1.0)
+    >>> [f"{end.last_mm:.1f} {end.tip_mm:.2f}" for end in ends]
+    ['-4.5 0.50', '4.5 0.50']
+    >>> int(grazing.sum())
+    0
     """
     grazing = np.zeros(len(points), np.bool_)
     ends = []
@@ -73,31 +91,39 @@ def travel_ends(points: Floats, step_mm: float) -> tuple[Mask, tuple[TravelEnd, 
         tips, spots = list[float | None](), list[float | None]()
         for stripe in _stripes(points, np.abs(points[:, 0] - outermost) < PLANE_MM):
             squares = _sections(points, stripe, -outward * step_mm)
-            foretold = _steps_to_tip(squares[1:])
-            if _is_spot(squares, foretold, step_mm):
+            predicted = _steps_to_tip(squares[1:])
+            if _is_spot(squares, predicted, step_mm):
                 grazing[stripe] = True
-                spots.append(_mean(foretold))
+                spots.append(_mean(predicted))
             else:
                 tips.append(_mean(_steps_to_tip(squares)))
         first = 0 if tips else 1
-        known = [steps for steps in tips or spots if steps is not None]
+        predictions = [steps for steps in tips or spots if steps is not None]
         ends.append(
             TravelEnd(
                 outward,
                 last_mm=float(outermost - outward * first * step_mm),
                 least_mm=first * (step_mm - BEFORE_MM),
                 most_mm=step_mm + first * BEHIND_MM,
-                tip_mm=max(known) * step_mm if known else None,
+                tip_mm=max(predictions) * step_mm if predictions else None,
             )
         )
     return grazing, (ends[0], ends[1])
 
 
 def drawn_to_tips(vertices: Floats, ends: tuple[TravelEnd, TravelEnd]) -> Floats:
-    """The vertices, those beyond the last stripes moved along X so that they end where the tips are.
+    """Move the vertices beyond the last stripes along X so that the surface ends at the tips.
 
-    The surface that goes on smoothly beyond a stripe foretells the tip too, by how it bends there; the sections do by
-    how they shrink. They err apart from each other, and the middle between both is taken.
+    The surface continues smoothly beyond a stripe, and its curvature there predicts the tip too. The sections predict
+    it by how they shrink. The errors of the two predictions are independent, and their mean is taken.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64, mm, scanner frame
+
+    Returns
+    -------
+    (V, 3) float64, mm
     """
     moved = vertices.copy()
     for end in ends:
@@ -107,22 +133,24 @@ def drawn_to_tips(vertices: Floats, ends: tuple[TravelEnd, TravelEnd]) -> Floats
             continue
         tip = reached if end.tip_mm is None else (reached + float(np.clip(end.tip_mm, end.least_mm, end.most_mm))) / 2
         change = float(np.clip(tip, end.least_mm, end.most_mm)) - reached
-        bend = max(change, -reached - change)  # more, and what lies beyond would fold over
+        bend = max(change, -reached - change)  # a larger change would fold the surface over
         share = np.maximum(beyond / reached, 0.0)
         moved[:, 0] += end.outward * (bend * share**2 + (change - bend) * share)
     return moved
 
 
-def _stripes(points: Floats, of: Mask) -> list[Numbers]:
-    """The points `of` a plane, by the toe they are of."""
-    numbers = np.flatnonzero(of)
+def _stripes(points: Floats, in_plane: Mask) -> list[Numbers]:
+    """Numbers of the points of one plane, separated by toe."""
+    numbers = np.flatnonzero(in_plane)
     numbers = numbers[np.argsort(points[numbers, 1], kind="stable")]
     return np.split(numbers, np.flatnonzero(np.diff(points[numbers, 1]) > APART_MM) + 1)
 
 
 def _sections(points: Floats, stripe: Numbers, inward_mm: float) -> Floats:
-    """(N, 2) squared extents in Y and Z, mm², of a stripe and those of the same tip in the planes before, `SECTIONS` at
-    most."""
+    """Returns (N, 2) squared extents in Y and Z, mm², of a stripe and of the same tip in the planes before.
+
+    There are at most `SECTIONS` of them.
+    """
     extents = [np.ptp(points[stripe, 1:], axis=0)]
     while len(extents) < SECTIONS:
         low, high = points[stripe, 1].min(), points[stripe, 1].max()
@@ -137,11 +165,10 @@ def _sections(points: Floats, stripe: Numbers, inward_mm: float) -> Floats:
 
 
 def _steps_to_tip(squares: Floats) -> Floats:
-    """(K,) how many steps beyond the first of the sections parabolas through three of them, or lines through two, fall
-    to nothing, for each of the two extents that shrinks.
+    """Returns (K,) distances in steps from the first section to the tip, one for each of the two extents that shrinks.
 
-    A parabola that bends up is none of one tip: a neighbouring toe is in the third section, and a line goes through the
-    others.
+    The distance is that at which a parabola through three sections, or a line through two, falls to zero. Where the
+    parabola bends up, the third section includes a neighbouring toe, and the line through the other two is taken.
     """
     if len(squares) < 2:
         return np.empty(0)
@@ -152,16 +179,15 @@ def _steps_to_tip(squares: Floats) -> Floats:
 
 
 def _mean(steps: Floats) -> float | None:
-    """What both extents foretell; the farther it is, the less sure."""
+    """Weighted mean of the predictions of both extents; a farther tip is less certain."""
     weights = 1.0 / np.maximum(steps, NEAREST_STEPS) ** 2
     return float(steps @ weights / weights.sum()) if steps.size else None
 
 
-def _is_spot(squares: Floats, foretold: Floats, step_mm: float) -> bool:
-    """Whether the first of the sections only tells that the tip is about there, by how many steps are `foretold` from
-    the second one to it."""
+def _is_spot(squares: Floats, predicted: Floats, step_mm: float) -> bool:
+    """True if the first section is a spot at the tip; `predicted` are the steps from the second section to the tip."""
     if len(squares) < 2:
         return False
     areas = np.sqrt(squares.prod(axis=1))
-    is_near = foretold.size and ((foretold - 1.0) * step_mm < BEHIND_MM).all()
+    is_near = predicted.size and ((predicted - 1.0) * step_mm < BEHIND_MM).all()
     return bool(areas[0] < areas[1] * (LARGEST_SPOT if is_near else BEHIND_MM / (BEHIND_MM + step_mm)))

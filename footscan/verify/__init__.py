@@ -1,1 +1,1 @@
-"""Registration and distances against a reference."""
+"""Registration to a reference, distances from it, and fits of reference bodies."""

@@ -1,4 +1,4 @@
-"""From any start to a few candidate poses: many rotations, of which the better ones are refined further and further."""
+"""Candidate poses for a registration from any start: many rotations, of which the better ones are refined further."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -11,42 +11,42 @@ from footscan.verify.icp import Poses, capped_squares, step
 from footscan.verify.nearest import CloudSurface, Floats
 
 SPIRAL = 120
-"""Rotations of the spiral; four times as many poses are tried."""
+"""Rotations of the spiral; four times as many poses are tried. Bound of time."""
 ROUNDS = ((504, 100, 6), (100, 250, 8), (30, 500, 12))
-"""How many poses are kept at most, the points that each is tried with, and the steps that it gets."""
+"""Bounds of time of each round: largest number of poses, points of each pose, and steps."""
 SURFACE_POINTS = 1500
-"""Points that stand for a surface here."""
+"""Bound of time: points that represent a surface."""
 SCALE_MEDIANS = 4.0
-"""Tukey's scale in medians of the distances: large while a pose is far away."""
+"""Tukey's scale in medians of the distances, so that it is large while a pose is far away; chosen by hand."""
 SMALLEST_SCALE = 0.015
-"""Of the size of the shape: finer than the points stand apart tells nothing."""
+"""Least Tukey's scale as a share of the size of the shape, about the spacing of the points; chosen by hand."""
 CAPPED = 0.03
-"""Of the size of the shape: a distance that says no more than that there is nothing near."""
+"""Distances are capped at this share of the size of the shape: farther points have no counterpart. Chosen by hand."""
 ALONG_SURFACE = 0.1
-"""Weight of the offset along the surface; across it, it is 1."""
+"""Weight of the offset along the surface; that across it has weight 1. Chosen by hand."""
 SAME_POSE = 0.03
-"""Of the size of the shape: poses that place its points no farther apart are one."""
+"""Poses are the same if no point of the shape differs by more than this share of its size; chosen by hand."""
 
 
 @dataclass(frozen=True)
 class Sketch:
-    """A shape as few points, its middle at the origin, its axes along those of the frame."""
+    """A shape as few points, its mean at the origin, its principal axes along those of the frame."""
 
     points: Floats
-    """(N, 3) mm, evenly spread, in random order."""
+    """(N, 3) mm, evenly spread, in random order"""
     surface: CloudSurface
-    """Of the first `SURFACE_POINTS`."""
+    """The surface of the first `SURFACE_POINTS`"""
     size: float
-    """mm, length of the diagonal of its box."""
+    """Diagonal of the bounding box, mm"""
 
 
 def sketch(points: Floats) -> Sketch:
-    """`points` : as in `Sketch`."""
+    """Make a sketch of `points`, which are as in `Sketch`."""
     return Sketch(points, CloudSurface(points[:SURFACE_POINTS]), float(np.linalg.norm(np.ptp(points, axis=0))))
 
 
 def candidates(moving: Sketch, fixed: Sketch) -> tuple[Poses, NDArray[np.intp]]:
-    """Distinct poses that bring `moving` near `fixed`, the best first, and how many starts ended at each."""
+    """Find distinct poses that bring `moving` near `fixed`, the best first, and the number of starts of each."""
     poses = start_poses()
     starts = np.ones(len(poses), np.intp)
     for kept, points, steps in ROUNDS:
@@ -61,9 +61,9 @@ def candidates(moving: Sketch, fixed: Sketch) -> tuple[Poses, NDArray[np.intp]]:
 
 
 def start_poses() -> Poses:
-    """Rotations between the axes of two shapes: the 24 that bring axes onto axes, and a spiral through all others.
+    """Rotations between the axes of two shapes: the 24 that bring axes onto axes, and an even spiral of others.
 
-    The axes have no sign; turning either shape by half a turn around any of them leaves the set as it is.
+    The axes have no sign; half a turn of either shape around any of them leaves the set unchanged.
     """
     axes = Rotation.create_group("O").as_matrix()
     half_turns = np.array([np.diag(signs) for signs in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))], np.float64)
@@ -73,7 +73,7 @@ def start_poses() -> Poses:
 
 
 def super_fibonacci(count: int) -> Floats:
-    """(count, 3, 3) rotations spread evenly (Alexa, "Super-Fibonacci spirals", CVPR 2022, algorithm 1)."""
+    """Returns (count, 3, 3) evenly spread rotations (Alexa, "Super-Fibonacci spirals", CVPR 2022, algorithm 1)."""
     phi, psi = np.sqrt(2.0), 1.533751168755204288118041
     s = np.arange(count) + 0.5
     r, big_r = np.sqrt(s / count), np.sqrt(1 - s / count)
@@ -84,7 +84,10 @@ def super_fibonacci(count: int) -> Floats:
 
 
 def cost(poses: Poses, moving: Sketch, fixed: Sketch, points: int) -> Floats:
-    """(S,) mean square of the capped distances, both ways: a part fits into a whole, but not the whole into it."""
+    """Returns (S,) the mean square of the capped distances in both directions, in mm².
+
+    Both directions count, since a part fits into a whole, but not the whole into it.
+    """
     cap = CAPPED * fixed.size
     there = capped_squares(poses, moving.points[:points], fixed.surface, cap)
     back = capped_squares(poses.inverse(), fixed.points[:points], moving.surface, cap)
@@ -93,7 +96,7 @@ def cost(poses: Poses, moving: Sketch, fixed: Sketch, points: int) -> Floats:
 
 
 def distinct(poses: Poses, starts: NDArray[np.intp], points: Floats, apart: float) -> tuple[Poses, NDArray[np.intp]]:
-    """The first of those `poses` that place a point no more than `apart` from one another, and the sum of `starts`."""
+    """Merge `poses` that place no point more than `apart` mm from the first of them; their `starts` are summed."""
     placed = poses.place(corners(points))
     chosen: list[int] = []
     sums: list[int] = []
@@ -109,7 +112,7 @@ def distinct(poses: Poses, starts: NDArray[np.intp], points: Floats, apart: floa
 
 
 def corners(points: Floats) -> Floats:
-    """(8, 3) of the box around `points`: no point of it moves farther than one of them."""
+    """Returns (8, 3) the corners of the box around `points`; no point of it moves farther than one of them."""
     low, high = points.min(axis=0), points.max(axis=0)
     upper = np.array(list(product((False, True), repeat=3)))
     box: Floats = np.where(upper, high, low)

@@ -1,4 +1,4 @@
-"""How far one shape lies from another, in figures."""
+"""Statistics of the distances of one shape from another."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,13 +17,13 @@ from schemas.base.errors import RefusedInput
 from schemas.quality import Comparison, Completeness, Figures, RegionFigures
 
 SAMPLES = 200_000
-"""Points that stand for a mesh; on a foot, one for each 0.4 mm²."""
+"""Points that represent a mesh; on a foot, one per 0.4 mm²."""
 WITHIN_MM = 1.0
-"""Half a travel step of 2 mm: what is there lies nearer to the first surface."""
+"""Largest distance of a reference point that counts as scanned: half a travel step of 2 mm."""
 ROUNDED = 0.01
-"""By which the length of a unit vector may be off in a file."""
+"""Largest error of the length of a unit vector in a file; chosen by hand."""
 CHUNK = 2**20
-"""Distances a sum in double precision."""
+"""Bound of memory: distances that are converted to double precision at once."""
 
 Normals = NDArray[np.floating]
 
@@ -38,26 +38,25 @@ def compare(
     both: bool = False,
     searched_b: SearchedMesh | None = None,
 ) -> Comparison:
-    """How far the surface of `a`, or its points where it is a cloud, lies from `b`; mm, both in one frame.
+    """Compute the distances of the surface of `a`, or of its points if it is a cloud, from `b`; mm, in the same frame.
 
-    Besides the two shapes and a search tree it holds the distances of all points in single precision, some 20 bytes a
-    point with what percentiles need; all else runs in blocks.
+    Memory: the two shapes, a search tree, and about 20 bytes per point for distances in single precision and their
+    percentiles. Everything else runs in blocks.
 
     Parameters
     ----------
     a, b : a mesh or a cloud
-    normals_a, normals_b : (V, 3) outward unit vectors of a cloud, where they are known
-        Between clouds they give distances a sign: those of `b`, otherwise those of `a`.
-    classes : of the histograms, > 0; none without
-    both : whether `b` is held against `a`, too, which tells how complete `a` is (Seitz et al., "A comparison and
+    normals_a, normals_b : (V, 3) outward unit vectors of a cloud, if known
+        They give distances between clouds a sign: those of `b`, or else those of `a`.
+    classes : number of classes of the histograms, > 0; default: no histograms
+    both : True also compares `b` with `a`, which shows how complete `a` is (Seitz et al., "A comparison and
         evaluation of multi-view stereo reconstruction algorithms", CVPR 2006, doi:10.1109/CVPR.2006.19)
-    searched_b : made from `b`, for who asks for more distances to it
+    searched_b : made from `b`, so that several comparisons share it
 
     Raises
     ------
     RefusedInput
-        One of them is empty, has triangles without area only, or coordinates that are not finite; or `b` is a single
-        point.
+        A shape is empty, has only triangles without area, or coordinates that are not finite; or `b` is a single point.
     """
     check_places(a[0], "shape")
     check_places(b[0], "reference")
@@ -83,25 +82,32 @@ def compare(
 def vertex_distances(
     a: Shape, b: Shape, *, normals_a: Normals | None = None, normals_b: Normals | None = None
 ) -> Distances:
-    """Distances of the vertices of `a` to `b`; parameters and errors are those of `compare`."""
+    """Compute the distances of the vertices of `a` from `b`; parameters and errors are those of `compare`."""
     return _distances(a[0], b, normals_b, normals_a)
 
 
 def apart_mm(a: Shape, b: Shape) -> float:
-    """How far the boxes around two shapes are apart, mm; 0 where they meet."""
+    """Distance of the bounding boxes of two shapes, mm; 0 if they overlap.
+
+    Examples
+    --------
+    >>> no_faces = np.zeros((0, 3), np.int32)
+    >>> apart_mm((np.array([[0.0, 0, 0]]), no_faces), (np.array([[3.0, 4, 0]]), no_faces))
+    5.0
+    """
     gap = np.maximum(a[0].min(axis=0) - b[0].max(axis=0), b[0].min(axis=0) - a[0].max(axis=0))
     return float(np.linalg.norm(np.maximum(gap, 0)))
 
 
 def moved(mesh: Mesh, transform: Sequence[Sequence[float]]) -> Mesh:
-    """`mesh` with its normals, moved by a 4 x 4 `transform` without scale, such as a registration's."""
+    """Move a mesh and its normals by a 4 x 4 `transform` without scale, such as that of a registration."""
     matrix = np.array(transform, np.float64)
     normals = None if mesh.normals is None else mesh.normals @ matrix[:3, :3].T
     return replace(mesh, vertices=apply(matrix, mesh.vertices), normals=normals)
 
 
 def cloud_normals(mesh: Mesh) -> Normals | None:
-    """Those by which distances of or to a cloud get a sign: None of a mesh, and where one is no unit vector."""
+    """Normals that give distances from or to a cloud a sign; None for a mesh, or if one is not a unit vector."""
     if len(mesh.faces) or mesh.normals is None or not len(mesh.normals):
         return None
     lengths = np.linalg.norm(mesh.normals, axis=1)
@@ -178,7 +184,7 @@ def _completeness(
     try:
         distances = _distances(points, a, normals_a, normals_b)
     except RefusedInput as error:
-        raise RefusedInput("shape", error.problem) from None  # here it is what the other is held against
+        raise RefusedInput("shape", error.problem) from None  # here the shape is the reference
     return Completeness(
         **_figures(distances).model_dump(),
         within_mm=WITHIN_MM,

@@ -11,34 +11,34 @@ from footscan.verify.pseudonormals import Sides, sides
 from schemas.base.errors import RefusedInput
 
 BLOCK = 100_000
-"""Points a query; it bounds the memory."""
+"""Bound of memory: points per query."""
 ON_MM = 1e-4
-"""A place of a mesh that lies closer than this to an edge or a vertex lies on it: its query was made in single
-precision, which moves it by up to 0.00002 mm."""
+"""A place nearer than this to an edge or a vertex lies on it: queries in single precision are off by up to 0.00002
+mm."""
 FARTHEST_MM = 1e7
-"""What lies farther from the origin is not in mm; in double precision it would be known to 0.000002 mm."""
+"""Largest coordinate that is accepted as mm; double precision resolves 0.000002 mm there."""
 
 Floats = NDArray[np.floating]
 Distances32 = NDArray[np.float32]
 
 
 class Distances(NamedTuple):
-    """Of N points, in mm; single precision (to 10⁻⁷ of them) keeps ten million in 40 MB."""
+    """Distances of N points, mm; single precision (10⁻⁷ of the value) keeps ten million in 40 MB."""
 
     unsigned: Distances32
-    """(N,) to the nearest place."""
+    """(N,) distance to the nearest place"""
     signed: Distances32 | None
-    """(N,) along the normal there, positive outside; None where no normal is known. As large as `unsigned` on a mesh;
-    on a cloud what lies across the normal is left out, as it is for the most part the spacing of the points."""
+    """(N,) distance along the normal there, positive outside; None without normals. On a mesh it is as large as
+    `unsigned`; on a cloud the part across the normal is left out, since it is mostly the spacing of the points."""
 
     @classmethod
     def of_signed(cls, signed: Distances32) -> Self:
-        """Of (N,) distances to a mesh."""
+        """Make both arrays from (N,) signed distances to a mesh."""
         return cls(np.abs(signed), signed)
 
 
 def distances_to_mesh(points: Floats, mesh: Shape) -> Distances:
-    """Of each of (N, 3) `points` to the nearest place of `mesh`.
+    """Compute the distance of each of (N, 3) `points`, mm, to the nearest place of `mesh`.
 
     Raises
     ------
@@ -49,16 +49,16 @@ def distances_to_mesh(points: Floats, mesh: Shape) -> Distances:
 
 
 def signed_distances(points: Floats, mesh: Shape) -> Distances32:
-    """(N,) distance in mm of each of (N, 3) `points` to the nearest place of `mesh`, negative inside.
+    """Returns (N,) distances in mm of (N, 3) `points` to the nearest place of `mesh`, negative inside.
 
-    What is inside is told by the normal at the nearest place, see `footscan.verify.pseudonormals`. Errors as in
+    The sign follows from the normal at the nearest place, see `footscan.verify.pseudonormals`. Errors as in
     `distances_to_mesh`.
     """
     return SearchedMesh(mesh).signed_distances(points)
 
 
 class SearchedMesh:
-    """A mesh with the search tree and the normals that distances to it take: made once, asked often."""
+    """A mesh with the search tree and the normals for distances to it; made once for many queries."""
 
     def __init__(self, mesh: Shape) -> None:
         """Errors are those of `distances_to_mesh` that concern the mesh."""
@@ -69,7 +69,7 @@ class SearchedMesh:
         vertices, faces = self._sides.vertices, self._sides.faces
         if not len(faces):
             raise RefusedInput("reference", "has no triangle with an area, expected a mesh")
-        # The scene counts in single precision: 0.01 um near its origin.
+        # The scene uses single precision: 0.01 µm near its origin.
         self._centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
         self._tensor = o3d.core.Tensor.from_numpy
         self._scene = o3d.t.geometry.RaycastingScene()
@@ -78,7 +78,7 @@ class SearchedMesh:
         )
 
     def signed_distances(self, points: Floats) -> Distances32:
-        """As the function of that name."""
+        """Returns (N,) distances as the function `signed_distances` does."""
         check_places(points, "shape")
         signed = np.empty(len(points), np.float32)
         by_blocks(points, lambda block, out: self._fill(signed[out], block))
@@ -98,17 +98,24 @@ class SearchedMesh:
 def distances_to_cloud(
     points: Floats, cloud: Floats, normals: Floats | None = None, point_normals: Floats | None = None
 ) -> Distances:
-    """Of each of (N, 3) `points` to the nearest of the (M, 3) points of `cloud`.
+    """Compute the distance of each of (N, 3) `points` to the nearest of the (M, 3) points of `cloud`, mm.
 
     Parameters
     ----------
-    normals : (M, 3) outward unit vectors of `cloud`, where they are known
-    point_normals : (N, 3) those of `points`, which serve where the cloud has none
+    normals : (M, 3) outward unit vectors of `cloud`, if known
+    point_normals : (N, 3) outward unit vectors of `points`, used if the cloud has none
 
     Raises
     ------
     RefusedInput
-        There are no points, the cloud is a single place, or a coordinate is not finite.
+        There are no points, all points of the cloud coincide, or a coordinate is not finite.
+
+    Examples
+    --------
+    >>> up = np.array([[0.0, 0, 1], [0, 0, 1]])
+    >>> apart = distances_to_cloud(np.array([[3.0, 4, 0], [0, 0, -2]]), np.array([[0.0, 0, 0], [9, 9, 9]]), up)
+    >>> apart.unsigned.tolist(), apart.signed.tolist()
+    ([5.0, 2.0], [0.0, -2.0])
     """
     from scipy.spatial import cKDTree
 
@@ -132,16 +139,16 @@ def distances_to_cloud(
 
 
 def check_places(coordinates: Floats, name: str) -> None:
-    """Refuses coordinates, (N, 3) mm, that are none of a shape; `name` is what the refusal calls it.
+    """Refuse coordinates, (N, 3), that cannot be those of a shape in mm; the message names the shape `name`.
 
     Raises
     ------
     RefusedInput
-        There are none, or one is not finite or not in mm.
+        There are none, or one is not finite or larger than `FARTHEST_MM`.
     """
     if not len(coordinates):
         raise RefusedInput(name, "is empty, expected a mesh or a cloud")
-    # Extremes tell of NaN, too, and need no array of answers.
+    # The extremes are NaN if any coordinate is, and need no further array.
     farthest = np.max(np.abs([coordinates.min(axis=0), coordinates.max(axis=0)]))
     if not farthest <= FARTHEST_MM:
         problem = "coordinates that are no numbers" if np.isnan(farthest) else f"a coordinate of {farthest:.3g}"
@@ -149,7 +156,7 @@ def check_places(coordinates: Floats, name: str) -> None:
 
 
 def by_blocks(points: Floats, of_block: Callable[[NDArray[np.float64], slice], None]) -> None:
-    """Calls `of_block` with each block of (N, 3) `points` and the rows that it comes from."""
+    """Call `of_block` with each block of (N, 3) `points` and its slice of rows."""
     for start in range(0, len(points), BLOCK):
         block = slice(start, start + BLOCK)
         of_block(np.asarray(points[block], np.float64), block)
@@ -158,12 +165,18 @@ def by_blocks(points: Floats, of_block: Callable[[NDArray[np.float64], slice], N
 def _normals_at(
     place: NDArray[np.float64], shares: NDArray[np.float64], face: NDArray[np.int64], mesh: Sides
 ) -> NDArray[np.float64]:
-    """(N, 3) normals at (N, 3) places on the faces `face`: of the vertex or the edge that a place lies on, or of the
-    face. `shares` (N, 3) of the corners in the places tell how far each is from the edge opposite to a corner."""
+    """Returns (N, 3) normals at places on a mesh: of the vertex or the edge on which a place lies, or of its face.
+
+    Parameters
+    ----------
+    place : (N, 3) mm
+    shares : (N, 3) barycentric coordinates of the places, which give their distances from the edges
+    face : (N,) faces of the places
+    """
     normals = mesh.of_faces[face]
     from_edges = shares * mesh.heights[face]
     edge = np.argmin(from_edges, axis=1)
-    on_edge = np.flatnonzero(from_edges[np.arange(len(face)), edge] < ON_MM)  # and so is what lies on a corner
+    on_edge = np.flatnonzero(from_edges[np.arange(len(face)), edge] < ON_MM)  # including places on a corner
     place, face, edge = place[on_edge], face[on_edge], edge[on_edge]
     normals[on_edge] = mesh.of_edges[face, edge]
 

@@ -15,33 +15,35 @@ from footscan.robust import MAD_TO_SD
 from footscan.verify.nearest import Floats, Surface
 
 TUKEY = 4.685
-"""Standard deviations beyond which a residual has no weight: 95 % efficient for Gaussian noise."""
+"""Tuning constant of Tukey's biweight, in standard deviations: 95 % efficient for Gaussian noise. Residuals beyond have
+no weight."""
 DAMPING = 1e-6
-"""Share of the mean diagonal that is added to the normal matrix: directions that nothing holds stay where they are."""
+"""Share of the mean diagonal that is added to the normal matrix, so that unconstrained directions do not move."""
 LONGEST_TURN = 0.3
-"""Radians a step."""
+"""Largest rotation of a step, radians; chosen by hand."""
 SETTLED_MM = 1e-4
 """A step that moves no point by more is the last."""
 CALMED_AFTER = 50
+"""Number of steps after which steps are shortened, since a pose may alternate between triangles; chosen by hand."""
 CALMING = 0.05
-"""After so many steps they are shortened: a pose may be tossed to and fro between triangles."""
+"""Weight of the offset along the surface that shortens such steps; chosen by hand."""
 SHRINKING = 0.7
-"""Tukey's scale falls by no more at a step: what lies well already must not outvote what does not yet. Graduated
-non-convexity: Blake & Zisserman, "Visual Reconstruction", 1987."""
+"""Least factor of Tukey's scale from step to step, so that points that fit already do not outvote those that do not fit
+yet. Graduated non-convexity: Blake & Zisserman, "Visual Reconstruction", 1987. Chosen by hand."""
 STEADY = 0.999
-"""Part of Tukey's scale that it must keep from step to step before the last."""
+"""Share of Tukey's scale that the last step must keep; chosen by hand."""
 SMALLEST_SCALE_MM = 0.02
-"""Tukey's scale between shapes without noise."""
+"""Least scale of Tukey's biweight, for shapes without noise; chosen by hand."""
 
 
 @dataclass(frozen=True)
 class Poses:
-    """S rigid motions: a point p goes to `rotations` p + `translations`."""
+    """S rigid transforms: a point p moves to `rotations` p + `translations`."""
 
     rotations: Floats
-    """(S, 3, 3), determinant +1."""
+    """(S, 3, 3), determinant +1"""
     translations: Floats
-    """(S, 3) mm."""
+    """(S, 3) mm"""
 
     def __len__(self) -> int:
         return len(self.rotations)
@@ -50,13 +52,13 @@ class Poses:
         return Poses(self.rotations[chosen], self.translations[chosen])
 
     def place(self, points: Floats) -> Floats:
-        """(S, N, 3) `points` (N, 3) in each of the poses."""
-        # Not by matmul: BLAS may sum in another order with another number of threads.
+        """Returns (S, N, 3) the `points`, (N, 3), in each of the poses."""
+        # Not by matmul: the order of BLAS's sums may depend on the number of threads.
         placed: Floats = np.einsum("sij,nj->sni", self.rotations, points) + self.translations[:, None]
         return placed
 
     def after(self, first: "Poses") -> "Poses":
-        """`first`, and then these."""
+        """The composition of `first` and then these poses."""
         rotations = np.einsum("sij,sjk->sik", self.rotations, first.rotations)
         return Poses(rotations, np.einsum("sij,sj->si", self.rotations, first.translations) + self.translations)
 
@@ -66,76 +68,75 @@ class Poses:
 
 
 @dataclass(frozen=True)
-class Fit:
-    """How points in S poses lie on a surface."""
+class PoseFit:
+    """Distances of points in S poses from a surface."""
 
     distances: Floats
-    """(S, N) mm."""
+    """(S, N) mm"""
     within: NDArray[np.bool_]
-    """(S, N) see `Nearest`."""
+    """(S, N) as in `Nearest`"""
 
 
-def fit_of(poses: Poses, points: Floats, surface: Surface) -> Fit:
-    """How `points` (N, 3) lie on `surface` in each pose."""
+def fit_of(poses: Poses, points: Floats, surface: Surface) -> PoseFit:
+    """Compute the distances of `points`, (N, 3) mm, from `surface` in each pose."""
     placed = poses.place(points)
-    found = surface.nearest(placed.reshape(-1, 3))
-    distances = np.linalg.norm(placed.reshape(-1, 3) - found.places, axis=1)
-    return Fit(distances.reshape(placed.shape[:2]), found.within.reshape(placed.shape[:2]))
+    nearest = surface.nearest(placed.reshape(-1, 3))
+    distances = np.linalg.norm(placed.reshape(-1, 3) - nearest.places, axis=1)
+    return PoseFit(distances.reshape(placed.shape[:2]), nearest.within.reshape(placed.shape[:2]))
 
 
 def capped_squares(poses: Poses, points: Floats, surface: Surface, cap: float) -> Floats:
-    """(S, N) squared distances in mm²; where the surface ends, or is farther away than `cap`, as if it were so far."""
+    """Returns (S, N) squared distances in mm², capped at `cap`, and equal to it where the surface ends."""
     fit = fit_of(poses, points, surface)
     return np.square(np.where(fit.within, np.minimum(fit.distances, cap), cap))
 
 
 def settle(pose: Poses, points: Floats, surface: Surface, scale: float, most_steps: int) -> tuple[Poses, float, float]:
-    """One pose brought to where steps no longer move it, while the robust scale follows the residuals down.
+    """Refine one pose until steps no longer move it, while the robust scale follows the residuals down.
 
     Returns
     -------
-    the pose, Tukey's scale in mm there, and by how much the last step moved it in mm
+    the pose, the last Tukey's scale in mm, and the movement of the last step in mm
     """
     moved = np.inf
     for count in range(most_steps):
-        # On a mesh no offset has a part along the surface, so that its weight does nothing but shorten the steps.
+        # Offsets from a mesh have no part along the surface, so that this weight merely shortens the steps.
         along = 0.0 if count < CALMED_AFTER else CALMING
         pose, moves, fit = step(pose, points, surface, np.array([scale]), along)
         moved = float(moves[0])
         near = fit.distances[fit.within & (fit.distances < scale)]
         if not len(near):
             return pose, scale, np.inf
-        follows = max(TUKEY * MAD_TO_SD * float(np.median(near)), SMALLEST_SCALE_MM)
-        if moved < SETTLED_MM and follows > STEADY * scale:
+        new_scale = max(TUKEY * MAD_TO_SD * float(np.median(near)), SMALLEST_SCALE_MM)
+        if moved < SETTLED_MM and new_scale > STEADY * scale:
             break
-        scale = min(scale, max(follows, SHRINKING * scale))
+        scale = min(scale, max(new_scale, SHRINKING * scale))
     return pose, scale, moved
 
 
-def step(poses: Poses, points: Floats, surface: Surface, scale: Floats, along: float) -> tuple[Poses, Floats, Fit]:
-    """One Gauss-Newton step of each pose towards the least robust distance.
+def step(poses: Poses, points: Floats, surface: Surface, scale: Floats, along: float) -> tuple[Poses, Floats, PoseFit]:
+    """Take one Gauss-Newton step of each pose towards the least robust distance.
 
     Parameters
     ----------
-    points : (N, 3) mm, about their own middle, which a step turns them around
+    points : (N, 3) mm, centred at the origin, the centre of rotation
     scale : (S,) mm, distance at which a point loses its weight
     along : weight of the offset along the surface, 0 for point-to-plane
 
     Returns
     -------
-    the poses after the step, (S,) the largest distance in mm that it moved any of the points by, at most, and how the
-    points lay before it
+    the poses after the step, (S,) an upper bound in mm of the movement of any point, and the fit before the step
     """
     placed = poses.place(points)
     count, size = placed.shape[:2]
-    found = surface.nearest(placed.reshape(-1, 3))
-    offsets = (placed.reshape(-1, 3) - found.places).reshape(count, size, 3)
+    nearest = surface.nearest(placed.reshape(-1, 3))
+    offsets = (placed.reshape(-1, 3) - nearest.places).reshape(count, size, 3)
     distances = np.linalg.norm(offsets, axis=2)
-    within = found.within.reshape(count, size)
+    within = nearest.within.reshape(count, size)
     weights = np.where(within, tukey_weights(distances, scale[:, None]), 0.0)
     radius = float(np.linalg.norm(points, axis=1).max())
     arms = (placed - poses.translations[:, None]) / radius
-    normals = found.normals.reshape(count, size, 3)
+    normals = nearest.normals.reshape(count, size, 3)
     matrix, vector = normal_equations(arms, normals, offsets, weights, along)
     damping = DAMPING * np.trace(matrix, axis1=1, axis2=2) / 6 + 1e-12
     change = -np.linalg.solve(matrix + damping[:, None, None] * np.eye(6), vector[:, :, None])[:, :, 0]
@@ -145,18 +146,19 @@ def step(poses: Poses, points: Floats, surface: Surface, scale: Floats, along: f
     rotations = Rotation.from_rotvec(turns).as_matrix()
     moved = Poses(np.einsum("sij,sjk->sik", rotations, poses.rotations), poses.translations + shifts)
     movement = np.linalg.norm(turns, axis=1) * radius + np.linalg.norm(shifts, axis=1)
-    return moved, movement, Fit(distances, within)
+    return moved, movement, PoseFit(distances, within)
 
 
 def normal_equations(
     arms: Floats, normals: Floats, offsets: Floats, weights: Floats, along: float
 ) -> tuple[Floats, Floats]:
-    """(S, 6, 6) and (S, 6): the weighted means of J'J and of J'r for three turns and three shifts.
+    """Returns (S, 6, 6) and (S, 6): the weighted means of J'J and of J'r for three rotations and three translations.
 
     Parameters
     ----------
     arms : (S, N, 3) from the centre of rotation to the points
-    normals, offsets : (S, N, 3) across the surface, and from the surface to the points
+    normals : (S, N, 3) of the surface
+    offsets : (S, N, 3) from the surface to the points
     weights : (S, N)
     along : weight of the offset along the surface
     """
@@ -176,6 +178,12 @@ def normal_equations(
 
 
 def tukey_weights(distances: Floats, scale: Floats) -> Floats:
-    """Tukey's biweight: 1 at no distance, 0 from `scale` on."""
+    """Tukey's biweight: 1 at distance 0, 0 from `scale` on.
+
+    Examples
+    --------
+    >>> tukey_weights(np.array([0.0, 1.0, 2.0, 3.0]), np.array([2.0])).tolist()
+    [1.0, 0.5625, 0.0, 0.0]
+    """
     weights: Floats = np.square(np.maximum(1 - np.square(distances / scale), 0.0))
     return weights

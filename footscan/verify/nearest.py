@@ -1,4 +1,4 @@
-"""The nearest place of a surface, of a mesh or of a cloud, and whether the surface goes on around it."""
+"""The nearest place of a mesh's or a cloud's surface, and whether the surface continues around it."""
 
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -13,43 +13,43 @@ from footscan.mesh.topology import directed_edges, edge_counts
 Floats = NDArray[np.float64]
 
 PLANE_NEIGHBOURS = 12
-"""Points that the plane through a point of a cloud is fitted to."""
+"""Points to which the plane at a point of a cloud is fitted; chosen by hand."""
 REACH_SPACINGS = 3.0
-"""Spacings beside the nearest point of a cloud within which its plane stands for the surface."""
+"""Distance from a point of a cloud, in spacings, within which its plane represents the surface; chosen by hand."""
 TOUCHING_MM = 1e-3
-"""Distance from a mesh below which the way to it has no direction of its own."""
+"""At smaller distances from a mesh the direction to it is not defined, and the normal is taken."""
 ON_BORDER = 1e-3
-"""Barycentric coordinate below which a place lies on the edge of its triangle."""
+"""A place with a smaller barycentric coordinate lies on the edge of its triangle."""
 
 
 @dataclass(frozen=True)
 class Nearest:
-    """What lies nearest to each of N points."""
+    """The nearest places of a surface to N points."""
 
     places: Floats
-    """(N, 3) mm, on the surface."""
+    """(N, 3) mm, on the surface"""
     normals: Floats
-    """(N, 3) unit vectors across the surface there, of either sign: along them the distance grows."""
+    """(N, 3) unit vectors across the surface there, of either sign, along which the distance grows"""
     within: NDArray[np.bool_]
-    """(N,) false where the surface ends at that place: at the rim of a hole or of a cloud. Nothing is known of what
-    lies beyond (Turk & Levoy, "Zippered polygon meshes from range images", 1994)."""
+    """(N,) false where the surface ends at that place: at the rim of a hole or of a cloud, beyond which it is unknown
+    (Turk & Levoy, "Zippered polygon meshes from range images", 1994)."""
 
 
 class Surface(Protocol):
-    """What points can be held against."""
+    """A surface with a search for nearest places."""
 
     def nearest(self, points: Floats) -> Nearest:
-        """The places nearest to (N, 3) `points`, mm, in the frame of the surface."""
+        """Find the places nearest to (N, 3) `points`, mm, in the frame of the surface."""
 
 
 class MeshSurface:
-    """The triangles themselves."""
+    """The surface of a mesh: its triangles."""
 
     def __init__(self, mesh: Shape) -> None:
         import open3d as o3d
 
         self._vertices, self._faces = np.asarray(mesh[0], np.float64), mesh[1]
-        self._middle = (self._vertices.min(axis=0) + self._vertices.max(axis=0)) / 2  # the scene counts in float32
+        self._middle = (self._vertices.min(axis=0) + self._vertices.max(axis=0)) / 2  # the scene uses float32
         self._tensor = o3d.core.Tensor.from_numpy
         self._scene: Any = o3d.t.geometry.RaycastingScene()
         self._scene.add_triangles(
@@ -64,12 +64,12 @@ class MeshSurface:
         triangle = answer["primitive_ids"].numpy().astype(np.int64)
         u, v = answer["primitive_uvs"].numpy().astype(np.float64).T
         barycentric = np.column_stack([1 - u - v, u, v])
-        corners = self._vertices[self._faces[triangle]]  # in float64: the scene's own place is good to 0.01 um only
+        corners = self._vertices[self._faces[triangle]]  # in float64: the place by the scene is off by up to 0.01 µm
         places = np.einsum("nk,nki->ni", barycentric, corners)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        ways = points - places  # at edges and corners not along the normal of either triangle
-        touching = np.linalg.norm(ways, axis=1, keepdims=True) < TOUCHING_MM
-        normals = np.where(touching, normals, ways)
+        offsets = points - places  # at edges and corners not along the normal of a triangle
+        touching = np.linalg.norm(offsets, axis=1, keepdims=True) < TOUCHING_MM
+        normals = np.where(touching, normals, offsets)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
         at_edge = np.any(self._open_edge[triangle] & (barycentric < ON_BORDER), axis=1)
         at_vertex = np.any(self._open_vertex[self._faces[triangle]] & (barycentric > 1 - 2 * ON_BORDER), axis=1)
@@ -77,7 +77,7 @@ class MeshSurface:
 
 
 def _borders(faces: NDArray[np.integer], vertices: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(F, 3) whether the edge opposite to each corner is open, and (V,) whether a vertex is on an open edge."""
+    """Returns (F, 3) whether the edge opposite to each corner is open, and (V,) whether a vertex is on an open edge."""
     edges, counts = edge_counts(faces)
     is_open = counts == 1
     keys = edges[:, 0] * vertices + edges[:, 1]
@@ -89,7 +89,7 @@ def _borders(faces: NDArray[np.integer], vertices: int) -> tuple[NDArray[np.bool
 
 
 class CloudSurface:
-    """A plane through the neighbours of each point."""
+    """The surface of a cloud: at each point, the plane through its neighbours."""
 
     def __init__(self, points: Floats) -> None:
         """`points` : (N, 3) mm, evenly spread, at least `PLANE_NEIGHBOURS` of them."""

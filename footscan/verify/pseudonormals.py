@@ -1,4 +1,4 @@
-"""Normals of a mesh's faces, edges and vertices, by which a point is told to lie outside or inside."""
+"""Normals of a mesh's faces, edges and vertices, which decide whether a point lies outside or inside."""
 
 from typing import NamedTuple
 
@@ -10,39 +10,41 @@ from footscan.mesh.topology import face_components
 from footscan.rows import distinct_rows
 
 SOLID_SHARE = 0.02
-"""Volume over area^1.5 from which a mesh is a body with an inside; a ball has 0.094, a foot 0.05, a sheet 0."""
+"""Least volume over area^1.5 of a body with an inside; a ball has 0.094, a foot 0.05, a sheet 0. Chosen by hand."""
 
 Floats = NDArray[np.float64]
 
 
 class Sides(NamedTuple):
-    """A mesh that tells its sides. A point p whose closest place on it is q lies outside where (p - q) · n > 0, with n
-    the normal of what q lies on: Baerentzen and Aanaes, "Signed distance computation using the angle weighted
+    """A mesh with the pseudonormals of its faces, edges and vertices.
+
+    A point p whose closest place on the mesh is q lies outside if (p - q) · n > 0, where n is the normal of the face,
+    edge or vertex on which q lies: Baerentzen and Aanaes, "Signed distance computation using the angle weighted
     pseudonormal", IEEE TVCG 11(3), 2005, doi:10.1109/TVCG.2005.49.
 
-    Unlike counting how often a ray crosses the mesh, this holds on a mesh with holes: there it says on which side of
-    the surface's rim the point lies.
+    Unlike counting the crossings of a ray, this works on a mesh with holes: there it gives the side of the rim on
+    which the point lies.
     """
 
     vertices: Floats
-    """(V, 3) mm, no two at one place."""
+    """(V, 3) mm, no two at one place"""
     faces: NDArray[np.int32]
-    """(F, 3), each with an area and no two alike, counter-clockwise as seen from outside."""
+    """(F, 3), each with an area and no two alike, counter-clockwise seen from outside"""
     of_faces: Floats
-    """(F, 3) unit normals."""
+    """(F, 3) unit normals"""
     of_edges: Floats
-    """(F, 3, 3) sums of the unit normals that meet at the edge opposite to each corner."""
+    """(F, 3, 3) sums of the unit normals that meet at the edge opposite to each corner"""
     of_vertices: Floats
-    """(V, 3) sums of the unit normals that meet at each vertex, weighted by the angles there."""
+    """(V, 3) sums of the unit normals that meet at each vertex, weighted by the angles there"""
     heights: Floats
-    """(F, 3) mm, of each corner above the edge opposite to it."""
+    """(F, 3) mm, height of each corner above the edge opposite to it"""
 
 
 def sides(mesh: Shape) -> Sides:
-    """The normals of `mesh`, whose faces may be turned any way, repeated or without area; F = 0 if none has an area.
+    """Compute the pseudonormals of `mesh`; F = 0 if no face has an area.
 
-    Faces that share an edge are turned alike. A body is turned so that outside is outside; a sheet stays as it is, as
-    what is its outer side cannot be known.
+    Faces may be turned any way, repeated or without area. Faces that share an edge are turned alike. A body is turned
+    so that its faces look outward; a sheet stays as it is, since its outer side is unknown.
     """
     vertices, faces = _merged(*mesh)
     edge_of, along, meeting = _edges(faces)
@@ -64,7 +66,7 @@ def sides(mesh: Shape) -> Sides:
 
 
 def _merged(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> tuple[Floats, NDArray[np.int32]]:
-    """Vertices that stand at one place become one; faces without area or that repeat another are left out."""
+    """Merge vertices at one place; drop faces without area and repeated faces."""
     places, _, of_vertex, _ = distinct_rows(np.asarray(vertices, np.float64) + 0.0)
     merged = of_vertex[faces]
     area = np.linalg.norm(_area_vectors(places[merged]), axis=1)
@@ -74,7 +76,7 @@ def _merged(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> tuple
 
 
 def _edges(faces: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int8], NDArray[np.int64]]:
-    """(F, 3) number of the edge opposite to each corner, (F, 3) 1 or -1 as the face runs along it, (E,) faces there."""
+    """Returns (F, 3) the edge opposite to each corner, (F, 3) 1 or -1 as the face runs along it, (E,) faces there."""
     start, end = faces[:, [1, 2, 0]].astype(np.int64), faces[:, [2, 0, 1]].astype(np.int64)
     size = int(faces.max(initial=0)) + 1
     key = np.minimum(start, end) * size + np.maximum(start, end)
@@ -83,7 +85,7 @@ def _edges(faces: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int8
 
 
 def _contradicts(edge_of: NDArray[np.int64], along: NDArray[np.int8], meeting: NDArray[np.int64]) -> bool:
-    """Whether two faces that alone meet at an edge run along it the same way."""
+    """True if the two faces of an edge run along it in the same direction."""
     direction = np.bincount(edge_of.ravel(), weights=along.ravel(), minlength=len(meeting))
     return bool(np.any((meeting == 2) & (direction != 0)))
 
@@ -92,21 +94,22 @@ def _turned_alike(vertices: Floats, faces: NDArray[np.int32]) -> NDArray[np.int3
     import open3d as o3d
 
     mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(faces))
-    mesh.orient_triangles()  # as far as that can be: a Moebius strip has one side
+    mesh.orient_triangles()  # as far as possible: a Möbius strip has one side
     return np.asarray(mesh.triangles).astype(np.int32)
 
 
 def _parts(faces: NDArray[np.int32]) -> list[NDArray[np.int64]]:
-    """Rows of the faces of each part of a mesh."""
+    """Returns the rows of the faces of each part of a mesh."""
     part = face_components(faces)
     order = np.argsort(part, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(part[order])) + 1)
 
 
 def _outward(vertices: Floats, faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    """`faces`, turned over where they enclose a negative volume.
+    """Turn `faces` over if they enclose a negative volume.
 
-    Seen from the middle of its rim a hole encloses next to nothing: the divergence theorem then holds for open meshes.
+    The volume is computed from the middle of the rim, from where a hole contributes next to nothing, so that the
+    divergence theorem holds for open meshes.
     """
     if not len(faces):
         return faces
@@ -120,13 +123,13 @@ def _outward(vertices: Floats, faces: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 def _area_vectors(corners: Floats) -> Floats:
-    """(F, 3) normals as long as the area of each triangle."""
+    """Returns (F, 3) normals whose lengths are the areas of the triangles."""
     vectors: Floats = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     return vectors
 
 
 def _angles(corners: Floats) -> Floats:
-    """(F, 3) angle of each triangle at each corner, radians."""
+    """Returns (F, 3) the angle of each triangle at each corner, radians."""
     angles = np.empty(corners.shape[:2])
     for k in range(3):
         a, b = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
@@ -140,5 +143,5 @@ def _unit(vectors: Floats) -> Floats:
 
 
 def _sums(group: NDArray[np.integer], vectors: Floats, count: int) -> Floats:
-    """(count, 3) sums of (N, 3) `vectors` by their `group`."""
+    """Returns (count, 3) sums of (N, 3) `vectors` by their `group`."""
     return np.column_stack([np.bincount(group, weights=vectors[:, axis], minlength=count) for axis in range(3)])

@@ -1,4 +1,4 @@
-"""Regions of a foot, by shares of its length."""
+"""Regions of a foot, defined by shares of its length."""
 
 from typing import NamedTuple
 
@@ -14,25 +14,26 @@ from schemas.base.errors import Finding
 from schemas.base.model import Side
 
 TOES = 0.80
-"""The longest toe begins about here; its ball, at 0.56 to 0.80 of the length, is behind."""
+"""Share of the length at which the longest toe begins, about; the ball lies behind, at 0.56 to 0.80."""
 HEEL, MIDFOOT = TOES / 3, 2 * TOES / 3
-"""Where heel and midfoot end: thirds of the foot without its toes, as Cavanagh and Rodgers divide footprints, "The arch
-index: a useful measure from footprints", J. Biomech. 20(5), 1987, doi:10.1016/0021-9290(87)90255-7."""
+"""Shares of the length at which heel and midfoot end: thirds of the foot without its toes, as in P. Cavanagh and
+M. Rodgers, "The arch index: a useful measure from footprints", J. Biomech. 20(5), 1987,
+doi:10.1016/0021-9290(87)90255-7."""
 SOLE = 0.04
-"""Below this height is the sole: 11 mm on a foot of 265 mm; the arch is midfoot."""
+"""Height below which the sole lies: 11 mm on a foot of 265 mm; the arch belongs to the midfoot. Chosen by hand."""
 ANKLE = 0.25
-"""Above this height is the ankle: below the malleoli (0.20 to 0.38 of the length), and as high as the instep."""
+"""Height above which the ankle lies: about at the malleoli (0.20 to 0.38 of the length) and the instep. Chosen by
+hand."""
 REGIONS = ("sole", "heel", "midfoot", "ball", "toes", "ankle")
-"""`midfoot` has the instep on its upper side."""
+"""Names of the regions; `midfoot` includes the instep."""
 UPRIGHT = 0.9
-"""Cosine by which a foot may lean that stands with its sole down."""
+"""Least cosine of the lean of a foot that stands with its sole down; chosen by hand."""
 DESCENT = 0.6
-"""A foot's toes are lower than this share of its hind part; a box or an egg is not."""
+"""The toes of a foot are lower than this share of its hind part; those of a box or an egg are not. Chosen by hand."""
 
 
 class FootRegions(NamedTuple):
-    """Tells where on a foot a point lies. Heights are shares of the length, too: the foot's own height depends on where
-    the scan was cut."""
+    """Regions of a foot. Heights are shares of the length, since the height of a scan depends on where it was cut."""
 
     transform: NDArray[np.float64]
     """(4, 4) from the frame of the foot to its own: X from heel to toes, floor at Z = 0; a left foot is mirrored."""
@@ -41,11 +42,11 @@ class FootRegions(NamedTuple):
 
     @property
     def side(self) -> Side:
-        """Which foot it is, as its toes tell."""
+        """The side of the foot, inferred from its form."""
         return "left" if np.linalg.det(self.transform[:3, :3]) < 0 else "right"
 
     def of(self, points: NDArray[np.floating]) -> NDArray[np.uint8]:
-        """(N,) row in `REGIONS` of each of (N, 3) points, mm. Each point has one: sole and ankle come first."""
+        """Returns (N,) the index in `REGIONS` of each of (N, 3) points, mm; sole and ankle take precedence."""
         region = np.empty(len(points), np.uint8)
 
         def of_block(block: NDArray[np.float64], out: slice) -> None:
@@ -58,13 +59,13 @@ class FootRegions(NamedTuple):
 
 
 def foot_regions(shape: Shape) -> FootRegions | None:
-    """The regions of a foot's mesh that stands in mm with its sole down; None where it is something else."""
+    """Find the regions of a mesh in mm of a foot that stands sole down; None for any other shape."""
     vertices, faces = shape
     if not len(faces) or not surface_area(vertices, faces) > 0:
         return None
     try:
         frame = foot_frame(vertices, faces, "unknown")
-    except (Finding, IndexError):  # on an upright sheet the window of a landmark holds nothing
+    except (Finding, IndexError):  # on an upright sheet, the window of a landmark is empty
         return None
     if frame.transform[2, 2] < UPRIGHT:
         return None

@@ -1,4 +1,4 @@
-"""Brings one shape onto another, from any start."""
+"""Registration: the rigid transform that brings one shape onto another, from any start."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -20,40 +20,45 @@ from schemas.parameters.registration import RegistrationParameters
 
 DEFAULTS = RegistrationParameters()
 FEWEST_POINTS = 100
-"""Distinct points of a cloud."""
+"""Least number of distinct points of a cloud; chosen by hand."""
 FARTHEST_MM = 1e6
+"""Largest coordinate that is accepted."""
 THINNEST_MM = 1e-3
+"""Least standard deviation along the shortest axis of a shape."""
 FLAT = 0.02
-"""Standard deviation along the shortest axis over that along the longest, below which a shape is flat."""
+"""A shape is flat if its standard deviation along the shortest axis is less than this share of that along the longest.
+Chosen by hand."""
 LARGEST_RATIO = 10.0
-"""Of the sizes of two shapes: metres beside millimetres, or a crumb."""
+"""Largest ratio of the sizes of two shapes; a larger one comes from other units or from a fragment. Chosen by hand."""
 FINEST_CELLS = 500
-"""Along the diagonal of a cloud: points that are nearer to one another become one."""
+"""Cells along the diagonal of a cloud; points in one cell are merged. Chosen by hand."""
 CLOUD_POINTS = 40_000
-"""At most, that stand for the surface of a cloud."""
+"""Bound of time: points that represent the surface of a cloud."""
 CONTENDERS = 6
-"""Candidates that are held against the surface itself."""
+"""Bound of time: candidates that are refined against the surface itself."""
 CONTENDER_POINTS = 1000
+"""Bound of time: points of that refinement."""
 CONTENDER_STEPS = 40
+"""Bound of time: steps of that refinement."""
 MOST_STEPS = 300
-"""Of the best, with all points."""
+"""Bound of time: steps of the best candidate, with all points."""
 WIDENED = 1.5
-"""Tukey's scale that the best goes on with, of that which it had with few points."""
+"""Factor of Tukey's scale from the refinement with few points to that with all; chosen by hand."""
 FIRST_SCALE = 0.04
-"""Of the size of the shape: Tukey's scale at the start of the refinement."""
+"""Tukey's scale at the start of the refinement, as a share of the size of the shape; chosen by hand."""
 SAME_POSE = 0.01
-"""Of the size of the shape: refined poses that place its points no farther apart are one."""
+"""Refined poses are the same if no point of the shape differs by more than this share of its size; chosen by hand."""
 CAPPED = 0.03
-"""Of the size of the shape: a distance that says no more than that there is nothing near."""
+"""Distances are capped at this share of the size of the shape: farther points have no counterpart. Chosen by hand."""
 SOFTEST = 0.01
-"""Stiffness below which a shape slides on the other: feet and parts of them have 0.02 and more, a cylinder
-of 16 sides or more less than 0.001."""
+"""Least stiffness of a certain pose: feet and their parts have 0.02 or more, a cylinder of 16 sides or more less than
+0.001."""
 CERTAIN = 3.0
-"""Standard deviations by which the runner-up must be worse."""
+"""Standard deviations by which the runner-up must be worse; chosen by hand."""
 TELLING_MM = 0.02
-"""Difference of the rms residuals below which poses are equally good, however certain it is."""
+"""Poses whose rms residuals differ by less are equally good, however certain the difference is; chosen by hand."""
 MATCHING_SHARE = 0.6
-"""Of inliers among the points that overlap, from which on the two are taken for the same shape."""
+"""Least share of inliers among the overlapping points of two equal shapes; chosen by hand."""
 
 
 class Residuals(Document):
@@ -69,89 +74,89 @@ class Residuals(Document):
 
 
 class Registration(Document):
-    """The one rigid motion that brings a shape onto another, and how much there is to be said for it."""
+    """The rigid transform that brings a shape onto another, with the evidence for it."""
 
     transform: list[list[float]]
     """4 x 4, mm: the moving shape in the frame of the fixed one. Determinant +1: a left foot stays a left foot."""
     before: Residuals
-    """In the frames that were given."""
+    """Residuals in the frames of the input."""
     after: Residuals
     runner_up: Residuals | None
-    """Of the next best pose; None where all starts ended at one."""
+    """Residuals of the next best pose; None if all starts ended at one pose."""
     starts: int
-    """Rotations that were tried."""
+    """Number of rotations that were tried."""
     agreeing: int
-    """Starts that were followed to the end and ended at this pose."""
+    """Number of starts that were refined to the end and ended at this pose."""
     stiffness: float
-    """Mean square by which points leave the surface for a movement of 1 mm in the direction that is held least."""
+    """Mean square distance of the points from the surface after moving 1 mm in the least constrained direction."""
     verdict: Literal["same shape", "different shapes"]
-    """Different shapes are where too few of the points that overlap are inliers: the pose is the best one, no more."""
+    """The shapes differ if too few of the overlapping points are inliers; the pose is then merely the best one."""
 
 
 @dataclass(frozen=True)
-class _Side:
-    """A shape about its own middle and along its own axes."""
+class _PreparedShape:
+    """A shape in its own frame, with its mean at the origin and its principal axes along X, Y and Z."""
 
     points: Floats
-    """(N, 3) mm, evenly spread, in random order."""
+    """(N, 3) mm, evenly spread, in random order"""
     surface: Surface
     to_own: Poses
-    """One pose: from the frame that was given."""
+    """One pose, from the frame of the input to this one"""
     size: float
-    """mm, diagonal of the box."""
+    """Diagonal of the bounding box, mm"""
 
 
 def register(moving: Shape, fixed: Shape, parameters: RegistrationParameters = DEFAULTS) -> Registration:
-    """The rigid motion that brings `moving`, a mesh or a cloud, onto `fixed`, from any start.
+    """Compute the rigid transform that brings `moving`, a mesh or a cloud in mm, onto `fixed`, from any start.
 
-    Many rotations between the principal axes of the two are refined by ICP on few points, the better ones further and
-    further; the best by robust point-to-plane ICP against the triangles until it moves by less than 0.0001 mm. Points
-    whose nearest place is at the rim of the other surface, or beyond the scale of the residuals, have no weight: either
-    may be a part of the other. Where only `fixed` is a cloud, its points are held against the mesh, and the residuals
-    are theirs. The same at every call, whatever the number of threads.
+    Many rotations between the principal axes of the two are refined by ICP on few points, and the better ones further.
+    The best one is refined by robust point-to-plane ICP against the triangles until it moves by less than 0.0001 mm.
+    Points whose nearest place is at the rim of the other surface, or beyond the scale of the residuals, have no weight,
+    since either shape may be a part of the other. If only `fixed` is a cloud, its points are registered to the mesh,
+    and the residuals are theirs. The result is the same at every call, for any number of threads.
 
     Raises
     ------
     Finding
-        The pose is ambiguous: a shape slides on the other, or another pose is no worse; or a shape has too few points,
-        is flat, is no number, or is of another size.
+        The pose is ambiguous, since a shape slides on the other or another pose is no worse; or a shape has too few
+        points, is flat, has coordinates that are no numbers, or differs in size; or the registration does not settle.
     """
-    ours, theirs = _side(moving, "moving", parameters), _side(fixed, "fixed", parameters)
-    if max(ours.size, theirs.size) > LARGEST_RATIO * min(ours.size, theirs.size):
-        raise Finding(f"shapes of {ours.size:.4g} mm and {theirs.size:.4g} mm, expected two of about one size")
-    backward = isinstance(ours.surface, MeshSurface) and isinstance(theirs.surface, CloudSurface)
+    source, target = _prepared(moving, "moving", parameters), _prepared(fixed, "fixed", parameters)
+    if max(source.size, target.size) > LARGEST_RATIO * min(source.size, target.size):
+        raise Finding(f"shapes of {source.size:.4g} mm and {target.size:.4g} mm, expected two of about one size")
+    backward = isinstance(source.surface, MeshSurface) and isinstance(target.surface, CloudSurface)
     if backward:
-        ours, theirs = theirs, ours
-    found, starts = candidates(sketch(ours.points), sketch(theirs.points))
-    contenders, scale, starts = _contenders(found[:CONTENDERS], starts, ours, theirs)
+        source, target = target, source
+    poses, starts = candidates(sketch(source.points), sketch(target.points))
+    contenders, scale, starts = _contenders(poses[:CONTENDERS], starts, source, target)
     if len(contenders) > 1:
-        _refuse_equals(contenders[:1], contenders[1:2], ours, theirs)
-    best, scale, moved = settle(contenders[:1], ours.points, theirs.surface, WIDENED * scale, MOST_STEPS)
-    held, way = stiffness(best, ours.points, theirs.surface, scale)
-    if held < SOFTEST:
-        raise Finding(f"ambiguous: {_slide(way)}, stiffness {held:.2g}, expected at least {SOFTEST}")
-    if not moved < SETTLED_MM:
-        raise Finding(f"the registration does not settle: its last step still moves the shape by {moved:.3g} mm")
-    after = _residuals(best, ours, theirs, parameters)
-    start = theirs.to_own.after(ours.to_own.inverse())
-    whole = theirs.to_own.inverse().after(best).after(ours.to_own)
+        _refuse_equals(contenders[:1], contenders[1:2], source, target)
+    best, scale, last_step = settle(contenders[:1], source.points, target.surface, WIDENED * scale, MOST_STEPS)
+    least, direction = stiffness(best, source.points, target.surface, scale)
+    if least < SOFTEST:
+        raise Finding(f"ambiguous: {_slide(direction)}, stiffness {least:.2g}, expected at least {SOFTEST}")
+    if not last_step < SETTLED_MM:
+        raise Finding(f"the registration does not settle: its last step still moves the shape by {last_step:.3g} mm")
+    after = _residuals(best, source, target, parameters)
+    start = target.to_own.after(source.to_own.inverse())
+    whole = target.to_own.inverse().after(best).after(source.to_own)
     return Registration(
         transform=_matrix(whole.inverse() if backward else whole).tolist(),
-        before=_residuals(start, ours, theirs, parameters),
+        before=_residuals(start, source, target, parameters),
         after=after,
-        runner_up=_residuals(contenders[1:2], ours, theirs, parameters) if len(contenders) > 1 else None,
+        runner_up=_residuals(contenders[1:2], source, target, parameters) if len(contenders) > 1 else None,
         starts=len(start_poses()),
         agreeing=int(starts[0]),
-        stiffness=held,
+        stiffness=least,
         verdict="same shape" if after.inliers >= MATCHING_SHARE * after.overlap else "different shapes",
     )
 
 
-def _side(shape: Shape, name: str, parameters: RegistrationParameters) -> _Side:
+def _prepared(shape: Shape, name: str, parameters: RegistrationParameters) -> _PreparedShape:
     vertices, faces = np.asarray(shape[0], np.float64), np.asarray(shape[1])
-    wrong = np.count_nonzero(~np.all(np.abs(vertices) <= FARTHEST_MM, axis=1))
-    if wrong:
-        raise Finding(f"{name}: {wrong} of {len(vertices)} points are no numbers or beyond {FARTHEST_MM:g} mm")
+    invalid = np.count_nonzero(~np.all(np.abs(vertices) <= FARTHEST_MM, axis=1))
+    if invalid:
+        raise Finding(f"{name}: {invalid} of {len(vertices)} points are no numbers or beyond {FARTHEST_MM:g} mm")
     is_mesh = len(faces) > 0 and surface_area(vertices, faces) > 0
     points = sample_surface(vertices, faces, parameters.points) if is_mesh else vertices
     if len(points) < FEWEST_POINTS:
@@ -171,15 +176,15 @@ def _side(shape: Shape, name: str, parameters: RegistrationParameters) -> _Side:
     else:
         dense, own = _thinned(own, size, CLOUD_POINTS), _thinned(own, size, parameters.points)
         if len(own) < FEWEST_POINTS:
-            raise Finding(f"{name}: {len(own)} of {len(points)} points lie apart, expected at least {FEWEST_POINTS}")
+            raise Finding(f"{name}: {len(own)} of {len(points)} points are distinct, expected at least {FEWEST_POINTS}")
         surface = CloudSurface(dense)
-    return _Side(own[np.random.default_rng(0).permutation(len(own))], surface, to_own, size)
+    return _PreparedShape(own[np.random.default_rng(0).permutation(len(own))], surface, to_own, size)
 
 
 def _thinned(points: Floats, size: float, count: int) -> Floats:
-    """At most `count` of `points`, which lie around the origin, evenly spread: the first in each cell of a grid.
+    """Select at most `count` evenly spread `points`, which lie around the origin: the first in each cell of a grid.
 
-    A cell is centred at the origin, so that turning an axis round changes nothing. Doubled points become one.
+    A cell is centred at the origin, so that reversing an axis changes nothing. Repeated points are merged.
     """
     cell = size / FINEST_CELLS
     while True:
@@ -190,34 +195,34 @@ def _thinned(points: Floats, size: float, count: int) -> Floats:
 
 
 def _contenders(
-    poses: Poses, starts: NDArray[np.intp], ours: _Side, theirs: _Side
+    poses: Poses, starts: NDArray[np.intp], source: _PreparedShape, target: _PreparedShape
 ) -> tuple[Poses, float, NDArray[np.intp]]:
-    """The distinct among candidates after few points were held against the surface itself, the best first.
+    """Refine candidates on few points against the surface itself.
 
-    With Tukey's scale of the best, and the starts of each.
+    Returns the distinct poses, the best first, Tukey's scale of the best in mm, and the number of starts of each.
     """
-    few, scale = ours.points[:CONTENDER_POINTS], FIRST_SCALE * theirs.size
-    settled = [settle(poses[k : k + 1], few, theirs.surface, scale, CONTENDER_STEPS) for k in range(len(poses))]
-    best_first = np.argsort([_squares(pose, ours, theirs, CONTENDER_POINTS).mean() for pose, _, _ in settled])
+    few, scale = source.points[:CONTENDER_POINTS], FIRST_SCALE * target.size
+    settled = [settle(poses[k : k + 1], few, target.surface, scale, CONTENDER_STEPS) for k in range(len(poses))]
+    best_first = np.argsort([_squares(pose, source, target, CONTENDER_POINTS).mean() for pose, _, _ in settled])
     rotations = np.concatenate([pose.rotations for pose, _, _ in settled])[best_first]
     translations = np.concatenate([pose.translations for pose, _, _ in settled])[best_first]
     contenders, starts = distinct(
-        Poses(rotations, translations), starts[best_first], ours.points, SAME_POSE * theirs.size
+        Poses(rotations, translations), starts[best_first], source.points, SAME_POSE * target.size
     )
     return contenders, settled[best_first[0]][1], starts
 
 
-def _squares(pose: Poses, ours: _Side, theirs: _Side, points: int | None) -> Floats:
-    """Capped squared distances both ways, for a part fits into a whole, but not the whole into it."""
-    cap = CAPPED * theirs.size
-    there = capped_squares(pose, ours.points[:points], theirs.surface, cap)[0]
-    back = capped_squares(pose.inverse(), theirs.points[:points], ours.surface, cap)[0]
+def _squares(pose: Poses, source: _PreparedShape, target: _PreparedShape, points: int | None) -> Floats:
+    """Capped squared distances in both directions, since a part fits into a whole, but not the whole into it."""
+    cap = CAPPED * target.size
+    there = capped_squares(pose, source.points[:points], target.surface, cap)[0]
+    back = capped_squares(pose.inverse(), target.points[:points], source.surface, cap)[0]
     return np.concatenate([there, back])
 
 
-def _refuse_equals(best: Poses, other: Poses, ours: _Side, theirs: _Side) -> None:
-    squares, others = _squares(best, ours, theirs, None), _squares(other, ours, theirs, None)
-    here, there = patches_of(ours.points), patches_of(theirs.points)
+def _refuse_equals(best: Poses, other: Poses, source: _PreparedShape, target: _PreparedShape) -> None:
+    squares, others = _squares(best, source, target, None), _squares(other, source, target, None)
+    here, there = patches_of(source.points), patches_of(target.points)
     certainty = evidence(squares, others, np.concatenate([here, here.max() + 1 + there]))
     rms, other_rms = np.sqrt(squares.mean()), np.sqrt(others.mean())
     if certainty < CERTAIN or other_rms - rms < TELLING_MM:
@@ -228,13 +233,15 @@ def _refuse_equals(best: Poses, other: Poses, ours: _Side, theirs: _Side) -> Non
         )
 
 
-def _slide(way: Floats) -> str:
-    turn, shift = np.linalg.norm(way[:3]), np.linalg.norm(way[3:])
+def _slide(direction: Floats) -> str:
+    turn, shift = np.linalg.norm(direction[:3]), np.linalg.norm(direction[3:])
     return "the shape turns on itself" if turn > shift else "the shape slides along itself"
 
 
-def _residuals(pose: Poses, ours: _Side, theirs: _Side, parameters: RegistrationParameters) -> Residuals:
-    fit = fit_of(pose, ours.points, theirs.surface)
+def _residuals(
+    pose: Poses, source: _PreparedShape, target: _PreparedShape, parameters: RegistrationParameters
+) -> Residuals:
+    fit = fit_of(pose, source.points, target.surface)
     return Residuals(
         rms=float(np.sqrt(np.mean(fit.distances**2))),
         mean=float(fit.distances.mean()),

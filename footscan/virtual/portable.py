@@ -1,8 +1,8 @@
 """Arithmetic that gives the same bytes on every x86-64 processor.
 
-NumPy's `exp`, `sin` and `power` take other instructions, hence other last digits, where a processor has AVX-512; BLAS,
-behind `@`, takes the kernels of each processor. Films and captures are made without them: by single operations of
-IEEE 754 in a fixed order. numba contracts no multiplication and addition unless `fastmath` is asked for.
+NumPy's `exp`, `sin` and `power` use other instructions on a processor with AVX-512, and give other last digits; BLAS,
+behind `@`, uses kernels of its own for each processor. Films and captures are made without them, by single operations
+of IEEE 754 in a fixed order. numba does not contract a multiplication and an addition unless `fastmath` is set.
 """
 
 import math
@@ -20,7 +20,7 @@ Border = Literal["reflect", "constant", "wrap"]
 _LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 """ln 2 in two parts, the first with 33 bits: its product with a power's exponent is exact."""
 _TERMS = 13
-"""Of the series of exp for |x| <= ln(2) / 2: the next one is below 4e-18."""
+"""Terms of the series of exp for |x| <= ln(2) / 2: the next term is below 4e-18."""
 
 
 def exp(x: Floats) -> Floats:
@@ -59,12 +59,12 @@ def gaussian_blur(
 
 
 def dot(vectors: Floats, vector: Floats) -> Floats:
-    """(N,) products of each of `vectors` (N, K) with `vector` (K,)."""
+    """Returns the (N,) scalar products of each of `vectors` (N, K) with `vector` (K,)."""
     return np.asarray(np.einsum("ij,j->i", vectors, vector, optimize=False))
 
 
 def product(vectors: Floats, matrix: Floats) -> Floats:
-    """(N, M) `vectors` (N, K) times `matrix` (K, M)."""
+    """Returns (N, M), `vectors` (N, K) times `matrix` (K, M)."""
     return np.stack([dot(vectors, column) for column in matrix.T], axis=1)
 
 

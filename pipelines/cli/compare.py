@@ -18,26 +18,29 @@ MOST_CLASSES = 10_000
 
 
 def compare(
-    result: Annotated[
-        Path, typer.Argument(help="What is examined: a mesh or a cloud; STL, PLY or OBJ in millimetres.")
-    ],
-    reference: Annotated[Path, typer.Argument(help="What it should be: a mesh, or a cloud.")],
-    register: Annotated[bool, typer.Option("--register", help="Move the first onto the second beforehand.")] = False,
-    both: Annotated[
-        bool, typer.Option("--both", help="Also take the distances of the second to the first: what of it is there.")
+    result: Annotated[Path, typer.Argument(help="Mesh or cloud to examine: STL, PLY or OBJ in millimetres.")],
+    reference: Annotated[Path, typer.Argument(help="Mesh or cloud to compare it with.")],
+    register: Annotated[
+        bool, typer.Option("--register", help="Register the first onto the reference before the comparison.")
     ] = False,
-    classes: Annotated[int, typer.Option(min=1, max=MOST_CLASSES, help="Classes of the histograms.")] = 70,
+    both: Annotated[
+        bool,
+        typer.Option(
+            "--both", help="Also compute the distances from the reference to the first, which show what is missing."
+        ),
+    ] = False,
+    classes: Annotated[int, typer.Option(min=1, max=MOST_CLASSES, help="Number of classes of the histograms.")] = 70,
     csv_file: Annotated[
-        Path | None, typer.Option("--csv", help="Write figures, regions and classes here, one a row.")
+        Path | None, typer.Option("--csv", help="CSV to write: figures, regions and classes, one per row.")
     ] = None,
     coloured: Annotated[
-        Path | None, typer.Option("--mesh", help="Write the first, coloured by its distance, here (PLY).")
+        Path | None, typer.Option("--mesh", help="Mesh to write: the first, coloured by its distance (PLY).")
     ] = None,
-    pictures: Annotated[Path | None, typer.Option(help="Folder to write four pictures into (PNG).")] = None,
-    report: Annotated[Path | None, typer.Option(help="Write a page to look at here (HTML).")] = None,
+    pictures: Annotated[Path | None, typer.Option(help="Folder for four pictures (PNG).")] = None,
+    report: Annotated[Path | None, typer.Option(help="Report to write (HTML).")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Distances of one surface to another, in millimetres; both in one frame, or brought there by --register."""
+    """Compute the distances in mm of one surface to another. Use --register if their frames differ."""
     from footscan.mesh.formats.files import read_file
     from footscan.report.comparison.table import comparison_csv
     from footscan.verify import compare as verify
@@ -109,7 +112,7 @@ def _show(
     pictures: Path | None,
     report: Path | None,
 ) -> None:
-    """Writes what is looked at."""
+    """Write the pictures and the report."""
     from footscan.report.comparison.page import comparison_page
     from footscan.report.deviation import deviation_of, deviation_pictures, deviation_ply
     from footscan.verify.compare import cloud_normals, vertex_distances

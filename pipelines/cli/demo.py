@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 
 def demo(
-    folder: Annotated[Path, typer.Option(help="Where everything is put.")] = Path("demo"),
+    folder: Annotated[Path, typer.Option(help="Folder for all files of the demo.")] = Path("demo"),
     side: Annotated[Literal["right", "left"], typer.Option(help="Which foot.")] = "right",
     light: Annotated[Literal["dark", "ambient", "bright"], typer.Option(help="Light in the room.")] = "ambient",
 ) -> None:
-    """Film a virtual foot, calibrate, reconstruct and measure it, and compare with what is known of it."""
+    """Film a virtual foot, calibrate, reconstruct and measure it, and compare the result with the truth."""
     from pipelines.demo import run_demo
     from schemas.measures import Measures
     from schemas.parameters.demo import FilmedFoot

@@ -14,31 +14,32 @@ if TYPE_CHECKING:
     from schemas.quality import MeshQuality
 
 FLOOR_MM = 1.0
-"""A mesh whose lowest vertex is farther than this from Z = 0 does not stand there."""
+"""Largest distance in mm of the lowest vertex from Z = 0 for a mesh that stands there; chosen by hand."""
 ANONYMOUS = {("side", "right"), ("side", "left"), ("side", "unknown"), ("frame", "scanner"), ("unit", "mm")}
-"""What is told of a mesh that does not tell whose it is: of the values, too, for a file may say anything."""
+"""The metadata that do not identify a patient; values are checked, too, because a file may contain anything."""
 SIZE_MM = (20.0, 2000.0)
-"""Across a foot, a block or a sphere in mm; in metres or inches it is smaller."""
+"""Range of the extent in mm of a foot, a block or a sphere; in metres or inches it is smaller."""
 
 
 def export(
     file: Annotated[Path, typer.Argument(help="Mesh of a foot in millimetres: STL, PLY or OBJ.")],
-    out: Annotated[Path, typer.Option(help="Write here; the name ends in .stl, .ply, .obj, .wrl, .3mf or .glb.")],
+    out: Annotated[Path, typer.Option(help="File to write: .stl, .ply, .obj, .wrl, .3mf or .glb.")],
     triangles: Annotated[
-        int | None, typer.Option(min=4, help="At most so many; 40000 and 20000 suit most programs. [default: all]")
+        int | None,
+        typer.Option(min=4, help="Largest number of faces; 40000 or 20000 suit most programs. [default: all]"),
     ] = None,
-    floor: Annotated[bool, typer.Option("--floor", help="Set the lowest point to Z = 0.")] = False,
+    floor: Annotated[bool, typer.Option("--floor", help="Move the mesh so that its lowest point is at Z = 0.")] = False,
     side: Annotated[
-        Literal["right", "left", "unknown"] | None, typer.Option(help="Which foot it is. [default: as FILE says]")
+        Literal["right", "left", "unknown"] | None, typer.Option(help="Side of the foot. [default: as FILE says]")
     ] = None,
-    patient: Annotated[str | None, typer.Option(help="Pseudonym, told in the file.")] = None,
-    scan: Annotated[str | None, typer.Option(help="Name of the scan, told in the file.")] = None,
+    patient: Annotated[str | None, typer.Option(help="Pseudonym to write into the file.")] = None,
+    scan: Annotated[str | None, typer.Option(help="Name of the scan to write into the file.")] = None,
     anonymous: Annotated[
-        bool, typer.Option("--anonymous", help="Tell nothing of whose foot it is: no names, no colours of the skin.")
+        bool, typer.Option("--anonymous", help="Write nothing that identifies the patient: no names, no skin colours.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write a foot's mesh for another program, with fewer triangles if it wants that."""
+    """Convert a foot's mesh for another program, with fewer triangles if needed."""
     from dataclasses import replace
 
     from footscan.mesh.formats.files import WRITERS, mesh_bytes, read_file
@@ -95,7 +96,7 @@ def export(
 
 
 def _check_name(out: Path, file: Path, mesh: "Mesh") -> None:
-    """Refuses a name that tells whose foot it is, as far as the mesh or the folders of its results tell that."""
+    """Refuse a file name that identifies the patient, as far as the mesh or the folders of its results do."""
     names = {mesh.metadata.get("patient", ""), mesh.metadata.get("scan", "")}
     folder = file.resolve().parent
     if (folder / "measures.json").exists():
@@ -117,7 +118,7 @@ def _check(mesh: "Mesh", file: Path) -> None:
 
 
 def _warn(mesh: "Mesh", quality: "MeshQuality", file: Path, triangles: int | None) -> None:
-    """What the file is not, though another program may expect it."""
+    """Warnings about properties that another program may expect of the file."""
     name = one_line(str(file))
     if quality.open_edges or quality.non_manifold_edges:
         message(

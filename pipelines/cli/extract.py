@@ -39,22 +39,25 @@ def extract(
         Path | None, typer.Option(parser=_path("--out"), help="CSV to write; default: standard output.")
     ] = None,
     overlay: Annotated[
-        Path | None, typer.Option(parser=_path("--overlay"), help="Draw the points over the frames here (PNG).")
+        Path | None,
+        typer.Option(
+            parser=_path("--overlay"), help="Picture to write: the frames with the stripe points drawn over them (PNG)."
+        ),
     ] = None,
     background: Annotated[
         Path | None,
         typer.Option(
             parser=_path("--background"),
-            help="The same with the laser off: an image for all frames, or as many frames as FILE has.",
+            help="Background, filmed with the laser off: one image, or as many frames as FILE has.",
         ),
     ] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the extraction; may stand several times."),
+        typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the extraction; may be repeated."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find the laser stripe: one sub-pixel point a row of frame,i,j,width,peak,score."""
+    """Find the laser stripe: CSV with one sub-pixel point per row (frame,i,j,width,peak,score)."""
     from footscan.frames.film import film_files, open_film, pixel_frames
     from footscan.stripe.film import extract_film, points_csv
     from pipelines.engine.files.atomic import write_atomically
@@ -96,7 +99,7 @@ def extract(
 
 
 def _backgrounds(path: Path, film: "Film") -> "Iterable[Rgb | None]":
-    """A laser-off frame for each frame of the film: of its own, or one and the same."""
+    """The background of each frame: its own, or one for all."""
     from footscan.frames.film import open_background, pixel_frames
 
     background = open_background(path, (film.height, film.width), film.frames, str(film.path))
@@ -105,7 +108,7 @@ def _backgrounds(path: Path, film: "Film") -> "Iterable[Rgb | None]":
 
 
 def _check_outputs(out: Path | None, overlay: Path | None, sources: Sequence[Path]) -> None:
-    """Refuses what cannot be written, or would replace the other output, or be a frame to the next run."""
+    """Refuse an output that cannot be written, replaces the other one, or would be a frame of the next run."""
     from pipelines.engine.files.atomic import is_stream
 
     if out is not None and not is_stream(out):
@@ -122,7 +125,7 @@ def _check_outputs(out: Path | None, overlay: Path | None, sources: Sequence[Pat
 
 
 def _check_folder(output: Path) -> None:
-    """Refuses a file in a folder that can be neither written nor made. Rights tell little: it has to be tried."""
+    """Refuse a file whose folder cannot be written or made. Permissions are not conclusive, so this tries it."""
     folder = output.parent
     try:
         folder = output.resolve().parent
@@ -136,12 +139,12 @@ def _check_folder(output: Path) -> None:
 
 @dataclass
 class _Seen:
-    """What is noticed of the frames while they are read."""
+    """Observations about the frames while they are read."""
 
     lost: list[int] = field(default_factory=list)
-    """Numbers of those that are not there, or torn."""
+    """Numbers of the frames that are missing or torn."""
     colour: bool = False
-    """Whether R, G and B differ anywhere."""
+    """True if R, G and B differ anywhere."""
 
     def watch(self, frames: "Iterable[Rgb | None]") -> "Iterator[Rgb | None]":
         for number, frame in enumerate(frames):
@@ -163,7 +166,7 @@ def _drawn(film: "Film", points: "StripePoints", lost: list[int], about: str) ->
 
 
 def _about(film: "Film", background: Path | None, parameters: "ExtractionParameters") -> str:
-    """What an overlay is of, and made with: names, and the parameters that are not the defaults."""
+    """Title of an overlay: names, and the parameters that differ from the defaults."""
     names = [_name(film.path)] + ([] if background is None else [f"background {_name(background)}"])
     return ", ".join(
         names + [f"{name}={value}" for name, value in parameters.model_dump(exclude_defaults=True).items()]
@@ -175,7 +178,7 @@ def _name(path: Path) -> str:
 
 
 def _figures(film: "Film", points: "StripePoints") -> dict[str, Any]:
-    """What was found and measured, for programs."""
+    """The summary as a JSON document."""
     import numpy as np
 
     return {
@@ -187,7 +190,7 @@ def _figures(film: "Film", points: "StripePoints") -> dict[str, Any]:
 
 
 def _summary(film: "Film", points: "StripePoints", seen: _Seen) -> str:
-    """What was found, in one line for persons."""
+    """The summary in one line."""
     with_points = len(set(points["frame"].tolist()))
     of = f"{with_points} of " if 0 < with_points < film.frames else ""
     lost = f", {len(seen.lost)} lost" if seen.lost else ""

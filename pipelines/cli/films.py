@@ -14,35 +14,49 @@ if TYPE_CHECKING:
 
 simulate = typer.Typer(help="Film with the virtual scanner: a scan, or the reference object.", no_args_is_help=True)
 
-Out = Annotated[Path, typer.Option(help="Folder to write; must not exist, or be empty.")]
-Light = Annotated[Literal["dark", "ambient", "bright"], typer.Option(help="Light in the room.")]
-Seed = Annotated[int, typer.Option(min=0, help="Of noise, speckle and clicks.")]
-ScannerSeed = Annotated[int, typer.Option(min=0, help="Of the scanner's own geometry; capture and scans share it.")]
+Out = Annotated[Path, typer.Option(help="Folder to write; must be new or empty.")]
+RoomLight = Annotated[Literal["dark", "ambient", "bright"], typer.Option(help="Light in the room.")]
+Seed = Annotated[int, typer.Option(min=0, help="Random seed of noise, speckle and clicks.")]
+ScannerSeed = Annotated[
+    int, typer.Option(min=0, help="Random seed of the scanner's geometry; use the same one for capture and scans.")
+]
 
 
 @simulate.command("scan")
 def simulate_scan(
     out: Out,
     mesh: Annotated[Path | None, typer.Argument(help="Mesh in mm: STL, PLY or OBJ.")] = None,
-    foot: Annotated[Literal["right", "left"] | None, typer.Option(help="The parametric foot, not a mesh.")] = None,
-    block: Annotated[bool, typer.Option("--block", help="The block of 150 x 100 x 50 mm instead of a mesh.")] = False,
-    patient: Annotated[str, typer.Option(help="Pseudonym.")] = "P0001",
+    foot: Annotated[
+        Literal["right", "left"] | None, typer.Option(help="Film the parametric foot instead of a mesh.")
+    ] = None,
+    block: Annotated[
+        bool, typer.Option("--block", help="Film the block of 150 x 100 x 50 mm instead of a mesh.")
+    ] = False,
+    patient: Annotated[str, typer.Option(help="Pseudonym of the patient.")] = "P0001",
     scan: Annotated[str, typer.Option(help="Name of the scan; default: the folder's name.")] = "",
-    side: Annotated[Literal["right", "left", "unknown"], typer.Option(help="Which foot a mesh is.")] = "unknown",
-    calibration: Annotated[str | None, typer.Option(help="Path that scan.yaml shall name, relative to it.")] = None,
+    side: Annotated[Literal["right", "left", "unknown"], typer.Option(help="Side of the foot.")] = "unknown",
+    calibration: Annotated[
+        str | None, typer.Option(help="Calibration path to write into scan.yaml, relative to it.")
+    ] = None,
     turn_deg: Annotated[
-        float | None, typer.Option(help="Turn it about Z, counter-clockwise from above; 5 for --block, otherwise 0.")
+        float | None,
+        typer.Option(
+            help="Rotation about Z in degrees, counter-clockwise seen from above; default: 5 for --block, else 0."
+        ),
     ] = None,
     frames: Annotated[int, typer.Option(min=1, max=10_000)] = 200,
     step_mm: Annotated[float, typer.Option(min=0.01, max=1000)] = 2.0,
-    light: Light = "ambient",
+    light: RoomLight = "ambient",
     seed: Seed = 1,
     scanner_seed: ScannerSeed = 1,
-    stripe_truth: Annotated[bool, typer.Option("--stripe-truth", help="Also write the true stripe centres.")] = False,
-    laser_off: Annotated[bool, typer.Option("--laser-off", help="Also film with the laser off: backgrounds.")] = False,
+    stripe_truth: Annotated[
+        bool, typer.Option("--stripe-truth", help="Also write the true stripe centres (CSV).")
+    ] = False,
+    laser_off: Annotated[bool, typer.Option("--laser-off", help="Also film backgrounds, with the laser off.")] = False,
 ) -> None:
-    """Film a mesh that stands on the glass, in the middle of the travel."""
-    from footscan.virtual.filming.record import record_scan
+    """Film a mesh that stands on the glass, centred on the travel."""
+    from footscan.virtual.filming.record import ScanExtras, ScanName, record_scan
+    from footscan.virtual.optics.scene import Mesh
     from footscan.virtual.stage.standing import BLOCK_TURN_DEG, stand_in_the_middle
     from pipelines.cli.terminal.progress import frame_progress
     from pipelines.virtual_objects import virtual_object
@@ -57,16 +71,11 @@ def simulate_scan(
     vertices = stand_in_the_middle(vertices, settings, turn)
     with frame_progress("filming") as progress:
         record_scan(
-            vertices,
-            faces,
+            Mesh(vertices, faces),
             out,
-            patient=pseudonym(patient, "--patient"),
-            scan=pseudonym(scan or out.resolve().name, "--scan"),
-            side=known_side,
-            settings=settings,
-            calibration=calibration,
-            stripe_truth=stripe_truth,
-            laser_off=laser_off,
+            ScanName(pseudonym(patient, "--patient"), pseudonym(scan or out.resolve().name, "--scan"), known_side),
+            settings,
+            extras=ScanExtras(calibration, stripe_truth=stripe_truth, laser_off=laser_off),
             progress=progress,
         )
     message(f"{out}: filmed {settings.frames} frames by each of 8 cameras")
@@ -75,13 +84,13 @@ def simulate_scan(
 @simulate.command("capture")
 def simulate_capture(
     out: Out,
-    reference: Annotated[Path | None, typer.Option(help="Reference object (YAML) instead of the standard one.")] = None,
-    placements: Annotated[int | None, typer.Option(min=1, help="Only so many of its placements.")] = None,
-    light: Light = "ambient",
+    reference: Annotated[Path | None, typer.Option(help="Reference object (YAML); default: the standard one.")] = None,
+    placements: Annotated[int | None, typer.Option(min=1, help="Number of placements to film; default: all.")] = None,
+    light: RoomLight = "ambient",
     seed: Seed = 1,
     scanner_seed: ScannerSeed = 1,
 ) -> None:
-    """Film the reference object in its placements, and write the chart of its corners as a person would click them."""
+    """Film the reference object in its placements, and write the chart of its corners as if clicked by hand."""
     from footscan.virtual.filming.capture import record_capture
     from footscan.virtual.stage.reference import read_reference, standard_reference
     from pipelines.cli.terminal.progress import frame_progress
@@ -107,7 +116,7 @@ def ingest(
     folders: Annotated[list[Path], typer.Argument(help="Scan folders, or an archive of them.")],
     as_json: AsJson = False,
 ) -> int:
-    """Films to Zarr: one array a camera in frames.zarr beside the films, the camera's JPEG bytes as they are."""
+    """Convert films to Zarr: one array per camera in frames.zarr beside the films, with the JPEG bytes unchanged."""
     from pipelines.archive.ingest import ingest_scans
 
     ends = ingest_scans(folders)

@@ -1,4 +1,4 @@
-"""The command's entry: its sub-commands, and every error as one line with an exit status of its own."""
+"""Entry point of the command: its sub-commands, and every error as one line with its own exit status."""
 
 import errno
 import logging
@@ -20,7 +20,7 @@ from schemas.base.limits import check_limits
 
 INTERRUPTED = 130
 MOST_OTHERS = 19
-"""Mistakes that are told after the first one: what a terminal shows at once."""
+"""Mistakes printed after the first one. Bound: what a terminal shows at once."""
 
 app = typer.Typer(
     name="footscan",
@@ -77,7 +77,7 @@ def main() -> None:
 
 
 def run_command(arguments: list[str]) -> int:
-    """The exit status of `footscan ARGUMENTS`; what went wrong stands on standard error, each mistake in one line."""
+    """Run `footscan ARGUMENTS` and return the exit status. Each mistake is one line on standard error."""
     try:
         check_limits()
         _check_arguments(arguments)
@@ -101,14 +101,14 @@ def run_command(arguments: list[str]) -> int:
 
 
 def _check_arguments(arguments: list[str]) -> None:
-    """Refuses what no program can be given by a shell; a file's name cannot hold it either."""
+    """Refuse arguments with a NUL byte, which no shell can pass and no file name can hold."""
     for argument in arguments:
         if "\0" in argument:
             raise RefusedInput(one_line(argument)[:80], "holds a character of value 0, expected none")
 
 
 def _explain(error: BaseException) -> tuple[str, int]:
-    """What to say of an error, and the exit status."""
+    """The message of an error, and the exit status."""
     if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
         name = str(error.filename)
         error = RefusedInput(f"{name[:60]}...", f"is a name of {len(name)} characters, expected a shorter one")

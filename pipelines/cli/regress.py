@@ -24,19 +24,22 @@ SUITE = Path("regression/suite.yaml")
 def regress(
     suite: Annotated[Path | None, typer.Argument(help=f"The suite; default: {SUITE}.", metavar="[SUITE]")] = None,
     accept: Annotated[
-        str | None, typer.Option("--accept", metavar="REASON", help="Make what comes out the baseline, and say why.")
+        str | None,
+        typer.Option("--accept", metavar="REASON", help="Accept the results as the new baseline, for this reason."),
     ] = None,
-    accepted_by: Annotated[str | None, typer.Option("--by", help="Who accepts; default: your login name.")] = None,
+    accepted_by: Annotated[
+        str | None, typer.Option("--by", help="Name of the person who accepts; default: your login name.")
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of films, cache, history and page; default: the suite's.")
+        Path | None, typer.Option(help="Folder for films, cache, history and page; default: that of the suite.")
     ] = None,
-    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="JUnit XML file to write.")] = None,
     check_last: Annotated[
-        str | None, typer.Option(metavar="AGE", help="Only say whether a night has ended within AGE, such as 26h.")
+        str | None, typer.Option(metavar="AGE", help="Only check that a night has ended within AGE, for example 26h.")
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Run a suite of scans and hold every figure beside the accepted one.
+    """Run a suite of scans and compare every figure with the accepted one.
 
     Exit status: 0 all is the same or better; 1 something is worse, missing or was not run; 2 refused input; 3 fault.
     """
@@ -108,7 +111,7 @@ def _progress() -> "Iterator[OnStepEnd]":
 
 
 def _tell(one: "JudgedSet") -> None:
-    """A line for each set as it ends."""
+    """Print a line for each set as it ends."""
     from pipelines.regression.report.result import VERDICTS
 
     counts = ", ".join(f"{one.count(verdict)} {verdict}" for verdict in VERDICTS if one.count(verdict))
@@ -116,7 +119,7 @@ def _tell(one: "JudgedSet") -> None:
 
 
 def _show(night: "Night") -> None:
-    """A table of all that is not the same, the steps it begins at, and where the page is."""
+    """Print a table of all figures that differ, the first steps that differ, and the path of the page."""
     rows = [
         [one.name, figure.name, _cell(figure.value), _cell(figure.accepted), f"{figure.allowed:.4g}", figure.verdict]
         for one in night.result.sets

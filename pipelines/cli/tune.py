@@ -35,7 +35,7 @@ def tune(
     tls_key: TlsKey = None,
     as_json: AsJson = False,
 ) -> int:
-    """Seek better parameters, as the section tune of a workflow says.
+    """Search for better parameters, as described in the section tune of a workflow.
 
     What has been computed before is not computed again; a search that was interrupted goes on where it was.
     """

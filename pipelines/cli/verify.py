@@ -17,29 +17,36 @@ if TYPE_CHECKING:
 
 THESIS_NOMINAL = (150.0, 100.0, 50.0)
 THESIS_FOUND = (151.2, 102.0, 51.4)
-"""Table 6-1 of the thesis: the block, and what its scanner made of it."""
+"""Table 6-1 of the thesis: the true block and the scanned one."""
 SAMPLES = 100_000
-"""Points spread over a mesh."""
+"""Number of points sampled on a mesh."""
 BASES = {"faces": "face", "stripes": "stripes", "floor": "floor", None: "not seen"}
 
-verify = typer.Typer(help="Hold a scan of a body of known form against that form.", no_args_is_help=True)
+verify = typer.Typer(help="Compare a scan of a body of known shape with that shape.", no_args_is_help=True)
 
 
 @verify.command("block")
 def block(
-    scan: Annotated[Path, typer.Argument(help="A scan's results, or a cloud or mesh of the block: PLY, STL, OBJ.")],
-    nominal: Annotated[str, typer.Option(help="The block's true dimensions in mm.")] = "150x100x50",
-    edge_mm: Annotated[float, typer.Option(min=0, max=20, help="Leave out what is nearer to an edge.")] = 3.0,
+    scan: Annotated[Path, typer.Argument(help="Results of a scan, or a cloud or mesh of the block: PLY, STL, OBJ.")],
+    nominal: Annotated[str, typer.Option(help="True dimensions of the block, mm.")] = "150x100x50",
+    edge_mm: Annotated[float, typer.Option(min=0, max=20, help="Ignore points closer to an edge than this, mm.")] = 3.0,
     floor_mm: Annotated[
-        float, typer.Option(min=-1e4, max=1e4, help="Z from which the height counts where no bottom is seen.")
+        float,
+        typer.Option(
+            min=-1e4,
+            max=1e4,
+            help="Z of the supporting plane, mm; used for the height when the bottom face is not seen.",
+        ),
     ] = 0.0,
     sheet_mm: Annotated[
         tuple[float, float],
-        typer.Option(help="Least and largest standard deviation of the laser's sheet; 0 0 seeks no cut stripes."),
+        typer.Option(
+            help="Smallest and largest standard deviation of the laser's profile; 0 0: do not look for cut stripes."
+        ),
     ] = (0.2, 0.6),
     as_json: AsJson = False,
 ) -> None:
-    """Fit the faces of a cuboid: dimensions, angles and flatness, beside the thesis's Table 6-1."""
+    """Fit a cuboid: dimensions, angles and flatness, compared with Table 6-1 of the thesis."""
     from footscan.verify.shapes.cuboid import fit_cuboid
     from schemas.fits import CuboidParameters
 
@@ -66,11 +73,11 @@ def block(
 
 @verify.command("sphere")
 def sphere(
-    files: Annotated[list[Path], typer.Argument(help="Clouds or meshes: PLY, STL, OBJ; or scans' results.")],
-    diameter: Annotated[float, typer.Option(min=1, max=1000, help="Calibrated diameter in mm.")] = 120.0,
+    files: Annotated[list[Path], typer.Argument(help="Clouds or meshes (PLY, STL, OBJ), or results of scans.")],
+    diameter: Annotated[float, typer.Option(min=1, max=1000, help="Calibrated diameter, mm.")] = 120.0,
     as_json: AsJson = False,
 ) -> None:
-    """Fit spheres of one known diameter, in several places of the volume, as ISO 20685-2 tests scanners."""
+    """Fit spheres of one calibrated diameter at several places of the volume, as in ISO 20685-2."""
     from footscan.verify.shapes.sphere import find_spheres
 
     found: list[tuple[Path, SphereFit]] = []
@@ -97,7 +104,7 @@ def _dimensions(text: str) -> tuple[float, float, float]:
 
 
 def _cloud_of(scan: Path) -> Path:
-    """The file to read: of a folder of results the cloud, which was measured, rather than the mesh made of it."""
+    """The file to read. Of a folder of results this is the cloud, which was measured; the mesh is derived from it."""
     if not scan.is_dir():
         return scan
     for name in ("cloud.ply", "foot.stl"):
@@ -107,7 +114,7 @@ def _cloud_of(scan: Path) -> Path:
 
 
 def _points(file: Path) -> "NDArray[np.float64]":
-    """The points of a cloud, or points spread over a mesh."""
+    """The points of a cloud, or points sampled on a mesh."""
     from footscan.mesh.formats.files import read_shape
     from footscan.mesh.sampling import sample_surface
 
@@ -116,7 +123,7 @@ def _points(file: Path) -> "NDArray[np.float64]":
 
 
 def _sights_of(cloud: Path) -> "Sights | None":
-    """What each camera saw before the fusion, as the store above a cloud has it; None where that is not there."""
+    """The points of each camera before fusion, from the store above a cloud; None if they are not there."""
     from footscan.calibration.models.pose import camera_centres
     from footscan.cloud.points import coordinates
     from footscan.verify.shapes.stripe_ends import Sights
@@ -148,7 +155,7 @@ def _sights_of(cloud: Path) -> "Sights | None":
 def _beside_nominal(
     fit: "CuboidFit", nominal: tuple[float, float, float]
 ) -> list[tuple[float, float | None, "CuboidDimension"]]:
-    """Each nominal dimension with the thesis's and the one of the fit that is meant: the block may lie on any face."""
+    """Each nominal dimension with the thesis's and the fitted one; the block may lie on any face."""
     from itertools import permutations
 
     def misfit(dimensions: "tuple[CuboidDimension, ...]") -> float:

@@ -1,4 +1,4 @@
-"""One scanner, one operator at a time, and the person who is here: what all pages see, and what one of them orders."""
+"""The console: one scanner, one operator at a time, and the present sitting, behind all pages."""
 
 import logging
 import threading
@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pipelines.console.guidance import guidance
-from pipelines.console.operator_lock import Charge
+from pipelines.console.operator_lock import OperatorLock
 from pipelines.console.presence import Presence
 from pipelines.console.scanner import Scanner, Side
-from pipelines.console.sitting import ScannedFoot, Sitting, judged
+from pipelines.console.sitting import ScannedFoot, Sitting, judge_scan
 from schemas.base.errors import FootscanError, RefusedInput
 from schemas.base.model import pseudonym
 
@@ -20,28 +20,30 @@ log = logging.getLogger("footscan.console")
 Action = Literal["connect", "home", "jog", "shine", "scan"]
 
 LOOKS_SECONDS = 1.0
-"""How old the health of the devices may be on a page."""
+"""Longest age of the health of the devices on a page; chosen by hand."""
 SHORTEST_SECONDS = 0.15
-"""Between two states that pages are told of."""
+"""Shortest time between two states that are sent to pages; chosen by hand."""
 END_SECONDS = 60.0
+"""Longest wait for a thread when the console closes."""
 WARNING_SECONDS = 60.0
+"""How long a warning is shown; chosen by hand."""
 
 
 class Console:
-    """What stands behind the pages; of any thread. A context manager, whose end leaves the scanner closed and dark."""
+    """The state behind the pages; usable from any thread. A context manager that closes the scanner, lasers off."""
 
     def __init__(self, scanner: Scanner, archive: Path, results: Path) -> None:
         self.archive, self.results = archive, results
         self.scanner = scanner
         self._lock = threading.Lock()
-        self._charge = Charge()
+        self._operator = OperatorLock()
         self._sitting = Sitting()
         self._presence = Presence()
         self._action: Action | None = None
         self._problem: str | None = None
         self._worker: threading.Thread | None = None
         self._warning: tuple[float, str] | None = None
-        self._heard: set[Callable[[], None]] = set()
+        self._listeners: set[Callable[[], None]] = set()
         self._wake, self.closing = threading.Event(), threading.Event()
         self._seen = self._look()
         self._unlisten = scanner.listen(lambda _: self._wake.set())
@@ -55,48 +57,48 @@ class Console:
         self.close()
 
     def seen_by(self, page: str) -> dict[str, Any]:
-        """The state of everything, as a page is told it."""
+        """The whole state, as it is sent to a page."""
         with self._lock:
-            holder = self._charge.holder
+            holder = self._operator.holder
             return {**self._seen, "in_charge": holder == page, "others": holder not in {None, page}}
 
-    def hear(self, told: Callable[[], None]) -> Callable[[], None]:
-        """Has `told` called, in some thread, whenever the state has changed; returns what ends that."""
+    def hear(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Call `listener`, in any thread, after each change of the state; returns a function that ends it."""
         with self._lock:
-            self._heard.add(told)
-        return lambda: self._heard.discard(told)
+            self._listeners.add(listener)
+        return lambda: self._listeners.discard(listener)
 
     def enter(self, page: str) -> None:
-        """A page looks from now on."""
+        """Register a page that shows the state."""
         with self._lock:
-            self._charge.enter(page)
+            self._operator.enter(page)
         self._tell()
 
     def leave(self, page: str) -> None:
-        """A page looks no more."""
+        """Unregister a page."""
         with self._lock:
-            self._charge.leave(page)
+            self._operator.leave(page)
         self._tell()
 
     def take_over(self, page: str) -> None:
-        """A page is in charge from now on."""
+        """Put a page in charge."""
         with self._lock:
-            self._charge.take(page)
+            self._operator.take(page)
         self._tell()
 
     def connect(self, page: str | None = None) -> None:
-        """Begins to open the devices, for a page or, as the console starts, for none.
+        """Start to open the devices, for a page or, when the console starts, for none.
 
-        As all orders: RefusedInput of a page that is not in charge, or where the scanner is busy.
+        Like all orders it raises RefusedInput if the page is not in charge, or the scanner is busy.
         """
         self._begin(page, "connect", self.scanner.connect)
 
     def home(self, page: str) -> None:
-        """Begins to home the heads."""
+        """Start to home the heads."""
         self._begin(page, "home", self.scanner.home)
 
     def jog(self, page: str, by_mm: float, head: int | None) -> None:
-        """Begins to move heads in the dark; they stop where the page is not `here` any longer."""
+        """Start to move heads with the lasers off; they stop when the page no longer calls `here`."""
 
         def move() -> None:
             with self._presence.needed(page, self.scanner.stop):
@@ -105,48 +107,48 @@ class Console:
         self._begin(page, "jog", move)
 
     def here(self, page: str) -> None:
-        """A page that moves heads is still there; waits for nothing."""
+        """Record that a page that moves heads is still there; never waits."""
         self._presence.here(page)
 
     def shine(self, page: str) -> None:
-        """Lights the heads for a few seconds."""
+        """Start to light the heads for a few seconds."""
         self._begin(page, "shine", self.scanner.shine)
 
     def scan(self, page: str, patient: str, side: Side, keep_partial: bool) -> None:
-        """Begins a scan."""
+        """Start a scan."""
         pseudonym(patient, "patient")
 
         def film() -> ScannedFoot:
             with self._lock:
                 self._sitting = self._sitting.begun(patient)
-            return judged(self.scanner.film(patient, side, keep_partial=keep_partial), self.results)
+            return judge_scan(self.scanner.film(patient, side, keep_partial=keep_partial), self.results)
 
         self._begin(page, "scan", film)
 
     def resume(self, page: str) -> None:
-        """Goes on after the door was closed."""
+        """Continue after the door was closed."""
         with self._lock:
-            self._charge.need(page)
+            self._operator.need(page)
         self.scanner.resume()
 
     def stop(self) -> None:
-        """Lasers off and heads held, whoever asks."""
+        """Switch the lasers off and hold the heads; any page may order it."""
         try:
             self.scanner.stop()
         finally:
             self._wake.set()
 
     def new_person(self, page: str) -> None:
-        """Forgets who was here; what was scanned stays where it is."""
+        """Begin a new sitting; stored scans stay."""
         with self._lock:
-            self._charge.need(page)
+            self._operator.need(page)
             if self._action is not None:
                 raise RefusedInput("scanner", "is busy, expected to wait or to stop it")
             self._sitting, self._problem = Sitting(), None
         self._wake.set()
 
     def warn(self, words: str) -> None:
-        """Tells all pages for a while, besides the state."""
+        """Show a warning on all pages for `WARNING_SECONDS`."""
         with self._lock:
             self._warning = (
                 time.monotonic() + WARNING_SECONDS,
@@ -155,12 +157,12 @@ class Console:
         self._wake.set()
 
     def end(self) -> None:
-        """Lasers off at once, and pages let go; may be called by a signal's handler, so it waits for nothing."""
+        """Switch the lasers off at once and release the pages; never waits, so that a signal handler may call it."""
         self.closing.set()
         threading.Thread(target=self._stop_working, name="console: last stop").start()
 
     def close(self) -> None:
-        """Stops what is under way and lets the scanner go; the lasers are off."""
+        """Stop the present action and close the scanner, lasers off."""
         self.closing.set()
         try:
             self._stop_working()
@@ -175,7 +177,7 @@ class Console:
     def _begin(self, page: str | None, action: Action, call: Callable[[], ScannedFoot | None]) -> None:
         with self._lock:
             if page is not None:
-                self._charge.need(page)
+                self._operator.need(page)
             if self._action is not None or self.closing.is_set():
                 raise RefusedInput("scanner", "is busy, expected to wait or to stop it")
             self._action, self._problem = action, None
@@ -189,7 +191,7 @@ class Console:
             foot = call()
         except FootscanError as error:
             problem = str(error)
-        except Exception as error:  # whatever it is, the operator must see it, and the next action must be possible
+        except Exception as error:  # the operator must see any error, and the next action must be possible
             log.exception("an action failed")
             problem = f"{type(error).__name__}: {error}"
         with self._lock:
@@ -231,9 +233,9 @@ class Console:
 
     def _tell(self) -> None:
         with self._lock:
-            heard = list(self._heard)
-        for told in heard:
-            told()
+            listeners = list(self._listeners)
+        for listener in listeners:
+            listener()
 
     def _stop_working(self) -> None:
         self._tell()

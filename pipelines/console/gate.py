@@ -1,8 +1,8 @@
-"""Where connections come in: Stop is answered here, in threads of its own, and the server gets whole requests alone.
+"""The gate before the server: it answers Stop in threads of its own, and passes on complete requests only.
 
-Whoever holds connections open, sends half a request, or has the server busy stands in nobody's way: what is not yet a
-request has a time limit and the oldest of it makes room, each kind of request has a budget of its own, and a Stop acts
-as soon as its head has come.
+A client that holds connections open, sends half a request or keeps the server busy does not block others: an incomplete
+request has a time limit, the oldest one makes room for a new one, each kind of request has its own budget, and a Stop
+acts as soon as its head has arrived.
 """
 
 import asyncio
@@ -24,27 +24,29 @@ log = logging.getLogger("footscan.console")
 
 STOP = b"/do/stop"
 LARGEST_HEAD = 16 * 1024
+"""Bytes of the head of a request: a bound of memory."""
 REQUEST_SECONDS = 5.0
-"""A request that has not come whole after this long is not waited for."""
+"""Time in which a request must arrive completely; chosen by hand."""
 ANSWER_SECONDS = 60.0
-"""Whoever has not taken an answer after this long, other than a stream of events, is let go."""
+"""Time in which a client must take an answer that is not a stream of events; chosen by hand."""
 DESCRIPTORS = 4096
-"""Of files and connections, as far as the system lets this program have them."""
+"""File descriptors that this program asks the system for."""
 MOST_WAITING = 256
-"""Connections on which no whole request has come; the oldest makes room for a further one."""
+"""Most connections without a complete request; the oldest one makes room for a new one."""
 KEPT_DESCRIPTORS = 256
-"""For board, cameras, films, answers and Stop: they are never lent to connections that wait."""
+"""File descriptors reserved for board, cameras, films, answers and Stop."""
 MOST_STOPS = 16
+"""Stops that are carried out at a time: a bound of threads."""
 BUDGETS = {"events": 24, "orders": 16, "pages": 48, "results": 8}
-"""Requests of each kind that the server has at a time; one more is answered 503."""
+"""Most requests of each kind that the server handles at a time; a further one is answered 503."""
 
 HandOver = Callable[[socket.socket, bytes, Callable[[], None], float | None], None]
-"""Gives the server a connection with what has come on it, and what to call when it ends; it ends after so many
-seconds at the latest, where a number is given."""
+"""Passes a connection to the server: the bytes received on it, a function to call when it ends, and the number of
+seconds after which it is ended at the latest (None: no limit)."""
 Headers = list[tuple[bytes, bytes]]
 Stop = Callable[[dict[str, Any], bool], tuple[int, bytes, Headers]]
-"""Stops the scanner, where the request (an ASGI scope) may; it has come by the socket of Stop alone, or not. Returns
-status, body and further headers of the answer."""
+"""Stops the scanner if the request (an ASGI scope) is permitted; the flag is True on the socket that accepts only Stop.
+Returns status, body and further headers of the answer."""
 
 
 @dataclass
@@ -52,14 +54,14 @@ class _Waiting:
     until: float
     is_aside: bool
     parser: h11.Connection = field(default_factory=lambda: h11.Connection(h11.SERVER, LARGEST_HEAD))
-    came: bytes = b""
+    received: bytes = b""
     request: h11.Request | None = None
 
 
 class Gate:
     """Listens in a thread of its own until it is closed.
 
-    A second socket, if given, is for Stop alone: a browser has six connections for a port, all of which may be taken.
+    The optional second socket accepts only Stop: a browser opens six connections per port, and all may be in use.
     """
 
     def __init__(
@@ -82,7 +84,7 @@ class Gate:
         self._thread.start()
 
     def close(self) -> None:
-        """Takes no more connections; those that the server has go on."""
+        """Accept no more connections; those that the server has continue."""
         self._closing.set()
         self._wake.send(b".")
         self._thread.join()
@@ -94,8 +96,8 @@ class Gate:
                     if isinstance(key.fileobj, socket.socket):
                         self._look_at(key.fileobj)
                 now = time.monotonic()
-                for late in [connection for connection, one in self._waiting.items() if one.until <= now]:
-                    self._answer(late, 408, b"footscan: the request did not come whole\n")
+                for late in [connection for connection, waiting in self._waiting.items() if waiting.until <= now]:
+                    self._answer(late, 408, b"footscan: the request did not arrive in time\n")
         finally:
             for connection in list(self._waiting):
                 self._forget(connection).close()
@@ -109,7 +111,7 @@ class Gate:
                 self._accept(ready)
             elif ready in self._waiting:
                 self._read(ready)
-        except Exception:  # whatever one of them does, the next one may be a Stop
+        except Exception:  # one connection must not end the gate: the next may be a Stop
             log.exception("a connection was dropped")
             if ready in self._waiting:
                 self._forget(ready).close()
@@ -124,7 +126,7 @@ class Gate:
                 connection, _ = door.accept()
             except BlockingIOError:
                 return
-            except OSError as error:  # no descriptor is left, or who called has gone
+            except OSError as error:  # no descriptor is left, or the client has gone
                 if not self._waiting:
                     log.warning("no connection can be taken (%s)", error.strerror)
                     time.sleep(0.05)
@@ -148,63 +150,65 @@ class Gate:
         return connection
 
     def _read(self, connection: socket.socket) -> None:
-        one = self._waiting[connection]
+        waiting = self._waiting[connection]
         try:
-            came = connection.recv(LARGEST_HEAD)
+            received = connection.recv(LARGEST_HEAD)
         except BlockingIOError:
             return
         except OSError:
-            came = b""
-        if not came:
+            received = b""
+        if not received:
             self._forget(connection).close()
             return
-        one.came += came
+        waiting.received += received
         try:
-            one.parser.receive_data(came)
-            if self._is_whole(one):
-                self._pass_on(self._forget(connection), one)
+            waiting.parser.receive_data(received)
+            if self._is_whole(waiting):
+                self._pass_on(self._forget(connection), waiting)
         except h11.RemoteProtocolError as error:
-            self._answer(connection, error.error_status_hint, b"footscan: this is no request of HTTP\n")
+            self._answer(connection, error.error_status_hint, b"footscan: expected an HTTP request\n")
 
-    def _is_whole(self, one: _Waiting) -> bool:
-        """Whether nothing more needs to come; the head is enough of a Stop, of what has no body, and of what the guard
-        refuses by its length."""
+    def _is_whole(self, waiting: _Waiting) -> bool:
+        """Return True if the request is complete.
+
+        The head suffices for a Stop, for a request without a body, and for one that the guard refuses by its length.
+        """
         while True:
-            event = one.parser.next_event()
+            event = waiting.parser.next_event()
             if event is h11.NEED_DATA:
                 return False
             if isinstance(event, h11.Request):
-                one.request = event
+                waiting.request = event
                 if event.method != b"POST" or _path(event) == STOP or not _has_small_body(event):
                     return True
             elif not isinstance(event, h11.Data):
                 return True
 
-    def _pass_on(self, connection: socket.socket, one: _Waiting) -> None:
-        if one.request is None:
+    def _pass_on(self, connection: socket.socket, waiting: _Waiting) -> None:
+        if waiting.request is None:
             connection.close()
             return
-        if one.request.method == b"POST" and _path(one.request) == STOP:
+        if waiting.request.method == b"POST" and _path(waiting.request) == STOP:
             if self._free_stops.acquire(blocking=False):
                 threading.Thread(
                     target=self._stop_now,
-                    args=(connection, one.request, one.is_aside),
+                    args=(connection, waiting.request, waiting.is_aside),
                     name="console: stop",
                     daemon=True,
                 ).start()
-            else:  # so many are being carried out
+            else:  # `MOST_STOPS` are being carried out
                 _respond(connection, 503, b"footscan: Stop is being carried out\n")
             return
-        if one.is_aside:
-            _respond(connection, 404, b"footscan: here is Stop alone\n")
+        if waiting.is_aside:
+            _respond(connection, 404, b"footscan: this port accepts only Stop\n")
             return
-        kind = _kind(one.request)
+        kind = _kind(waiting.request)
         free = self._free[kind]
         if not free.acquire(blocking=False):
             _respond(connection, 503, b"footscan: too many requests of this kind at a time\n")
             return
         try:
-            self._hand_over(connection, one.came, free.release, None if kind == "events" else ANSWER_SECONDS)
+            self._hand_over(connection, waiting.received, free.release, None if kind == "events" else ANSWER_SECONDS)
         except RuntimeError:  # the server has ended
             free.release()
             connection.close()
@@ -220,9 +224,9 @@ class Gate:
 
 
 def hand_over_to(loop: asyncio.AbstractEventLoop, protocol_of: Callable[[], asyncio.Protocol]) -> HandOver:
-    """Gives connections to a server that runs in `loop`; RuntimeError once that is closed."""
+    """Return a function that passes connections to a server in `loop`; it raises RuntimeError if the loop is closed."""
 
-    def hand_over(connection: socket.socket, came: bytes, ended: Callable[[], None], seconds: float | None) -> None:
+    def hand_over(connection: socket.socket, received: bytes, ended: Callable[[], None], seconds: float | None) -> None:
         async def take() -> None:
             protocol = protocol_of()
             lost = protocol.connection_lost
@@ -233,7 +237,7 @@ def hand_over_to(loop: asyncio.AbstractEventLoop, protocol_of: Callable[[], asyn
                     timer.cancel()
                 lost(error)
 
-            protocol.connection_lost = connection_lost  # type: ignore[method-assign, assignment]  # of this one alone
+            protocol.connection_lost = connection_lost  # type: ignore[method-assign, assignment]  # of this object only
             timer: asyncio.TimerHandle | None = None
             try:
                 transport, _ = await loop.connect_accepted_socket(lambda: protocol, connection)
@@ -243,7 +247,7 @@ def hand_over_to(loop: asyncio.AbstractEventLoop, protocol_of: Callable[[], asyn
                 return
             if seconds is not None:
                 timer = loop.call_later(seconds, transport.abort)
-            protocol.data_received(came)
+            protocol.data_received(received)
 
         def begin() -> None:
             task = loop.create_task(take())
@@ -273,7 +277,7 @@ def _has_small_body(request: h11.Request) -> bool:
 
 
 def _scope(request: h11.Request) -> dict[str, Any]:
-    """What ASGI makes of the head of a request."""
+    """The ASGI scope of the head of a request."""
     path, _, query = bytes(request.target).partition(b"?")
     headers = [(bytes(name), bytes(value)) for name, value in request.headers]
     method = request.method.decode("ascii")
@@ -281,7 +285,7 @@ def _scope(request: h11.Request) -> dict[str, Any]:
 
 
 def _respond(connection: socket.socket, status: int, body: bytes, further: Headers | None = None) -> None:
-    """Answers a small request and closes; whoever does not take the answer is not waited for."""
+    """Answer a small request and close the connection, without waiting for a client that does not take the answer."""
     kind = b"application/json" if body.startswith(b"{") else b"text/plain; charset=utf-8"
     headers = [(name.encode(), value.encode()) for name, value in HEADERS.items()] + (further or [])
     headers += [(b"connection", b"close"), (b"content-length", str(len(body)).encode()), (b"content-type", kind)]
@@ -292,17 +296,17 @@ def _respond(connection: socket.socket, status: int, body: bytes, further: Heade
         connection.setblocking(False)
         connection.send(head + b"\r\n" + body)
         connection.shutdown(socket.SHUT_WR)
-        connection.recv(LARGEST_HEAD)  # what is left unread would take the answer back
+        connection.recv(LARGEST_HEAD)  # unread bytes would reset the connection and discard the answer
     except OSError:
         pass
     connection.close()
 
 
 def _descriptors() -> int:
-    """How many files and connections this program may have open, after asking for more."""
+    """Number of file descriptors that this program may open, after asking the system for more."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(DESCRIPTORS, hard)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
-        return wanted
+    limit = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(DESCRIPTORS, hard)
+    if soft != resource.RLIM_INFINITY and soft < limit:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (limit, hard))
+        return limit
     return DESCRIPTORS if soft == resource.RLIM_INFINITY else soft

@@ -1,4 +1,4 @@
-"""Who is let in: loopback or a token, the server's own pages alone, small requests; and what browsers are told."""
+"""Access control: loopback or a token, only the server's own pages, small requests; and the headers for browsers."""
 
 import hmac
 import ipaddress
@@ -15,8 +15,9 @@ COOKIE = "footscan_console"
 PAGE_HEADER = "x-footscan-page"
 PAGE = re.compile(r"[A-Za-z0-9]{8,64}")
 LARGEST_BODY = 4096
+"""Bytes of the body of a request: a bound of memory, far above the largest order."""
 LINKED = ("/foot/", "/pair/")
-"""What another site's page may link to, besides the first page."""
+"""Pages that other sites may link to, besides the first page."""
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "[::1]")
 
 POLICY = (
@@ -34,14 +35,14 @@ HEADERS = {
 
 
 class Guard:
-    """Stands before the application; what it refuses, the application never sees."""
+    """ASGI middleware: the application never sees a request that the rules refuse."""
 
     def __init__(self, app: ASGIApp, rules: "Rules") -> None:
         self._app = app
         self._rules = rules
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """As ASGI has it."""
+        """Handle a request; ASGI interface."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -60,14 +61,14 @@ class Guard:
 
 
 class Rules:
-    """Which requests are let in.
+    """The rules of access.
 
     Parameters
     ----------
-    host : the address that is listened on
-    token : what a browser must bring along; None where none is asked for
-    foreign : is told, in words, of each request that another site's page has made
-    ports : of the pages, and of Stop alone; None where it has none of its own
+    host : the address that the server listens on
+    token : the token that a browser must send; None if none is required
+    foreign : called with a sentence about each request from a page of another site
+    ports : port of the pages, and port that accepts only Stop; None if Stop has no port of its own
     """
 
     def __init__(
@@ -79,18 +80,18 @@ class Rules:
         self._ports = ports
 
     def answer(self, scope: Scope) -> Response | None:
-        """What a request is answered that does not come in; None of one that does."""
+        """The answer to a request that is not admitted; None if it is admitted."""
         return self._refusal(scope) or self._entrance(scope)
 
     def answer_aside(self, scope: Scope) -> Response | None:
-        """As `answer`, of a Stop on the port of its own: that is another origin than the page's, and of the same site.
+        """As `answer`, for a Stop on its own port: for a browser that is another origin of the same site.
 
-        It has no header of the page's own, for which a browser would ask beforehand whether it may.
+        The request has no custom header, because for that a browser would first send a preflight request.
         """
         headers = Headers(scope=scope)
         hosts = headers.getlist("host")
         if len(hosts) != 1 or not self._is_ours(hosts[0]):
-            return _refused(421, "this server is asked by its own address only")
+            return _refused(421, "expected a request to this server's own address")
         if (
             headers.get("origin") != self.page_origin(hosts[0])
             or headers.get("sec-fetch-site", "same-site") != "same-site"
@@ -99,23 +100,23 @@ class Rules:
         return _length_refused(headers) or self._entrance(scope)
 
     def page_origin(self, host: str) -> str:
-        """Of the pages, for who has asked the port of Stop by the name `host`."""
+        """Origin of the pages, for a request to the port of Stop that named the server `host`."""
         port = self._ports[0] if self._ports else 80
         return f"http://{_name(host)}" + ("" if port == 80 else f":{port}")
 
     def policy(self, scope: Scope) -> str:
-        """What a page may load, and whom it may ask: this server, and the port of Stop."""
+        """The content security policy of a page: it may connect to this server, and to the port of Stop."""
         host = Headers(scope=scope).get("host", "")
-        if self._ports is None or not self._is_ours(host) or "[" in host:  # of IPv6 a policy knows nothing
+        if self._ports is None or not self._is_ours(host) or "[" in host:  # policies do not support IPv6 addresses
             return POLICY
         return POLICY.replace("connect-src 'self'", f"connect-src 'self' http://{_name(host)}:{self._ports[1]}")
 
     def _refusal(self, scope: Scope) -> Response | None:
-        """What a request is answered that must not come in; None for all others."""
+        """The answer to a request that breaks a rule; None if it breaks none."""
         headers = Headers(scope=scope)
         hosts = headers.getlist("host")
         if len(hosts) != 1 or not self._is_ours(hosts[0]):
-            return _refused(421, "this server is asked by its own address only")
+            return _refused(421, "expected a request to this server's own address")
         if scope["method"] in {"GET", "HEAD"}:
             return None if self._may_look(scope["path"], hosts[0], headers) else self._of_another_site(scope, headers)
         if scope["method"] != "POST":
@@ -130,40 +131,40 @@ class Rules:
         return _length_refused(headers)
 
     def _may_look(self, path: str, host: str, headers: Headers) -> bool:
-        """Whether a page may be read: another site may link to pages, and have nothing else."""
+        """True if the page may be read: other sites may link to pages, but read nothing else."""
         if path == "/events" and "text/event-stream" not in headers.get("accept", ""):
-            return False  # a link, which would make whoever follows it look on, perhaps in charge
+            return False  # a link to it would register a page, perhaps in charge
         is_page = path == "/" or path.startswith(LINKED)
         if not is_page and headers.get("origin", f"http://{host}") != f"http://{host}":
-            return False  # all that browsers tell a server that is on another computer
+            return False  # the only hint of browsers to a server on another computer
         if headers.get("sec-fetch-site") not in {"cross-site", "same-site"}:
             return True
         return is_page and headers.get("sec-fetch-mode") == "navigate"
 
     def _of_another_site(self, scope: Scope, headers: Headers) -> Response:
-        by = headers.get("origin") or headers.get("referer") or "a page that does not say where it is from"
-        self._foreign(f"{by[:80]} asked this scanner for {scope['path'][:40]} and was refused")
-        return _refused(403, "expected a request of this server's own page")
+        origin = headers.get("origin") or headers.get("referer") or "a page of unknown origin"
+        self._foreign(f"{origin[:80]} asked this scanner for {scope['path'][:40]} and was refused")
+        return _refused(403, "expected a request from this server's own page")
 
     def _entrance(self, scope: Scope) -> Response | None:
-        """The way in with a token: the first visit brings it along and is given a cookie."""
+        """Check the token: the first visit has it in its address, and gets a cookie for the next ones."""
         if self._token is None:
             return None
-        given = cookie_parser(Headers(scope=scope).get("cookie", "")).get(COOKIE, "")
-        if self._fits(given):
+        cookie = cookie_parser(Headers(scope=scope).get("cookie", "")).get(COOKIE, "")
+        if self._fits(cookie):
             return None
-        asked = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
-        if scope["method"] == "GET" and self._fits(asked):
+        token = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
+        if scope["method"] == "GET" and self._fits(token):
             answer = RedirectResponse("/", 303)
             answer.set_cookie(COOKIE, self._token, httponly=True, samesite="lax", path="/")
             return answer
-        return _refused(401, "open the address that 'footscan console' has printed, with its token")
+        return _refused(401, "expected a token: open the address that 'footscan console' has printed")
 
-    def _fits(self, given: str) -> bool:
-        return self._token is not None and hmac.compare_digest(given.encode(), self._token.encode())
+    def _fits(self, token: str) -> bool:
+        return self._token is not None and hmac.compare_digest(token.encode(), self._token.encode())
 
     def _is_ours(self, host: str) -> bool:
-        """Whether a browser that asks for `host` cannot have been led here by a name of somebody else's."""
+        """True if `host` names this server; any other name may be of a foreign site that resolves to this address."""
         name = _name(host)
         if name in LOOPBACK_NAMES or name == self._host.lower():
             return True
@@ -171,12 +172,12 @@ class Rules:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only programs of this computer reach `host`."""
+    """True if only programs of this computer can reach `host`."""
     return host == "localhost" or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
 
 
 def _name(host: str) -> str:
-    """Without the port."""
+    """The name of a host, without its port."""
     return re.sub(r":\d{1,5}$", "", host).lower()
 
 
@@ -184,7 +185,7 @@ def _length_refused(headers: Headers) -> Response | None:
     length = headers.get("content-length", "")
     if length.isascii() and length.isdigit() and int(length[:9]) <= LARGEST_BODY:
         return None
-    return _refused(413, f"expected a body of a told length, up to {LARGEST_BODY} bytes")
+    return _refused(413, f"expected a content-length of up to {LARGEST_BODY} bytes")
 
 
 def _is_address(name: str) -> bool:

@@ -1,4 +1,4 @@
-"""The live scanner as the page sees it: its devices in words, and one call for each thing that an operator does."""
+"""An adapter of the live scanner to the console: its devices in words, and a method for each order."""
 
 import datetime
 import shutil
@@ -11,7 +11,7 @@ from footscan.capture.cameras.usb_bus import Pass
 from pipelines.console.scanner import Device, Health, Level, Scanned, Side
 from pipelines.live.devices import passes_of
 from pipelines.live.light import ScanLight
-from pipelines.live.scanner import LiveScanner, ScanOrder
+from pipelines.live.scanner import REPORT_SECONDS, LiveScanner, ScanOrder
 from pipelines.live.state import OnState, ScannerState
 from pipelines.live.storing import ScanName, next_scan_name
 from schemas.base.errors import FootscanError
@@ -19,16 +19,19 @@ from schemas.base.errors import FootscanError
 JOG_MM_PER_S = 20.0
 SHINE_SECONDS = 4.0
 SHINE_POWER = 0.5
+"""Speed of a jog; duration and share of the laser power of a look at the stripe; all chosen by hand."""
 SCAN_BYTES = 40_000 * 8 * 400
-"""Of a scan with its laser-off frames, at most."""
+"""Largest size of a scan with laser-off frames: bytes per frame x cameras x frames."""
+LEAST_SCANS, FEW_SCANS = 2, 20
+"""The disk is bad below, and a warning is shown below, this many times `SCAN_BYTES`; chosen by hand."""
 LEVELS: dict[str, Level] = {"lost": "bad", "closed": "bad", "alarm": "bad", "door": "warning", "held": "warning"}
 CABLE = "check its cable and hub, then connect again"
 
 PlaceFoot = Callable[[Side, Callable[[int, int], None]], None]
-"""Puts the foot of a side onto the glass, and tells how far that is; for a virtual scanner, whose operator cannot."""
+"""Puts the foot of a side onto the glass of a virtual scanner; the second argument hears of the progress."""
 
 
-class OverLive:
+class LiveAdapter:
     """A `Scanner` over a `LiveScanner`."""
 
     def __init__(
@@ -69,7 +72,7 @@ class OverLive:
             *self._plan(),
             self._space(),
         ]
-        frames = {camera: one.received - self._before_pass.get(camera, 0) for camera, one in streams.items()}
+        frames = {camera: stream.received - self._before_pass.get(camera, 0) for camera, stream in streams.items()}
         cameras = tuple(camera.id for camera in self._scanner.rig.cameras)
         return Health(devices, cameras, frames, resumable=self._is_held())
 
@@ -104,9 +107,9 @@ class OverLive:
         today = datetime.datetime.now().astimezone().date()
         name = ScanName(patient, next_scan_name(self._archive, patient, side, today), side, today)
         order = ScanOrder(name, self._archive, self._results, self._calibration, self._light, keep_partial=keep_partial)
-        done = self._scanner.scan(order)
-        problem = None if done.measured is None else done.measured.problem
-        return Scanned(patient, name.scan, side, problem, dict(done.stored.left_out))
+        result = self._scanner.scan(order)
+        problem = None if result.measured is None else result.measured.problem
+        return Scanned(patient, name.scan, side, problem, dict(result.stored.left_out))
 
     def resume(self) -> None:
         """As `Scanner.resume`."""
@@ -121,35 +124,35 @@ class OverLive:
         self._scanner.close()
 
     def _count_from_here(self, state: ScannerState) -> None:
-        """Frames are counted from the begin of each pass."""
+        """Restart the count of the frames at the begin of each pass."""
         begins = state.name == "filming" and (not self._was_filming or state.progress == 0.0)
         self._was_filming = state.name == "filming"
         if begins:
-            self._before_pass = {camera: one.received for camera, one in self._scanner.deck.health().items()}
+            self._before_pass = {camera: stream.received for camera, stream in self._scanner.deck.health().items()}
 
     def _board(self) -> Iterator[Device]:
         try:
             heads = self._scanner.heads
         except FootscanError:
             yield Device("Controller", "bad", "not connected", "check its USB cable and its power, then connect")
-            yield from (Device(f"Head {head}", "unknown", "not known") for head in (1, 2, 3))
+            yield from (Device(f"Head {head}", "unknown", "position unknown") for head in (1, 2, 3))
             return
         state = heads.state
-        door = "" if heads.board.watches_door else "; it has no input for a lid: nothing stops where one is opened"
+        door = "" if heads.board.watches_door else "; it has no input for a lid: opening a lid stops nothing"
         level = LEVELS.get(state.name, "ok" if heads.board.watches_door else "warning")
         yield Device("Controller", level, f"{state.words}{door}", state.remedy)
-        reports = heads.log.between(time.monotonic() - 1.0, float("inf"))
+        reports = heads.log.between(time.monotonic() - REPORT_SECONDS, float("inf"))
         for head in (1, 2, 3):
             if not heads.board.homed:
-                yield Device(f"Head {head}", "warning", "where it stands is not known", "home the heads")
+                yield Device(f"Head {head}", "warning", "position unknown", "home the heads")
             elif reports:
                 yield Device(f"Head {head}", "ok", f"at X = {reports[-1].x_mm[head - 1]:.1f} mm")
             else:
-                yield Device(f"Head {head}", "unknown", "homed; the controller says nothing")
+                yield Device(f"Head {head}", "unknown", "homed; no report from the controller")
 
     def _camera(self, camera: int, stream: StreamHealth | None) -> Device:
         name = f"Camera {camera}"
-        latency = next(one.latency for one in self._scanner.rig.cameras if one.id == camera)
+        latency = next(rig_camera.latency for rig_camera in self._scanner.rig.cameras if rig_camera.id == camera)
         if stream is None:
             problem = self._not_opened.get(camera)
             return Device(name, "bad", problem, CABLE) if problem else Device(name, "unknown", "not open")
@@ -158,29 +161,26 @@ class OverLive:
         if stream.state == "connecting":
             return Device(name, "unknown", "connecting")
         if latency is None:
-            return Device(name, "bad", "its latency is not known", "run 'footscan calibrate latency'")
-        wrong = [
-            f"{count} {what}"
-            for what, count in (("torn", stream.torn), ("repeated", stream.repeated), ("overflowed", stream.overflowed))
-            if count
-        ]
-        if wrong:
-            return Device(name, "warning", f"{stream.received} frames, of these {', '.join(wrong)}", CABLE)
+            return Device(name, "bad", "latency unknown", "run 'footscan calibrate latency'")
+        counts = {"torn": stream.torn, "repeated": stream.repeated, "overflowed": stream.overflowed}
+        defects = [f"{count} {defect}" for defect, count in counts.items() if count]
+        if defects:
+            return Device(name, "warning", f"{stream.received} frames, of these {', '.join(defects)}", CABLE)
         return Device(name, "ok", f"{stream.received} frames")
 
     def _plan(self) -> Iterator[Device]:
         if self._plan_problem is not None:
             yield Device("Passes", "bad", self._plan_problem)
-        for number, one in enumerate(self._passes, start=1):
-            yield Device("Passes" if len(self._passes) == 1 else f"Pass {number}", "ok", one.reason)
+        for number, planned in enumerate(self._passes, start=1):
+            yield Device("Passes" if len(self._passes) == 1 else f"Pass {number}", "ok", planned.reason)
 
     def _space(self) -> Device:
-        there = next(folder for folder in (self._archive, *self._archive.absolute().parents) if folder.exists())
-        free = shutil.disk_usage(there).free
+        existing = next(folder for folder in (self._archive, *self._archive.absolute().parents) if folder.exists())
+        free = shutil.disk_usage(existing).free
         words = f"{free / 1e9:.1f} GB are free for scans"
-        if free < 2 * SCAN_BYTES:
+        if free < LEAST_SCANS * SCAN_BYTES:
             return Device("Disk", "bad", words, f"make room: a scan takes up to {SCAN_BYTES / 1e9:.1f} GB")
-        return Device("Disk", "warning" if free < 20 * SCAN_BYTES else "ok", words)
+        return Device("Disk", "warning" if free < FEW_SCANS * SCAN_BYTES else "ok", words)
 
     def _is_held(self) -> bool:
         try:

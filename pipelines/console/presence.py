@@ -1,4 +1,4 @@
-"""Whether the page that moves heads by hand is still there: it says so several times a second."""
+"""Presence of the page that moves heads by hand: it reports several times a second that it is there."""
 
 import threading
 import time
@@ -8,30 +8,31 @@ from contextlib import contextmanager, suppress
 from schemas.base.errors import Fault, FootscanError
 
 GONE_SECONDS = 0.5
-"""A page that is not heard of for so long is gone: closed, cut off, or it hangs. Its script speaks every 0.15 s."""
+"""A page that was silent for this long is gone: closed, cut off or stuck. Its script reports every 0.15 s."""
 LOOKS_SECONDS = 0.05
+"""Interval at which the silence is checked."""
 
 
 class Presence:
-    """When a page was heard of last; of any thread."""
+    """Time of the last report of a page; usable from any thread."""
 
     def __init__(self) -> None:
         self._page: str | None = None
         self._heard = 0.0
 
     def here(self, page: str) -> None:
-        """The page is there; one that nobody waits for is not listened to."""
+        """Record a report of the page; ignored if no block needs that page."""
         if page == self._page:
             self._heard = time.monotonic()
 
     @contextmanager
     def needed(self, page: str, stop: Callable[[], None]) -> Iterator[None]:
-        """Calls `stop` when the page is gone, until the block has ended.
+        """Call `stop` when the page is gone, until the block has ended.
 
         Raises
         ------
         Fault
-            The page was gone, whatever the block made of that.
+            The page was gone, whether the block failed or not.
         """
         self._page, self._heard = page, time.monotonic()
         ended, gone = threading.Event(), threading.Event()
@@ -40,7 +41,7 @@ class Presence:
             while not ended.wait(LOOKS_SECONDS):
                 if time.monotonic() - self._heard > GONE_SECONDS:
                     gone.set()
-                    with suppress(FootscanError):  # the state tells it
+                    with suppress(FootscanError):  # the state reports it
                         stop()
 
         thread = threading.Thread(target=watch, name="presence of the page", daemon=True)

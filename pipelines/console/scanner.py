@@ -1,4 +1,4 @@
-"""What the page needs of a scanner, whatever stands behind it."""
+"""The interface of a scanner that the console needs, for a live scanner and for tests."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,26 +12,26 @@ Level = Literal["ok", "warning", "bad", "unknown"]
 
 @dataclass(frozen=True)
 class Device:
-    """How a part of the scanner is, in words."""
+    """Condition of a part of the scanner, in words."""
 
     name: str
     level: Level
     words: str
     remedy: str = ""
-    """What to do; empty where nothing is needed."""
+    """What to do; empty if nothing is needed."""
 
 
 @dataclass(frozen=True)
 class Health:
-    """How the whole scanner is."""
+    """Condition of the whole scanner."""
 
     devices: Sequence[Device]
     cameras: Sequence[int] = ()
-    """Those that may have a live picture."""
+    """Cameras that may have a live picture."""
     frames: Mapping[int, int] = field(default_factory=dict)
-    """Pictures of each camera since the pass began."""
+    """Frames of each camera since the pass began."""
     resumable: bool = False
-    """Whether heads are held and would go on."""
+    """True if the heads are held and can continue."""
 
 
 @dataclass(frozen=True)
@@ -42,62 +42,62 @@ class Scanned:
     scan: str
     side: Side
     problem: str | None = None
-    """Why it was not measured."""
+    """Why it was not measured; None if it was."""
     left_out: Mapping[int, str] = field(default_factory=dict)
-    """Cameras that are not in it, and why."""
+    """Cameras that are not in the scan, and why."""
 
 
 class Scanner(Protocol):
-    """A scanner. `state`, `health`, `picture`, `resume` and `stop` are of any thread, the others come one at a time.
+    """A scanner. Any thread may call `state`, `health`, `picture`, `resume` and `stop`; the others run one at a time.
 
-    What goes wrong is a `FootscanError`.
+    Failures are raised as `FootscanError`.
     """
 
     @property
     def state(self) -> ScannerState:
-        """What is true now; of any thread."""
+        """The present state."""
         ...
 
     def listen(self, listener: OnState) -> Callable[[], None]:
-        """Has `listener` called with each new state; returns what ends that."""
+        """Call `listener` with each new state; returns a function that ends it."""
         ...
 
     def health(self) -> Health:
-        """How everything is; of any thread, and soon."""
+        """The condition of all parts; returns soon."""
         ...
 
     def picture(self, camera: int) -> bytes | None:
-        """The latest JPEG of a camera; None where there is none."""
+        """The latest JPEG of a camera; None without one."""
         ...
 
     def connect(self) -> None:
-        """Opens the devices, again where they were lost."""
+        """Open the devices; lost devices are opened again."""
         ...
 
     def home(self) -> None:
-        """Homes the heads."""
+        """Home the heads."""
         ...
 
     def jog(self, by_mm: float, head: int | None) -> None:
-        """Moves all heads, or one, in the dark."""
+        """Move all heads, or one, with the lasers off."""
         ...
 
     def shine(self) -> None:
-        """Lights the heads where they stand, for a few seconds."""
+        """Switch the lasers on for a few seconds; the heads do not move."""
         ...
 
     def film(self, patient: str, side: Side, *, keep_partial: bool) -> Scanned:
-        """A scan from homing to measures."""
+        """Make a scan, from homing to measures."""
         ...
 
     def resume(self) -> None:
-        """Goes on after the door was closed; while `film` waits."""
+        """Continue after the door was closed, while `film` waits."""
         ...
 
     def stop(self) -> None:
-        """Lasers off, heads held; ends what is under way."""
+        """Switch the lasers off, hold the heads, and end the present action."""
         ...
 
     def close(self) -> None:
-        """Lets everything go, with the lasers off."""
+        """Close all devices, lasers off."""
         ...

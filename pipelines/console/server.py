@@ -1,4 +1,4 @@
-"""The web server: pages, what they ask for, and the state as it changes."""
+"""The web server of the console: pages, their orders, and the stream of states."""
 
 import asyncio
 import json
@@ -33,7 +33,7 @@ from pipelines.console.guard import LARGEST_BODY, PAGE, PAGE_HEADER, Guard, Rule
 from pipelines.console.pages.foot import foot_page
 from pipelines.console.pages.live_picture import LivePictures
 from pipelines.console.pages.pair import pair_page
-from pipelines.console.pages.results import KINDS, open_result, shown, version_of
+from pipelines.console.pages.results import KINDS, guarded, open_result, version_of
 from pipelines.console.pages.sitting import sitting_page
 from pipelines.console.scanner import Side
 from pipelines.console.stopping import stop_asked
@@ -45,40 +45,42 @@ _Made = TypeVar("_Made")
 STATIC = Path(__file__).with_name("static")
 SCRIPTS = ("link.js", "sitting.js", "foot.js")
 ALIVE_SECONDS = 10.0
-"""After so long without a change a page is told that the server is there."""
+"""Interval of the signs of life to a page while the state does not change; chosen by hand."""
 PAGES_KEPT = 4
+"""Pages of feet in the cache: a bound of memory."""
 PAGE_OF = ("measures.json", "quality.json", "foot.ply")
-"""What the page of a foot is made of."""
+"""Files that the page of a foot is made from."""
 PART_BYTES = 256 * 1024
+"""Bytes that are read of a file at a time: a bound of memory."""
 BACKLOG = 4096
-"""Connections that may wait to be taken: of one more the system drops the first packet, which comes again after 1 s."""
+"""Connections that may wait to be accepted; beyond, the system drops the first packet, which is repeated after 1 s."""
 WORKERS = 2
-"""Threads that make pages and read results."""
+"""Threads that make pages and read results; few, so that Stop and the board keep the processor."""
 REPORT_POLICY = (
     "sandbox allow-scripts; default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 )
-"""Of a page that stands alone: its own policy admits its own scripts only; here it is kept apart from the server."""
+"""Policy of a report, whose own policy admits only its own scripts; the sandbox separates it from the server."""
 
 
-class ScanAsked(Document):
-    """What a scan is started with."""
+class ScanRequest(Document):
+    """The body of an order to scan."""
 
     patient: Pseudonym
     side: Side
     keep_partial: bool = False
 
 
-class JogAsked(Document):
-    """How heads are moved by hand."""
+class JogRequest(Document):
+    """The body of an order to move heads by hand."""
 
     mm: Annotated[float, Field(ge=-500, le=500)]
     head: Literal[1, 2, 3] | None = None
 
 
 class ConsoleServer(uvicorn.Server):
-    """Ends on signals without raising them again: the command lets the scanner go afterwards.
+    """Ends on signals without raising them again: the command closes the scanner afterwards.
 
-    The heads stop at once, see `signals_end_the_program`; they do not wait for what is done here.
+    The heads stop at once, see `signals_end_the_program`; they do not wait for this server.
     """
 
     def __init__(self, config: uvicorn.Config, ends: Callable[[], None], stop: Stop) -> None:
@@ -87,31 +89,31 @@ class ConsoleServer(uvicorn.Server):
         self._stop = stop
         self._gate: Gate | None = None
         self.ended_by: int | None = None
-        """The signal that ended it."""
+        """The signal that ended the server."""
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """As uvicorn has it, but `sockets` are watched by the gate: that of the pages, and that of Stop alone."""
+        """As in uvicorn, but the gate listens on `sockets`: that of the pages, and optionally one only for Stop."""
         await super().startup([])
         listening, *aside = sockets or []
         hand_over = hand_over_to(asyncio.get_running_loop(), self._protocol)
         self._gate = Gate(listening, hand_over, self._stop, aside[0] if aside else None)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """As uvicorn has it."""
+        """As in uvicorn."""
         if self._gate is not None:
             self._gate.close()
         await super().shutdown(sockets)
 
     def _protocol(self) -> asyncio.Protocol:
-        made = self.config.http_protocol_class(  # type: ignore[call-arg]
+        protocol = self.config.http_protocol_class(  # type: ignore[call-arg]
             config=self.config, server_state=self.server_state, app_state=self.lifespan.state
         )
-        assert isinstance(made, asyncio.Protocol)
-        return made
+        assert isinstance(protocol, asyncio.Protocol)
+        return protocol
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """As uvicorn has it."""
+        """As in uvicorn."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -123,19 +125,19 @@ class ConsoleServer(uvicorn.Server):
                 signal.signal(number, handler)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """As uvicorn has it."""
+        """As in uvicorn."""
         self.ended_by = self.ended_by or sig
         self._ends()
         super().handle_exit(sig, frame)
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A socket that the server may be given.
+    """Open a socket for the server.
 
     Raises
     ------
     RefusedInput
-        Nothing can listen there.
+        The address cannot be used.
     """
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
@@ -147,8 +149,10 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def server_of(console: Console, host: str, token: str | None, ports: tuple[int, int] | None = None) -> ConsoleServer:
-    """What serves the console; `run` it with the sockets of `listen`: one for pages, and if `ports` are given (see
-    `Rules`) one for Stop alone."""
+    """Return the server of the console; `host`, `token` and `ports` as in `Rules`.
+
+    `run` it with the sockets of `listen`: one for pages and, if `ports` are given, one only for Stop.
+    """
     rules = Rules(host, token, console.warn, ports)
     config = uvicorn.Config(
         _application(console, rules, None if ports is None else ports[1]),
@@ -167,7 +171,7 @@ def server_of(console: Console, host: str, token: str | None, ports: tuple[int, 
 
 
 def application(console: Console, host: str, token: str | None) -> Starlette:
-    """The application behind its guard; `host` and `token` as `Rules` has them."""
+    """Return the application behind its guard; `host` and `token` as in `Rules`."""
     return _application(console, Rules(host, token, console.warn), None)
 
 
@@ -202,7 +206,7 @@ def _application(console: Console, rules: Rules, stop_port: int | None) -> Starl
 
 
 class _Pages:
-    """What is answered to GET."""
+    """Answers to GET requests."""
 
     def __init__(self, console: Console, stop_port: int | None) -> None:
         self._console, self._stop_port = console, stop_port
@@ -213,8 +217,8 @@ class _Pages:
     def _foot_page(self, patient: str, scan: str, _version: tuple[int, ...]) -> str:
         return foot_page(self._console.archive, self._console.results, patient, scan)
 
-    async def _worked(self, make: Callable[[], _Made]) -> _Made:
-        """What `make` makes in one of a few threads: more of them would take the processor from Stop and the board."""
+    async def _in_worker(self, make: Callable[[], _Made]) -> _Made:
+        """Run `make` in one of `WORKERS` threads and return its result."""
         return await asyncio.get_running_loop().run_in_executor(self._workers, make)
 
     async def sitting(self, _: Request) -> Response:
@@ -223,35 +227,35 @@ class _Pages:
     async def foot(self, request: Request) -> Response:
         patient, scan = request.path_params["patient"], request.path_params["scan"]
 
-        def made() -> str:
+        def make() -> str:
             results = self._console.results
             version = version_of(results, patient, scan, *PAGE_OF)
-            return shown(results / patient / scan, lambda: self._foot(patient, scan, version))
+            return guarded(results / patient / scan, lambda: self._foot(patient, scan, version))
 
-        return HTMLResponse(await self._worked(made))
+        return HTMLResponse(await self._in_worker(make))
 
     async def pair(self, request: Request) -> Response:
         patient, left, right = (request.path_params[name] for name in ("patient", "left", "right"))
         results = self._console.results
         page = partial(pair_page, results, patient, left, right)
-        return HTMLResponse(await self._worked(partial(shown, results / patient, page)))
+        return HTMLResponse(await self._in_worker(partial(guarded, results / patient, page)))
 
     async def result(self, request: Request) -> Response:
         patient, scan, name = (request.path_params[part] for part in ("patient", "scan", "name"))
-        file = await self._worked(partial(open_result, self._console.results, patient, scan, name))
+        file = await self._in_worker(partial(open_result, self._console.results, patient, scan, name))
         if name.endswith(".html"):
-            return _Given(self._parts(file), file, KINDS[".html"], {"content-security-policy": REPORT_POLICY})
+            return _FileResponse(self._parts(file), file, KINDS[".html"], {"content-security-policy": REPORT_POLICY})
         headers = {"content-disposition": f'attachment; filename="{patient}-{scan}-{name}"'}
-        return _Given(self._parts(file), file, KINDS[Path(name).suffix], headers)
+        return _FileResponse(self._parts(file), file, KINDS[Path(name).suffix], headers)
 
     async def _parts(self, file: BinaryIO) -> AsyncIterator[bytes]:
-        """A file bit by bit, up to the size that it has at first."""
-        left = os.fstat(file.fileno()).st_size
-        while left and (part := await self._worked(partial(file.read, min(left, PART_BYTES)))):
-            left -= len(part)
+        """Read a file in parts, up to its size at the begin."""
+        remaining = os.fstat(file.fileno()).st_size
+        while remaining and (part := await self._in_worker(partial(file.read, min(remaining, PART_BYTES)))):
+            remaining -= len(part)
             yield part
-        if left:
-            raise OSError("the file has become shorter while it was given out")
+        if remaining:
+            raise OSError("the file became shorter while it was sent")
 
     async def picture(self, request: Request) -> Response:
         camera = request.path_params["camera"]
@@ -259,30 +263,30 @@ class _Pages:
         if jpeg is None:
             return Response(status_code=204)
         try:
-            drawn, points = await self._worked(partial(self._pictures.drawn, camera, jpeg))
+            drawn, points = await self._in_worker(partial(self._pictures.drawn, camera, jpeg))
         except ValueError:
             return Response(status_code=204)
         return Response(drawn, media_type="image/jpeg", headers={"x-stripe-points": str(points)})
 
     async def here(self, request: Request) -> Response:
-        """Of a page that moves heads: no thread of the pool is needed, for it may not come late."""
+        """Record that the page that moves heads is there; without a thread of the pool, since it must not be late."""
         self._console.here(request.headers[PAGE_HEADER])
         return Response(status_code=204)
 
     async def events(self, request: Request) -> Response:
         page = request.query_params.get("page", "")
         if PAGE.fullmatch(page) is None:
-            return PlainTextResponse("footscan: expected the page's own name\n", 400)
-        return StreamingResponse(self._told(page), media_type="text/event-stream")
+            return PlainTextResponse("footscan: page: expected the name of the page\n", 400)
+        return StreamingResponse(self._states(page), media_type="text/event-stream")
 
-    async def _told(self, page: str) -> AsyncIterator[str]:
-        """The state now and whenever it changes, as server-sent events."""
+    async def _states(self, page: str) -> AsyncIterator[str]:
+        """Yield the state now and after each change, as server-sent events."""
         console, loop, changed = self._console, asyncio.get_running_loop(), asyncio.Event()
 
-        def told() -> None:
+        def wake() -> None:
             loop.call_soon_threadsafe(changed.set)
 
-        unhear = console.hear(told)
+        unhear = console.hear(wake)
         await run_in_threadpool(console.enter, page)
         try:
             before = None
@@ -300,8 +304,8 @@ class _Pages:
             console.leave(page)
 
 
-class _Given(StreamingResponse):
-    """A file that is given out, and closed whoever goes away meanwhile."""
+class _FileResponse(StreamingResponse):
+    """An answer with a file, which is closed even if the client disconnects."""
 
     def __init__(self, parts: AsyncIterator[bytes], file: BinaryIO, kind: str, headers: dict[str, str]) -> None:
         length = {"content-length": str(os.fstat(file.fileno()).st_size)}
@@ -309,13 +313,13 @@ class _Given(StreamingResponse):
         self._file = file
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """As ASGI has it."""
+        """Send the answer; ASGI interface."""
         with self._file:
             await super().__call__(scope, receive, send)
 
 
 async def _do(act: Callable[[str, bytes], None], request: Request) -> Response:
-    """Carries out what the page in charge orders; what is wrong is told in one line."""
+    """Carry out an order of a page; a problem is answered in one line."""
     try:
         body = await _body(request)
         await run_in_threadpool(act, request.headers[PAGE_HEADER], body)
@@ -324,12 +328,12 @@ async def _do(act: Callable[[str, bytes], None], request: Request) -> Response:
     except Fault as error:
         return JSONResponse({"problem": str(error)}, 502)
     except ValidationError:
-        return JSONResponse({"problem": "expected other fields, or other values in them"}, 400)
+        return JSONResponse({"problem": "the order has unexpected fields or values"}, 400)
     return Response(status_code=204)
 
 
 async def _body(request: Request) -> bytes:
-    """The body of a request, which the guard has let in by the length that it told."""
+    """Read the body of a request that the guard admitted by its content-length."""
     body = b""
     try:
         async for part in request.stream():
@@ -342,13 +346,13 @@ async def _body(request: Request) -> bytes:
 
 
 def _scan(console: Console, page: str, body: bytes) -> None:
-    asked = ScanAsked.model_validate_json(body)
-    console.scan(page, asked.patient, asked.side, asked.keep_partial)
+    order = ScanRequest.model_validate_json(body)
+    console.scan(page, order.patient, order.side, order.keep_partial)
 
 
 def _jog(console: Console, page: str, body: bytes) -> None:
-    asked = JogAsked.model_validate_json(body)
-    console.jog(page, asked.mm, asked.head)
+    order = JogRequest.model_validate_json(body)
+    console.jog(page, order.mm, order.head)
 
 
 async def _static(request: Request) -> Response:
@@ -359,10 +363,10 @@ async def _static(request: Request) -> Response:
         return Response(SCRIPT, media_type="text/javascript")
     if name in SCRIPTS:
         return Response((STATIC / name).read_text(encoding="utf-8"), media_type="text/javascript")
-    return PlainTextResponse("footscan: there is no such file\n", 404)
+    return PlainTextResponse("footscan: no such file\n", 404)
 
 
 async def _not_there(_: Request, error: Exception) -> Response:
-    """Of results that are not there, or that were changed by hand."""
+    """Answer a request for results that are missing, or were changed by hand."""
     assert isinstance(error, FootscanError)
     return PlainTextResponse(f"footscan: {error}\n", 404)

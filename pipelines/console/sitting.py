@@ -1,4 +1,4 @@
-"""The feet of the person who is here, and what became of each."""
+"""A sitting: the scans of the present person, and their quality."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +12,7 @@ from schemas.base.errors import RefusedInput
 
 @dataclass(frozen=True)
 class ScannedFoot:
-    """A scan of this sitting."""
+    """A scan of the sitting."""
 
     scanned: Scanned
     level: Level
@@ -20,33 +20,33 @@ class ScannedFoot:
 
     @property
     def href(self) -> str | None:
-        """Address of its page; None where it was not measured."""
-        one = self.scanned
-        return None if one.problem else f"/foot/{one.patient}/{one.scan}"
+        """Address of its page; None if it was not measured."""
+        scanned = self.scanned
+        return None if scanned.problem else f"/foot/{scanned.patient}/{scanned.scan}"
 
 
 @dataclass(frozen=True)
 class Sitting:
-    """Who is here, and the scans in the order in which they were made."""
+    """The present person, and the scans in the order in which they were made."""
 
     patient: str = ""
     feet: tuple[ScannedFoot, ...] = ()
 
     def begun(self, patient: str) -> "Sitting":
-        """The sitting of `patient`: this one, or a new one of somebody else."""
+        """The sitting of `patient`: this one, or a new one if the person is another."""
         return self if patient == self.patient else Sitting(patient)
 
     def added(self, foot: ScannedFoot) -> "Sitting":
-        """The sitting with one scan more."""
+        """The sitting with one more scan."""
         return replace(self, feet=(*self.feet, foot))
 
     def pair_href(self) -> str | None:
-        """Address of the page of both feet: the last measured one of each side; None where one is missing."""
+        """Address of the page of both feet, the last measured one of each side; None if one is missing."""
         last = {foot.scanned.side: foot.scanned.scan for foot in self.feet if foot.href}
         return f"/pair/{self.patient}/{last['left']}/{last['right']}" if len(last) == 2 else None
 
     def as_json(self) -> dict[str, Any]:
-        """For the page."""
+        """The sitting as a JSON object for the page."""
         feet = [
             {
                 "side": foot.scanned.side,
@@ -62,8 +62,8 @@ class Sitting:
         return {"patient": self.patient, "feet": feet, "pair": self.pair_href()}
 
 
-def judged(scanned: Scanned, results: Path) -> ScannedFoot:
-    """A scan with the judgement of its results."""
+def judge_scan(scanned: Scanned, results: Path) -> ScannedFoot:
+    """Judge the results of a scan."""
     if scanned.problem is not None:
         return ScannedFoot(scanned, "poor")
     try:

@@ -1,4 +1,4 @@
-"""Stop, as a request asks for it: in a thread of its own, and answered soon whatever the board does."""
+"""Stop by a request: in a thread of its own, and answered soon even if the board does not respond."""
 
 import json
 import threading
@@ -10,18 +10,18 @@ from pipelines.console.guard import Rules
 from schemas.base.errors import FootscanError, RefusedInput
 
 CONFIRM_SECONDS = 0.15
-"""How long the answer waits for the board."""
+"""How long the answer waits for the board; chosen by hand, since Stop must be answered within 0.3 s."""
 
 
 def stop_asked(console: Console, rules: Rules, scope: dict[str, Any], is_aside: bool) -> tuple[int, bytes, Headers]:
-    """Stops, where the request may: status, body and further headers of the answer.
+    """Stop if the request is permitted; return status, body and further headers of the answer.
 
-    The answer does not wait for a board that takes long to confirm; where it never does, the state tells so.
+    The answer does not wait for a board that is slow to confirm; if it never confirms, the state reports it.
 
     Parameters
     ----------
-    scope : the request's, as ASGI has it
-    is_aside : whether it has come on the port of Stop alone, whose answers a page reads only if they say that it may
+    scope : ASGI scope of the request
+    is_aside : True if it came on the port of Stop, whose answers need CORS headers for a page to read them
     """
     refusal = rules.answer_aside(scope) if is_aside else rules.answer(scope)
     if refusal is not None:
@@ -38,7 +38,7 @@ def stop_asked(console: Console, rules: Rules, scope: dict[str, Any], is_aside: 
 
 
 def _stop(console: Console) -> FootscanError | None:
-    """What is wrong, as far as it is known soon."""
+    """Stop the scanner; return the problem, if one is known within `CONFIRM_SECONDS`."""
     problems: list[FootscanError] = []
 
     def stop() -> None:

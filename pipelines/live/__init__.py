@@ -1,1 +1,1 @@
-"""The live scanner: from devices to a measured foot, and a world without hardware to try it in."""
+"""The live scanner: from devices to a measured foot, and a virtual scanner without hardware."""

@@ -1,4 +1,4 @@
-"""From what a rig says to what can be opened; and what of it is there."""
+"""Devices of a rig: what is opened, and what is connected."""
 
 import math
 from collections.abc import Collection
@@ -24,44 +24,47 @@ class SerialPort:
     device: str
     stable_name: str
     words: str
-    """What the adapter says of itself."""
+    """Description that the adapter reports."""
 
 
 def heads_of(rig: Rig) -> tuple[Head, Head, Head]:
-    """How the rails of the three heads lie."""
+    """Offset and direction of the rails of the three heads."""
     one, two, three = (Head(head.offset_mm, head.direction) for head in rig.heads)
     return one, two, three
 
 
 def sources_of(rig: Rig) -> dict[int, CameraSource]:
-    """Where each camera's pictures come from."""
+    """Source of the frames of each camera, by camera."""
     return {camera.id: CameraSource(camera.device, frames_per_second=rig.frames_per_second) for camera in rig.cameras}
 
 
 def timing_of(camera: RigCamera, exposure_ms: float | None = None) -> CameraTiming:
-    """What is known of a camera's times at an exposure; RefusedInput where its latency is not.
+    """Timing of a camera at an exposure, in ms; RefusedInput if its latency is unknown.
 
-    An exposure other than that of the latency moves the middle of the frame, to which side the camera does not say.
+    If the exposure differs from that at which the latency was measured, the middle of the exposure moves. The camera
+    does not report the direction, so the shift is added to the uncertainty.
     """
-    known = camera.latency
-    if known is None:
+    latency = camera.latency
+    if latency is None:
         raise RefusedInput(
-            f"camera {camera.id}", "has none in the rig, expected it from 'footscan calibrate latency'", field="latency"
+            f"camera {camera.id}",
+            "is missing in the rig, expected it from 'footscan calibrate latency'",
+            field="latency",
         )
-    moved_s = 0.0
-    if exposure_ms is not None and known.exposure_ms is not None:
-        moved_s = abs(exposure_ms - known.exposure_ms) / 2000.0
-    return CameraTiming(Timed(known.seconds, math.hypot(known.sd_s, moved_s)), known.exposure_share, known.frame_sd_s)
+    shift_s = 0.0
+    if exposure_ms is not None and latency.exposure_ms is not None:
+        shift_s = abs(exposure_ms - latency.exposure_ms) / 2000.0
+    timed = Timed(latency.seconds, math.hypot(latency.sd_s, shift_s))
+    return CameraTiming(timed, latency.exposure_share, latency.frame_sd_s)
 
 
 def passes_of(rig: Rig, cameras: Collection[int]) -> list[Pass]:
-    """In how many passes the cameras can film, and why."""
-    wanted = [camera for camera in rig.cameras if camera.id in cameras]
-    return plan_passes([_place(camera) for camera in wanted])
+    """Plan the passes in which the cameras can film; each has its reason."""
+    return plan_passes([_place(camera) for camera in rig.cameras if camera.id in cameras])
 
 
 def serial_ports() -> list[SerialPort]:
-    """All serial ports, by the names that stay."""
+    """All serial ports, with the names that stay the same after replugging."""
     from serial.tools import list_ports
 
     links = {link.resolve(): link for link in sorted(Path("/dev/serial/by-id").glob("*"))}
@@ -72,27 +75,27 @@ def serial_ports() -> list[SerialPort]:
 
 
 def devices_json(rig: Rig | None) -> dict[str, Any]:
-    """What is there, and what of it the rig expects."""
+    """The connected devices, and those that the rig expects, as a JSON object."""
     cameras = list_cameras()
-    found = {
+    connected = {
         "serial_ports": [asdict(port) for port in serial_ports()],
         "cameras": [_camera_json(camera) for camera in cameras],
     }
     if rig is None:
-        return found
-    there = {str(name) for camera in cameras for name in (camera.node, camera.by_path, camera.by_id) if name}
+        return connected
+    names = {str(name) for camera in cameras for name in (camera.node, camera.by_path, camera.by_id) if name}
     expected = [
         {
             "camera": camera.id,
             "device": camera.device,
             "head": camera.on_head,
-            "there": None if not camera.device.startswith("/") else camera.device in there,
+            "there": None if not camera.device.startswith("/") else camera.device in names,
             "latency_ms": None if camera.latency is None else round(1e3 * camera.latency.seconds, 3),
         }
         for camera in rig.cameras
     ]
-    passes = [asdict(each) for each in passes_of(rig, [camera.id for camera in rig.cameras])]
-    return {**found, "rig": {"port": rig.port, "cameras": expected, "passes": passes}}
+    passes = [asdict(planned) for planned in passes_of(rig, [camera.id for camera in rig.cameras])]
+    return {**connected, "rig": {"port": rig.port, "cameras": expected, "passes": passes}}
 
 
 def _place(camera: RigCamera) -> UsbCamera:

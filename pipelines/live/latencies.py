@@ -1,4 +1,4 @@
-"""The latency of each camera, from passes over an object that stands still on the glass."""
+"""Latency of each camera, measured by passes over an object that stands still on the glass."""
 
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -26,26 +26,30 @@ from schemas.parameters.extraction import ExtractionParameters
 from schemas.rig import Rig, RigLatency
 
 FASTER = (1.5, 2.4)
-"""Than a scan: a latency shows in proportion to the speed, and two speeds tell it from the play of the drive."""
+"""Speeds of the passes relative to a scan; chosen by hand.
+
+The offset by a latency is proportional to the speed: two speeds separate it from the play of the drive."""
 LATEST_SECONDS = 0.5
-"""No camera is later than that."""
-OF_FASTEST = 0.9
-"""Of what the heads can do."""
+"""Upper bound of the latency of a camera; chosen by hand."""
+FASTEST_SHARE = 0.9
+"""Largest speed of a pass as a share of the largest speed of the heads; chosen by hand."""
 
 
 @dataclass(frozen=True)
 class MeasuredLatencies:
-    """What the passes told."""
+    """Result of the passes."""
 
     latencies: dict[int, Latency]
     problems: dict[int, str]
-    """Why the latency of a camera cannot be told."""
+    """Why the latency of a camera could not be measured."""
 
 
 def measure_latencies(
     scanner: LiveScanner, from_mm: float, to_mm: float, light: ScanLight, on_progress: Callable[[int, int], None]
 ) -> MeasuredLatencies:
-    """Films the object between two places, forth and back at two speeds, and estimates the latency of each camera.
+    """Film the object between two positions, forth and back at two speeds, and estimate the latency of each camera.
+
+    `from_mm`, `to_mm` : X of the heads
 
     Raises
     ------
@@ -53,7 +57,7 @@ def measure_latencies(
         As `LiveScanner.scan`.
     """
     rig = scanner.rig
-    fastest = OF_FASTEST * min(BoardSettings().max_mm_per_s)
+    fastest = FASTEST_SHARE * min(BoardSettings().max_mm_per_s)
     plans = [
         PassPlan(*ends, min(factor * rig.travel.mm_per_s, fastest), light.power)
         for factor in FASTER
@@ -73,18 +77,18 @@ def measure_latencies(
                     passes[camera.id].append(_observed(scanner, filmed, camera.id, camera.on_head, recording))
             on_progress(number + 1, count)
     latencies: dict[int, Latency] = {}
-    for camera_id, seen in passes.items():
+    for camera_id, of_camera in passes.items():
         if camera_id in problems:
             continue
         try:
-            latencies[camera_id] = estimate_latency(camera_id, seen)
+            latencies[camera_id] = estimate_latency(camera_id, of_camera)
         except Finding as finding:
             problems[camera_id] = str(finding)
     return MeasuredLatencies(latencies, problems)
 
 
 def rig_with(rig: Rig, latencies: Mapping[int, Latency], light: ScanLight) -> Rig:
-    """The rig with what was measured in a light."""
+    """The rig with the latencies that were measured in a light."""
     cameras = [
         camera.model_copy(update={"latency": _document(latencies[camera.id], light.exposure_ms.get(camera.id))})
         if camera.id in latencies
@@ -107,7 +111,7 @@ def _document(latency: Latency, exposure_ms: float | None) -> RigLatency:
 def _observed(
     scanner: LiveScanner, filmed: FilmedPass, camera: int, head: int, recording: ScanRecording
 ) -> LatencyPass:
-    """The stripe in each frame of a camera that was taken on a pass."""
+    """The stripe in the frames of a camera on a pass, with their times."""
     first, clock = filmed.times[camera]
     tally = filmed.films[film_name(camera)]
     begin, end = filmed.travel

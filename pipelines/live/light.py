@@ -1,4 +1,4 @@
-"""The light of a scan: laser power and each camera's exposure, given by hand or chosen by what the cameras see."""
+"""Light of a scan: laser power and exposure of each camera, set by hand or measured."""
 
 import time
 from collections import defaultdict
@@ -16,13 +16,15 @@ from schemas.base.errors import Fault
 from schemas.rig import Rig
 
 MAINS: dict[int, Literal[0, 50, 60]] = {0: 0, 50: 50, 60: 60}
+"""Mains frequencies, Hz, as the literal type that the camera controls take."""
 TEST_PLACES = 3
-"""Of the heads, along the travel, at which the light is looked at."""
+"""Positions along the travel at which the light is measured; chosen by hand."""
 FRAMES_A_PLACE = 2
+"""Frames of each camera at such a position; chosen by hand."""
 SETTLE_SECONDS = 0.4
-"""From a new exposure, or light, to the first frame that has it."""
+"""Time from a new exposure or laser power to the first frame that has it; chosen by hand."""
 LOOK_SECONDS = 2.0
-"""How long the lasers shine on standing heads for a look."""
+"""Time that the lasers shine on standing heads for a measurement; chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -30,21 +32,23 @@ class ScanLight:
     """The light of a scan."""
 
     power: float = 1.0
-    """Of the lasers, 0 to 1."""
+    """Power of the lasers, 0 to 1."""
     exposure_ms: Mapping[int, float] = field(default_factory=dict)
-    """Of each camera; one that is not named stays as it is."""
+    """Exposure of each camera; a camera without an entry keeps its exposure."""
     reasons: Mapping[int, str] = field(default_factory=dict)
+    """Reason of the exposure of each camera, if it was measured."""
     looks: int = 0
+    """Number of measurements."""
     is_measured: bool = False
 
 
 def light_by_hand(rig: Rig, power: float, exposure_ms: float) -> ScanLight:
-    """The same exposure for all cameras."""
+    """A light with the same exposure for all cameras."""
     return ScanLight(power, dict.fromkeys((camera.id for camera in rig.cameras), exposure_ms))
 
 
 def fix_light(rig: Rig, deck: CameraDeck, exposure_ms: Mapping[int, float]) -> dict[int, list[FixedControl]]:
-    """Fixes exposure, gain, white balance and mains frequency of the open cameras; what each made of it."""
+    """Fix exposure, gain, white balance and mains frequency of the open cameras; returns the result by camera."""
     by_id = {camera.id: camera for camera in rig.cameras}
     fixed = {}
     for camera in deck.open_cameras:
@@ -59,9 +63,9 @@ def fix_light(rig: Rig, deck: CameraDeck, exposure_ms: Mapping[int, float]) -> d
 
 
 def measured_light(rig: Rig, deck: CameraDeck, heads: Heads, check: Callable[[], None]) -> ScanLight:
-    """The light in which the open cameras see the stripe best, with the heads at some places along the travel.
+    """Measure the light in which the open cameras see the stripe best, with the heads at `TEST_PLACES` positions.
 
-    `check` is called before each look; what it raises ends it.
+    `check` is called before each measurement and may raise an exception to end it.
 
     Raises
     ------
@@ -90,14 +94,14 @@ def measured_light(rig: Rig, deck: CameraDeck, heads: Heads, check: Callable[[],
 
 
 def _look(deck: CameraDeck, heads: Heads, power: float) -> dict[int, list[Rgb]]:
-    """Some frames of each open camera, with the lasers at a power on heads that stand."""
+    """Take `FRAMES_A_PLACE` frames of each open camera, with standing heads and the lasers at `power`."""
     begin = time.monotonic()
-    came: dict[int, list[bytes]] = {camera: [] for camera in deck.open_cameras}
+    jpegs: dict[int, list[bytes]] = {camera: [] for camera in deck.open_cameras}
 
     def keep(frame: CapturedFrame) -> None:
         since = frame.seconds - begin
         if frame.problem is None and SETTLE_SECONDS < since < LOOK_SECONDS - SETTLE_SECONDS:
-            came[frame.camera] = [*came[frame.camera], frame.jpeg][-FRAMES_A_PLACE:]
+            jpegs[frame.camera] = [*jpegs[frame.camera], frame.jpeg][-FRAMES_A_PLACE:]
 
     deck.send_to(keep)
     try:
@@ -107,7 +111,7 @@ def _look(deck: CameraDeck, heads: Heads, power: float) -> dict[int, list[Rgb]]:
             deck.wait_beyond(begin + LOOK_SECONDS, 3 * LOOK_SECONDS)
     finally:
         deck.send_to(None)
-    for camera, frames in came.items():
+    for camera, frames in jpegs.items():
         if not frames:
             raise Fault(f"camera {camera}: no frame within {LOOK_SECONDS:g} s")
-    return {camera: [decode_image(jpeg) for jpeg in frames] for camera, frames in came.items()}
+    return {camera: [decode_image(jpeg) for jpeg in frames] for camera, frames in jpegs.items()}

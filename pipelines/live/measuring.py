@@ -1,4 +1,4 @@
-"""A new scan through the usual dataflow, as `footscan run --scan` takes it."""
+"""Measurement of a new scan by the same dataflow as `footscan run --scan`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,18 +12,18 @@ from schemas.measures import Measures
 
 @dataclass(frozen=True)
 class Measured:
-    """What became of a scan."""
+    """The outcome of measuring a scan."""
 
     folder: Path | None
-    """Its results; None where it has none."""
+    """Folder of the results; None without results."""
     measures: Measures | None
     problem: str | None
     kind: str | None
-    """`refused`, `finding`, `fault` or `damaged`, as in `ScanEnd`."""
+    """Kind of the problem: `refused`, `finding`, `fault` or `damaged`, as in `ScanEnd`."""
 
 
 def measure_scan(scan: Path, calibration: Path, results: Path, on_progress: Callable[[float], None]) -> Measured:
-    """Reconstructs and measures a scan folder; `on_progress` hears the share of the steps that have ended."""
+    """Reconstruct and measure a scan folder; `on_progress` is called with the share of the steps that have ended."""
     planned = plan_job(job_of_scan(scan, calibration, results))
     ended = 0
 
@@ -37,4 +37,4 @@ def measure_scan(scan: Path, calibration: Path, results: Path, on_progress: Call
         if end.folder is not None:
             measures = Measures.model_validate_json((end.folder / "measures.json").read_bytes())
         return Measured(end.folder, measures, end.problem, end.kind)
-    raise Fault(f"{scan}: nothing became of it")
+    raise Fault(f"{scan}: the run ended without a result")

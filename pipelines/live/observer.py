@@ -1,4 +1,4 @@
-"""A look at regular intervals, in a thread of its own, while something else goes on."""
+"""Periodic checks in a thread of its own while a block runs."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def looking_on(look: Callable[[], None], every_seconds: float, name: str) -> Iterator[None]:
-    """Calls `look` every so many seconds until the block ends; its end waits for a look that is under way."""
+    """Call `look` every `every_seconds` until the block ends; the end waits for a running call."""
     ended = threading.Event()
 
     def watch() -> None:

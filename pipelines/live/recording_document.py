@@ -1,4 +1,4 @@
-"""recording.json: how a scan was filmed."""
+"""The document recording.json: how a scan was filmed."""
 
 import datetime
 from collections.abc import Mapping, Sequence
@@ -20,33 +20,36 @@ from schemas.base.model import canonical_json
 from schemas.recording import LeftOut, RecordedBoard, RecordedCamera, RecordedLight, RecordedPass, Recording
 from schemas.rig import Rig, RigCamera
 
+LONGEST_TEXT = 1000
+"""Most characters of a warning, as in `schemas.recording.Text`."""
+
 
 @dataclass
 class ScanStory:
-    """How a scan came about, for recording.json."""
+    """Data on the making of a scan that recording.json needs."""
 
     started: datetime.datetime
     light: ScanLight
     passes: Sequence[Pass]
     plan: PassPlan
     filmed: list[FilmedPass] = field(default_factory=list)
-    """As `passes`."""
+    """Filmed passes, in the order of `passes`."""
     fixed: dict[int, list[FixedControl]] = field(default_factory=dict)
-    """What each camera made of its settings."""
+    """Result of fixing the settings of each camera."""
     lost_steps_mm: Triple | None = None
-    """How far heads 1, 2, 3 were off after the last travel, by their home switches."""
+    """Position errors of heads 1, 2, 3 after the last travel, by their home switches."""
 
     def timing(self, camera: RigCamera) -> CameraTiming:
-        """What is known of the times of a camera in the light of the scan."""
+        """Timing of a camera in the light of the scan."""
         return timing_of(camera, self.light.exposure_ms.get(camera.id))
 
 
 def recording_document(
     rig: Rig, story: ScanStory, films: Mapping[int, FilmFrames], left_out: Mapping[int, str], heads: Heads
 ) -> Recording:
-    """What is to be told of a scan; `left_out`: cameras that are not in it, and why."""
+    """Build the document of a scan; `left_out` holds the cameras that are not in it, and why."""
     settings = {str(number): value for number, value in heads.board.settings().items()}
-    travels = [heads.log.arrays(*one.travel) for one in story.filmed]
+    travels = [heads.log.arrays(*filmed.travel) for filmed in story.filmed]
     times_sd = np.concatenate([sd for _, _, sd in travels])
     cameras = [_camera(camera, story, films[camera.id]) for camera in rig.cameras if camera.id in films]
     plan = story.plan
@@ -65,32 +68,34 @@ def recording_document(
         light=RecordedLight(power=story.light.power, looks=story.light.looks, is_measured=story.light.is_measured),
         passes=[
             RecordedPass(
-                cameras=list(one.cameras),
+                cameras=list(filmed.cameras),
                 reason=planned.reason,
                 start_mm=plan.start_mm,
                 end_mm=plan.end_mm,
                 mm_per_s=plan.mm_per_s,
-                seconds=one.travel.end_seconds - one.travel.begin_seconds,
+                seconds=filmed.travel.end_seconds - filmed.travel.begin_seconds,
             )
-            for one, planned in zip(story.filmed, story.passes, strict=True)
+            for filmed, planned in zip(story.filmed, story.passes, strict=True)
         ],
         cameras=cameras,
-        warnings=[f"camera {camera} is left out: {problem}"[:1000] for camera, problem in sorted(left_out.items())],
+        warnings=[
+            f"camera {camera} is left out: {problem}"[:LONGEST_TEXT] for camera, problem in sorted(left_out.items())
+        ],
     )
 
 
 def _camera(camera: RigCamera, story: ScanStory, film: FilmFrames) -> RecordedCamera:
-    clock = next(one.times[camera.id][1] for one in story.filmed if camera.id in one.cameras)
+    clock = next(filmed.times[camera.id][1] for filmed in story.filmed if camera.id in filmed.cameras)
     fixed = {control.name: control for control in story.fixed.get(camera.id, [])}
-    found = {name: control.found for name, control in fixed.items()}
+    actual = {name: control.found for name, control in fixed.items()}
     return RecordedCamera(
         id=camera.id,
         device=camera.device,
         head=camera.on_head,
-        exposure_ms=found.get("exposure_ms"),
-        gain=found.get("gain"),
+        exposure_ms=actual.get("exposure_ms"),
+        gain=actual.get("gain"),
         light_reason=story.light.reasons.get(camera.id),
-        not_fixed=[f"{name}: {control.problem}"[:1000] for name, control in fixed.items() if control.problem],
+        not_fixed=[f"{name}: {control.problem}"[:LONGEST_TEXT] for name, control in fixed.items() if control.problem],
         expected=len(film.x_mm) + len(film.left_out),
         stored=len(film.arrivals),
         lost=[LeftOut(number=int(film.number[k]), reason=reason) for k, reason in film.lost.items()],

@@ -1,4 +1,4 @@
-"""rig.yaml, read and written."""
+"""Reading and writing of rig.yaml."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from schemas.rig import Rig
 
 
 def read_rig(path: Path) -> Rig:
-    """The scanner that `path` describes; its calibration is relative to it. RefusedInput where it breaks its format."""
+    """Read a rig, and make the path of its calibration absolute. RefusedInput if it breaks its format."""
     rig = read_yaml(path, Rig)
     if rig.calibration is None:
         return rig
@@ -18,7 +18,7 @@ def read_rig(path: Path) -> Rig:
 
 
 def write_rig(path: Path, rig: Rig) -> None:
-    """Writes a rig, its calibration relative to it where that is below."""
+    """Write a rig; a calibration in the same folder or below is written as a relative path."""
     document = rig.model_dump(mode="json", exclude_none=True)
     if rig.calibration is not None and Path(rig.calibration).is_relative_to(path.resolve().parent):
         document["calibration"] = Path(rig.calibration).relative_to(path.resolve().parent).as_posix()

@@ -1,4 +1,4 @@
-"""The live scanner: one object that a command, a page or a test drives, from connecting to a measured foot."""
+"""The live scanner: one object for commands, pages and tests, from connecting to a measured foot."""
 
 import datetime
 import math
@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from footscan.capture.board.heads import HEADS, SLACK_MM, Heads
@@ -29,42 +28,48 @@ from schemas.base.errors import Fault, FootscanError, RefusedInput
 from schemas.rig import Rig
 
 FRAME_BYTES = 40_000
-"""Of a picture, before any has come."""
+"""Expected size of a frame, for the check of the free space before a scan."""
 WATCH_SECONDS = 0.1
+"""Interval at which heads, disk and stops are checked; chosen by hand."""
+JOG_FACTOR, JOG_SECONDS = 2.0, 5.0
+"""Longest wait for a jog: this factor of its time at full speed, plus this time; chosen by hand."""
+REPORT_SECONDS = 1.0
+"""Age of the reports of the board among which the latest position is looked for; chosen by hand."""
 UNDER_WAY = ("moving", "jogging", "homing", "held", "door")
+"""States of the board in which a stop is always sent to it: heads move or are held."""
 ANSWERING = (*UNDER_WAY, "ready", "not homed", "alarm", "restarting")
-"""States of the board that a stop ends."""
+"""States of the board in which a stop is sent to it during an activity of the scanner."""
 STOPPED = "stopped; nothing of this scan is kept"
 
 
 @dataclass(frozen=True)
 class ScanOrder:
-    """What is to be scanned, and where it goes."""
+    """Order of a scan: its name, its folders and its options."""
 
     name: ScanName
     archive: Path
     results: Path | None = None
-    """None: the scan is stored, and not measured."""
+    """Folder of the results; None: the scan is stored, but not measured."""
     calibration: Path | None = None
-    """Default: the one of the rig."""
+    """Calibration file; default: that of the rig."""
     light: ScanLight | None = None
-    """None: chosen by what the cameras see."""
+    """Light of the scan; default: measured with the cameras."""
     texture: bool = False
-    """Whether the way back is filmed in the dark: laser-off frames all along the foot, for the colours of its skin."""
+    """True to film the way back with the lasers off: frames all along the foot, for the colours of its skin."""
     keep_partial: bool = False
-    """Whether a scan is stored in spite of cameras whose films are not whole; they are left out."""
+    """True to store a scan although films of some cameras are incomplete; these cameras are left out."""
 
 
 @dataclass(frozen=True)
 class LiveResult:
-    """What a scan came to."""
+    """The outcome of a scan."""
 
     stored: FilmedScan
     measured: Measured | None
 
 
 class LiveScanner:
-    """The scanner that a rig describes. A context manager: its end leaves lasers off and nothing half done."""
+    """The scanner of a rig. A context manager that closes the devices, lasers off."""
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
@@ -78,19 +83,17 @@ class LiveScanner:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @property
     def state(self) -> ScannerState:
-        """What is true now; of any thread."""
+        """The present state; usable from any thread."""
         heads = self._heads
         return with_board(self._board.state, None if heads is None else heads.state)
 
     def listen(self, listener: OnState) -> Callable[[], None]:
-        """Has `listener` called with each new state, in the thread that works; returns what ends that."""
+        """Call `listener` with each new state, in the working thread; returns a function that ends it."""
         return self._board.listen(listener)
 
     @property
@@ -100,17 +103,17 @@ class LiveScanner:
 
     @property
     def heads(self) -> Heads:
-        """The heads; Fault where the scanner is not connected."""
+        """The heads; Fault if the scanner is not connected."""
         if self._heads is None:
             raise Fault("the scanner is not connected")
         return self._heads
 
     def connect(self, *, cameras: bool = True) -> dict[int, str]:
-        """Opens the board, and the cameras of the first pass.
+        """Open the board, and the cameras of the first pass.
 
         Returns
         -------
-        problems : of cameras that give no pictures.
+        problems : why a camera gives no frames, by camera
         """
         with self._at_work("disconnected", "connecting"):
             self._connect_board()
@@ -119,7 +122,7 @@ class LiveScanner:
             return problems
 
     def home(self) -> None:
-        """Homes the heads and aligns them."""
+        """Home the heads and align them."""
         with self._at_work("homing"):
             self._connect_board()
             self._refuse_stopped()
@@ -127,7 +130,7 @@ class LiveScanner:
             self._board.tell("idle")
 
     def jog(self, by_mm: float, mm_per_s: float, head: int | None = None) -> tuple[float, float, float]:
-        """Moves all heads, or one, in the dark, and waits until they stand; where they stand then."""
+        """Move all heads, or one, with the lasers off; returns their X, mm, when they stand."""
         with self._at_work("idle", "moving"):
             self._connect_board()
             heads = self.heads
@@ -135,48 +138,48 @@ class LiveScanner:
             self._refuse_stopped()
             heads.jog(by_mm, mm_per_s, head)
             try:
-                limit = time.monotonic() + 2.0 * abs(by_mm) / mm_per_s + 5.0
-                x_mm = heads.position_mm()  # asked anew, so that the state is that after the order
+                limit = time.monotonic() + JOG_FACTOR * abs(by_mm) / mm_per_s + JOG_SECONDS
+                x_mm = heads.position_mm()  # a new report, so that the state is that after the order
                 while heads.state.name == "jogging" and time.monotonic() < limit:
                     time.sleep(WATCH_SECONDS)
                     x_mm = heads.position_mm()
-                way = [by_mm if head in {None, each} else 0.0 for each in HEADS]
-                if any(abs(x - at - by) > SLACK_MM for x, at, by in zip(x_mm, before, way, strict=True)):
-                    stand = ", ".join(f"{x:.2f}" for x in x_mm)
-                    raise Fault(f"the heads were stopped at X = {stand} mm, before they were where they were sent")
+                moves = [by_mm if head in {None, each} else 0.0 for each in HEADS]
+                if any(abs(x - start - by) > SLACK_MM for x, start, by in zip(x_mm, before, moves, strict=True)):
+                    places = ", ".join(f"{x:.2f}" for x in x_mm)
+                    raise Fault(f"the heads were stopped at X = {places} mm before they reached their target")
             except BaseException:
-                with suppress(Fault):  # the state tells it
+                with suppress(Fault):  # the state reports it
                     heads.stop()
                 raise
             self._board.tell("idle")
             return x_mm
 
     def stop(self) -> None:
-        """Ends what is under way; lasers are off afterwards, and nothing of a scan that was being filmed is kept.
+        """End the present action; lasers are off afterwards, and a scan that was being filmed is not kept.
 
-        Where nothing moves or shines, nothing happens.
+        If nothing moves or shines, nothing happens.
         """
         self._stopped.set()
-        # At work, heads are stopped also where the board has not told yet of motion that has just begun.
+        # During work, heads are stopped even if the board has not yet reported a motion that has just begun.
         self._stop_heads(ANSWERING if self._working.is_set() else UNDER_WAY)
 
     @contextmanager
     def waiting_for(self, words: str) -> Iterator[Callable[[int, int], None]]:
-        """Nobody else at work, while something outside of the scanner is made ready; hears how much of it is done."""
-        with self._at_work("idle", words), self._stop_said():
+        """Reserve the scanner during a preparation outside of it; yields a function that reports the progress."""
+        with self._at_work("idle", words), self._stop_reported():
             yield lambda done, total: self._board.tell("idle", words, done / total)
             self._refuse_stopped()
             self._board.tell("idle")
 
     def scan(self, order: ScanOrder) -> LiveResult:
-        """Films, stores, reconstructs and measures.
+        """Film, store, reconstruct and measure a foot.
 
         Raises
         ------
         RefusedInput
-            The rig lacks what a scan needs, the scan is there already, or the scanner is busy.
+            The rig lacks data that a scan needs, the scan exists already, or the scanner is busy.
         Finding
-            The films are not whole, and `keep_partial` was not asked for. Nothing is stored.
+            A film is incomplete, and the order does not say `keep_partial`. Nothing is stored.
         Fault
             A device or the disk failed. Nothing is stored.
         """
@@ -194,10 +197,10 @@ class LiveScanner:
             return LiveResult(stored, measured)
 
     def film(self, order: ScanOrder) -> FilmedScan:
-        """The part of `scan` that needs the devices, for who is at work already."""
+        """Film and store a foot: the part of `scan` that needs the devices; the caller has reserved the scanner."""
         for camera in self.rig.cameras:
             timing_of(camera)
-        with self._stop_said():
+        with self._stop_reported():
             self._connect_board()
             self._home_if_needed()
             passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])
@@ -207,9 +210,9 @@ class LiveScanner:
             story = ScanStory(datetime.datetime.now().astimezone(), light, passes, plan)
             place = order.archive / order.name.patient / order.name.scan
             with ScanRecording(place, self._expected_bytes(plan)) as recording:
-                for number, one in enumerate(passes, start=1):
+                for number, planned in enumerate(passes, start=1):
                     words = f"pass {number} of {len(passes)}" if len(passes) > 1 else ""
-                    story.filmed.append(self.film_one_pass(one, plan, light, recording, words, story))
+                    story.filmed.append(self.film_one_pass(planned, plan, light, recording, words, story))
                 story.lost_steps_mm = self._check_steps()
                 self._board.tell("storing")
                 recording.settle()
@@ -217,8 +220,8 @@ class LiveScanner:
 
     @contextmanager
     def ready_to_film(self) -> Iterator[None]:
-        """Connected and homed, and nobody else at work, for who films passes of his own; then no steps may be lost."""
-        with self._at_work("filming"), self._stop_said():
+        """Reserve the scanner, connected and homed, for passes in the block; then check the heads for lost steps."""
+        with self._at_work("filming"), self._stop_reported():
             self._connect_board()
             self._home_if_needed()
             yield
@@ -227,22 +230,22 @@ class LiveScanner:
 
     def film_one_pass(
         self,
-        one: Pass,
+        planned: Pass,
         plan: PassPlan,
         light: ScanLight,
         recording: ScanRecording,
         words: str = "",
         story: ScanStory | None = None,
     ) -> FilmedPass:
-        """Opens the cameras of a pass and films it into a recording."""
+        """Open the cameras of a pass and film it into a recording."""
         self._board.tell("filming", words, 0.0)
-        problems = self._deck.open_only(one.cameras)
+        problems = self._deck.open_only(planned.cameras)
         if problems:
             raise Fault("; ".join(problems.values()))
         fixed = fix_light(self.rig, self._deck, light.exposure_ms)
         if story is not None:
             story.fixed |= fixed
-        for camera in one.cameras:
+        for camera in planned.cameras:
             recording.open_film(film_name(camera))
             recording.open_film(film_name(camera, background=True))
 
@@ -255,10 +258,10 @@ class LiveScanner:
 
         check()
         with self._watched(plan, recording):
-            return film_pass(self.heads, self._deck, one.cameras, plan, take, check)
+            return film_pass(self.heads, self._deck, planned.cameras, plan, take, check)
 
     def shine(self, power: float, seconds: float) -> None:
-        """Lights the heads where they stand for a moment, so that live pictures show the stripe."""
+        """Switch the lasers on while the heads stand, so that live pictures show the stripe."""
         with self._at_work("idle", "lasers on"):
             self._connect_board()
             self._home_if_needed()
@@ -266,7 +269,7 @@ class LiveScanner:
             self._board.tell("idle")
 
     def close(self) -> None:
-        """Lets all devices go, with the lasers off."""
+        """Close all devices, lasers off."""
         with ExitStack() as stack:
             stack.callback(self._board.tell, "disconnected")
             stack.callback(self._deck.close)
@@ -277,7 +280,7 @@ class LiveScanner:
     @contextmanager
     def _at_work(self, first: Activity, words: str = "") -> Iterator[None]:
         with self._board.at_work(first, words):
-            self._stopped.clear()  # a stop is of what was under way when it was pressed
+            self._stopped.clear()  # a stop ends only the action during which it was pressed
             self._working.set()
             try:
                 with self._held_to_stops():
@@ -287,19 +290,19 @@ class LiveScanner:
 
     @contextmanager
     def _held_to_stops(self) -> Iterator[None]:
-        """Ends motion that began just after a stop was pressed, before the board had told of it."""
+        """End a motion that began just after a stop was pressed, before the board had reported the motion."""
 
         def look() -> None:
             if self._stopped.is_set():
-                with suppress(Fault):  # the state tells it
+                with suppress(Fault):  # the state reports it
                     self._stop_heads(UNDER_WAY)
 
         with looking_on(look, WATCH_SECONDS, "watch for a stop"):
             yield
 
     @contextmanager
-    def _stop_said(self) -> Iterator[None]:
-        """Whatever a stop made to fail, it was the stop."""
+    def _stop_reported(self) -> Iterator[None]:
+        """Report a failure that a stop has caused as the stop."""
         try:
             yield
         except FootscanError:
@@ -331,7 +334,7 @@ class LiveScanner:
             self._refuse_stopped()
 
     def _check_steps(self) -> Triple:
-        """Whether the heads were where they were told to be: nothing that was filmed counts otherwise."""
+        """Check that the heads lost no steps: films with wrong positions are worthless. Returns the errors, mm."""
         self._board.tell("filming", "checking that the heads lost no steps")
         lost_mm = self.heads.lost_steps_mm()
         self._refuse_stopped()
@@ -342,21 +345,21 @@ class LiveScanner:
         return self._deck.open_only(passes[0].cameras)
 
     def _measured_light(self, passes: Sequence[Pass]) -> ScanLight:
-        """The light for all passes, by those cameras that film together at least."""
+        """Measure the light of each pass with its cameras, and combine the results for all passes."""
         exposures: dict[int, float] = {}
         reasons: dict[int, str] = {}
         powers, looks = [], 0
-        for one in passes:
+        for planned in passes:
             self._board.tell("filming", "looking at the light")
-            self._deck.open_only(one.cameras)
+            self._deck.open_only(planned.cameras)
             light = measured_light(self.rig, self._deck, self.heads, self._refuse_stopped)
             exposures |= light.exposure_ms
             reasons |= light.reasons
             powers.append(light.power)
             looks += light.looks
         weakest = min(powers)
-        for one, power in zip(passes, powers, strict=True):  # one power for all: what is lit less is exposed longer
-            for camera in one.cameras:
+        for planned, power in zip(passes, powers, strict=True):  # one power for all: with less light, expose longer
+            for camera in planned.cameras:
                 exposures[camera] = min(exposures[camera] * power / weakest, self.rig.light.longest_ms)
         return ScanLight(weakest, exposures, reasons, looks, is_measured=True)
 
@@ -366,7 +369,7 @@ class LiveScanner:
         if self.rig.calibration is not None:
             return Path(self.rig.calibration)
         if order.results is not None:
-            raise RefusedInput("rig", "names none, expected the scanner's calibration file", field="calibration")
+            raise RefusedInput("rig", "is missing, expected the scanner's calibration file", field="calibration")
         return None
 
     def _expected_bytes(self, plan: PassPlan) -> int:
@@ -375,21 +378,21 @@ class LiveScanner:
 
     @contextmanager
     def _watched(self, plan: PassPlan, recording: ScanRecording) -> Iterator[None]:
-        """Tells how far the heads are, and ends the pass where the disk fails."""
+        """Report the progress of the heads, and end the pass if the disk fails."""
         heads = self.heads
 
         def look() -> None:
             try:
                 recording.check()
             except Fault:
-                with suppress(Fault):  # the state tells it
+                with suppress(Fault):  # the state reports it
                     self._stop_heads(UNDER_WAY)
-            for latest in heads.log.between(time.monotonic() - 1.0, math.inf)[-1:]:
+            for latest in heads.log.between(time.monotonic() - REPORT_SECONDS, math.inf)[-1:]:
                 self._board.progress((latest.x_mm[0] - plan.start_mm) / (plan.end_mm - plan.start_mm))
 
         try:
             with looking_on(look, WATCH_SECONDS, "watch over the pass"):
                 yield
         except FootscanError:
-            recording.check()  # the disk's failure, which ended the pass, says more
+            recording.check()  # if the disk failed, its error is the cause
             raise

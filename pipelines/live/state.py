@@ -1,4 +1,4 @@
-"""What the live scanner does now, for all who want to know: a command, a page, a test."""
+"""The state of the live scanner, with listeners: commands, pages, tests."""
 
 import logging
 import threading
@@ -22,9 +22,9 @@ class ScannerState:
 
     name: StateName
     words: str = ""
-    """What is done, or why it failed."""
+    """What the scanner does, or why it failed."""
     progress: float | None = None
-    """Share that is done, 0 to 1; None where it is not known."""
+    """Share of the activity that is done, 0 to 1; None if unknown."""
 
     def __str__(self) -> str:
         share = "" if self.progress is None else f" {100 * self.progress:.0f} %"
@@ -35,7 +35,7 @@ OnState = Callable[[ScannerState], None]
 
 
 class StateBoard:
-    """Holds the state; any thread may read it, and listeners hear of each change, in the thread that makes it."""
+    """The state and its listeners. Any thread may read the state; listeners run in the thread that changes it."""
 
     def __init__(self) -> None:
         self._state = ScannerState("disconnected")
@@ -45,17 +45,17 @@ class StateBoard:
 
     @property
     def state(self) -> ScannerState:
-        """What was told last."""
+        """The latest state."""
         return self._state
 
     def listen(self, listener: OnState) -> Callable[[], None]:
-        """Has `listener` called with each new state; returns what ends that."""
+        """Call `listener` with each new state; returns a function that ends it."""
         with self._lock:
             self._listeners.append(listener)
         return lambda: self._listeners.remove(listener)
 
     def tell(self, name: Activity, words: str = "", progress: float | None = None) -> None:
-        """A new state."""
+        """Set a new state."""
         with self._lock:
             self._state = state = ScannerState(name, words, progress)
             listeners = list(self._listeners)
@@ -63,7 +63,7 @@ class StateBoard:
             listener(state)
 
     def progress(self, share: float) -> None:
-        """How far the present activity is."""
+        """Set the progress of the present activity, 0 to 1."""
         with self._lock:
             self._state = state = replace(self._state, progress=min(max(share, 0.0), 1.0))
             listeners = list(self._listeners)
@@ -72,12 +72,12 @@ class StateBoard:
 
     @contextmanager
     def at_work(self, first: Activity, words: str = "") -> Iterator[None]:
-        """One thing at a time; a failure becomes the state, and goes on to the caller.
+        """Reserve the scanner for one activity; a failure becomes the state and is raised to the caller.
 
         Raises
         ------
         RefusedInput
-            The scanner does something else.
+            The scanner is busy.
         """
         if not self._working.acquire(blocking=False):
             raise RefusedInput("scanner", f"is {self._state.name}, expected it to be idle")
@@ -98,7 +98,7 @@ class StateBoard:
 
 
 def with_board(state: ScannerState, board: BoardState | None) -> ScannerState:
-    """The state, unless the board says that something else matters more: the lid, an alarm, a lost connection."""
+    """The state, unless that of the board is more urgent: an open lid, an alarm, a lost connection."""
     if board is None:
         return state
     match board.name:

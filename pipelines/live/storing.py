@@ -1,4 +1,4 @@
-"""What was filmed, into the archive: films with their places, scan.yaml, and how it all came about."""
+"""Storing of a filmed scan in the archive: films with positions, scan.yaml and recording.json."""
 
 import datetime
 from dataclasses import dataclass, field
@@ -23,12 +23,14 @@ from schemas.rig import Rig, RigCamera
 from schemas.scan import Scan
 
 LARGEST_SD_MM = 0.3
-"""A frame whose place is known less well is lost: its place is never guessed."""
+"""Largest standard deviation of the position of a frame; a frame with a larger one is lost. Chosen by hand."""
+MOST_SCANS = 999
+"""Most scans of a day and side of a patient; chosen by hand."""
 
 
 @dataclass(frozen=True)
 class ScanName:
-    """Whose foot, and what the scan is called."""
+    """Patient, name, side and date of a scan."""
 
     patient: str
     scan: str
@@ -38,13 +40,13 @@ class ScanName:
 
 @dataclass(frozen=True)
 class FilmedScan:
-    """A scan that was stored."""
+    """A stored scan."""
 
     place: Path
     films: dict[int, FilmFrames]
-    """Of each camera that is in it."""
+    """Frames of each camera of the scan."""
     left_out: dict[int, str] = field(default_factory=dict)
-    """Cameras that are not, and why."""
+    """Cameras that are left out, and why."""
 
 
 def store_scan(
@@ -55,22 +57,22 @@ def store_scan(
     recording: ScanRecording,
     keep_partial: bool,
 ) -> FilmedScan:
-    """Gives the frames their places and the scan its own.
+    """Compute the positions of the frames, and store the scan.
 
     Raises
     ------
     Finding
-        A camera's film is not whole, and `keep_partial` was not asked for; or none is.
+        The film of a camera is incomplete and `keep_partial` is False; or no film is complete.
     Fault
         The disk refuses.
     """
     films: dict[int, FilmFrames] = {}
     left_out: dict[int, str] = {}
     entries = []
-    for one in story.filmed:
-        for camera in (camera for camera in rig.cameras if camera.id in one.cameras):
+    for filmed in story.filmed:
+        for camera in (camera for camera in rig.cameras if camera.id in filmed.cameras):
             try:
-                film = _placed(story, camera, one, heads)
+                film = _placed(story, camera, filmed, heads)
             except FootscanError as error:
                 left_out[camera.id] = str(error)
                 continue
@@ -78,10 +80,10 @@ def store_scan(
                 left_out[camera.id] = film.problem
                 continue
             films[camera.id] = film
-            entries.append(_store_camera(camera, film, one, heads, story, recording))
+            entries.append(_store_camera(camera, film, filmed, heads, story, recording))
     if left_out and (not keep_partial or not films):
-        told = "; ".join(f"camera {camera}: {problem}" for camera, problem in sorted(left_out.items()))
-        raise Finding(f"the scan is not whole: {told}")
+        problems = "; ".join(f"camera {camera}: {problem}" for camera, problem in sorted(left_out.items()))
+        raise Finding(f"the scan is incomplete: {problems}")
     for camera_id in left_out:
         for background in (False, True):
             recording.drop_film(film_name(camera_id, background=background))
@@ -101,25 +103,27 @@ def store_scan(
     return FilmedScan(recording.finish(scan), films, left_out)
 
 
-def _placed(story: ScanStory, camera: RigCamera, one: FilmedPass, heads: Heads) -> FilmFrames:
-    if camera.id in one.failed:
-        raise Finding(one.failed[camera.id])
-    if (tally := one.films.get(film_name(camera.id))) is None:
+def _placed(story: ScanStory, camera: RigCamera, filmed: FilmedPass, heads: Heads) -> FilmFrames:
+    if camera.id in filmed.failed:
+        raise Finding(filmed.failed[camera.id])
+    if (tally := filmed.films.get(film_name(camera.id))) is None:
         raise Finding("gave no frame on the travel")
-    motion = motion_of_head(heads.log, camera.on_head, one.travel)
+    motion = motion_of_head(heads.log, camera.on_head, filmed.travel)
     ends = (story.plan.start_mm, story.plan.end_mm)
-    return place_frames(tally, one.times[camera.id], one.travel, motion, story.timing(camera), ends, LARGEST_SD_MM)
+    return place_frames(
+        tally, filmed.times[camera.id], filmed.travel, motion, story.timing(camera), ends, LARGEST_SD_MM
+    )
 
 
 def _store_camera(
-    camera: RigCamera, film: FilmFrames, one: FilmedPass, heads: Heads, story: ScanStory, recording: ScanRecording
+    camera: RigCamera, film: FilmFrames, filmed: FilmedPass, heads: Heads, story: ScanStory, recording: ScanRecording
 ) -> dict[str, object]:
-    """Closes the films of one camera; its entry in scan.yaml."""
+    """Close the films of a camera; returns its entry in scan.yaml."""
     name, dark = film_name(camera.id), film_name(camera.id, background=True)
     recording.close_film(name, film.arrivals, len(film.x_mm))
     write_positions(recording.file(f"{name}.csv"), film.x_mm.tolist())
     entry: dict[str, object] = {"id": camera.id, "file": f"{GROUP}/{name}", "positions": f"{name}.csv"}
-    background, count = _background(camera, film, one, heads, story)
+    background, count = _background(camera, film, filmed, heads, story)
     if background:
         recording.close_film(dark, background, count)
         entry["background"] = f"{GROUP}/{dark}"
@@ -129,27 +133,27 @@ def _store_camera(
 
 
 def _background(
-    camera: RigCamera, film: FilmFrames, one: FilmedPass, heads: Heads, story: ScanStory
+    camera: RigCamera, film: FilmFrames, filmed: FilmedPass, heads: Heads, story: ScanStory
 ) -> tuple[dict[int, int], int]:
-    """The laser-off frames: one for each of the film where the way back was filmed, else one for all."""
-    tally = one.films.get(film_name(camera.id, background=True))
+    """Choose the laser-off frames: one per frame of the film if the way back was filmed, else one for all."""
+    tally = filmed.films.get(film_name(camera.id, background=True))
     if tally is None:
         return {}, 0
-    times, timing = one.times[camera.id], story.timing(camera)
-    if one.back is not None:
+    times, timing = filmed.times[camera.id], story.timing(camera)
+    if filmed.back is not None:
         ends = (story.plan.start_mm, story.plan.end_mm)
-        motion = motion_of_head(heads.log, camera.on_head, one.back)
-        back = place_frames(tally, times, one.back, motion, timing, ends, LARGEST_SD_MM)
+        motion = motion_of_head(heads.log, camera.on_head, filmed.back)
+        back = place_frames(tally, times, filmed.back, motion, timing, ends, LARGEST_SD_MM)
         return nearest_frames(film, back), len(film.x_mm)
-    standing = standing_frame(tally, times, timing, one.before)
+    standing = standing_frame(tally, times, timing, filmed.before)
     return ({}, 0) if standing is None else ({0: standing}, 1)
 
 
 def next_scan_name(archive: Path, patient: str, side: Literal["right", "left"], date: datetime.date) -> str:
-    """`2026-11-20-R`, or with a number behind it where there is one of this name."""
+    """The first free name such as `2026-11-20-R`, `2026-11-20-R-2`; RefusedInput if 999 are taken."""
     first = f"{date.isoformat()}-{side[0].upper()}"
-    names = [first, *(f"{first}-{number}" for number in range(2, 1000))]
+    names = [first, *(f"{first}-{number}" for number in range(2, MOST_SCANS + 1))]
     for name in names:
         if not (archive / patient / name).exists():
             return name
-    raise RefusedInput(archive / patient, "has 999 scans of this day and side, expected fewer")
+    raise RefusedInput(archive / patient, f"has {MOST_SCANS} scans of this day and side, expected fewer")

@@ -1,4 +1,4 @@
-"""Which calibration a scan is mapped with, where it names none itself: that of its scanner and its day."""
+"""The choice of the calibration for a scan that names none itself: that of its scanner and its day."""
 
 import datetime
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from schemas.workflow import Workflow
 
 
 class CalibrationPlace(NamedTuple):
-    """A calibration, and for which scans it is meant, see `ChosenCalibration`."""
+    """A calibration, and the scans that it is meant for, see `ChosenCalibration`."""
 
     file: Path
     """The calibration file, or the folder of a capture."""
@@ -25,18 +25,20 @@ def calibration_places(workflow: Workflow, base: Path) -> tuple[CalibrationPlace
     if workflow.calibration is not None:
         return (CalibrationPlace(base / workflow.calibration),)
     return tuple(
-        CalibrationPlace(base / (one.file or one.capture or ""), one.scanner, one.since, one.capture is not None)
-        for one in workflow.calibrations
+        CalibrationPlace(
+            base / (chosen.file or chosen.capture or ""), chosen.scanner, chosen.since, chosen.capture is not None
+        )
+        for chosen in workflow.calibrations
     )
 
 
 def choose_calibration(scan: RecordedScan, places: Sequence[CalibrationPlace]) -> CalibrationPlace:
-    """Of those for the scan's scanner, or else of those for any, the last one that began before the scan's day ended.
+    """The latest calibration up to the scan's day, among those for its scanner, or else among those for any scanner.
 
     Raises
     ------
     RefusedInput
-        There is none, or it cannot be told which.
+        No calibration fits, or the scan's day is unknown and the calibrations differ by day.
     """
     scanner, day = scan.document.scanner, scan.document.day
     if not places:

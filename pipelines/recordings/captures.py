@@ -1,4 +1,4 @@
-"""Calibration captures: reading one and checking what its capture.yaml promises."""
+"""Calibration captures: reading one and checking it against its capture.yaml."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +27,7 @@ class RecordedCapture:
 
     @property
     def file(self) -> Path:
-        """Its capture.yaml."""
+        """The capture.yaml of the capture."""
         return self.folder / CAPTURE_FILE
 
     @property
@@ -37,7 +37,7 @@ class RecordedCapture:
 
     @property
     def files(self) -> list[Path]:
-        """All that is read of it."""
+        """All files of the capture that are read."""
         films = [file for camera in self.document.cameras for file in film_files(self.film(camera))]
         return [self.file, self.reference_file, *films]
 
@@ -52,8 +52,8 @@ def read_capture(folder: Path) -> RecordedCapture:
     Raises
     ------
     RefusedInput
-        No capture.yaml, no reference object, or ones that break their format; a film that is missing, is none, or has
-        not one frame for each placement.
+        The capture.yaml or the reference object is missing or breaks its format; or a film is missing, is not a film,
+        or does not have one frame for each placement.
     """
     folder = recorded_folder(folder, CAPTURE_FILE, "a calibration capture")
     document = read_yaml(folder / CAPTURE_FILE, Capture)

@@ -1,4 +1,4 @@
-"""Whether the last night was run at all: asked in the morning by what does not depend on the night."""
+"""The check that the last night ran at all, made in the morning by a job that does not depend on the night."""
 
 import re
 from datetime import UTC, datetime, timedelta
@@ -14,33 +14,33 @@ _UNITS = {"m": timedelta(minutes=1), "h": timedelta(hours=1), "d": timedelta(day
 
 
 def age_of(text: str) -> timedelta:
-    """`26h`, `90m` or `2d`; RefusedInput for anything else."""
-    found = re.fullmatch(r"([0-9]{1,6}(?:\.[0-9]{1,3})?)([mhd])", text)
-    if found is None:
+    """Parse an age such as `26h`, `90m` or `2d`; RefusedInput for any other text."""
+    match = re.fullmatch(r"([0-9]{1,6}(?:\.[0-9]{1,3})?)([mhd])", text)
+    if match is None:
         raise RefusedInput("--check-last", f"expected an age such as 26h, 90m or 2d, found {text[:80]!r}")
-    return float(found[1]) * _UNITS[found[2]]
+    return float(match[1]) * _UNITS[match[2]]
 
 
 def check_last(out: Path, age: timedelta) -> tuple[bool, str]:
-    """Whether a night has ended within `age`, and one line that says so.
+    """Return True if a night has ended within `age`, and one line about it.
 
-    Where none has, the page says so too, until the next night writes it anew.
+    If not, the page shows that line, too, until the next night writes the page again.
     """
     history, now = read_history(out), datetime.now(UTC)
     last = max((night.time for night in history.ended), default=None)
     if last is not None and now - last <= age:
         status = max(history.ended, key=lambda night: night.time).status
         return True, f"the last night ended {_hours(now - last)} ago, with status {status}"
-    said = f"no night has ended in {out}" if last is None else f"the last night ended {_hours(now - last)} ago"
-    said += f", expected one within {_hours(age)}"
+    problem = f"no night has ended in {out}" if last is None else f"the last night ended {_hours(now - last)} ago"
+    problem += f", expected one within {_hours(age)}"
     begun = max((night.time for night in history.unfinished), default=None)
     if begun is not None and (last is None or begun > last):
-        said += f"; one began {_hours(now - begun)} ago and did not end"
+        problem += f"; one began {_hours(now - begun)} ago and did not end"
     page = out / PAGE
     if page.is_file():
-        notice = f"Looked at {now:%Y-%m-%d %H:%M} UTC: {said}."
+        notice = f"Checked at {now:%Y-%m-%d %H:%M} UTC: {problem}."
         write_atomically(page, with_notice(page.read_text(encoding="utf-8"), notice).encode())
-    return False, said
+    return False, problem
 
 
 def _hours(span: timedelta) -> str:

@@ -1,4 +1,4 @@
-"""The parametric foot of a suite, filmed by the virtual scanner; the result tells what the foot is and was filmed."""
+"""A step that films the parametric foot of a suite with the virtual scanner."""
 
 import json
 from collections.abc import Mapping
@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.virtual.filming.record import record_scan
+from footscan.virtual.filming.record import ScanExtras, ScanName, record_scan
 from footscan.virtual.foot.foot import make_foot
+from footscan.virtual.optics.scene import Mesh
 from footscan.virtual.stage.standing import stand_in_the_middle
 from pipelines.engine.files.digest import sha256
 from schemas.parameters.virtual_scan import VirtualScan
@@ -16,22 +17,19 @@ PATIENT = "virtual"
 
 
 def run(inputs: Mapping[str, bytes], parameters: VirtualScan, places: Mapping[str, Path]) -> bytes:
-    """`places`: the `folder` of the scan, which bears its name.
+    """`places`: the `folder` of the scan, which has the name of the scan.
 
-    The result has the foot's `known` measures in mm by name, and the digests of the `films`.
+    The result holds the true measures of the foot, mm, by name (`known`), and the digests of the `films`.
     """
     del inputs
     folder, settings = places["folder"], parameters.settings
     foot = make_foot(side=parameters.side)
     record_scan(
-        stand_in_the_middle(foot.vertices, settings),
-        foot.faces.astype(np.int64),
+        Mesh(stand_in_the_middle(foot.vertices, settings), foot.faces.astype(np.int64)),
         folder,
-        patient=PATIENT,
-        scan=folder.name,
-        side=parameters.side,
-        settings=settings,
-        laser_off=parameters.laser_off,
+        ScanName(PATIENT, folder.name, parameters.side),
+        settings,
+        extras=ScanExtras(laser_off=parameters.laser_off),
     )
     films = {film.name: sha256(film.read_bytes()) for film in sorted(folder.glob("*.avi"))}
     return (json.dumps({"known": foot.measures, "films": films}, indent=2, sort_keys=True) + "\n").encode()

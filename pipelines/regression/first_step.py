@@ -1,7 +1,7 @@
-"""Which step came out otherwise first: of all whose results differ from the accepted ones, those that rest on none.
+"""The first steps whose results differ from the accepted ones: those that do not depend on another such step.
 
-Another kind of processor rounds otherwise, so that with a baseline from elsewhere every step differs from the first on,
-and no figure does. What came out alike in the last good night on this machine is therefore not where it begins.
+Processors of different kinds round differently: with a baseline from another machine, all steps may differ although no
+figure does. A step that agrees with the last good night on this machine is therefore not reported.
 """
 
 import json
@@ -17,59 +17,60 @@ from pipelines.regression.report.result import Change, FirstStep, JudgedFigure
 from schemas.regression import AcceptedStep
 
 FILMED_FROM = {"ingest": "film", "background": "film"}
-"""The steps that take the films of a virtual scan, and the one that makes them."""
+"""Kinds of steps that read the films of a virtual scan, and the step that makes the films."""
 CALIBRATED = {"map", "clean", "orient", "texture", "quality", "report"}
-"""Those that take its calibration."""
+"""Kinds of steps that use the calibration of a virtual scan."""
 LINES = 12
-"""Of a change that are shown."""
+"""Lines of a change that are shown; chosen by hand."""
 SLOWER, LARGER = "takes longer", "takes more memory"
 
 
 @dataclass(frozen=True)
 class PresentStep:
-    """A step of last night."""
+    """A step of the last night."""
 
     step: Step
     key: str
-    """Of its action; empty where a step before it failed."""
+    """Key of its action; empty if a step before it failed."""
     image: str
+    """The text that `key` is the hash of; empty if a step before it failed."""
     result: str
     """As in `AcceptedStep`."""
 
     @property
     def name(self) -> str:
-        """Within its scan: `extract-3`."""
+        """Name within its scan: `extract-3`."""
         return self.step.name.removeprefix(f"{self.step.scan}/")
 
     @property
     def accepted(self) -> AcceptedStep:
-        """As it is written down."""
+        """The step as it is written into the baseline."""
         return AcceptedStep(step=self.name, key=self.key, result=self.result)
 
 
 @dataclass(frozen=True)
-class KnownSteps:
-    """What the steps of a set came to before."""
+class EarlierSteps:
+    """Earlier results of the steps of a set."""
 
     accepted: Sequence[AcceptedStep]
-    """When the baseline was accepted; empty where that is not known."""
+    """Results when the baseline was accepted; empty if unknown."""
     good: Sequence[AcceptedStep] = ()
-    """In the last night on this machine in which nothing of the set was worse; empty where there was none."""
+    """Results in the last night on this machine in which nothing of the set was worse; empty without such a night."""
 
     def of(self, name: str) -> list[AcceptedStep]:
-        """A step in the last good night, and when it was accepted."""
+        """Results of a step: in the last good night, then in the baseline."""
         return [step for step in (*self.good, *self.accepted) if step.step == name]
 
     @property
     def lasting(self) -> list[str]:
-        """Names of the accepted steps, without those that the last good night did without."""
+        """Names of the accepted steps that the last good night had, too."""
         kept = {step.step for step in self.good or self.accepted}
         return [step.step for step in self.accepted if step.step in kept]
 
 
 def present_steps(steps: Sequence[Step], outcomes: Mapping[str, Outcome]) -> list[PresentStep]:
-    """What each step came to; those that failed by a fault, and what waits for them, have no outcome."""
-    found = []
+    """Combine each step with its result; steps without an outcome failed by a fault, or waited for such a step."""
+    present = []
     for step in steps:
         outcome = outcomes.get(step.name)
         digests = input_digests(step, outcomes)
@@ -78,44 +79,44 @@ def present_steps(steps: Sequence[Step], outcomes: Mapping[str, Outcome]) -> lis
             result = outcome.digest
         else:
             result = f"no result: {outcome.kind if isinstance(outcome, Failure) else 'fault'}"
-        found.append(PresentStep(step, key_of(image) if image else "", image, result))
-    return found
+        present.append(PresentStep(step, key_of(image) if image else "", image, result))
+    return present
 
 
-def first_steps(known: KnownSteps, present: Sequence[PresentStep], store: Store) -> list[FirstStep]:
-    """Where the difference between two runs begins; empty where there is none, or nothing was accepted."""
-    if not known.accepted:
+def first_steps(earlier: EarlierSteps, present: Sequence[PresentStep], store: Store) -> list[FirstStep]:
+    """Find the steps at which two runs begin to differ; empty if they agree, or nothing was accepted."""
+    if not earlier.accepted:
         return []
     names = {step.name for step in present}
-    gone = [name for name in known.lasting if name not in names]
-    found = [FirstStep([name], "is no more") for name in _chain_starts(gone)]
+    missing = [name for name in earlier.lasting if name not in names]
+    first = [FirstStep([name], "no longer exists") for name in _chain_starts(missing)]
     differ: set[str] = set()
     roots: list[PresentStep] = []
     for step in present:
-        if all(before.result != step.result for before in known.of(step.name)):
+        if all(before.result != step.result for before in earlier.of(step.name)):
             differ.add(step.name)
             follows = any(name in differ for name in _before(step.step, names))
-            # What cameras come together in differs where one of them is missing.
-            if not follows and (step.step.camera is not None or not any(map(_of_a_camera, gone))):
+            # A step that combines all cameras differs if one of them is missing.
+            if not follows and (step.step.camera is not None or not any(map(_of_a_camera, missing))):
                 roots.append(step)
-    found += [_explained(step, known, store) for step in roots]
-    return list(_together(found))
+    first += [_explained(step, earlier, store) for step in roots]
+    return list(_grouped(first))
 
 
 def costly_steps(
     figures: Sequence[JudgedFigure],
     keeps_most: str | None,
-    known: KnownSteps,
+    earlier: EarlierSteps,
     present: Sequence[PresentStep],
     store: Store,
 ) -> list[FirstStep]:
-    """The first kind of step that takes longer than accepted, and the first that takes more memory.
+    """Find the first kind of step that takes longer than accepted, and the first that takes more memory.
 
     Parameters
     ----------
-    keeps_most : the kind after which memory grows most from pass to pass
+    keeps_most : the kind of step after which memory grows most from pass to pass
     """
-    found = []
+    costly = []
     for group, why in (("time", SLOWER), ("memory", LARGER)):
         worse = {
             figure.name.removeprefix(f"{group}.").removesuffix("_mb"): figure
@@ -130,13 +131,13 @@ def costly_steps(
             kind = keeps_most if group == "memory" else _slowest(figures, kinds)
         steps = [step for step in present if step.step.kind == kind]
         if steps:
-            first = _explained(steps[0], known, store)
-            found.append(FirstStep([step.name for step in steps], why, first.changes))
-    return found
+            first = _explained(steps[0], earlier, store)
+            costly.append(FirstStep([step.name for step in steps], why, first.changes))
+    return costly
 
 
 def _slowest(figures: Sequence[JudgedFigure], kinds: Sequence[str]) -> str | None:
-    """The kind whose time has grown most, where the sum has grown too much, but none by itself."""
+    """The kind of step whose time has grown most: only the sum exceeds its tolerance, no kind alone."""
     grown = {
         kind: figure.value - figure.accepted
         for figure in figures
@@ -147,7 +148,7 @@ def _slowest(figures: Sequence[JudgedFigure], kinds: Sequence[str]) -> str | Non
 
 
 def _before(step: Step, names: set[str]) -> Iterator[str]:
-    """The steps that a step takes from, those that film and calibrate among them."""
+    """Names of the steps that a step depends on, including those that film and calibrate."""
     for source in step.inputs.values():
         if isinstance(source, Output):
             yield source.step.removeprefix(f"{step.scan}/")
@@ -157,10 +158,10 @@ def _before(step: Step, names: set[str]) -> Iterator[str]:
         yield "calibrate"
 
 
-def _chain_starts(gone: Sequence[str]) -> list[str]:
-    """Of steps that are no more, in their order: the first of each camera, or the first of all."""
+def _chain_starts(missing: Sequence[str]) -> list[str]:
+    """The first missing step of each camera, or the first of all; `missing` is in the order of the steps."""
     starts: dict[str, str] = {}
-    for name in gone:
+    for name in missing:
         starts.setdefault(name.rpartition("-")[2] if _of_a_camera(name) else "", name)
     return [name for camera, name in starts.items() if camera or len(starts) == 1]
 
@@ -169,28 +170,28 @@ def _of_a_camera(name: str) -> bool:
     return name.rpartition("-")[2].isdecimal()
 
 
-def _explained(step: PresentStep, known: KnownSteps, store: Store) -> FirstStep:
-    before = known.of(step.name)
+def _explained(step: PresentStep, earlier: EarlierSteps, store: Store) -> FirstStep:
+    before = earlier.of(step.name)
     if not before:
         return FirstStep([step.name], "is new")
-    rows = (store.row(one.key) for one in before if one.key and step.image)
+    rows = (store.row(accepted.key) for accepted in before if accepted.key and step.image)
     row = next((row for row in rows if row is not None), None)
-    found: list[Change] = []
+    shown: list[Change] = []
     if row is not None:
         for change in changes(step.step, row.image, json.loads(step.image), store):
             as_lines = change.what == "code" or "\n" in f"{change.old}{change.new}"
             if as_lines and change.old is not None and change.new is not None:
-                found.append(Change(str(change), side_by_side(change)[:LINES]))
+                shown.append(Change(str(change), side_by_side(change)[:LINES]))
             elif change.what in {"parameter", "library"}:
-                found += [Change(f"{change}: {told}") for told in _old_and_new(change.old, change.new)]
+                shown += [Change(f"{change}: {values}") for values in _old_and_new(change.old, change.new)]
             else:
-                found.append(Change(str(change)))
-    why = step.result if step.result.startswith("no result") else "its result is another"
-    return FirstStep([step.name], why, found)
+                shown.append(Change(str(change)))
+    why = step.result if step.result.startswith("no result") else "its result differs"
+    return FirstStep([step.name], why, shown)
 
 
 def _old_and_new(old: str | None, new: str | None) -> list[str]:
-    """Two values; of groups of values, those that differ."""
+    """An old and a new value; of groups of values, only those that differ."""
     try:
         was, now = json.loads(old or "null"), json.loads(new or "null")
     except ValueError:  # a version of a library
@@ -201,13 +202,13 @@ def _old_and_new(old: str | None, new: str | None) -> list[str]:
     return [f"{name} {json.dumps(was.get(name))} → {json.dumps(now.get(name))}" for name in differ]
 
 
-def _together(found: Sequence[FirstStep]) -> Iterator[FirstStep]:
-    """Steps of one kind of which the same is to be said, such as those of the cameras, in one."""
-    alike: dict[tuple[object, ...], FirstStep] = {}
-    for one in found:
-        first = one.steps[0]
-        kind = first.rpartition("-")[0] if _of_a_camera(first) else first
-        said = (kind, one.why, tuple(change.text for change in one.changes))
-        known = alike.get(said)
-        alike[said] = one if known is None else FirstStep([*known.steps, *one.steps], one.why, known.changes)
-    yield from alike.values()
+def _grouped(steps: Sequence[FirstStep]) -> Iterator[FirstStep]:
+    """Combine steps of one kind with the same explanation, such as those of several cameras."""
+    groups: dict[tuple[object, ...], FirstStep] = {}
+    for step in steps:
+        name = step.steps[0]
+        kind = name.rpartition("-")[0] if _of_a_camera(name) else name
+        explanation = (kind, step.why, tuple(change.text for change in step.changes))
+        group = groups.get(explanation)
+        groups[explanation] = step if group is None else FirstStep([*group.steps, *step.steps], step.why, group.changes)
+    yield from groups.values()

@@ -1,4 +1,4 @@
-"""The history of a suite: a file of JSON lines that only grows, and stays whole whatever befalls a night."""
+"""The history of a suite: a file of JSON lines that only grows, and stays intact if a night is killed."""
 
 import fcntl
 import json
@@ -18,6 +18,8 @@ from schemas.base.model import canonical_json
 from schemas.regression import NightBegun, NightEnded
 
 FILE, LOCK = "history.jsonl", "night.lock"
+GAP = 1.5
+"""Time between two nights, in intervals, above which a night between them is missing; chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -27,17 +29,17 @@ class History:
     begun: list[NightBegun] = field(default_factory=list)
     ended: list[NightEnded] = field(default_factory=list)
     damaged: list[int] = field(default_factory=list)
-    """Numbers of lines that cannot be read; nothing else is lost with them."""
+    """Numbers of the lines that cannot be read; all other lines are used."""
 
     @property
     def unfinished(self) -> list[NightBegun]:
-        """Nights that have begun and not ended: killed, or under way."""
+        """Nights that have begun but not ended: killed, or still running."""
         ended = {night.night for night in self.ended}
         return [night for night in self.begun if night.night not in ended]
 
 
 def read_history(folder: Path) -> History:
-    """What is known of the nights in a folder."""
+    """Read the history of the nights in a folder; empty without a history. Fault if it cannot be read."""
     history = History()
     try:
         lines = (folder / FILE).read_bytes().split(b"\n")
@@ -60,10 +62,10 @@ def read_history(folder: Path) -> History:
 
 
 def append(folder: Path, line: NightBegun | NightEnded) -> None:
-    """Add a line as a whole or not at all.
+    """Append a line as a whole or not at all.
 
-    Others that append wait for each other. A last line that was torn by a killed process is closed first, so that it
-    spoils no other. Where the disk takes but a part of the line, that part is taken away again.
+    Concurrent writers wait for each other. A last line that a killed process left incomplete is ended first, so that it
+    does not spoil the new one. If the disk takes only a part of the line, that part is removed again.
 
     Raises
     ------
@@ -86,12 +88,12 @@ def append(folder: Path, line: NightBegun | NightEnded) -> None:
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """One night at a time: held while it lasts, and let go by the system however it ends.
+    """Hold the lock of a night until the block ends; the system releases it if the process dies.
 
     Raises
     ------
     Fault
-        Another one is under way.
+        Another night holds it.
     """
     path = folder / LOCK
     try:
@@ -107,10 +109,10 @@ def alone(folder: Path) -> Iterator[None]:
         yield
 
 
-def gaps(history: History, every: timedelta) -> list[tuple[datetime, datetime]]:
-    """Ends of nights that follow each other so late that one between them did not run."""
+def gaps(history: History, interval: timedelta) -> list[tuple[datetime, datetime]]:
+    """Ends of successive nights between which a night is missing; one is expected every `interval`."""
     ends = sorted(night.time for night in history.ended)
-    return [(one, other) for one, other in pairwise(ends) if other - one > 1.5 * every]
+    return [(before, after) for before, after in pairwise(ends) if after - before > GAP * interval]
 
 
 def _append(descriptor: int, data: bytes) -> None:
@@ -128,5 +130,5 @@ def _append(descriptor: int, data: bytes) -> None:
 
 
 def night_name() -> str:
-    """The name of a night that begins now; two that begin at once have different ones."""
+    """A name for a night that begins now; it is unique even if two nights begin at once."""
     return f"{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}-{os.urandom(4).hex()}"

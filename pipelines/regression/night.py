@@ -1,4 +1,4 @@
-"""A night: every data set of a suite is run and its figures held beside the accepted ones."""
+"""A night: all data sets of a suite are run, and their figures compared with the accepted ones."""
 
 import platform
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +19,7 @@ from pipelines.regression.baseline import (
 from pipelines.regression.figures.costs import cost_figures, keeps_most
 from pipelines.regression.figures.timed import take_times
 from pipelines.regression.figures.verdict import judge_figures
-from pipelines.regression.first_step import KnownSteps, costly_steps, first_steps
+from pipelines.regression.first_step import EarlierSteps, costly_steps, first_steps
 from pipelines.regression.history import History, alone, append, gaps, night_name, read_history
 from pipelines.regression.pictures import difference_pictures
 from pipelines.regression.report.page import regress_page
@@ -33,9 +33,13 @@ from schemas.regression import Acceptance, AcceptedStep, Baseline, NightBegun, N
 
 PAGE = "index.html"
 SHOWN_NIGHTS = 120
+"""Most nights on the page, for its size."""
+SHOWN_NOTES = 5
+"""Most notes of one kind on the page; chosen by hand."""
 TIMED_AGAIN = 2
-"""So often a scan is timed anew whose time or memory is worse, or is to be accepted: what else ran at that time does
-not run each time."""
+"""How often a scan is timed again whose time or memory is worse, or is to be accepted; chosen by hand.
+
+Other programs that disturbed the first timing do not disturb all of them."""
 BAD: tuple[Verdict, ...] = ("worse", "missing")
 
 Status = Literal[0, 1, 3]
@@ -53,24 +57,23 @@ class Regression:
 
     @property
     def name(self) -> str:
-        """What the suite is called: its file, or the folder of one that is called suite.yaml."""
+        """Name of the suite: that of its file, or of its folder if the file is suite.yaml."""
         return self.path.stem if self.path.stem != "suite" else self.path.resolve().parent.name
 
 
 @dataclass(frozen=True)
 class Night:
-    """What a night came to."""
+    """The outcome of a night."""
 
     result: NightResult
     status: Status
-    """0 where all is the same or better, 1 where something is worse or missing, if only the baseline, 3 where a set
-    failed by a fault."""
+    """0 if all is the same or better; 1 if a figure, a set or the baseline is worse or missing; 3 after a fault."""
     page: Path
 
 
 @dataclass
-class _Run:
-    """What is gathered while a night lasts."""
+class _Gathered:
+    """Results of the sets that have been run so far."""
 
     figures: dict[str, dict[str, float | None]] = field(default_factory=dict)
     steps: dict[str, list[AcceptedStep]] = field(default_factory=dict)
@@ -79,7 +82,7 @@ class _Run:
 
 
 def read_suite(path: Path, out: Path | None = None) -> Regression:
-    """The suite in a file; RefusedInput where it breaks its format. `out` wins over the one that it names."""
+    """Read a suite; RefusedInput if it breaks its format. `out` replaces the folder that it names."""
     suite = read_yaml(path, Suite)
     for name in suite.sets:
         try:
@@ -94,50 +97,52 @@ def read_suite(path: Path, out: Path | None = None) -> Regression:
 
 
 def run_night(regression: Regression, on_step_end: OnStepEnd, on_set: OnSet, accept: Acceptance | None = None) -> Night:
-    """Run all sets of a suite; with `accept`, make what comes out the baseline.
+    """Run all sets of a suite; with `accept`, make their figures the baseline.
 
-    The night's begin and end stand in the history, whatever comes between.
+    The history records begin and end of the night, even if sets fail.
 
     Raises
     ------
     RefusedInput
-        The baseline breaks its format, or something was to be accepted that did not run to its end.
+        The baseline breaks its format, or a set did not run to its end although `accept` is given.
     Fault
-        Another night is under way, or the disk refuses.
+        Another night is running, or the disk refuses.
     """
     suite, out = regression.suite, regression.out
-    baseline, was = read_baseline(regression.baseline), read_steps(regression.baseline)
+    baseline, accepted_steps = read_baseline(regression.baseline), read_steps(regression.baseline)
     with alone(out):
         history = read_history(out)
         name = night_name()
         append(out, NightBegun(night=name, time=_now(), software=SOFTWARE, host=platform.node()))
-        gathered = _Run()
+        gathered = _Gathered()
         judged: list[JudgedSet] = []
         with workspace_of(out).lease():
             good = read_good_steps(out)
             for data_set in suite.sets:
-                known = KnownSteps(was.sets.get(data_set, []), good.get(data_set, []))
+                earlier = EarlierSteps(accepted_steps.sets.get(data_set, []), good.get(data_set, []))
                 accepted = {} if baseline is None else baseline.sets.get(data_set, {})
-                one = _judge_set(
-                    data_set, regression, accepted, known, history, gathered, on_step_end,
+                judged_set = _judge_set(
+                    data_set, regression, accepted, earlier, history, gathered, on_step_end,
                     is_accepted=accept is not None,
                 )  # fmt: skip
-                on_set(one)
-                judged.append(one)
+                on_set(judged_set)
+                judged.append(judged_set)
         judged += _gone(suite, baseline, history)
         accepted_now = None if gathered.problems else accept
         if accepted_now is not None:
             baseline = write_baseline(regression.baseline, accepted_now, gathered.figures, gathered.steps)
         if baseline is not None:
-            better = {one.name for one in judged if accepted_now or not (one.problem or one.count(*BAD))}
-            write_good_steps(out, {**good, **{name: of for name, of in gathered.steps.items() if name in better}})
+            good_names = {s.name for s in judged if accepted_now or not (s.problem or s.count(*BAD))}
+            write_good_steps(
+                out, {**good, **{name: steps for name, steps in gathered.steps.items() if name in good_names}}
+            )
         status = _status(judged, gathered, is_accepted=accept is not None, has_baseline=baseline is not None)
         ended = NightEnded(
             night=name,
             time=_now(),
             status=status,
             accepted=None if accepted_now is None else accepted_now.reason,
-            worse=[f"{one.name}: {figure.name}" for one in judged for figure in one.figures if figure.verdict in BAD],
+            worse=[f"{s.name}: {figure.name}" for s in judged for figure in s.figures if figure.verdict in BAD],
             problems=gathered.problems,
             sets=gathered.figures,
         )
@@ -155,14 +160,14 @@ def _judge_set(
     name: str,
     regression: Regression,
     accepted: Mapping[str, float | None],
-    known: KnownSteps,
+    earlier: EarlierSteps,
     history: History,
-    gathered: _Run,
+    gathered: _Gathered,
     on_step_end: OnStepEnd,
     *,
     is_accepted: bool,
 ) -> JudgedSet:
-    """Run one set; what goes wrong with it does not cost the others."""
+    """Run and judge one set; its failure does not stop the other sets."""
     suite, nights = regression.suite, history.ended[-SHOWN_NIGHTS + 1 :]
     try:
         prepared = prepare(name, suite, regression.path.resolve().parent, regression.out, on_step_end)
@@ -174,39 +179,38 @@ def _judge_set(
     if run.problem is not None:
         gathered.problems[name] = run.problem
 
-    def judged(one: SetRun) -> JudgedSet:
-        figures = judge_figures(name, one.figures, accepted, one.known, suite, nights)
-        return JudgedSet(name, one.problem, figures)
+    def judge(run: SetRun) -> JudgedSet:
+        return JudgedSet(name, run.problem, judge_figures(name, run.figures, accepted, run.truths, suite, nights))
 
-    found = judged(run)
+    judged = judge(run)
     for _ in range(TIMED_AGAIN if run.timed else 0):
-        costly = [f for f in found.figures if f.verdict == "worse" and f.name.startswith(("time.", "memory."))]
+        costly = [f for f in judged.figures if f.verdict == "worse" and f.name.startswith(("time.", "memory."))]
         if run.job is None or not (costly or is_accepted):
             break
-        again = [*run.timed, take_times(run.job, suite.timed_passes)]
-        run = replace(run, timed=again, figures={**run.figures, **cost_figures(again)})
-        found = judged(run)
+        timed = [*run.timed, take_times(run.job, suite.timed_passes)]
+        run = replace(run, timed=timed, figures={**run.figures, **cost_figures(timed)})
+        judged = judge(run)
     gathered.figures[name] = dict(run.figures)
     gathered.steps[name] = [step.accepted for step in run.steps]
     if run.store is None:
-        return found
-    first = first_steps(known, run.steps, run.store)
-    if not first and found.count(*BAD):
-        first = first_steps(KnownSteps(known.accepted), run.steps, run.store)
-    first += costly_steps(found.figures, keeps_most(run.timed), known, run.steps, run.store)
+        return judged
+    first = first_steps(earlier, run.steps, run.store)
+    if not first and judged.count(*BAD):
+        first = first_steps(EarlierSteps(earlier.accepted), run.steps, run.store)
+    first += costly_steps(judged.figures, keeps_most(run.timed), earlier, run.steps, run.store)
     results = {step.name: step.result for step in run.steps}
-    otherwise = sum(results.get(step.step) != step.result for step in known.accepted)
-    pictures, note = difference_pictures(known, results, run.store)
-    return replace(found, first=first, otherwise=otherwise, pictures=pictures, note=note)
+    changed_steps = sum(results.get(step.step) != step.result for step in earlier.accepted)
+    pictures, note = difference_pictures(earlier, results, run.store)
+    return replace(judged, first=first, otherwise=changed_steps, pictures=pictures, note=note)
 
 
 def _gone(suite: Suite, baseline: Baseline | None, history: History) -> list[JudgedSet]:
-    """Sets that the baseline has and the suite has no more: each of their figures is missing."""
+    """Sets of the baseline that the suite no longer has: all of their figures are missing."""
     sets = {} if baseline is None else baseline.sets
     return [
         JudgedSet(
             name,
-            "is no more in the suite",
+            "is no longer in the suite",
             judge_figures(name, {}, figures, {}, suite, history.ended[-SHOWN_NIGHTS + 1 :]),
         )
         for name, figures in sets.items()
@@ -214,12 +218,12 @@ def _gone(suite: Suite, baseline: Baseline | None, history: History) -> list[Jud
     ]
 
 
-def _status(judged: Sequence[JudgedSet], gathered: _Run, *, is_accepted: bool, has_baseline: bool) -> Status:
+def _status(judged: Sequence[JudgedSet], gathered: _Gathered, *, is_accepted: bool, has_baseline: bool) -> Status:
     if gathered.has_fault:
         return 3
     if gathered.problems:
         return 1
-    return 0 if is_accepted or (has_baseline and not any(one.count(*BAD) for one in judged)) else 1
+    return 0 if is_accepted or (has_baseline and not any(judged_set.count(*BAD) for judged_set in judged)) else 1
 
 
 def _result(
@@ -232,7 +236,8 @@ def _result(
         software=SOFTWARE,
         sets=judged,
         accepted=[
-            Accepted(one.reason, one.date, one.by, one.software) for one in (baseline.accepted if baseline else [])
+            Accepted(entry.reason, entry.date, entry.by, entry.software)
+            for entry in (baseline.accepted if baseline else [])
         ],
         nights=[night.time for night in nights],
         notes=_notes(regression.suite, history, ended),
@@ -241,15 +246,17 @@ def _result(
 
 
 def _notes(suite: Suite, history: History, ended: NightEnded) -> list[str]:
-    notes = [f"The night of {_minute(night.time)} began and did not end." for night in history.unfinished[-5:]]
+    notes = [
+        f"The night of {_minute(night.time)} began and did not end." for night in history.unfinished[-SHOWN_NOTES:]
+    ]
     if suite.every_hours is not None:
-        known = replace(history, ended=[*history.ended[-SHOWN_NIGHTS:], ended])
+        recent = replace(history, ended=[*history.ended[-SHOWN_NIGHTS:], ended])
         notes += [
-            f"No night between {_minute(one)} and {_minute(other)}, expected one every {suite.every_hours:g} h."
-            for one, other in gaps(known, timedelta(hours=suite.every_hours))[-5:]
+            f"No night between {_minute(before)} and {_minute(after)}, expected one every {suite.every_hours:g} h."
+            for before, after in gaps(recent, timedelta(hours=suite.every_hours))[-SHOWN_NOTES:]
         ]
     if history.damaged:
-        lines = ", ".join(map(str, history.damaged[-5:]))
+        lines = ", ".join(map(str, history.damaged[-SHOWN_NOTES:]))
         notes.append(f"Damaged lines of the history were left out: {lines}.")
     return notes
 

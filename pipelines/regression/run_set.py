@@ -1,4 +1,4 @@
-"""A data set through the engine's cache, and through an empty one for its time."""
+"""Run a data set with the cache of the suite, and with an empty cache to take its times."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,17 +18,17 @@ from pipelines.regression.sets import PreparedSet
 
 @dataclass(frozen=True)
 class SetRun:
-    """What a data set came to."""
+    """The outcome of a data set."""
 
     problem: str | None = None
     """Why it was not run to its end."""
     is_fault: bool = False
     figures: Mapping[str, float | None] = field(default_factory=dict)
-    known: Mapping[str, float] = field(default_factory=dict)
-    """True measures of the foot by name."""
+    truths: Mapping[str, float] = field(default_factory=dict)
+    """True measures of the foot, mm, by name."""
     steps: Sequence[PresentStep] = ()
     timed: Sequence[Sequence[Pass]] = ()
-    """The passes of each process that was timed."""
+    """Passes of each timed process."""
     job: Job | None = None
     store: Store | None = None
 
@@ -39,30 +39,30 @@ def run_set(prepared: PreparedSet, passes: int, on_step_end: OnStepEnd) -> SetRu
     Raises
     ------
     Fault
-        The process that is timed died.
+        The timed process died.
     """
     job = prepared.job
     planned = plan_job(job)
     [end] = run_job(planned, Threads(job.threads), on_step_end)
     if planned.refused:
-        return SetRun(problem=end.problem, known=prepared.known)
-    again = plan_job(job)
-    steps, outcomes = _outcomes(prepared, again)
-    again.workspace.close()
-    store = Store(again.workspace.store.files)  # what follows reads a few results once
+        return SetRun(problem=end.problem, truths=prepared.truths)
+    planned_again = plan_job(job)
+    steps, outcomes = _outcomes(prepared, planned_again)
+    planned_again.workspace.close()
+    store = Store(planned_again.workspace.store.files)  # few results are read, each once
     present = present_steps(steps, outcomes)
     figures = _figures(end, steps, outcomes, store)
-    figures |= {"steps.all": len(steps), "steps.run_again": again.to_run}
+    figures |= {"steps.all": len(steps), "steps.run_again": planned_again.to_run}
     timed = [take_times(job, passes)] if passes and end.problem is None else []
     if timed:
         results = {step.name: step.result for step in present}
         figures |= {"steps.unsteady": len(unsteady(timed, results)), **cost_figures(timed)}
     is_fault = end.kind in {"fault", "damaged"}
-    return SetRun(end.problem, is_fault, figures, prepared.known, present, timed, job, store)
+    return SetRun(end.problem, is_fault, figures, prepared.truths, present, timed, job, store)
 
 
 def _outcomes(prepared: PreparedSet, planned: PlannedJob) -> tuple[list[Step], dict[str, Outcome]]:
-    """All steps of a set that has been run, those that filmed it first, and what they came to."""
+    """All steps of a set that has been run, beginning with those that filmed it, and their outcomes."""
     [folder] = prepared.job.folders
     steps = draw_steps(read_scan(folder, prepared.job.archive_of(folder)), planned)
     plan = planned.workspace.plan(steps)
@@ -73,7 +73,7 @@ def _outcomes(prepared: PreparedSet, planned: PlannedJob) -> tuple[list[Step], d
 def _figures(
     end: ScanEnd, steps: Sequence[Step], outcomes: Mapping[str, Outcome], store: Store
 ) -> dict[str, float | None]:
-    """The figures of the documents and shapes that there are, and of the files that were delivered."""
+    """Figures of the documents, shapes and delivered files of a scan, as far as they exist."""
     if end.folder is None:
         return {}
     documents: dict[str, bytes] = {}

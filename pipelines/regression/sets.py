@@ -1,4 +1,4 @@
-"""The data sets of a suite as jobs of the engine; virtual ones are filmed and calibrated first."""
+"""Data sets of a suite as jobs of the engine; virtual sets are filmed and calibrated first."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -24,25 +24,25 @@ from schemas.parameters.virtual_scan import VirtualScan
 from schemas.regression import Suite
 
 OF_A_RECORDING = SimulationSettings().model_dump(include={"seed", "start_mm", "step_mm", "frames", "ambient"})
-"""What differs from recording to recording: a scanner is calibrated once, in ordinary light."""
+"""Settings of a single recording, at their defaults: a scanner is calibrated once, in ordinary light."""
 
 
 @dataclass(frozen=True)
 class PreparedSet:
-    """A data set that can be run."""
+    """A data set that is ready to run."""
 
     name: str
     job: Job
-    known: Mapping[str, float] = field(default_factory=dict)
-    """True measures of the foot by name, as far as they are known."""
+    truths: Mapping[str, float] = field(default_factory=dict)
+    """True measures of the foot, mm, by name, as far as they are known."""
     filming: Sequence[Step] = ()
     """The steps that filmed it."""
     outcomes: Mapping[str, Outcome] = field(default_factory=dict)
-    """Theirs, by name."""
+    """Outcomes of these steps, by name."""
 
 
 def prepare(name: str, suite: Suite, base: Path, out: Path, on_step_end: OnStepEnd) -> PreparedSet:
-    """The data set `name` of a suite.
+    """Prepare the data set `name` of a suite.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def prepare(name: str, suite: Suite, base: Path, out: Path, on_step_end: OnStepE
     Raises
     ------
     Fault
-        It could not be filmed.
+        The set could not be filmed.
     """
     data_set = suite.sets[name]
     parameters = parameters_of(name, suite)
@@ -64,7 +64,7 @@ def prepare(name: str, suite: Suite, base: Path, out: Path, on_step_end: OnStepE
 
 
 def parameters_of(name: str, suite: Suite) -> ScanParameters:
-    """Those of the suite with the set's own in their place; RefusedInput where they break a model."""
+    """The parameters of the suite, overridden by those of the set; RefusedInput if they break a model."""
     values: dict[str, Any] = suite.parameters.model_dump(mode="json")
     for section, changed in suite.sets[name].parameters.items():
         values[section] = {**values.get(section, {}), **changed}
@@ -75,7 +75,7 @@ def parameters_of(name: str, suite: Suite) -> ScanParameters:
 
 
 def workspace_of(out: Path) -> Workspace:
-    """Where all sets of a suite run, and keep what was computed."""
+    """The workspace in which all sets of a suite run, with their cache."""
     return Workspace(out / "cache")
 
 
@@ -84,12 +84,12 @@ def _virtual(
 ) -> PreparedSet:
     films = out / "films"
     scan = films / PATIENT / name
-    once = virtual.settings.model_copy(update=OF_A_RECORDING)
-    capture = films / "captures" / sha256(canonical_json(once.model_dump(mode="json")).encode())[:12]
+    scanner_settings = virtual.settings.model_copy(update=OF_A_RECORDING)
+    capture = films / "captures" / sha256(canonical_json(scanner_settings.model_dump(mode="json")).encode())[:12]
     film = Step(
         name, "film", "pipelines.regression.film", virtual, places={"folder": scan}, writes=scan / SCAN_FILE
     )  # fmt: skip
-    filming = [film, *filmed_calibration_steps(name, capture, once)]
+    filming = [film, *filmed_calibration_steps(name, capture, scanner_settings)]
     with workspace_of(out) as workspace:
         outcomes = workspace.run(filming, Threads(1), on_step_end)
         digests = digests_by_kind(filming, outcomes)

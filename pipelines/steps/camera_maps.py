@@ -1,4 +1,4 @@
-"""A calibration to the one with the maps of some cameras alone."""
+"""A calibration reduced to the maps of some cameras."""
 
 import json
 from collections.abc import Mapping

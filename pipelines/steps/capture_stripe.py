@@ -17,8 +17,14 @@ from schemas.parameters.extraction import ExtractionParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: ExtractionParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: the `film`, with the digests of the filmed files by name where another step filmed it; `places`: the
-    `film`, and the `capture` document."""
+    """Find the stripe in each frame of one camera.
+
+    Parameters
+    ----------
+    inputs : the `film`; empty, or the digests of all files by name where another step filmed them, and the `file`
+    parameters : ExtractionParameters
+    places : the `film`, and the `capture` document
+    """
     if inputs["film"]:
         _check_filmed(places["film"], json.loads(inputs["film"]), places["capture"])
     film = open_film(places["film"])

@@ -1,4 +1,4 @@
-"""The points of all cameras without outliers, with the count of what was removed and why."""
+"""The points of all cameras without outliers, with the number of removed points by reason."""
 
 import json
 from collections.abc import Mapping

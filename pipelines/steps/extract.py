@@ -31,7 +31,7 @@ def run(inputs: Mapping[str, bytes], parameters: ExtractionParameters, places: M
 
 
 def _frames(array: Path, manifest: FrameManifest) -> Iterator[Rgb | None]:
-    """The frames of an array; one that is found damaged is ingested anew."""
+    """The frames of an array; a damaged array is discarded, so that the next run ingests it again."""
     try:
         yield from read_frames(array, manifest)
     except DamagedError:
@@ -40,7 +40,7 @@ def _frames(array: Path, manifest: FrameManifest) -> Iterator[Rgb | None]:
 
 
 def _noting_lost(frames: Iterator[Rgb | None], lost: list[int]) -> Iterator[Rgb | None]:
-    """The same frames; the numbers of those that cannot be had are added to `lost`."""
+    """The same frames; the numbers of lost ones are added to `lost`."""
     for number, frame in enumerate(frames):
         if frame is None:
             lost.append(number)
@@ -48,7 +48,7 @@ def _noting_lost(frames: Iterator[Rgb | None], lost: list[int]) -> Iterator[Rgb 
 
 
 def _backgrounds(array: Path, manifest: FrameManifest, count: int) -> Iterator[Rgb | None]:
-    """The laser-off frame of each of `count` frames; where there is but one, it stands for all."""
+    """The laser-off frame of each of `count` frames; a single one is used for all."""
     backgrounds = _frames(array, manifest)
     if len(manifest.frames) == count:
         return backgrounds

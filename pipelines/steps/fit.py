@@ -1,4 +1,4 @@
-"""What one camera recognises, and the poses of the object, to the calibration of this camera."""
+"""The recognised edges of one camera and the poses of the object to the calibration of this camera."""
 
 import json
 from collections.abc import Mapping
@@ -17,8 +17,8 @@ from schemas.reference import ReferenceObject
 
 
 def run(inputs: Mapping[str, bytes], parameters: CalibrationParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: the `reference` object, its `poses`, the `camera`, its `stripe`, what is `recognised`; `places`: the
-    `capture` document. The result holds nothing where the camera does not recognise the object."""
+    """`inputs`: the `reference` object, its `poses`, the `camera`, its `stripe`, and `recognised`; `places`: the
+    `capture` document. The result is empty if the camera does not recognise the object."""
     camera = json.loads(inputs["camera"])["id"]
     _, recognised = seen_by(camera, unpack(inputs["stripe"]), unpack(inputs["recognised"]))
     if isinstance(recognised, str):

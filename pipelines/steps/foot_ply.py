@@ -1,4 +1,4 @@
-"""The mesh as foot.ply, with all that is known of its vertices."""
+"""The mesh as foot.ply, with all attributes of its vertices."""
 
 import json
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The points of all cameras to one cloud, with how well the cameras agree."""
+"""The points of all cameras to one cloud, with the agreement of the cameras."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,9 +1,9 @@
-"""The poses of the reference object, where every camera sees it from the side on which it stands."""
+"""The poses of the reference object, refused unless every camera sees it from the side on which the camera stands."""
 
 from collections.abc import Mapping
 from pathlib import Path
 
-from footscan.calibration.capture.as_arrays import seen_of
+from footscan.calibration.capture.as_arrays import camera_views_of
 from footscan.calibration.capture.refused_capture import refuse_contradictions
 from pipelines.arrays import unpack
 
@@ -17,6 +17,6 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
         A camera sees the object from another side.
     """
     del parameters
-    seen = seen_of({name: unpack(data) for name, data in inputs.items() if name != "poses"})
+    seen = camera_views_of({name: unpack(data) for name, data in inputs.items() if name != "poses"})
     refuse_contradictions(seen.recognised, str(places["capture"]))
     return inputs["poses"]

@@ -1,11 +1,11 @@
-"""What all cameras recognise to the poses in which the reference object stood."""
+"""The recognised edges of all cameras to the poses in which the reference object stood."""
 
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from footscan.calibration.capture.as_arrays import seen_of
+from footscan.calibration.capture.as_arrays import camera_views_of
 from footscan.calibration.capture.from_capture import object_poses
 from footscan.calibration.capture.reference import edges_of
 from footscan.calibration.capture.refused_capture import check_placements, refuse_unrecognised
@@ -20,10 +20,10 @@ def run(inputs: Mapping[str, bytes], parameters: PlacementParameters, places: Ma
     Raises
     ------
     RefusedCapture
-        The object stood elsewhere than said, or no camera recognises it.
+        The object was wrongly placed, or no camera recognises it.
     """
     reference = ReferenceObject.model_validate_json(inputs["reference"])
-    seen = seen_of({name: unpack(data) for name, data in inputs.items() if name != "reference"})
+    seen = camera_views_of({name: unpack(data) for name, data in inputs.items() if name != "reference"})
     edges, placements = edges_of(reference.profile_mm), np.array(reference.placements_mm, np.float64)
     source = str(places["capture"])
     check_placements(seen.views, seen.recognised, edges, placements, parameters.placement_tolerance_mm, source)

@@ -1,4 +1,4 @@
-"""What is known of a scan's quality, as quality.json."""
+"""The quality of a scan, as quality.json."""
 
 import json
 from collections.abc import Mapping

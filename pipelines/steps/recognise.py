@@ -21,5 +21,5 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     mounting = mounting_of_signs(camera["mounting"])
     view = view_of(camera["id"], unpack(inputs["stripe"]), mounting)
     placements = np.array(reference.placements_mm, np.float64)
-    found = recognise_view(view, edges_of(reference.profile_mm), placements)
-    return pack(**recognised_arrays(found, mounting))
+    recognised = recognise_view(view, edges_of(reference.profile_mm), placements)
+    return pack(**recognised_arrays(recognised, mounting))

@@ -9,7 +9,8 @@ import numpy as np
 from footscan.frames.array import discard
 from footscan.frames.reader import read_frame
 from footscan.report.sample_frames import FrameSample
-from footscan.report.scan.page import scan_page
+from footscan.report.scan.foot_colours import FootSurface
+from footscan.report.scan.page import ScanPoints, ScanTitle, scan_page
 from footscan.stripe.points import StripePoints
 from pipelines.arrays import unpack
 from schemas.base.errors import DamagedError
@@ -20,7 +21,7 @@ from schemas.parameters.foot import FootParameters
 from schemas.quality import Quality
 
 FRAMES_SHOWN = 12
-"""Along the travel, of each camera."""
+"""Frames of each camera along the travel that the page shows; chosen by hand."""
 
 
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
@@ -31,21 +32,23 @@ def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping
     about = json.loads(inputs["about"])
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
     page = scan_page(
-        patient=about["patient"],
-        scan=about["scan"],
-        side=parameters.side,
-        vertices=surface["vertices"],
-        faces=surface["faces"],
-        filled=surface.get("filled"),
-        cut_mm=surface["cut_mm"].item() if "cut_mm" in surface else None,
-        points=np.concatenate([unpack(inputs[f"points-{camera}"])["points"] for camera in ids]),
-        codes=unpack(inputs["clean"])["codes"],
-        cloud=unpack(inputs["oriented"])["cloud"],
+        title=ScanTitle(about["patient"], about["scan"], parameters.side),
+        surface=FootSurface(
+            vertices=surface["vertices"],
+            faces=surface["faces"],
+            filled=surface.get("filled"),
+            cut_mm=surface["cut_mm"].item() if "cut_mm" in surface else None,
+            truth_distance=unpack(inputs["verified"])["vertex_distance"] if "verified" in inputs else None,
+        ),
+        points=ScanPoints(
+            points=np.concatenate([unpack(inputs[f"points-{camera}"])["points"] for camera in ids]),
+            codes=unpack(inputs["clean"])["codes"],
+            cloud=unpack(inputs["oriented"])["cloud"],
+        ),
         measures=Measures.model_validate_json(inputs["measures"]),
         quality=Quality.model_validate_json(inputs["quality"]),
         calibration=Calibration.model_validate_json(inputs["calibration"]),
         samples=_samples(ids, inputs, places),
-        truth_distance=unpack(inputs["verified"])["vertex_distance"] if "verified" in inputs else None,
         provenance=about["provenance"],
     )
     return page.encode()

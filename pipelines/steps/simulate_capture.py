@@ -1,4 +1,4 @@
-"""The reference object, filmed by the virtual scanner; the result are the digests of the capture's files."""
+"""The reference object, filmed by the virtual scanner; the result is the digests of the capture's files."""
 
 import hashlib
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from schemas.parameters.simulation import SimulationSettings
 from schemas.reference import ReferenceObject
 
 PLACEMENTS = 5
-"""They fill the volume."""
+"""Number of placements that are filmed, enough to fill the measured volume."""
 
 
 def run(inputs: Mapping[str, bytes], parameters: SimulationSettings, places: Mapping[str, Path]) -> bytes:

@@ -1,4 +1,4 @@
-"""The parametric foot, filmed by the virtual scanner; the result is what is known of the foot."""
+"""The parametric foot, filmed by the virtual scanner; the result is the true measures of the foot."""
 
 import json
 from collections.abc import Mapping
@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.virtual.filming.record import record_scan
+from footscan.virtual.filming.record import ScanName, record_scan
 from footscan.virtual.foot.foot import make_foot
+from footscan.virtual.optics.scene import Mesh
 from footscan.virtual.stage.standing import stand_in_the_middle
 from schemas.parameters.demo import FilmedFoot
 
@@ -17,12 +18,9 @@ def run(inputs: Mapping[str, bytes], parameters: FilmedFoot, places: Mapping[str
     del inputs
     foot = make_foot(side=parameters.side)
     record_scan(
-        stand_in_the_middle(foot.vertices, parameters.settings),
-        foot.faces.astype(np.int64),
+        Mesh(stand_in_the_middle(foot.vertices, parameters.settings), foot.faces.astype(np.int64)),
         places["folder"],
-        patient=parameters.patient,
-        scan=parameters.scan,
-        side=parameters.side,
-        settings=parameters.settings,
+        ScanName(parameters.patient, parameters.scan, parameters.side),
+        parameters.settings,
     )
     return (json.dumps(foot.measures, indent=2, sort_keys=True) + "\n").encode()

@@ -15,7 +15,7 @@ def run(inputs: Mapping[str, bytes], parameters: SurfaceParameters, places: Mapp
     del places
     oriented = unpack(inputs["oriented"])
     mesh = surface_of_cloud(oriented["cloud"], oriented["normals"], parameters)
-    known = {"normals": mesh.normals, "camera": mesh.camera, "filled": mesh.filled}
+    optional = {"normals": mesh.normals, "camera": mesh.camera, "filled": mesh.filled}
     cut = {"cut_mm": np.array(float(mesh.metadata["cut_mm"]))} if "cut_mm" in mesh.metadata else {}
-    given = {name: values for name, values in known.items() if values is not None}
-    return pack(vertices=mesh.vertices, faces=mesh.faces, **given, **cut)
+    attributes = {name: values for name, values in optional.items() if values is not None}
+    return pack(vertices=mesh.vertices, faces=mesh.faces, **attributes, **cut)

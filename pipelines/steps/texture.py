@@ -14,16 +14,16 @@ from schemas.calibration import Calibration
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
     """`inputs`: `surface`, the `calibration` of all cameras, `points-N` and `colours-N` of each that has colours.
 
-    There are no `colours` where no point has one.
+    The result has no `colours` if no point has a colour.
     """
     del parameters, places
     surface = unpack(inputs["surface"])
     views = views_of(Calibration.model_validate_json(inputs["calibration"]).cameras)
     points, colours = [], []
     for name in sorted((name for name in inputs if name.startswith("colours-")), key=lambda name: int(name[8:])):
-        found = unpack(inputs[name])
-        points.append(unpack(inputs[f"points-{name[8:]}"])["points"][found["seen"]])
-        colours.append(found["colours"][found["seen"]])
+        of_camera = unpack(inputs[name])
+        points.append(unpack(inputs[f"points-{name[8:]}"])["points"][of_camera["seen"]])
+        colours.append(of_camera["colours"][of_camera["seen"]])
     if not any(map(len, points)):
         return pack()
     colours_of_vertices = vertex_colours(

@@ -1,4 +1,4 @@
-"""Distances of the surface to the scan's reference model; the lid where the leg is cut is no skin, and left out."""
+"""Distances of the surface to the scan's reference model; the flat cut of the leg is no skin and left out."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,1 +1,1 @@
-"""The search for better parameters: what is tried, how it is judged, what came out."""
+"""The search for better parameters: trials, objectives, results."""

@@ -1,4 +1,4 @@
-"""Scans under other parameters: the steps that lead to their figures, through the engine's cache."""
+"""Scans with trial parameters: the steps that lead to their figures, run through the cache of the engine."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,58 +16,60 @@ from schemas.parameters.scan import ScanParameters
 from schemas.quality import Quality
 
 OWN = "tune/"
-"""Before the names of the steps: what a trial runs does not become the last that was run of a scan."""
+"""Prefix of the names of the steps, so that a trial does not count as the last run of a scan."""
 OF_TRUTH = {"completeness", "false_points"}
-"""Objectives that the step `judge` is for."""
+"""Objectives that need the step `judge`."""
 
 
 @dataclass(frozen=True)
 class Bench:
-    """Where sets of parameters are tried."""
+    """The means by which sets of parameters are tried."""
 
     planned: PlannedJob
     pool: Pool
     on_step_end: OnStepEnd
     goals: frozenset[str]
-    """Names of the objectives: nothing runs that none of them asks for."""
+    """Names of the objectives; only steps that they need are run."""
     clock: Clock
 
     def judge(
         self, parameters: ScanParameters, scans: Sequence[RecordedScan]
     ) -> tuple[dict[str, Judged], dict[str, float]]:
-        """What becomes of scans with these parameters.
+        """Judge scans with these parameters.
 
         Returns
         -------
         judged : dict
-            Figures, or the problem, of each scan by its name.
+            Figures or problem of each scan, by its name.
         seconds : dict
-            How long the steps took that were run for it, by the key of their action.
+            Times of the steps that were run, by the key of their action.
 
         Raises
         ------
         Fault
-            Nothing came out of any scan, by a fault of the machine.
+            All scans failed by a fault of the machine.
         """
         judged: dict[str, Judged] = {}
         seconds: dict[str, float] = {}
         at_once = WINDOW * self.pool.count
         for first in range(0, len(scans), at_once):
-            some, noted = self._judge_together(parameters, scans[first : first + at_once])
-            judged |= some
-            seconds |= noted
-        faults = [one.problem for one in judged.values() if one.kind == "fault"]
+            batch, batch_seconds = self._judge_together(parameters, scans[first : first + at_once])
+            judged |= batch
+            seconds |= batch_seconds
+        faults = [scan.problem for scan in judged.values() if scan.kind == "fault"]
         if faults and len(faults) == len(judged):
             raise Fault(str(faults[0]))
         return judged, seconds
 
     def results(self, parameters: ScanParameters, scan: RecordedScan) -> dict[str, bytes]:
-        """What the steps of a scan come to, as far as the filter of outliers, by kind and camera (`extract-1`); what
-        has failed is left out."""
+        """Results of the steps of a scan up to the filter of outliers, by kind and camera (`extract-1`).
+
+        Steps that failed are left out.
+        """
         steps = self._steps(parameters, scan, {"clean"})
         outcomes = self._run(steps)
-        read = {step.name.rpartition("/")[2]: self._read(step.name, outcomes) for step in steps}
-        return {name: result for name, result in read.items() if result is not None}
+        results = {step.name.rpartition("/")[2]: self._read(step.name, outcomes) for step in steps}
+        return {name: result for name, result in results.items() if result is not None}
 
     def _judge_together(
         self, parameters: ScanParameters, scans: Sequence[RecordedScan]
@@ -88,15 +90,15 @@ class Bench:
         return judged, seconds
 
     def _steps(self, parameters: ScanParameters, scan: RecordedScan, kinds: set[str]) -> list[Step]:
-        """The steps of a scan that lead to those of some kinds, under names of their own."""
+        """The steps of a scan that lead to those of `kinds`, with the prefix `OWN`."""
         job = replace(self.planned.job, parameters=parameters)
         steps = draw_steps(scan, replace(self.planned, job=job))
         if scan.truth is not None:
             truth = source_files(scan.truth, self.planned.workspace.digests)
-            made = {"oriented": Output(f"{scan.name}/orient"), "surface": Output(f"{scan.name}/surface")}
+            computed = {"oriented": Output(f"{scan.name}/orient"), "surface": Output(f"{scan.name}/surface")}
             places = {"truth": scan.truth}
             steps.append(
-                Step(scan.name, "judge", "pipelines.tuning.judge", None, {**made, "truth": truth}, places=places)
+                Step(scan.name, "judge", "pipelines.tuning.judge", None, {**computed, "truth": truth}, places=places)
             )
         return _leading_to(kinds, steps)
 
@@ -115,22 +117,22 @@ class Bench:
             self._read(f"{OWN}{scan}/{kind}", outcomes) for kind in ("quality", "judge", "measure")
         )
         if quality is None:
-            return Judged(problem=f"{scan}: its quality is damaged, run again to make it anew", kind="fault")
+            return Judged(problem=f"{scan}: the stored quality is damaged, run again to compute it anew", kind="fault")
         figures = figures_of(Quality.model_validate_json(quality), shares)
         if "time" in self.goals:
             figures["time"] = self.clock.of(steps, outcomes, self.planned.workspace.store)
         return Judged(figures, {} if measures is None else lengths_of(Measures.model_validate_json(measures)))
 
     def _read(self, step: str, outcomes: Mapping[str, Outcome]) -> bytes | None:
-        """A step's result; None where it has none, or there is no such step."""
+        """The result of a step; None if it has none, or the step does not exist."""
         outcome = outcomes.get(step)
         return self.planned.workspace.store.get(outcome.digest) if isinstance(outcome, Success) else None
 
 
 def _leading_to(kinds: set[str], steps: Sequence[Step]) -> list[Step]:
-    """Those of the steps, under names of their own, that the results of some kinds rest on."""
+    """The steps that the results of `kinds` depend on, with the prefix `OWN`."""
     needed: set[str] = set()
-    found: list[Step] = []
+    leading: list[Step] = []
     for step in reversed(steps):
         if step.kind not in kinds and step.name not in needed:
             continue
@@ -140,5 +142,5 @@ def _leading_to(kinds: set[str], steps: Sequence[Step]) -> list[Step]:
             name: Output(OWN + source.step) if isinstance(source, Output) else source
             for name, source in step.inputs.items()
         }
-        found.append(step._replace(scan=OWN + step.scan, inputs=inputs))
-    return found[::-1]
+        leading.append(step._replace(scan=OWN + step.scan, inputs=inputs))
+    return leading[::-1]

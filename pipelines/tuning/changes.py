@@ -1,4 +1,4 @@
-"""The frames in which two sets of parameters keep the most different points."""
+"""The frames in which the points kept with two sets of parameters differ most."""
 
 from collections.abc import Mapping, Sequence
 
@@ -18,29 +18,29 @@ from schemas.frames import FrameManifest
 from schemas.parameters.scan import ScanParameters
 
 SCANS, FRAMES = 3, 8
-"""How many scans are looked through, and how many frames are shown."""
+"""Number of scans that are searched, and of frames that are shown; chosen by hand."""
 APART = 5
-"""Frames of a film that are nearer look alike: only one of them is shown."""
+"""Least distance of two frames shown of a film, since neighbouring frames look alike; chosen by hand."""
 
 
 def frame_changes(
     bench: Bench, present: ScanParameters, winner: ScanParameters, scans: Sequence[RecordedScan]
 ) -> list[FrameChange]:
-    """The frames of the first few scans in which the points that are kept differ most, the greatest change first."""
-    found: list[tuple[float, int, RecordedScan, int, int]] = []
+    """Find the frames of the first `SCANS` scans in which the kept points differ most; the greatest change first."""
+    candidates: list[tuple[float, int, RecordedScan, int, int]] = []
     results = {}
     for place, scan in enumerate(scans[:SCANS]):
         pair = bench.results(present, scan), bench.results(winner, scan)
-        kept = [_kept(made, scan) for made in pair]
+        kept = [_kept(step_results, scan) for step_results in pair]
         for camera in sorted(kept[0]):
             if f"ingest-{camera}" not in pair[0]:
                 continue
             manifest = FrameManifest.model_validate_json(pair[0][f"ingest-{camera}"])
             results[scan.name, camera] = manifest, kept[0][camera], kept[1][camera]
             change = change_by_frame(kept[0][camera], kept[1][camera], len(manifest.frames))
-            found += [(-c, place, scan, camera, frame) for frame, c in enumerate(change.tolist()) if c]
+            candidates += [(-c, place, scan, camera, frame) for frame, c in enumerate(change.tolist()) if c]
     shown: list[FrameChange] = []
-    for _, _, scan, camera, frame in sorted(found, key=lambda one: (one[0], one[1], one[3], one[4])):
+    for _, _, scan, camera, frame in sorted(candidates, key=lambda row: (row[0], row[1], row[3], row[4])):
         if len(shown) == FRAMES:
             break
         if any((s.scan, s.camera) == (scan.name, camera) and abs(s.frame - frame) < APART for s in shown):
@@ -49,7 +49,7 @@ def frame_changes(
         array = next(scan.array(film) for film in scan.document.cameras if film.id == camera)
         try:
             image = read_frame(array, manifest, frame)
-        except DamagedError:  # a picture less; the next run ingests it anew
+        except DamagedError:  # it is not shown; the next run ingests it anew
             continue
         if image is not None:
             shown.append(
@@ -58,22 +58,22 @@ def frame_changes(
     return shown
 
 
-def _kept(made: Mapping[str, bytes], scan: RecordedScan) -> dict[int, StripePoints]:
-    """The stripe points of each camera that the filter of outliers left, by camera."""
-    codes = unpack(made["clean"])["codes"] if "clean" in made else None
+def _kept(results: Mapping[str, bytes], scan: RecordedScan) -> dict[int, StripePoints]:
+    """Stripe points that the filter of outliers kept, by camera; `results` as of `Bench.results`."""
+    codes = unpack(results["clean"])["codes"] if "clean" in results else None
     kept: dict[int, StripePoints] = {}
     first = 0
     for camera in sorted(film.id for film in scan.document.cameras):
-        if f"map-{camera}" not in made or codes is None:
+        if f"map-{camera}" not in results or codes is None:
             kept[camera] = np.zeros(0, STRIPE_DTYPE)
             continue
-        points = unpack(made[f"map-{camera}"])["points"]
+        points = unpack(results[f"map-{camera}"])["points"]
         stay = points[codes[first : first + len(points)] == KEPT]
-        kept[camera] = unpack(made[f"extract-{camera}"])["stripe"][stay["source"]]
+        kept[camera] = unpack(results[f"extract-{camera}"])["stripe"][stay["source"]]
         first += len(points)
     return kept
 
 
 def _places(points: StripePoints, frame: int) -> NDArray[np.float64]:
-    there = points[points["frame"] == frame]
-    return np.column_stack([there["i"], there["j"]])
+    of_frame = points[points["frame"] == frame]
+    return np.column_stack([of_frame["i"], of_frame["j"]])

@@ -1,4 +1,4 @@
-"""How long steps take, whenever it was that they ran."""
+"""Times of steps, including those that ran earlier."""
 
 import importlib
 import threading
@@ -16,25 +16,25 @@ from pipelines.engine.store.store import Store
 
 @dataclass
 class Clock:
-    """Counts the steps that run, and notes how long each takes."""
+    """Counts the steps that run, and records their times."""
 
     seconds: dict[str, float]
-    """By the key of its action; of earlier runs, too."""
+    """Time of each step by the key of its action, including earlier runs."""
     ran: Counter[str] = field(default_factory=Counter)
-    """Steps that ran, by kind."""
+    """Number of steps that ran, by kind."""
     _lasted: dict[str, float] = field(default_factory=dict)
-    """Of steps that have just run, by name."""
+    """Times of the steps that have just run, by name."""
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def on_step_end(self, end: StepEnd) -> None:
-        """Hears that a step has ended."""
+        """Record the end of a step."""
         with self._lock:
             if end.ran:
                 self.ran[end.step.kind] += 1
                 self._lasted[end.step.name] = end.seconds
 
     def note(self, steps: Sequence[Step], outcomes: Mapping[str, Outcome]) -> dict[str, float]:
-        """Keep how long those of the steps took that have just run; returns it."""
+        """Keep the times of the steps that have just run, and return them by the key of their action."""
         noted: dict[str, float] = {}
         for step in steps:
             lasted = self._lasted.pop(step.name, None)
@@ -44,7 +44,7 @@ class Clock:
         return noted
 
     def of(self, steps: Sequence[Step], outcomes: Mapping[str, Outcome], store: Store) -> float:
-        """What steps take, added up; one whose result is known, but not how long it took, is run again for that."""
+        """Sum of the times of steps; a step with a stored result but unknown time is run again to time it."""
         total = 0.0
         for step in steps:
             digests = _inputs(step, outcomes)
@@ -58,7 +58,7 @@ class Clock:
 
 
 def _inputs(step: Step, outcomes: Mapping[str, Outcome]) -> dict[str, str] | None:
-    """Digests of what a step takes; None where one of the steps before it has failed."""
+    """Digests of the inputs of a step; None if a step before it has failed."""
     digests: dict[str, str] = {}
     for name, source in step.inputs.items():
         if not isinstance(source, Output):

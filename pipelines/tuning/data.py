@@ -1,4 +1,4 @@
-"""Which scans decide a search, and which test its winner."""
+"""Choice of the scans that decide a search, and of those that test its winner."""
 
 import difflib
 from collections.abc import Sequence
@@ -13,8 +13,10 @@ from schemas.tuning import Tuning
 
 
 def may_be_meant(folder: Path, job: Job, tuning: Tuning) -> bool:
-    """Whether a search is about the scan in a folder, or about one whose name cannot be read: of no other the films are
-    looked at."""
+    """True if a search may include the scan in a folder: its name fits, or cannot be read.
+
+    The films of other scans are not read.
+    """
     patterns = [*tuning.data, *(tuning.held_out if isinstance(tuning.held_out, list) else [])]
     try:
         name = read_scan(folder, job.archive_of(folder)).name
@@ -24,37 +26,40 @@ def may_be_meant(folder: Path, job: Job, tuning: Tuning) -> bool:
 
 
 def split(scans: Sequence[RecordedScan], tuning: Tuning) -> tuple[list[RecordedScan], list[RecordedScan]]:
-    """The scans that decide, and those that are held out.
+    """Split scans into those that decide and those that are held out.
 
     Raises
     ------
     RefusedInput
-        A pattern fits no scan, or no scan is left to decide.
+        A pattern fits no scan, or all scans are held out.
     """
-    meant = _fitting(scans, tuning.data, "tune.data")
+    included = _fitting(scans, tuning.data, "tune.data")
     if isinstance(tuning.held_out, list):
         held_out = _fitting(scans, tuning.held_out, "tune.held_out")
     else:
-        held_out = _drawn(meant, tuning.held_out or 0.0, tuning.seed)
+        held_out = _drawn(included, tuning.held_out or 0.0, tuning.seed)
     names = {scan.name for scan in held_out}
-    data = [scan for scan in meant if scan.name not in names]
+    data = [scan for scan in included if scan.name not in names]
     if not data:
-        raise RefusedInput("tune.held_out", "holds all scans out, expected some that decide")
+        raise RefusedInput("tune.held_out", "holds all scans out, expected to leave some that decide")
     return data, held_out
 
 
 def _fitting(scans: Sequence[RecordedScan], patterns: Sequence[str], field: str) -> list[RecordedScan]:
     for pattern in patterns:
         if not any(fnmatchcase(scan.name, pattern) for scan in scans):
-            near = difflib.get_close_matches(pattern, [scan.name for scan in scans], n=1)
-            hint = f"did you mean {near[0]!r}?" if near else "expected PATIENT/SCAN"
+            similar = difflib.get_close_matches(pattern, [scan.name for scan in scans], n=1)
+            hint = f"did you mean {similar[0]!r}?" if similar else "expected PATIENT/SCAN"
             raise RefusedInput(field, f"no scan that can be read is called {pattern[:80]!r}, {hint}")
     return [scan for scan in scans if any(fnmatchcase(scan.name, pattern) for pattern in patterns)]
 
 
 def _drawn(scans: Sequence[RecordedScan], share: float, seed: int) -> list[RecordedScan]:
-    """That share of the patients, for scans of one foot are too much alike to test each other; of the scans where there
-    is but one patient. Another patient in the archive leaves the order of the others as it was."""
+    """Draw a share of the patients, since scans of one foot are too similar to test each other.
+
+    If all scans are of one patient, a share of the scans is drawn. A new patient in the archive does not change the
+    order of the others.
+    """
     if not share:
         return []
     patients = {scan.name: scan.document.patient for scan in scans}

@@ -1,4 +1,4 @@
-"""What a search leaves in its folder: the winner as a workflow, a table of trials, and a page."""
+"""Output files of a search: the winner as a workflow, the table of trials, the page."""
 
 import io
 import os
@@ -22,7 +22,7 @@ BEST, CSV, PARQUET, PAGE = "best.yaml", "trials.csv", "trials.parquet", "index.h
 def write_files(
     folder: Path, workflow: Path, document: Workflow, result: TuneResult, parameters: ScanParameters
 ) -> None:
-    """Write all of it; Fault where the disk refuses."""
+    """Write all files; Fault if the disk refuses."""
     rows = [_row(trial, result) for trial in result.trials]
     write_atomically(folder / BEST, best_yaml(folder, workflow, document, result, parameters).encode())
     write_atomically(folder / CSV, _as_csv(rows).encode())
@@ -31,7 +31,7 @@ def write_files(
 
 
 def best_yaml(folder: Path, workflow: Path, document: Workflow, result: TuneResult, parameters: ScanParameters) -> str:
-    """The workflow with the winner's parameters, for a file in `folder`: its paths lead where they did."""
+    """The workflow with the parameters of the winner, for a file in `folder`; its paths are adapted to that folder."""
     base = workflow.resolve().parent
 
     def moved(path: str) -> str:
@@ -88,7 +88,7 @@ def _as_parquet(rows: Sequence[dict[str, Cell]]) -> bytes:
 def _type(cells: Sequence[Cell]) -> Any:
     import pyarrow
 
-    known = {type(cell) for cell in cells if cell is not None}
-    if known and known <= {int, bool}:
-        return pyarrow.bool_() if known == {bool} else pyarrow.int64()
-    return pyarrow.float64() if known and known <= {int, float} else pyarrow.string()
+    types = {type(cell) for cell in cells if cell is not None}
+    if types and types <= {int, bool}:
+        return pyarrow.bool_() if types == {bool} else pyarrow.int64()
+    return pyarrow.float64() if types and types <= {int, float} else pyarrow.string()

@@ -1,4 +1,4 @@
-"""What a search has tried so far, in a file beside its results: a search that was interrupted goes on from there."""
+"""The journal of a search, a file beside its results, from which an interrupted search continues."""
 
 import contextlib
 import json
@@ -15,10 +15,9 @@ from schemas.tuning import TriedPoint, TuneJournal, Tuning
 
 
 class Journal:
-    """A file of JSON lines: what was sought, then each point whose steps have all been run.
+    """A file of JSON lines: first the search, then each point whose steps have all been run.
 
-    Each search has a file of its own: its data sets and the number of its trials may change, for what was tried of it
-    stays tried.
+    Each search has a file of its own. Its data sets and its number of trials may change; tried points remain valid.
     """
 
     def __init__(self, folder: Path, tuning: Tuning) -> None:
@@ -30,35 +29,35 @@ class Journal:
         self._path = folder / f"trials-{sha256(self._head.encode())[:12]}.jsonl"
 
     def read(self) -> list[TriedPoint]:
-        """What was tried, in that order, up to a line that is damaged: that and what follows is taken away."""
+        """Read the tried points in their order; the first damaged line and all lines behind it are removed."""
         text = _text(self._path)
         lines = text.splitlines()
-        tried = [self._in_order(one) for one in _points(lines)] if lines[:1] == [self._head] else []
-        sound = "".join(f"{line}\n" for line in [self._head, *lines[1 : len(tried) + 1]])
-        if text != sound:
-            write_atomically(self._path, sound.encode())
+        tried = [self._in_order(point) for point in _points(lines)] if lines[:1] == [self._head] else []
+        valid = "".join(f"{line}\n" for line in [self._head, *lines[1 : len(tried) + 1]])
+        if text != valid:
+            write_atomically(self._path, valid.encode())
         return tried
 
     def _in_order(self, tried: TriedPoint) -> TriedPoint:
-        """With its values in the order of the search: lines of JSON are sorted by name."""
+        """Restore the order of the values, since JSON lines are sorted by name."""
         point = tried.point and {name: tried.point[name] for name in self._names}
         return tried.model_copy(update={"point": point})
 
     def append(self, tried: TriedPoint) -> None:
-        """Add a point."""
+        """Append a tried point; Fault if the disk refuses."""
         try:
-            with self._path.open("ab", buffering=0) as file:  # a line as a whole: another search may write there, too
+            with self._path.open("ab", buffering=0) as file:  # one write per line: another search may append, too
                 file.write(canonical_json(tried.model_dump(mode="json")).encode() + b"\n")
         except OSError as error:
             raise Fault(f"{self._path}: cannot be written ({error.strerror or error})") from None
 
     def seconds(self) -> dict[str, float]:
-        """How long steps took that any search in this folder has run, by the key of their action."""
-        known: dict[str, float] = {}
+        """Times of the steps that any search in this folder has run, by the key of their action."""
+        seconds: dict[str, float] = {}
         for path in sorted(self._folder.glob("trials-*.jsonl")):
             for tried in _points(_text(path).splitlines()):
-                known |= tried.seconds
-        return known
+                seconds |= tried.seconds
+        return seconds
 
 
 def _text(path: Path) -> str:

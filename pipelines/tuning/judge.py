@@ -1,4 +1,4 @@
-"""A step: what of a scan's cloud is false, and what of its truth is there."""
+"""A step: the false share of the cloud of a scan, and the covered share of its truth."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +15,11 @@ from schemas.base.model import canonical_json
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `oriented`, `surface`, `truth`; `places`: the `truth` model."""
+    """`inputs`: `oriented`, `surface`, `truth`; `places`: the `truth` model.
+
+    The result has the shares `false`, of the cloud farther than `WITHIN_MM` from the truth, and `there`, of the truth
+    within `WITHIN_MM` of the surface.
+    """
     del parameters
     surface = unpack(inputs["surface"])
     truth = read_mesh(places["truth"])

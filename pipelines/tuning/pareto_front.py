@@ -1,11 +1,17 @@
-"""The Pareto front of trials, and the one of them that is taken."""
+"""The Pareto front of trials, and the choice of the winner."""
 
 from collections.abc import Sequence
 from math import prod
 
 
 def on_front(values: Sequence[Sequence[float]]) -> set[int]:
-    """Numbers of those that no other is as good as in all and better than in something; less is better."""
+    """Numbers of the Pareto-optimal rows of `values`; less is better.
+
+    A row is Pareto-optimal if no other row is at least as good in all values and better in one.
+
+    >>> sorted(on_front([[1.0, 4.0], [2.0, 2.0], [3.0, 3.0]]))
+    [0, 1]
+    """
     return {
         number
         for number, own in enumerate(values)
@@ -16,10 +22,13 @@ def on_front(values: Sequence[Sequence[float]]) -> set[int]:
 
 
 def best_compromise(values: Sequence[Sequence[float]], floors: Sequence[float], front: set[int]) -> int:
-    """The number of the one on the front with the least product of all its values.
+    """Number of the row on the front with the least product of its values.
 
-    So a hundredth of one objective is worth a hundredth of another, whatever their units. Below its floor no value
-    is better than another. Of equal ones the first is taken: what is there already, where nothing is better.
+    So one percent of an objective is worth one percent of any other, regardless of units. Values below their floor
+    count as the floor. Among equal rows the first wins: that of the present parameters, if nothing is better.
+
+    >>> best_compromise([[1.0, 4.0], [2.0, 1.5], [3.0, 3.0]], [0.1, 0.1], {0, 1})
+    1
     """
 
     def product(number: int) -> float:

@@ -1,7 +1,7 @@
-"""Which set of parameters is tried next: a grid, or what one of Optuna's samplers makes of those before.
+"""Proposals of the next set of parameters: a grid, or a sampler of Optuna that learns from the trials before.
 
-A proposal depends on the search, its seed and the trials before it alone, whatever was interrupted in between: each is
-drawn with a random generator of its own, and a search that is taken up again is shown its earlier trials first.
+A proposal depends only on the search, its seed and the trials before it, even if the search was interrupted: each is
+drawn with a random generator of its own, and a continued search replays its earlier trials first.
 """
 
 import json
@@ -18,28 +18,28 @@ if TYPE_CHECKING:
     from optuna.samplers import BaseSampler
 
 POPULATION = 12
-"""Of NSGA-II, whose own 50 would make 40 trials one random generation."""
+"""Population of NSGA-II; with the default of 50, 40 trials would be one random generation. Chosen by hand."""
 
 
 class Proposals(Protocol):
     """Sets of parameters to try, one after another."""
 
     def ask(self) -> Point | None:
-        """The next one; None when there is no more."""
+        """The next set; None if there are no more."""
         ...
 
     def tell(self, point: Point, values: Sequence[float]) -> None:
-        """What was tried in its place, as a rule itself, and what that came to, by objective; less is better."""
+        """Report the point that was tried, usually the proposed one, and its values by objective; less is better."""
         ...
 
 
 def proposals_of(tuning: Tuning, objectives: int) -> Proposals:
-    """How a search proposes what to try."""
+    """Return the proposals of a search."""
     return _Grid(grid(tuning)) if tuning.sampler == "grid" else _Sampled(tuning, objectives)
 
 
 class _Grid:
-    """Every point of a grid."""
+    """All points of a grid."""
 
     def __init__(self, points: Iterator[Point]) -> None:
         self._points = points
@@ -48,14 +48,15 @@ class _Grid:
         return next(self._points, None)
 
     def tell(self, point: Point, values: Sequence[float]) -> None:
-        """A grid does not depend on it."""
+        """Do nothing: a grid does not depend on results."""
 
 
 class _Sampled:
-    """What a sampler of Optuna proposes.
+    """Proposals of a sampler of Optuna.
 
-    Its own trial of what it is asked for is given up, and one of what was tried is added: so the sampler learns the
-    same, and keeps the same of it (NSGA-II its generations), whether its proposal was taken or an earlier one.
+    The trial that Optuna creates for a proposal is marked as failed, and a trial of the point that was tried is added.
+    So the sampler learns and stores the same (NSGA-II its generations), whether its proposal or an earlier point was
+    tried.
     """
 
     def __init__(self, tuning: Tuning, objectives: int) -> None:

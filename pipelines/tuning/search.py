@@ -1,4 +1,4 @@
-"""A search for better parameters, from the workflow that describes it to what it came to."""
+"""A search for better parameters, from its description in a workflow to its result."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,40 +23,40 @@ from schemas.parameters.scan import ScanParameters
 from schemas.tuning import TriedPoint, Tuning
 
 FOLDER = "tune"
-"""In the folder of the results."""
+"""Name of the folder within that of the results."""
 ASKED_AGAIN = 20
-"""A sampler that proposes what was tried already is asked again, so often for each trial on average."""
+"""Bound of the proposals per trial, on average, since a sampler may propose points that were tried; chosen by hand."""
 
 OnTrial = Callable[[Trial], None]
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """What a search came to, and what it took."""
+    """The outcome of a search, and its cost."""
 
     result: TuneResult
     parameters: ScanParameters
-    """The winner's."""
+    """Parameters of the winner."""
     refused: Mapping[str, str]
-    """Scans that took no part, and why."""
+    """Scans that were left out, and why."""
     faults: int
-    """Scans that failed, in some trial, by a fault of the machine."""
+    """Number of scans that failed in a trial by a fault of the machine."""
     ran: Mapping[str, int]
-    """Steps that ran, by kind."""
+    """Number of steps that ran, by kind."""
 
 
 def tune(job: Job, tuning: Tuning, pool: Pool, on_step_end: OnStepEnd, on_trial: OnTrial) -> Tuned:
-    """Try sets of parameters on the scans of a job, and test the best on those held out.
+    """Try sets of parameters on the scans of a job, and test the best on the scans that are held out.
 
-    Every trial is the plan of all scans' steps with other parameters: what was run before, in this search, in another
-    or by `footscan run`, is known. Nothing is delivered into the results.
+    Each trial plans the steps of all scans with other parameters. Results of steps from earlier searches and from
+    `footscan run` are reused. Nothing is delivered into the results.
 
     Raises
     ------
     RefusedInput
         The search does not fit the scans.
     Fault
-        All scans of a trial failed by a fault of the machine; the next search goes on from there.
+        All scans of a trial failed by a fault of the machine; the next search continues from there.
     """
     planned = plan_job(replace(job, folders=[folder for folder in job.folders if may_be_meant(folder, job, tuning)]))
     share_written(planned)
@@ -68,17 +68,17 @@ def tune(job: Job, tuning: Tuning, pool: Pool, on_step_end: OnStepEnd, on_trial:
 def _tune(planned: PlannedJob, tuning: Tuning, pool: Pool, on_step_end: OnStepEnd, on_trial: OnTrial) -> Tuned:
     if not planned.scans and planned.refused:
         raise planned.refused[0].error
-    data, held_out = split([one.scan for one in planned.scans], tuning)
+    data, held_out = split([entry.scan for entry in planned.scans], tuning)
     goals, notes = goals_of(tuning.objectives, data)
     journal = Journal(planned.job.results / FOLDER, tuning)
-    known = [one.point for one in journal.read() if one.point is not None]
+    earlier = [tried.point for tried in journal.read() if tried.point is not None]
     clock = Clock(journal.seconds())
     bench = Bench(planned, pool, on_step_end, frozenset(goal.name for goal in goals), clock)
     search = _Search(bench, tuning, goals, data, planned.job.parameters, journal)
     with planned.workspace.lease():
-        search.run(known, on_trial)
+        search.run(earlier, on_trial)
         result, parameters = search.result(held_out, notes)
-    refused = {one.scan: str(one.error) for one in planned.refused}
+    refused = {entry.scan: str(entry.error) for entry in planned.refused}
     return Tuned(result, parameters, refused, search.faults, dict(clock.ran))
 
 
@@ -100,8 +100,8 @@ class _Search:
         self._trials: list[Trial] = []
         self.faults = 0
 
-    def run(self, known: Sequence[Point], on_trial: OnTrial) -> None:
-        """Try the present parameters, then one proposal after another; `known` are those of an earlier run."""
+    def run(self, earlier: Sequence[Point], on_trial: OnTrial) -> None:
+        """Try the present parameters, then one proposal after another; `earlier` points replace the first proposals."""
         proposals = proposals_of(self._tuning, len(self._goals))
         on_trial(self._try(None))
         is_grid = self._tuning.sampler == "grid"
@@ -111,8 +111,8 @@ class _Search:
             point = proposals.ask()
             if point is None:
                 break
-            if is_known := asked < len(known):
-                point = known[asked]
+            if is_known := asked < len(earlier):
+                point = earlier[asked]
             name = canonical_json(point)
             if name not in tried:
                 tried[name] = self._try(point, is_known=is_known)
@@ -123,7 +123,7 @@ class _Search:
             asked += 1
 
     def result(self, held_out: Sequence[RecordedScan], notes: Sequence[str]) -> tuple[TuneResult, ScanParameters]:
-        """The winner, beside the present parameters."""
+        """Choose the winner, and compare it with the present parameters."""
         values = [[_badness(goal, trial.values[goal.name]) for goal in self._goals] for trial in self._trials]
         front = on_front(values)
         trials = [replace(trial, on_front=number in front) for number, trial in enumerate(self._trials)]
@@ -132,19 +132,19 @@ class _Search:
         on_data = self._judged[0], self._judged[best]
         if held_out:
             tested = self._judge(self._present, held_out), self._judge(parameters, held_out)
-        told = [*notes]
+        all_notes = [*notes]
         if not held_out:
-            told.append("No scan was held out: the gain is that on the scans that chose the winner, and so too large.")
+            all_notes.append("No scan was held out: the gain is too large, since the same scans chose the winner.")
         tests = self._gains(*tested, held_out) if held_out else []
-        untold = [goal.name for goal in self._goals if goal not in [gain.goal for gain in tests]]
-        if held_out and untold:
-            told.append(f"The held-out scans do not tell {', '.join(untold)}.")
+        untested = [goal.name for goal in self._goals if goal not in [gain.goal for gain in tests]]
+        if held_out and untested:
+            all_notes.append(f"The held-out scans do not test {', '.join(untested)}.")
         if failed := sum(bool(trial.problems) for trial in trials):
-            told.append(f"In {failed} of {len(trials)} trials scans failed; each counts as the worst that there is.")
+            all_notes.append(f"In {failed} of {len(trials)} trials scans failed; each counts as the worst value.")
         result = TuneResult(
             goals=self._goals,
             sampler=self._tuning.sampler,
-            notes=told,
+            notes=all_notes,
             trials=trials,
             winner=trials[best],
             gains=self._gains(*on_data, self._data),
@@ -164,10 +164,10 @@ class _Search:
         else:
             judged = self._judge(parameters, self._data, None if is_known else point)
         of_sets = {goal.name: values_of(goal, judged, self._data) for goal in self._goals}
-        problems = {name: one.problem for name, one in judged.items() if one.problem is not None}
+        problems = {name: scan.problem for name, scan in judged.items() if scan.problem is not None}
         for goal in self._goals:
             unknown = (name for name, value in of_sets[goal.name].items() if value is None)
-            problems = {name: f"{goal.name} is not known" for name in unknown if name in judged} | problems
+            problems = {name: f"{goal.name} is unknown" for name in unknown if name in judged} | problems
         trial = Trial(
             number=len(self._trials),
             point=present_point(self._present, self._tuning) if point is None else point,
@@ -182,11 +182,11 @@ class _Search:
     def _judge(
         self, parameters: ScanParameters, scans: Sequence[RecordedScan], new: Point | None = None
     ) -> dict[str, Judged]:
-        """Judge parameters; `new` is their point where the journal does not have it yet."""
+        """Judge parameters; `new` is their point if the journal does not have it yet."""
         judged, seconds = self._bench.judge(parameters, scans)
         if seconds or new is not None:
             self._journal.append(TriedPoint(point=new, seconds=seconds))
-        self.faults += sum(one.kind == "fault" for one in judged.values())
+        self.faults += sum(scan.kind == "fault" for scan in judged.values())
         return judged
 
     def _gains(
@@ -201,5 +201,5 @@ class _Search:
 
 
 def _badness(goal: Goal, value: float) -> float:
-    """An objective as a quantity that is better the nearer it is to 0: of completeness, what is missing."""
+    """An objective as a value that is better the nearer it is to 0; for completeness that is the missing share, %."""
     return 100 - value if goal.larger_is_better else value

@@ -1,4 +1,4 @@
-"""Sets of parameters: how one is laid over those of a workflow, and a grid of them."""
+"""Sets of parameters: how they override those of a workflow, and grids of them."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -12,14 +12,15 @@ from schemas.parameters.scan import ScanParameters
 from schemas.tuning import SearchRange, Tuning, is_whole
 
 Point = dict[str, Any]
-"""A value of each parameter that is sought, by `section.name`."""
+"""Value of each searched parameter, by `section.name`."""
 LARGEST_GRID = 10_000
+"""Most points of a grid: a bound of time."""
 DIGITS = 4
-"""Of a real value that a sampler proposes: so people can read it, and no film shows the difference."""
+"""Significant digits of a real value that a sampler proposes: readable, and finer than any film can resolve."""
 
 
 def with_point(parameters: ScanParameters, point: Mapping[str, Any]) -> ScanParameters:
-    """`parameters` with the values of `point`; RefusedInput where they contradict each other."""
+    """`parameters` with the values of `point`; RefusedInput if they contradict each other."""
     settings = [f"{name}={value if isinstance(value, str) else canonical_json(value)}" for name, value in point.items()]
     try:
         return overridden(ScanParameters, parameters.model_dump(mode="json", exclude_unset=True), settings)
@@ -28,13 +29,13 @@ def with_point(parameters: ScanParameters, point: Mapping[str, Any]) -> ScanPara
 
 
 def present_point(parameters: ScanParameters, tuning: Tuning) -> Point:
-    """The values that `parameters` have of what is sought."""
+    """The present values of the searched parameters."""
     values = parameters.model_dump(mode="json")
     return {name: values[name.partition(".")[0]][name.partition(".")[2]] for name in tuning.search}
 
 
 def grid(tuning: Tuning) -> Iterator[Point]:
-    """Every combination, the last parameter's values running fastest; RefusedInput where there are too many."""
+    """All combinations; the last parameter varies fastest. RefusedInput if there are too many."""
     axes = {name: grid_values(name, tried) for name, tried in tuning.search.items()}
     if (count := math.prod(map(len, axes.values()))) > LARGEST_GRID:
         raise RefusedInput("tune.search", f"is a grid of {count} points, expected at most {LARGEST_GRID}")
@@ -42,11 +43,11 @@ def grid(tuning: Tuning) -> Iterator[Point]:
 
 
 def grid_values(name: str, tried: SearchRange | list[Any]) -> list[Any]:
-    """What a grid tries of one parameter."""
+    """Values of one parameter in a grid."""
     if isinstance(tried, list):
         return tried
     if tried.step is None and not is_whole(name):
-        raise RefusedInput(f"tune.search.{name}", "is a range without a step, expected one, or a list, for a grid")
+        raise RefusedInput(f"tune.search.{name}", "is a range without a step, expected a step or a list for a grid")
     step = tried.step or 1.0
     count = math.floor((tried.high - tried.low) / step * (1 + 1e-12)) + 1
     if count > LARGEST_GRID:
@@ -55,7 +56,7 @@ def grid_values(name: str, tried: SearchRange | list[Any]) -> list[Any]:
 
 
 def plain(point: Point, tuning: Tuning) -> Point:
-    """A proposed point as it is tried: real numbers have few digits."""
+    """Round the real values of a proposed point to `DIGITS`."""
     return {name: _plain(name, value, tuning.search[name]) for name, value in point.items()}
 
 

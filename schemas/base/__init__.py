@@ -1,1 +1,1 @@
-"""What all schemas are made of: documents and their errors, limits, units."""
+"""The parts that all schemas share: documents and their errors, limits, units."""

@@ -1,4 +1,4 @@
-"""What can go wrong, each kind with the exit status that it ends the command with.
+"""The errors of the project, each kind with the exit status of the command.
 
 A message is one line and names the file, the field or value, and what was expected.
 """
@@ -9,7 +9,7 @@ from typing import Any
 
 
 class FootscanError(Exception):
-    """Base of all errors that a user is told in one line."""
+    """Base of all errors that are reported to a user in one line."""
 
     exit_status = 3
 
@@ -24,11 +24,11 @@ class RefusedInput(FootscanError):
         self.field = field
         self.problem = problem
         self.others: tuple[RefusedInput, ...] = ()
-        """Further mistakes in the same document, where all are told at once."""
+        """Further mistakes in the same document, if all are reported at once."""
         super().__init__(": ".join(one_line(part) for part in (self.source, field, problem) if part))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """What another process makes it anew from."""
+        """The parts from which another process rebuilds the error."""
         return partial(RefusedInput, field=self.field), (self.source, self.problem), {"others": self.others}
 
 
@@ -51,7 +51,7 @@ class Fault(FootscanError):
 
 
 class DamagedError(Fault):
-    """Something stored is not what was stored. What is damaged has been set aside: running again makes it anew."""
+    """A stored file has changed since it was written. It has been set aside: another run computes it again."""
 
 
 def one_line(text: str) -> str:
@@ -60,8 +60,10 @@ def one_line(text: str) -> str:
 
 
 def printable(text: str, keep: str = "") -> str:
-    """`text` with another sign for what a terminal would obey instead of showing: control characters, escape sequences,
-    line breaks, marks that turn the direction of writing. The characters in `keep` stay."""
+    """`text` with a replacement character for each one that a terminal would obey instead of showing.
+
+    These are control characters, escape sequences, line breaks and marks that turn the direction of writing. The
+    characters in `keep` stay."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c in keep else "\N{REPLACEMENT CHARACTER}" for c in text)

@@ -19,7 +19,7 @@ def read_json(path: Path, model: type[AnyDocument]) -> AnyDocument:
 
 
 def parse_json(source: Path | str, text: str) -> Any:
-    """`text` as JSON without NaN, infinities and names that stand twice; BeyondLimitError of too many values."""
+    """`text` as JSON without NaN, infinities and duplicate names; BeyondLimitError for too many values."""
     refuse_beyond("json_values", text.count(","), source)
     try:
         return encodable(json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_refuse_twice))
@@ -33,7 +33,7 @@ def validate(
     value: Any,
     place: Callable[[Mistake], str] | None = None,
 ) -> AnyDocument:
-    """`value` as `model`, or one line that names the first wrong field; `place` may say where it stands."""
+    """`value` as `model`, or a refusal in one line that names the first wrong field; `place` may add its position."""
     if not isinstance(value, dict):
         raise RefusedInput(source, f"expected a document with named fields, found {_kind(value)}")
     try:
@@ -45,7 +45,7 @@ def validate(
 
 
 def read_text(path: Path, bound: str) -> str:
-    """The content of a UTF-8 file; RefusedInput where it is none, or larger than the `bound` of that name allows."""
+    """The content of a UTF-8 file; RefusedInput if it is not UTF-8 or larger than the limit named `bound`."""
     try:
         return read_bounded(path, bound).decode("utf-8")
     except UnicodeDecodeError:
@@ -57,7 +57,7 @@ def read_text(path: Path, bound: str) -> str:
 
 
 def encodable(value: Any) -> Any:
-    """`value`; ValueError where an escape like \\ud800 has made text that is none and could not be written again."""
+    """`value`; ValueError if an escape like \\ud800 has made text that cannot be encoded."""
     json.dumps(value, ensure_ascii=False).encode()
     return value
 
@@ -70,7 +70,7 @@ def _refuse_twice(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     names: set[str] = set()
     for name, _ in pairs:
         if name in names:
-            raise ValueError(f"{name[:80]!r} stands twice, expected each name once")
+            raise ValueError(f"{name[:80]!r} is listed twice, expected each name once")
         names.add(name)
     return dict(pairs)
 

@@ -1,4 +1,4 @@
-"""Bounds of what is read: files come from outside, and none may take the machine's memory or its time.
+"""Bounds of the files that are read: they come from outside and must not exhaust the machine's memory or time.
 
 A bound is raised by the environment variable `FOOTSCAN_LIMITS`, such as `mesh_bytes=1G,chart_points=20000`, for every
 command alike. docs/limits.md holds them in a table.
@@ -18,11 +18,11 @@ from schemas.base.errors import RefusedInput
 VARIABLE = "FOOTSCAN_LIMITS"
 FACTORS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
 LARGEST = 10**15
-"""No bound can be raised further: what is computed from it stays a number of bytes."""
+"""Bound of memory: no limit can be raised further, so that numbers of bytes computed from it stay sensible."""
 
 
 class Limit(NamedTuple):
-    """A bound."""
+    """A bound of one property of input files."""
 
     default: int
     of_what: str
@@ -33,7 +33,7 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
     {
         "yaml_bytes": Limit(256_000, "bytes of a YAML document", "a scan.yaml has some 2 kB; 256 kB parse in 2 s"),
         "json_bytes": Limit(8_000_000, "bytes of a JSON document", "a calibration has some 100 kB"),
-        "json_values": Limit(500_000, "values in a JSON document", "each may be a mistake that takes 1 kB to tell"),
+        "json_values": Limit(500_000, "values in a JSON document", "each may be a mistake that takes 1 kB to report"),
         "table_bytes": Limit(32_000_000, "bytes of a CSV file", "the stripe points of a scan have some 20 MB"),
         "table_rows": Limit(1_000_000, "lines of a CSV file", "blank ones, too, take their time"),
         "chart_points": Limit(2_000, "control points of a chart", "the thesis has 5 a camera; the work grows faster"),
@@ -53,10 +53,10 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
 
 
 class BeyondLimitError(RefusedInput):
-    """An input larger than its bound. It is refused as long as the bound stands: the input itself may be sound."""
+    """An input larger than its bound. The input itself may be sound: a higher bound admits it."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """What another process makes it anew from."""
+        """The parts from which another process rebuilds the error."""
         return partial(BeyondLimitError, field=self.field), (self.source, self.problem)
 
 
@@ -66,18 +66,18 @@ def limit(name: str) -> int:
     Raises
     ------
     RefusedInput
-        `FOOTSCAN_LIMITS` says something that is no bound.
+        `FOOTSCAN_LIMITS` is not a list of bounds.
     """
     return _raised(os.environ.get(VARIABLE, "")).get(name, LIMITS[name].default)
 
 
 def check_limits() -> None:
-    """Refuses a `FOOTSCAN_LIMITS` that is not as it should be, whatever is read."""
+    """Refuse a malformed `FOOTSCAN_LIMITS` before anything is read."""
     _raised(os.environ.get(VARIABLE, ""))
 
 
 def refuse_beyond(name: str, found: int, source: Path | str, *, field: str | None = None) -> None:
-    """Refuses `found` where it lies beyond the bound of that name.
+    """Refuse `found` if it exceeds the bound of that name.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def refuse_beyond(name: str, found: int, source: Path | str, *, field: str | Non
 
 
 def beyond(name: str, found: int) -> str:
-    """What to say of a `found` that lies beyond the bound of that name."""
+    """The message about a `found` that exceeds the bound of that name."""
     many = f"{found} {LIMITS[name].of_what} are too many"
     return f"{many}, expected at most {limit(name)} ({VARIABLE}={name}=N raises it)"
 
@@ -97,7 +97,7 @@ def beyond(name: str, found: int) -> str:
 def read_bounded(path: Path, name: str) -> bytes:
     """The bytes of a regular file that is not larger than the bound of that name.
 
-    The size is asked for before anything is read, and a file that grows meanwhile is not read further.
+    The size is checked before anything is read, and a file that grows meanwhile is not read further.
 
     Raises
     ------

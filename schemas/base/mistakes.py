@@ -1,4 +1,4 @@
-"""What is wrong with a document, field by field, in words that say what was expected."""
+"""The mistakes in a document, field by field, each with what was expected."""
 
 import difflib
 import re
@@ -9,8 +9,9 @@ from pydantic import BaseModel, ValidationError
 
 Path = tuple[str | int, ...]
 MOST = 100
-"""Nobody reads more mistakes at once."""
+"""Most mistakes that are reported at once; chosen by hand."""
 LONGEST_NAME = 80
+"""Characters of a name that are compared with the fields' names; a bound of time."""
 
 
 class Mistake(NamedTuple):
@@ -20,20 +21,20 @@ class Mistake(NamedTuple):
     """Names and places that lead to it; a missing field's own name is the last."""
     problem: str
     is_name: bool
-    """Whether the name is wrong, not the value."""
+    """True if the name is wrong, not the value."""
 
 
 def mistakes(model: type[BaseModel], error: ValidationError, most: int = MOST) -> list[Mistake]:
-    """What pydantic found, wrong names first: a misspelt field is missing, too, and its own name says more.
+    """The mistakes that pydantic reports, wrong names first: a misspelt field is also missing, but its name tells more.
 
-    No more than `most`: to find the name that was meant takes its time.
+    At most `most` of them, because the search for the intended name takes time.
     """
     found = sorted(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
     return [Mistake(tuple(e["loc"]), _problem(model, dict(e)), e["type"] == "extra_forbidden") for e in found[:most]]
 
 
 def nearest_name(model: type[BaseModel], path: Path) -> str | None:
-    """The field that was meant by `path`: one of the section that it stands in, or else of any, with its section."""
+    """The field that `path` probably means: one of the same section, or else one of any section, with that section."""
     name = str(path[-1])[:LONGEST_NAME]
     here = sorted({field for section in _sections(model, path[:-1]) for field in _fields(section)})
     if near := difflib.get_close_matches(name, here, n=1):
@@ -49,7 +50,7 @@ def _problem(model: type[BaseModel], error: dict[str, Any]) -> str:
         return "unknown field" + (f", did you mean {near!r}?" if near else "")
     if error["type"] == "missing":
         return "is missing, expected a value"
-    if error["type"] == "model_type":  # whose own words name a class of ours
+    if error["type"] == "model_type":  # pydantic's message names a class of the project
         return f"expected fields with values, found {str(error.get('input'))[:80]!r}"
     message = str(error["msg"]).removeprefix("Value error, ")
     message = f"{message[0].lower()}{message[1:]}"
@@ -73,7 +74,7 @@ def _hint(error: dict[str, Any], found: str) -> str:
 
 
 def _sections(model: type[BaseModel], path: Path) -> list[type[BaseModel]]:
-    """The models that `path` may lead to: of a field that may hold one of several, it has the tag as well."""
+    """The models that `path` may lead to; it also holds the tag of a field that takes one of several models."""
     sections = [model]
     for part in path:
         holders = [_fields(section)[str(part)] for section in sections if part in _fields(section)]

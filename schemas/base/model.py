@@ -20,7 +20,7 @@ Pseudonym = Annotated[str, AfterValidator(_pseudonym)]
 
 
 Side = Literal["right", "left", "unknown"]
-"""Which foot it is."""
+"""The side of a foot."""
 
 
 def _relative(path: str) -> str:
@@ -48,7 +48,7 @@ def canonical_json(value: Any) -> str:
 
 
 def pseudonym(name: str, field: str) -> str:
-    """`name`, or a refusal where it could not be a folder."""
+    """`name`, or a refusal if it cannot be the name of a folder."""
     try:
         return _pseudonym(name)
     except ValueError as error:

@@ -12,7 +12,7 @@ OPTION = "--set"
 
 
 def overridden(model: type[AnyDocument], values: Mapping[str, Any], settings: Sequence[str]) -> AnyDocument:
-    """The document of `values` with each of `settings` in its place.
+    """The document of `values`, overridden by each of `settings`.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def overridden(model: type[AnyDocument], values: Mapping[str, Any], settings: Se
     Raises
     ------
     RefusedInput
-        One is no setting, stands twice, or breaks the model.
+        A setting is malformed, is repeated, or breaks the model.
     """
     changed = dict(values)
     for name, value in parse_settings(settings).items():
@@ -37,14 +37,14 @@ def overridden(model: type[AnyDocument], values: Mapping[str, Any], settings: Se
 
 
 def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
-    """What each setting sets, by its name."""
+    """The value of each setting, by its name."""
     values: dict[str, Any] = {}
     for setting in settings:
         name, equals, value = (part.strip() for part in setting.partition("="))
         if not (name and equals):
             raise RefusedInput(OPTION, f"expected NAME=VALUE, found {setting[:80]!r}")
         if name in values:
-            raise RefusedInput(OPTION, "stands twice, expected each parameter once", field=name)
+            raise RefusedInput(OPTION, "is listed twice, expected each parameter once", field=name)
         values[name] = _list(name, value) if value.startswith("[") else value
     return values
 

@@ -1,4 +1,4 @@
-"""Paths that a document names."""
+"""Paths named in documents."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from schemas.base.errors import RefusedInput
 
 
 def inside(archive: Path, document: Path, relative: str, field: str) -> Path:
-    """The file that `document` names by `relative`, which may not lie outside `archive`, symbolic links followed."""
+    """The file `relative` to `document`; RefusedInput if it lies outside `archive`, symbolic links followed."""
     try:
         path = (document.parent / relative).resolve()
     except (OSError, RuntimeError):  # before Python 3.13 a circle of links is a RuntimeError

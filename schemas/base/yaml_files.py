@@ -23,7 +23,7 @@ def read_yaml(path: Path, model: type[AnyDocument]) -> AnyDocument:
 
 
 def read_yaml_text(path: Path, text: str) -> Any:
-    """`text`, the content of `path`, as YAML has it; RefusedInput where it is none."""
+    """The value of the YAML `text`, the content of `path`; RefusedInput if it is not YAML."""
     try:
         value = parse_yaml(text)
     except ValueError as error:
@@ -35,7 +35,7 @@ def read_yaml_text(path: Path, text: str) -> Any:
 
 
 def line_and_column(text: str, mistake: Mistake) -> str:
-    """Where in a YAML `text` a mistake stands; that of its section where a field is missing."""
+    """The position of a mistake in a YAML `text`; that of the section if a field is missing."""
     line, column = place_in_yaml(text, mistake.path, of_name=mistake.is_name)
     return f"line {line}, column {column}"
 

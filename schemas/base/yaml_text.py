@@ -1,4 +1,4 @@
-"""YAML as the project takes it: lists and named values, whose scalars stay text; and where in the text each stands."""
+"""The YAML that the project reads: lists and named values, whose scalars stay text; and the position of each."""
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
@@ -7,25 +7,26 @@ from typing import Any
 import yaml
 
 MAX_DEPTH = 24
+"""Most levels of nesting, a bound of the stack; chosen by hand."""
 NOTHING = {"", "~", "null"}
-"""What stands for no value where it is not in quotes."""
+"""Scalars that mean no value unless they are in quotes."""
 _PARSER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-"""Of libyaml where PyYAML was built with it: an archive has a document for each scan."""
+"""The parser of libyaml if PyYAML was built with it, for speed: an archive has a document for each scan."""
 _Events = Iterator[Any]
-"""PyYAML's, which have no types."""
+"""Events of PyYAML, which has no types."""
 
 
 def parse_yaml(text: str) -> Any:
-    """The only document of `text`; None where there is none. ValueError says in one line what is wrong, and where.
+    """The only document of `text`, or None if it is empty. ValueError says in one line what is wrong, and where.
 
     Scalars stay the text that was written; the model gives them their type: YAML would read `no` as false, `2026-11-20`
-    as a date, `0123` as 83 and `1e3` as text. What makes YAML more than lists and named values is refused: aliases,
+    as a date, `0123` as 83 and `1e3` as text. Features of YAML beyond lists and named values are refused: aliases,
     tags, deep nesting.
     """
     try:
         try:
             return _document(yaml.parse(text, Loader=_PARSER))
-        except (yaml.YAMLError, ValueError):  # PyYAML's own parser takes a little more, and says better what is wrong
+        except (yaml.YAMLError, ValueError):  # PyYAML's own parser accepts a little more and has better messages
             return _document(yaml.parse(text, Loader=yaml.SafeLoader))
     except yaml.MarkedYAMLError as error:
         mark: Any = error.problem_mark
@@ -37,12 +38,12 @@ def parse_yaml(text: str) -> Any:
 
 
 def place_in_yaml(text: str, path: Sequence[str | int], *, of_name: bool = False) -> tuple[int, int]:
-    """Line and column, from 1, of the value that `path` leads to in a `text` that parses, or as far as it leads.
+    """Line and column, from 1, of the value that `path` leads to in a `text` that parses, or of its last known part.
 
     Parameters
     ----------
     of_name : bool
-        Where the value's name stands instead, as it always is of a section.
+        True for the position of the value's name, which is always used for a section.
     """
     node = name = _composed(text)
     for part in path:
@@ -58,10 +59,10 @@ def place_in_yaml(text: str, path: Sequence[str | int], *, of_name: bool = False
 
 @lru_cache(maxsize=2)
 def _composed(text: str) -> Any:
-    """The nodes of a `text` that parses: they are the same for each of its mistakes."""
+    """The nodes of a `text` that parses, cached because each of its mistakes needs them."""
     try:
         return yaml.compose(text, Loader=_PARSER)
-    except yaml.YAMLError:  # the one took it, or the other did, see `parse_yaml`
+    except yaml.YAMLError:  # only one of the parsers accepts it, see `parse_yaml`
         return yaml.compose(text, Loader=yaml.SafeLoader)
 
 
@@ -94,7 +95,7 @@ def _value(event: Any, events: _Events, depth: int) -> Any:
         if not isinstance(name, str):
             raise _refusal("expected a name before ':'", key)
         if name in values:
-            raise _refusal(f"{name[:80]!r} stands twice, expected each name once", key)
+            raise _refusal(f"{name[:80]!r} is listed twice, expected each name once", key)
         values[name] = _value(next(events), events, depth + 1)
     return values
 

@@ -1,1 +1,1 @@
-"""What a step can be told: one model a step, each value with its unit and its range."""
+"""The parameters of the steps: one model a step, each value with its unit and its range."""

@@ -1,4 +1,4 @@
-"""What a calibration can be told."""
+"""Parameters of a calibration."""
 
 from typing import Annotated, Literal, Self
 
@@ -12,18 +12,18 @@ ModelName = Literal["polynomial", "homography", "homography-distortion", "homogr
 
 
 class CalibrationParameters(Document):
-    """Which model of a camera is fitted."""
+    """The model that is fitted to each camera."""
 
     model: Literal["auto", "quadratic", ModelName] = Field(
         default="auto",
         description="auto: the model with the least held-out error; polynomial: orders 1 to 5 in normalised "
         "coordinates; homography: a plane seen by a pinhole; homography-distortion: bent by a lens; "
-        "homography-correction: and by what else there is, such as glass; quadratic: second order of the plain pixel "
+        "homography-correction: and corrected for the rest, such as glass; quadratic: second order of the plain pixel "
         "coordinates, with the basic solution where there are fewer points than unknowns (charts only)",
     )
     order: Order | None = Field(
         default=None,
-        description="order of the polynomial; left out, the order with the least held-out error is taken",
+        description="order of the polynomial; default: the order with the least held-out error",
     )
 
     @model_validator(mode="after")
@@ -34,21 +34,21 @@ class CalibrationParameters(Document):
 
 
 class PlacementParameters(Document):
-    """Where the reference object may have stood."""
+    """The tolerance for the placements of the reference object."""
 
     placement_tolerance_mm: Annotated[float, Field(gt=0, le=50)] = Field(
         default=1.0,
-        description="distance in mm from where it should stand beyond which the object is wrongly placed; what is less "
-        "is put right where the cameras agree on it",
+        description="distance in mm from its nominal place beyond which the object is wrongly placed; a smaller error "
+        "is corrected if the cameras agree on it",
     )
 
 
 class CaptureCalibrationParameters(CalibrationParameters, PlacementParameters):
-    """How a capture of the reference object becomes a calibration."""
+    """Parameters of a calibration from a capture of the reference object."""
 
     extraction: ExtractionParameters = Field(
         default=ExtractionParameters(largest_width_px=14.0),
-        description="how the stripe is found on the object: it is matt, so its stripe is narrow",
+        description="extraction of the stripe on the object, which is matt, so that its stripe is narrow",
     )
 
     @model_validator(mode="after")
@@ -59,10 +59,10 @@ class CaptureCalibrationParameters(CalibrationParameters, PlacementParameters):
 
     @property
     def placement(self) -> PlacementParameters:
-        """What judges the placements."""
+        """The parameters of the placements alone."""
         return PlacementParameters(placement_tolerance_mm=self.placement_tolerance_mm)
 
     @property
     def fit(self) -> CalibrationParameters:
-        """What chooses the model of a camera."""
+        """The parameters of the fit of a camera alone."""
         return CalibrationParameters(model=self.model, order=self.order)

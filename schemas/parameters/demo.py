@@ -1,4 +1,4 @@
-"""What the demo films."""
+"""Parameters of the demo's film."""
 
 from typing import Literal
 

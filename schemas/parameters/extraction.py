@@ -1,4 +1,4 @@
-"""What the extraction of the stripe can be told."""
+"""Parameters of the extraction of the stripe."""
 
 from typing import Literal, Self
 
@@ -8,7 +8,7 @@ from schemas.base.model import Document
 
 
 class ExtractionParameters(Document):
-    """How the laser stripe is told from the rest of a frame, and where its centre is taken."""
+    """Parameters that separate the laser stripe from the rest of a frame and locate its centre."""
 
     red_threshold: int = Field(
         default=18,
@@ -26,7 +26,7 @@ class ExtractionParameters(Document):
         default=2.5,
         ge=0.5,
         le=4.0,
-        description="standard deviation in px of the Gaussian under which the ridge of the stripe is sought",
+        description="standard deviation in px of the Gaussian filter that finds the ridge of the stripe",
     )
     smallest_contrast: float = Field(
         default=12.0,
@@ -38,18 +38,18 @@ class ExtractionParameters(Document):
         default=6.0,
         ge=1.0,
         le=255.0,
-        description="grey levels by which the ends of a piece must stand out that is stronger elsewhere; at most "
+        description="grey levels by which the weaker ends of a piece of the stripe must stand out; at most "
         "`smallest_contrast`",
     )
     largest_width_px: float = Field(
         default=40.0,
         ge=2.0,
         le=100.0,
-        description="full width at half height in px beyond which a red thing is no stripe",
+        description="full width at half height in px beyond which a red object is not the stripe",
     )
     centre_method: Literal["threshold-median", "gravity", "gaussian", "ridge", "fir"] = Field(
         default="gravity",
-        description="how the centre is taken from the profile across the stripe",
+        description="method that takes the centre from the profile across the stripe",
     )
     centre_level: float = Field(
         default=0.5,
@@ -68,19 +68,19 @@ class ExtractionParameters(Document):
         default=5.0,
         ge=1.5,
         le=20.0,
-        description="distance in px that points of one piece of the stripe may have from each other",
+        description="largest distance in px between neighbouring points of one piece of the stripe",
     )
     shortest_piece_px: int = Field(
         default=12,
         ge=1,
         le=1000,
-        description="points below which a piece is a glint",
+        description="number of points below which a piece is a glint",
     )
     group_gap_px: float = Field(
         default=40.0,
         ge=1.5,
         le=1000.0,
-        description="distance in px that pieces of one stripe may have from each other",
+        description="largest distance in px between neighbouring pieces of one stripe",
     )
     smallest_group: float = Field(
         default=0.15,
@@ -92,33 +92,33 @@ class ExtractionParameters(Document):
         default=0.1,
         ge=0.01,
         le=1.0,
-        description="share of a film's frames, and eight of them at least, in which a short piece must stand in one "
-        "place to be a glint: the foot moves, the hardware does not; of no use in films of fewer than eight frames",
+        description="share of a film's frames, at least eight, in which a short piece must stay in one place to be a "
+        "glint: the foot moves, the hardware does not; has no effect in films of fewer than eight frames",
     )
     glint_length_px: float = Field(
         default=40.0,
         ge=0.0,
         le=1000.0,
-        description="extent in px from which a piece is no glint, however long it stands still",
+        description="extent in px from which a piece is never a glint, however long it stays in one place",
     )
     follow_reach_px: float = Field(
         default=12.0,
         ge=2.0,
         le=200.0,
-        description="distance in px that the stripe may move from one frame to the next",
+        description="largest distance in px that the stripe moves from one frame to the next",
     )
     lonely_length_px: float = Field(
         default=60.0,
         ge=0.0,
         le=1000.0,
-        description="extent in px below which a piece is dropped that nothing lies near in the frame before and after",
+        description="extent in px below which a piece is dropped if nothing lies near it in the frame before or after",
     )
     largest_blur: float = Field(
         default=1.5,
         ge=1.0,
         le=100.0,
-        description="times the film's median width, and its median sigma, beyond both of which a piece that is hardly "
-        "red is the lit rim of the skin; of no use in films of fewer than eight frames",
+        description="multiple of the film's median width and of its median sigma: a piece that exceeds both and is "
+        "hardly red is the lit rim of the skin; has no effect in films of fewer than eight frames",
     )
     ghost_reach_px: float = Field(
         default=60.0,
@@ -130,8 +130,8 @@ class ExtractionParameters(Document):
         default=0.05,
         ge=0.0,
         le=1.0,
-        description="light, relative to the stripe beside it, below which a piece is a ghost; one that is parallel to "
-        "the stripe is so at half its light",
+        description="light, relative to the stripe beside it, below which a piece is a ghost; a piece parallel to the "
+        "stripe is a ghost below half of the stripe's light",
     )
 
     @model_validator(mode="after")

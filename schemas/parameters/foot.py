@@ -1,9 +1,9 @@
-"""What is known of a foot before it is measured."""
+"""Parameters of a foot that are known before it is measured."""
 
 from schemas.base.model import Document, Side
 
 
 class FootParameters(Document):
-    """Which foot it is."""
+    """The side of the foot."""
 
     side: Side

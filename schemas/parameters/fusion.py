@@ -8,18 +8,18 @@ from schemas.base.model import Document
 
 
 class FusionParameters(Document):
-    """How the points of several cameras become one cloud."""
+    """Parameters that turn the points of several cameras into one cloud."""
 
     spacing_mm: Annotated[float, Field(ge=0, le=5)] = 0.4
     """Points of one stripe plane are no closer to each other; 0 keeps all."""
     contradiction_mm: Annotated[float, Field(gt=0, le=10)] = 1.0
     """Points of two cameras that lie farther apart show different surfaces."""
     contradiction_sigmas: Annotated[float, Field(ge=1, le=20)] = 4.0
-    """Of points that are closer and yet more than so many standard deviations apart, the better supported stay."""
+    """If points are closer, but more than this number of standard deviations apart, the better supported ones stay."""
     correct_cameras: bool = True
-    """Whether a camera may be moved by what it and others see of the same skin."""
+    """True if a camera may be moved to agree with others on the skin that they all see."""
     overlap_mm: Annotated[float, Field(gt=0, le=20)] = 3.0
-    """How far apart two cameras may place the same skin for it to be compared."""
+    """Largest distance between two cameras' points of the same skin at which they are compared."""
     largest_correction_mm: Annotated[float, Field(gt=0, le=10)] = 1.0
     """A camera that would have to be moved farther is left as it is and reported."""
     smallest_correction_mm: Annotated[float, Field(ge=0, le=10)] = 0.02

@@ -11,42 +11,42 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class OutlierParameters(Document):
-    """Which points are dropped."""
+    """Limits beyond which points are dropped."""
 
     x_mm: Range = (-500.0, 500.0)
-    """Control volume along the travel; wide, for the travel itself bounds X."""
+    """Control volume along the travel; wide, because the travel itself bounds X."""
     y_mm: Range = (-75.0, 75.0)
     """Control volume across the travel."""
     z_mm: Range = (-150.0, 120.0)
-    """Control volume in height; it takes in the mirror image below the glass, which has a limit of its own."""
+    """Control volume in height; it includes the mirror image below the glass, which `glass_mm` limits."""
     drop_unsupported: bool = True
     """Drop points of pixels that no control point of the calibration supports."""
     glass_mm: Annotated[float, Field(ge=0, le=50)] = 0.5
-    """Nothing is farther below the glass, at Z = 0; what lies no farther from it beside the foot is the glass."""
+    """Points farther below the glass, at Z = 0, are dropped; points beside the foot this near to it are the glass."""
     gap_mm: Annotated[float, Field(gt=0, le=50)] = 1.5
-    """A segment of stripe ends where the next point is farther away, ..."""
+    """A segment of stripe ends where the next point is farther away than this, ..."""
     segment_mm: Annotated[float, Field(gt=0, le=1000)] = 15.0
-    """... or when it is so long; points of one segment are kept or dropped together."""
+    """... or where it reaches this length; points of one segment are kept or dropped together."""
     end_points: Annotated[int, Field(ge=0, le=100)] = 4
-    """So many points at each end of a piece of stripe are dropped where another camera sees the place: there the
-    stripe's profile is cut off, and its centre runs away."""
+    """Points dropped at each end of a piece of stripe if another camera sees the place: the stripe's profile is cut off
+    there, and its centre is displaced."""
     shortest: Annotated[int, Field(ge=1, le=1000)] = 3
-    """Segments of fewer points are dropped where no other camera has points beside them."""
+    """Segments of fewer points are dropped if no other camera has points beside them."""
     beside_mm: Annotated[float, Field(gt=0, le=50)] = 4.0
-    """How far a segment is from those in the planes before and behind it, in Y and Z; three times as far where there
-    are none on one side: the first stripes of heel and toes grow fast."""
+    """Distance in Y and Z within which a segment has neighbours in the planes before and behind it; three times as far
+    where one side has none: the first stripes of heel and toes grow fast."""
     beside_share: Share = 0.3
-    """A segment is isolated when fewer of its points have others so far away."""
+    """A segment is isolated if less than this share of its points has neighbours within `beside_mm`."""
     fewest_cameras: Annotated[int, Field(ge=2, le=64)] = 4
-    """With fewer cameras nobody is asked to confirm what another one sees."""
+    """With fewer cameras, no camera has to confirm the points of another."""
     denied_share: Share = 0.5
-    """A segment is dropped when other cameras should see more of its points, and do not, ..."""
+    """A segment is dropped if other cameras should see more than this share of its points, and do not, ..."""
     confirmed_share: Share = 0.25
     """... unless they see more than this share."""
     static_share: Share = 0.7
-    """What stands at the same Y and Z in more of a camera's first and of its last frames travels with the heads."""
+    """Points at the same Y and Z in more of a camera's first and of its last frames travel with the heads."""
     island_gap_steps: Annotated[float, Field(gt=0, le=50)] = 2.5
-    """Parts of the cloud closer than about so many steps from stripe to stripe belong together."""
+    """Parts of the cloud that are closer than about this number of steps from stripe to stripe belong together."""
     island_share: Annotated[float, Field(ge=0, lt=1)] = 0.005
     """Parts with less than this share of the cloud's points are dropped."""
 

@@ -1,4 +1,4 @@
-"""What a registration can be told."""
+"""Parameters of a registration."""
 
 from pydantic import Field
 
@@ -6,7 +6,7 @@ from schemas.base.model import Document
 
 
 class RegistrationParameters(Document):
-    """How closely two shapes are looked at when one is brought onto the other."""
+    """Sampling and inlier distance of the registration of one shape to another."""
 
     points: int = Field(
         default=10_000,

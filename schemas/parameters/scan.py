@@ -10,7 +10,7 @@ from schemas.parameters.surface import SurfaceParameters
 
 
 class ScanParameters(Document):
-    """What the steps of a scan can be told, a model a step."""
+    """The parameters of all steps of a scan, one model a step."""
 
     extraction: ExtractionParameters = ExtractionParameters()
     mapping: MappingParameters = MappingParameters()

@@ -1,4 +1,4 @@
-"""Settings of the virtual scanner: what it films, and how strongly each effect of real cameras shows."""
+"""Settings of the virtual scanner: its travel, its light, and the strength of each effect of real cameras."""
 
 from typing import Annotated, Literal
 
@@ -15,9 +15,9 @@ class SimulationSettings(Document):
     """One recording of the virtual scanner. Equal settings give equal bytes."""
 
     seed: Seed = 1
-    """Of all that differs from recording to recording: noise, speckle, flicker, texture of the skin, clicks."""
+    """Seed of everything that differs between recordings: noise, speckle, flicker, texture of the skin, clicks."""
     scanner_seed: Seed = 1
-    """Of the scanner itself: mounting, lenses, glints. Recordings of one scanner share it."""
+    """Seed of the scanner itself: mounting, lenses, glints. Recordings of one scanner share it."""
 
     start_mm: Annotated[float, Field(ge=-1e4, le=1e4)] = 0.0
     """X of the laser plane at the first frame."""
@@ -26,7 +26,7 @@ class SimulationSettings(Document):
     frames: Annotated[int, Field(ge=1, le=10_000)] = 200
     """Frames of each camera."""
     frames_per_second: Annotated[int, Field(ge=1, le=120)] = 18
-    """Rate that the films bear."""
+    """Frame rate in the header of the films."""
 
     ambient: Literal["dark", "ambient", "bright"] = "ambient"
     """Light in the room; `bright` saturates parts of the picture."""
@@ -35,7 +35,7 @@ class SimulationSettings(Document):
     laser_sigma_mm: Annotated[float, Field(gt=0.02, le=5)] = 0.32
     """Half-width of the laser sheet at its focus: the standard deviation of its Gaussian across X."""
     leak: Scale = 1.0
-    """Red light that passes the green and blue filters: what turns an over-exposed stripe white."""
+    """Red light that passes the green and blue filters; it turns an over-exposed stripe white."""
     speckle: Annotated[float, Field(ge=0, le=1)] = 0.12
     """Contrast (standard deviation over mean) of the laser's speckle in one pixel."""
     halo: Scale = 1.0
@@ -55,7 +55,7 @@ class SimulationSettings(Document):
     noise: Scale = 1.0
     """Shot and read noise of the sensor."""
     bayer: bool = True
-    """One colour a pixel, the others interpolated."""
+    """True if each pixel records one colour and the others are interpolated."""
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 85
     """Quality of the camera's JPEG compression."""
     jpeg_chroma: Literal["444", "422", "420"] = "420"

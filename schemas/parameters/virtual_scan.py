@@ -1,4 +1,4 @@
-"""What a suite films."""
+"""Parameters of a film of a regression suite."""
 
 from typing import Literal
 
@@ -7,9 +7,9 @@ from schemas.parameters.simulation import SimulationSettings
 
 
 class VirtualScan(Document):
-    """A parametric foot before the virtual scanner: filmed once, and again where the simulator has changed."""
+    """A parametric foot before the virtual scanner: filmed once, and again after the simulator has changed."""
 
     side: Literal["right", "left"] = "right"
     laser_off: bool = False
-    """Whether each frame is taken again with the laser off, so that the surface bears colours."""
+    """True if each frame is taken again with the laser off, so that the surface has colours."""
     settings: SimulationSettings = SimulationSettings()

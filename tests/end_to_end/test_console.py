@@ -155,7 +155,7 @@ def test_a_pseudonym_is_checked_as_typed(show: Callable[..., Opened], scanner: A
     told, start = page.locator("#patient-told"), page.locator("#start")
     expect(page.locator("#start-told")).to_have_text("A pseudonym is missing.")
     page.locator("#patient").press_sequentially("P 1/ä")
-    expect(told).to_have_text("Only letters, digits, - and _ may be in it, no space, “/”, “ä”.")
+    expect(told).to_have_text("Only letters, digits, - and _ are allowed, no space, “/”, “ä”.")
     assert page.get_attribute("#patient", "aria-invalid") == "true"
     assert start.get_attribute("aria-disabled") == "true"
     page.keyboard.press("Enter")

@@ -121,7 +121,7 @@ def test_no_surface_is_a_finding(name: str, method: str, calibration: bytes) -> 
 
 @pytest.mark.parametrize("name", SHEETS)
 def test_a_sheet_is_closed_by_none_of_the_methods(name: str, calibration: bytes) -> None:
-    with pytest.raises(Finding, match="do not go around something"):
+    with pytest.raises(Finding, match="do not surround a solid"):
         meshed(SHEETS[name](), calibration, SurfaceParameters())
     pivoted = unpack(meshed(SHEETS[name](), calibration, SurfaceParameters(method="ball_pivoting"))["surface"])
     assert mesh_quality(pivoted["vertices"], pivoted["faces"]).open_edges > 0
@@ -234,7 +234,7 @@ def test_a_scan_that_is_mapped_to_a_plane_or_a_line_is_a_finding(
     assert (done.returncode, done.stdout) == (1, "")
     line = mistake(done)
     assert "P0001/small" in line
-    assert "points do not go around something" in line
+    assert "points do not surround a solid" in line
 
 
 def test_a_scan_of_one_camera_that_sees_one_side_is_a_finding(
@@ -247,4 +247,4 @@ def test_a_scan_of_one_camera_that_sees_one_side_is_a_finding(
     assert (done.returncode, done.stdout) == (1, "")
     line = mistake(done)
     assert "P0001/small" in line
-    assert "points do not go around something" in line
+    assert "points do not surround a solid" in line

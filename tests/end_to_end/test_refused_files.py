@@ -176,7 +176,7 @@ def test_a_foot_in_no_unit(refuse: Refuse, tmp_path: Path, scale: float) -> None
 def test_the_unit_of_a_foot_is_told(footscan: Footscan, tmp_path: Path) -> None:
     (tmp_path / "foot.stl").write_bytes(stl(0.001))
     done = footscan("measure", tmp_path / "foot.stl", "--json")
-    assert "coordinates in m, told by the length of 0.26" in done.stderr
+    assert "coordinates in m, inferred from the length of 0.26" in done.stderr
     assert json.loads(done.stdout)["measures"]["foot_length"]["value"] == pytest.approx(262.0, abs=0.5)
 
 

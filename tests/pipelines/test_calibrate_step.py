@@ -12,7 +12,8 @@ from footscan.calibration.capture.as_arrays import view_of
 from footscan.calibration.capture.stripe_arrays import stripe_arrays
 from pipelines.calibrate import calibration_steps, recorded_inputs
 from pipelines.capture_job import calibrate_capture
-from pipelines.engine.actions.step import Failure, Outcome, Step
+from pipelines.engine.actions.key import image_text, key_of
+from pipelines.engine.actions.step import Failure, Outcome, Output, Step
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
 from pipelines.engine.plan import make_plan
@@ -20,12 +21,14 @@ from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.run import run_plan
 from pipelines.engine.store.store import open_store
 from pipelines.recordings.captures import read_capture
+from pipelines.simulate import filmed_calibration_steps
 from pipelines.steps import capture_stripe
 from schemas.base.errors import DamagedError, RefusedInput
 from schemas.calibration import Calibration
 from schemas.mounting import Mounting
 from schemas.parameters.calibration import CaptureCalibrationParameters
 from schemas.parameters.extraction import ExtractionParameters
+from schemas.parameters.simulation import SimulationSettings
 
 Calibrated = tuple[dict[str, Outcome], list[str]]
 JOINT = ["all-recognise", "calibrate", "own-side", "place"]
@@ -107,3 +110,13 @@ def test_a_capture_that_is_not_what_was_filmed_is_filmed_anew(tmp_path: Path, na
     with pytest.raises(DamagedError, match=rf"{name}: is not what was filmed; run again"):
         capture_stripe.run({"film": listing}, ExtractionParameters(), places)
     assert not (tmp_path / "capture.yaml").exists()
+
+
+def test_each_camera_of_a_capture_that_is_to_be_filmed_has_its_own_stripe(tmp_path: Path) -> None:
+    steps = filmed_calibration_steps("demo", tmp_path / "capture", SimulationSettings())
+    keys = set()
+    for step in steps:
+        if step.kind == "stripe":  # all take the same listing of films
+            digests = {name: "0" * 64 if isinstance(one, Output) else one.digest for name, one in step.inputs.items()}
+            keys.add(key_of(image_text(step, digests)))
+    assert len(keys) == 8

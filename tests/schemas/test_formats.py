@@ -105,7 +105,7 @@ def test_capture_is_accepted(tmp_path: Path) -> None:
     capture = read_yaml(write(tmp_path, CAPTURE), Capture)
     assert (capture.reference, capture.x_mm, capture.cameras[0].file) == ("reference.yaml", 0.0, "cam1.avi")
     twice = CAPTURE + "  - {id: 1, file: cam2.avi}\n"
-    with pytest.raises(RefusedInput, match=r"camera 1 stands twice, expected each id once$"):
+    with pytest.raises(RefusedInput, match=r"camera 1 is listed twice, expected each id once$"):
         read_yaml(write(tmp_path, twice), Capture)
 
 

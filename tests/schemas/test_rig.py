@@ -38,8 +38,8 @@ def test_a_short_rig_has_the_thesis_travel(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "complaint"),
     [
-        ("id: 5", "id: 1", "cameras: id 1 stands twice, expected each once"),
-        ("20:81", "21:81", "cameras: device http://192.168.1.21:81/stream stands twice, expected each once"),
+        ("id: 5", "id: 1", "cameras: id 1 is listed twice, expected each once"),
+        ("20:81", "21:81", "cameras: device http://192.168.1.21:81/stream is listed twice, expected each once"),
         ("id: 5", "id: 9", "cameras.1.id: "),
         ("head: 2", "head: 4", "cameras.2.head: "),
         ("port:", "light: {shortest_ms: 30}\nport:", "shortest_ms: expected at most longest_ms, 20, found 30"),

@@ -1,4 +1,4 @@
-"""How far apart two cameras place one and the same edge."""
+"""Agreement of two cameras: the distance at which they place the same edge."""
 
 from collections.abc import Mapping
 from itertools import combinations
@@ -12,16 +12,21 @@ from footscan.calibration.models.selection import rms
 from schemas.calibration import CameraCalibration, PairAgreement
 
 Floats = NDArray[np.float64]
-Place = tuple[int, int, int]
-"""Placement, edge, and a stretch of `BLOCK_MM` along it."""
+EdgeStretch = tuple[int, int, int]
+"""Number of the placement, of the edge, and of the stretch of `BLOCK_MM` along it."""
 
 FEWEST_POINTS = 3
+"""Points of a stretch from which its place is measured. Chosen by hand."""
 
 
 def pair_agreements(cameras: Mapping[int, CameraCalibration], points: Mapping[int, EdgePoints]) -> list[PairAgreement]:
-    """The disagreement of each pair of cameras over the stretches of edges that both see, across the edges, in mm.
+    """Measure the disagreement of each pair of cameras on the stretches of edges that both see.
 
-    Along an edge there is nothing to hold on to.
+    It is measured across the edges, in mm, since the place along an edge is not observed.
+
+    Parameters
+    ----------
+    cameras, points : camera -> its calibration, and the points of its stripe on edges.
     """
     offsets = {camera: _offsets(cameras[camera], points[camera]) for camera in cameras}
     pairs = []
@@ -40,8 +45,8 @@ def pair_agreements(cameras: Mapping[int, CameraCalibration], points: Mapping[in
     return pairs
 
 
-def _offsets(camera: CameraCalibration, points: EdgePoints) -> dict[Place, float]:
-    """Where a camera places each stretch of an edge, across it: the median distance from the true edge, mm."""
+def _offsets(camera: CameraCalibration, points: EdgePoints) -> dict[EdgeStretch, float]:
+    """The median distance, mm, from the true edge at which a camera places each stretch of it."""
     across = points.across(to_world(camera, points.pixels))
     stretch = np.floor(points.along / BLOCK_MM).astype(np.intp)
     places, number, count = np.unique(

@@ -1,4 +1,4 @@
-"""All ways to name four straight pieces of the stripe as edges of the reference object, and the map that each makes."""
+"""All assignments of edges of the reference object to four straight pieces of the stripe, and the map of each."""
 
 from itertools import combinations
 
@@ -12,35 +12,50 @@ Floats = NDArray[np.float64]
 Names = NDArray[np.intp]
 
 EDGES = 16
-"""Names are tried among the longest edges."""
+"""Number of the longest edges that are assigned: a bound of time."""
 SCALE_MM_PX = (0.02, 2.0)
-"""Millimetres to the pixel that a foot scanner's camera can have."""
+"""Range of the scale of a foot scanner's camera, mm a px. Chosen by hand."""
 UNIT_MM = 50.0
-"""About the object's extent: it makes normals and offsets alike."""
+"""Scale of lengths: about the object's extent, so that normals and offsets have similar size."""
 LEAST_VOLUME = 1e-3
-"""Of three lines, as unit vectors: below, they meet in one point, near or at infinity."""
+"""Determinant of three lines, as unit vectors, up to which they meet in one point, near or at infinity. Chosen by
+hand."""
 LEAST_DEPTH = 0.05
+"""Depth, relative to that of the pixel (0, 0), from which a point lies in front of the camera. Chosen by hand."""
+HORIZON = 1e-9
+"""Lower bound of a depth by which is divided."""
+DECIMALS = 6
+"""Decimals to which normals and offsets of edges on one line are equal: rounding."""
 
-_TRIPLES = [list(three) for three in combinations(range(4), 3)]
+_TRIPLES = [list(triple) for triple in combinations(range(4), 3)]
 
 
 def facing_names(edges: Edges) -> Names:
-    """(M, 4) edges that can all face one camera, in every order, one edge for each line on which edges lie."""
+    """List all sets of four edges that can face one camera.
+
+    Returns
+    -------
+    (M, 4) numbers of edges, in every order; of edges on one line only the longest is listed.
+    """
     names = _supporting_lines(edges)
-    every = np.stack(np.meshgrid(*[names] * 4, indexing="ij"), axis=-1).reshape(-1, 4)
-    return np.asarray(every[_on_one_side(edges.normal[every])])
+    quadruples = np.stack(np.meshgrid(*[names] * 4, indexing="ij"), axis=-1).reshape(-1, 4)
+    return np.asarray(quadruples[_on_one_side(edges.normal[quadruples])])
 
 
 def named_maps(names: Names, pieces: Floats, ends: Floats, frames: Names, shifts: Floats, edges: Edges) -> Floats:
-    """The homographies (M, 3, 3), last number 1, that take four pieces to edges, for all names that make a view.
+    """Compute the homographies that map four pieces to their edges, for all assignments that are possible views.
 
     Parameters
     ----------
-    names : (N, 4) edges, as of `facing_names`.
-    pieces : (4, 3) their lines n_i i + n_j j = d as (n_i, n_j, d), px.
-    ends : (8, 2) their ends, px.
-    frames : (4,) the frame of each; within one, no edge is named twice.
-    shifts : (4, 2) of the object in that frame, mm.
+    names : (N, 4) numbers of the edges, as from `facing_names`.
+    pieces : (4, 3) lines of the pieces, n_i i + n_j j = d, as (n_i, n_j, d), px.
+    ends : (8, 2) ends of the pieces, px.
+    frames : (4,) frame of each piece; within a frame, two pieces have different edges.
+    shifts : (4, 2) shift of the object in that frame, mm.
+
+    Returns
+    -------
+    (M, 3, 3) float64, from px to mm; their last number is 1.
     """
     for a, b in combinations(range(4), 2):
         if frames[a] == frames[b]:
@@ -53,7 +68,7 @@ def named_maps(names: Names, pieces: Floats, ends: Floats, frames: Names, shifts
     world = world[np.min(volumes, axis=0) > LEAST_VOLUME]
     if not len(world) or min(abs(float(np.linalg.det(pieces[triple]))) for triple in _TRIPLES) == 0.0:
         return np.empty((0, 3, 3))
-    # Lines n . x = d are (n, -d); a homography H takes points one way and lines, by its transpose, the other.
+    # A line n . x = d is (n, -d). A homography maps points; its transpose maps lines in the opposite direction.
     sign = np.array([1.0, 1.0, -1.0])
     from_world = np.linalg.inv(_basis(world * sign * [1.0, 1.0, UNIT_MM]))
     maps = np.swapaxes(_basis((pieces * sign)[np.newaxis]) @ from_world, 1, 2)
@@ -63,35 +78,42 @@ def named_maps(names: Names, pieces: Floats, ends: Floats, frames: Names, shifts
 
 
 def misfits(maps: Floats, pixels: Floats, shift: Floats, edges: Edges, reach_mm: float) -> Floats:
-    """(M,) mean distance, mm, at most `reach_mm` a point, of `pixels` (N, 2) by `maps` (M, 3, 3) from the nearest edge
-    of the object, shifted by `shift` (N, 2), mm."""
-    found: Floats = _misfits(maps, pixels, shift, edges.start, edges.end, reach_mm)
-    return found
+    """Compute the mean distances (M,), mm, of mapped points from the nearest edge, each at most `reach_mm`.
+
+    Parameters
+    ----------
+    maps : (M, 3, 3) from px to mm.
+    pixels : (N, 2) px.
+    shift : (N, 2) shift of the object in the frame of each point, mm.
+    """
+    means: Floats = _misfits(maps, pixels, shift, edges.start, edges.end, reach_mm)
+    return means
 
 
 def can_be_seen(edges: Edges, seen: NDArray[np.bool_]) -> bool:
-    """Whether the edges (E,) that are `seen` can all face one camera."""
+    """True if the edges marked in `seen` (E,) can all face one camera."""
     return bool(_on_one_side(edges.normal[np.newaxis, seen])[0])
 
 
 def is_view(matrix: Floats, pixels: Floats) -> bool:
-    """Whether a camera can see the plane so: all of it before the camera, and at a scale that a scanner has."""
+    """True if a map (3, 3) is possible: all pixels (N, 2) in front of the camera, at the scale of a scanner."""
     return bool(_are_views(matrix[np.newaxis], pixels)[0])
 
 
 def _on_one_side(normals: Floats) -> NDArray[np.bool_]:
-    """Whether some direction has all of the `normals` (M, n, 2) on its side, (M,)."""
+    """True for the sets of `normals` (M, n, 2) that lie on one side of some direction; (M,)."""
     angles = np.sort(np.arctan2(normals[:, :, 1], normals[:, :, 0]), axis=1)
     gaps = np.diff(np.column_stack([angles, angles[:, 0] + 2 * np.pi]), axis=1)
     return np.asarray(gaps.max(axis=1) > np.pi + 1e-6)
 
 
 def _supporting_lines(edges: Edges) -> Names:
-    """One edge of each line on which edges lie, the longest first."""
-    seen: dict[tuple[float, ...], int] = {}
+    """The longest edge on each line, the longest first."""
+    by_line: dict[tuple[float, ...], int] = {}
     for k in np.argsort(-edges.length, kind="stable").tolist():
-        seen.setdefault((*np.round(edges.normal[k], 6).tolist(), round(float(edges.offset[k]), 6)), k)
-    return np.array(list(seen.values())[:EDGES], np.intp)
+        line = (*np.round(edges.normal[k], DECIMALS).tolist(), round(float(edges.offset[k]), DECIMALS))
+        by_line.setdefault(line, k)
+    return np.array(list(by_line.values())[:EDGES], np.intp)
 
 
 def _basis(lines: Floats) -> Floats:
@@ -101,6 +123,7 @@ def _basis(lines: Floats) -> Floats:
 
 
 def _are_views(maps: Floats, pixels: Floats) -> NDArray[np.bool_]:
+    """True for the maps (M, 3, 3) that are possible, as in `is_view`; (M,)."""
     taken = np.einsum("mlk,nk->mnl", maps[:, :, :2], pixels) + maps[:, np.newaxis, :, 2]
     depth = taken[:, :, 2]
     ahead = np.all(depth > LEAST_DEPTH, axis=1) | np.all(depth < -LEAST_DEPTH, axis=1)
@@ -108,7 +131,7 @@ def _are_views(maps: Floats, pixels: Floats) -> NDArray[np.bool_]:
     plane = taken[:, :, :2] / safe[:, :, np.newaxis]
     slopes = maps[:, np.newaxis, :2, :2] - plane[:, :, :, np.newaxis] * maps[:, np.newaxis, 2:, :2]
     slopes = slopes / safe[:, :, np.newaxis, np.newaxis]
-    # Singular values s, t of a 2 x 2 matrix: s t is its determinant, s^2 + t^2 the sum of its squares.
+    # For the singular values s, t of a 2 x 2 matrix, s t is its determinant and s^2 + t^2 the sum of its squares.
     area = np.abs(slopes[..., 0, 0] * slopes[..., 1, 1] - slopes[..., 0, 1] * slopes[..., 1, 0])
     total = np.sum(slopes**2, axis=(2, 3))
     largest = np.sqrt((total + np.sqrt(np.maximum(total**2 - 4.0 * area**2, 0.0))) / 2.0)
@@ -119,14 +142,15 @@ def _are_views(maps: Floats, pixels: Floats) -> NDArray[np.bool_]:
 
 @compiled
 def _misfits(maps: Floats, pixels: Floats, shift: Floats, start: Floats, end: Floats, reach: float) -> Floats:
+    """The result of `misfits`, for edges from `start` to `end` (E, 2)."""
     mean = np.zeros(len(maps))
     for m in range(len(maps)):
         h = maps[m]
         for n in range(len(pixels)):
             i, j = pixels[n]
             depth = h[2, 0] * i + h[2, 1] * j + h[2, 2]
-            if abs(depth) < 1e-9:
-                depth = 1e-9
+            if abs(depth) < HORIZON:
+                depth = HORIZON
             y = (h[0, 0] * i + h[0, 1] * j + h[0, 2]) / depth - shift[n, 0]
             z = (h[1, 0] * i + h[1, 1] * j + h[1, 2]) / depth - shift[n, 1]
             least = reach * reach

@@ -1,4 +1,4 @@
-"""The corners of the reference object as a camera sees them: a chart of control points that nobody clicked."""
+"""The corners of the reference object in the images of a camera: a chart of control points without clicks."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from schemas.calibration import CameraCalibration
 Floats = NDArray[np.float64]
 
 NEAR_MM = 0.5
-"""A corner of the stripe as near as this to one of the object is it."""
+"""Distance up to which a corner of the stripe is that of the object. Chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -34,18 +34,18 @@ class FoundCorner:
 def corners_in(
     camera: CameraCalibration, stripes: Sequence[Floats], edges: Edges, poses: Floats
 ) -> Iterator[FoundCorner]:
-    """The corners in what a calibrated camera saw.
+    """Find the corners of the object in the stripes of a calibrated camera.
 
     Parameters
     ----------
-    stripes : for each of K frames the stripe's points (N, 2), px.
-    poses : (K, 3) of the object in each, mm, mm and radians.
+    stripes : for each of K frames the points (N, 2) of the stripe, px.
+    poses : (K, 3) of the object in each frame, mm, mm and radians.
     """
     for frame, (stripe, pose) in enumerate(zip(stripes, poses, strict=True)):
         pixels = np.array([corner.position for corner in find_corners(find_lines(stripe), stripe)]).reshape(-1, 2)
-        true = from_object(edges.start, pose)
-        distance = np.linalg.norm(to_world(camera, pixels)[:, np.newaxis] - true, axis=2)
+        corners = from_object(edges.start, pose)
+        distance = np.linalg.norm(to_world(camera, pixels)[:, np.newaxis] - corners, axis=2)
         for k in np.flatnonzero(distance.min(axis=1, initial=np.inf) < NEAR_MM):
             i, j = pixels[k].tolist()
-            corner_y, corner_z = true[distance[k].argmin()].tolist()
+            corner_y, corner_z = corners[distance[k].argmin()].tolist()
             yield FoundCorner(camera.camera, frame, (i, j), (corner_y, corner_z))

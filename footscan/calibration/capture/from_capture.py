@@ -1,8 +1,8 @@
-"""Calibration from a capture: the stripe over the reference object, seen by every camera, and nobody clicks.
+"""Calibration from a capture: the stripe over the reference object, seen by all cameras, without any clicks.
 
-Each camera's view of the object is recognised; all cameras together tell whether it stood where it should; then every
-point of the stripe is to lie on the edge of the known cross-section that it belongs to, in all placements at once, and
-the model of each camera is chosen by held-out error.
+The object is recognised in the view of each camera. All cameras together determine its poses. Then a map is fitted that
+brings each point of the stripe onto its edge of the known cross-section, in all placements at once. The model of each
+camera is selected by held-out error.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ from footscan.calibration.capture.reference import Edges
 from footscan.calibration.chart.from_chart import calibrated
 from footscan.calibration.models.fit import UndeterminedError
 from footscan.calibration.models.homography import HomographyModel, image_frame
-from footscan.calibration.models.selection import ModelTrial, asked_for, candidates, select
+from footscan.calibration.models.selection import ModelTrial, candidates, requested_models, select
 from schemas.base.errors import RefusedInput
 from schemas.calibration import Calibration, CameraCalibration, Source
 from schemas.mounting import Mounting
@@ -29,20 +29,20 @@ from schemas.parameters.calibration import CalibrationParameters
 Floats = NDArray[np.float64]
 
 STRIPE = 100
-"""With so many points a frame shows a stripe, whatever it lies on."""
+"""Points from which a frame shows a stripe, on whatever object. Chosen by hand."""
 SEEN = 0.5
-"""A camera sees a placement where so much of its stripe is explained by the object."""
+"""Share of the stripe explained by the object from which a camera sees a placement. Chosen by hand."""
 
 
 @dataclass(frozen=True)
 class CameraView:
-    """What one camera saw of the reference object."""
+    """The stripe of one camera over the reference object."""
 
     camera: int
     image_px: tuple[int, int]
     """Columns and rows."""
     stripes: Sequence[Floats]
-    """For each of K placements the stripe's points (N, 2), px; empty where there are none."""
+    """For each of K placements the points (N, 2) of the stripe, px, N >= 0."""
     mounting: Mounting
     lost: tuple[int, ...] = ()
     """Frames that cannot be decoded."""
@@ -55,54 +55,59 @@ class Recognised:
     view: CameraView
     first: FirstMap
     rough: CameraFit
-    """With the object where it was said to stand, and a lens."""
+    """A map with distortion, for the object in its nominal poses."""
 
     @property
     def doubts(self) -> list[str]:
-        """What looks like a mistake in the capture, a line each."""
+        """Possible mistakes in the capture, a line each."""
         camera = f"camera {self.view.camera}"
-        found = [f"{camera}: frame {number} cannot be decoded and is not used" for number in self.view.lost]
-        found += [
+        doubts = [f"{camera}: frame {number} cannot be decoded and is not used" for number in self.view.lost]
+        doubts += [
             f"{camera}: the object is not recognised in frame {number}, which is not used"
             for number, (stripe, share) in enumerate(zip(self.view.stripes, self.first.explained, strict=True))
             if len(stripe) >= STRIPE and share < SEEN
         ]
         if self.contradiction:
-            found.append(f"{camera} {self.contradiction}")
-        return found
+            doubts.append(f"{camera} {self.contradiction}")
+        return doubts
 
     @property
     def contradiction(self) -> str | None:
-        """What of it speaks against this being the camera's own film, or against the placements, if anything does."""
-        said, seen = self.view.mounting, self.first.seen_from
-        return f"sees the object from {seen}, expected from {said}" if seen.contradicts(said) else None
+        """The contradiction between view and mounting: the film may be another camera's, or the placements wrong."""
+        nominal, seen = self.view.mounting, self.first.seen_from
+        return f"sees the object from {seen}, expected from {nominal}" if seen.contradicts(nominal) else None
 
 
 @dataclass(frozen=True)
 class CalibratedView:
-    """The calibration of one camera, and what it rests on."""
+    """The calibration of one camera, with its data."""
 
     calibration: CameraCalibration
     trials: list[ModelTrial]
     points: EdgePoints
-    """What was used of the stripe."""
+    """The points of the stripe that were used."""
     corners: list[FoundCorner]
 
 
 def recognise_view(view: CameraView, edges: Edges, placements: Floats) -> Recognised | str:
-    """The object in the view of a camera, standing in its `placements` (K, 2), mm; or why it is not recognised."""
+    """Recognise the object in the view of a camera, in its `placements` (K, 2), mm; or give the reason why not."""
     try:
         first = recognise(view.stripes, edges, placements, view.mounting)
     except UnrecognisedError as reason:
         return str(reason)
     try:
-        return Recognised(view, first, fit_view(view, first, edges, as_said(placements)))
+        return Recognised(view, first, fit_view(view, first, edges, nominal_poses(placements)))
     except UndeterminedError:
         return "too little of the stripe lies on the object"
 
 
 def fit_view(view: CameraView, first: FirstMap, edges: Edges, poses: Floats, without: int | None = None) -> CameraFit:
-    """The map that knows the lens, from placements in which the camera sees the object; one may be left out.
+    """Fit a map with distortion to the placements in which a camera sees the object, one of which may be left out.
+
+    Parameters
+    ----------
+    poses : (K, 3) of the object, mm, mm and radians.
+    without : number of the placement to leave out.
 
     Raises
     ------
@@ -117,44 +122,48 @@ def fit_view(view: CameraView, first: FirstMap, edges: Edges, poses: Floats, wit
     return fit_to_edges(seen, first.world, edges, poses, lens)
 
 
-def as_said(placements: Floats) -> Floats:
-    """Poses (K, 3), mm, mm and radians, of an object that stands in its `placements` (K, 2)."""
+def nominal_poses(placements: Floats) -> Floats:
+    """Convert the `placements` (K, 2), mm, of an object to poses (K, 3), mm, mm and radians, without rotation.
+
+    >>> print(nominal_poses(np.array([[10.0, 0.0]])))
+    [[10.  0.  0.]]
+    """
     return np.column_stack([placements, np.zeros(len(placements))])
 
 
 def object_poses(recognised: Mapping[int, Recognised], edges: Edges, placements: Floats) -> Floats:
-    """Where the object stood, as all cameras tell: (K, 3) mm, mm and radians. A single placement is what it is."""
-    poses = as_said(placements)
+    """Determine the poses (K, 3) of the object, mm, mm and radians, from all cameras; a single placement is kept."""
+    poses = nominal_poses(placements)
     if len(placements) == 1:
         return poses
-    return joined_poses({camera: known.rough for camera, known in recognised.items()}, edges, poses)[0]
+    return joined_poses({camera: result.rough for camera, result in recognised.items()}, edges, poses)[0]
 
 
 def calibrate_view(
     recognised: Recognised, edges: Edges, poses: Floats, parameters: CalibrationParameters, source: str
 ) -> CalibratedView:
-    """The calibration of one camera with the object in known `poses` (K, 3).
+    """Calibrate one camera with the object in known `poses` (K, 3), mm, mm and radians.
 
     Raises
     ------
     RefusedInput
-        The model that was asked for cannot be fitted.
+        No requested model can be fitted.
     """
     view = recognised.view
     points = fit_view(view, recognised.first, edges, poses).points
     observations = points.observations()
-    tried = asked_for(candidates(observations.pixels, view.image_px), parameters)
-    found, trials = select(tried, observations, view.camera, robust=True)
-    if found is None:
-        reason = trials[0].remark or "nothing can be held out"
+    tried = requested_models(candidates(observations.pixels, view.image_px), parameters)
+    fitted, trials = select(tried, observations, view.camera, robust=True)
+    if fitted is None:
+        reason = trials[0].remark or "no data can be held out"
         raise RefusedInput(source, f"no model can be judged: {reason}", field=f"camera {view.camera}")
     chosen = next(trial for trial in trials if trial.status == "chosen")
-    calibration = calibrated(found, observations, chosen, view.image_px)
+    calibration = calibrated(fitted, observations, chosen, view.image_px)
     return CalibratedView(calibration, trials, points, list(corners_in(calibration, view.stripes, edges, poses)))
 
 
 def assemble(views: Sequence[CalibratedView], sources: list[Source], software: str, warnings: list[str]) -> Calibration:
-    """One calibration of all cameras, with how well each two of them agree."""
+    """Assemble the calibration of all cameras, with the agreement of each pair of them."""
     cameras = {view.calibration.camera: view.calibration for view in views}
     return Calibration(
         sources=sources,

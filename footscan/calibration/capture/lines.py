@@ -1,4 +1,7 @@
-"""Straight pieces of the stripe in one frame, and the corners in which they meet."""
+"""Straight pieces of the stripe in one frame, and the corners in which they meet.
+
+The constants are chosen by hand, unless another reason is given.
+"""
 
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -12,34 +15,30 @@ from footscan.robust import MAD_TO_SD
 Floats = NDArray[np.float64]
 
 SHORTEST_PX = 12.0
-"""A piece that is not longer than this is none."""
+"""Length up to which a piece is dropped."""
 TOLERANCE_PX = (0.4, 1.2)
-"""How far from a piece's parabola a point of it may lie, at least and at most; between them, four times the spread."""
+"""Bounds of the distance of a point from its piece's parabola; between them, the limit is four times the spread."""
 NOISE_PX = 0.1
-"""Standard deviation across the stripe of a point of it, far from corners; a piece may show more, but none less."""
+"""Lower bound of the standard deviation of a piece's points across the stripe, far from corners."""
 HUBER = 1.345
-"""Residuals beyond so many standard deviations lose weight (Huber 1964, doi:10.1214/aoms/1177703732)."""
+"""Residual, in standard deviations, beyond which points lose weight (Huber 1964, doi:10.1214/aoms/1177703732)."""
 BEND_PER_PX = 6e-5
-"""Standard deviation of the parabola's square coefficient that lens distortion gives: a sagitta of 1 px over 250 px.
+"""Prior standard deviation of the parabola's square coefficient, by lens distortion: a sagitta of 1 px over 250 px.
 Long pieces with several times as much keep it, short ones stay straight."""
 END_PX = 4.0
-"""So far from its ends a piece is not fitted: at a corner, a contour or a shadow the stripe's centre is biased."""
-SEED_PX = 8.0
-"""Radius within which a piece begins."""
-STEP_PX = 8.0
-"""Longest gap that a piece grows over."""
-JOIN_PX = 40.0
-"""Longest gap over which two pieces of one parabola are one."""
-JOIN_STEP_PX = 0.4
-"""How far their common parabola may lie off two pieces that are one."""
-CORNER_REACH_PX = 15.0
-"""Two pieces meet where both end nearer than this to their intersection."""
-OVERSHOOT_PX = 6.0
-"""How far beyond a corner a piece may seem to run."""
+"""Length of each end that is not fitted: at a corner, a contour or a shadow the stripe's centre is biased."""
+SEED_PX, STEP_PX = 8.0, 8.0
+"""Radius around a point within which a piece starts, and longest gap across which it grows."""
+JOIN_PX, JOIN_STEP_PX = 40.0, 0.4
+"""Longest gap across which two pieces are joined, and their largest distance from their common parabola."""
+CORNER_REACH_PX, OVERSHOOT_PX = 15.0, 6.0
+"""Largest gap between a piece and its corner, and largest length of a piece beyond its corner."""
 SMALLEST_ANGLE = np.radians(12.0)
-"""Pieces that meet under less are one bent piece, or two side by side."""
+"""Smallest angle of a corner: with less, the pieces are one bent piece, or lie side by side."""
 CORRELATION_PX = 4.0
-"""The profiles of neighbours share pixels: so many points in a row tell no more than one."""
+"""Factor on the variance of a fit: so many points in a row, whose profiles share pixels, count as one."""
+GROWTHS, REWEIGHTINGS, NEWTON_STEPS = 40, 3, 5
+"""Iterations of the growth of a piece, of robust least squares, and of an intersection: bounds of time."""
 
 
 @dataclass(frozen=True)
@@ -47,18 +46,18 @@ class ImageLine:
     """A straight piece of the stripe, slightly bent by the lens."""
 
     points: NDArray[np.intp]
-    """(n,) indices of the input points on it, in the order along it, those near its ends among them."""
+    """(n,) indices of the input points on it, in order along it, including those near its ends."""
     normal: Floats
     """(2,) unit, image frame (i, j)."""
     offset: float
     """normal . (i, j) = offset, px: the line of total least squares."""
     middle: float
-    """Position along the line, px, from which `bend` counts: half-way between the ends."""
+    """Position along the line, px, of the middle between the ends; origin of `bend`."""
     bend: Floats
-    """(3,) c0, c1, c2: the piece departs from the line, towards the normal, by c0 + c1 s + c2 s^2 px, s px from the
-    middle along `along`."""
+    """(3,) c0, c1, c2: the distance of the piece from the line, in the direction of the normal, is c0 + c1 s + c2 s^2
+    px, s px from the middle along `along`."""
     ends: Floats
-    """(2, 2) px: its first and its last point, brought onto the parabola."""
+    """(2, 2) px: its first and its last point, projected onto the parabola."""
     rms_px: float
     """Root mean square distance of its points from the parabola."""
 
@@ -77,25 +76,28 @@ class ImageLine:
         return np.asarray(pixels @ self.along - self.middle)
 
     def distances(self, pixels: Floats) -> Floats:
-        """Signed distances (N,) px off the parabola, towards the normal, of `pixels` (N, 2)."""
+        """Signed distances (N,) px of `pixels` (N, 2) from the parabola, positive in the direction of the normal."""
         s = self.positions(pixels)
         return np.asarray(pixels @ self.normal - self.offset - np.vander(s, 3, increasing=True) @ self.bend)
 
 
 @dataclass(frozen=True)
 class ImageCorner:
-    """Where two neighbouring pieces of the stripe meet."""
+    """The corner in which two neighbouring pieces of the stripe meet."""
 
     position: Floats
     """(2,) px."""
     lines: tuple[int, int]
     """Indices of the two pieces."""
     sigma_px: float
-    """Standard deviation of the position, root mean square of its two axes; what bias the stripe has is not in it."""
+    """Standard deviation of the position, root mean square of its two axes, without the bias of the stripe."""
 
 
 def find_lines(pixels: Floats) -> list[ImageLine]:
-    """The straight pieces of the stripe in one frame, longest first.
+    """Find the straight pieces of the stripe in one frame, longest first.
+
+    A piece starts where points are straightest and grows along the stripe as long as points lie on its parabola. A
+    prior keeps the bend as small as that of lenses: a short piece is a line.
 
     Parameters
     ----------
@@ -103,15 +105,15 @@ def find_lines(pixels: Floats) -> list[ImageLine]:
 
     Returns
     -------
-    Pieces of more than 12 px; the fit leaves 4 px out at both ends of each, where the stripe's centre is biased. A
-    point belongs to one piece at most; a point at a corner belongs to the nearer one.
-    Two pieces on one parabola are one where the gap between them is below 40 px, and two beyond. A straight reflection
-    or a glint is a piece as well: what belongs to the object, its known cross-section must tell.
+    Pieces of more than 12 px, fitted without 4 px at both ends, where the stripe's centre is biased. A point belongs to
+    one piece at most, at a corner to the nearer one. Pieces on one parabola are joined if the gap is below 40 px.
+    A straight reflection or a glint is a piece too; only the known cross-section shows what belongs to the object.
 
-    Notes
-    -----
-    A piece begins where the points around a point are straightest and grows along the stripe, as long as points are on
-    its parabola, of which the bend is held small by what lenses do: a short piece is a line.
+    Examples
+    --------
+    >>> [line] = find_lines(np.column_stack([np.arange(50.0), np.full(50, 20.0)]))
+    >>> print(len(line.points), round(line.length, 3), round(abs(line.offset), 3))
+    50 49.0 20.0
     """
     pixels = np.asarray(pixels, np.float64).reshape(-1, 2)
     if len(pixels) < 3:
@@ -126,28 +128,26 @@ def find_lines(pixels: Floats) -> list[ImageLine]:
 
 
 def find_corners(lines: list[ImageLine], pixels: Floats, leave_out_px: float = 5.0) -> list[ImageCorner]:
-    """The corners in which neighbouring pieces of the stripe meet, those with the shortest gap first.
+    """Find the corners in which neighbouring pieces of the stripe meet, those with the shortest gap first.
+
+    A corner is the intersection of two parabolas. An end of a piece meets one other piece at most. Two pieces of which
+    one hides the other may seem to meet as well.
 
     Parameters
     ----------
-    lines : what `find_lines` found in `pixels` (N, 2).
-    leave_out_px : points nearer to the corner than this are left out; the stripe's centre is biased there.
-
-    Notes
-    -----
-    A corner is the intersection of two parabolas. An end of a piece meets one other piece at most. Two pieces of which
-    one hides the other may seem to meet as well.
+    lines : the result of `find_lines` for `pixels` (N, 2).
+    leave_out_px : distance from the corner within which points are ignored; the stripe's centre is biased there.
     """
     pixels = np.asarray(pixels, np.float64).reshape(-1, 2)
-    found = []
+    meetings = []
     for a, b in combinations(range(len(lines)), 2):
         position = _meet(lines[a], lines[b])
         if position is not None:
             gap = max(_gap(lines[a], position), _gap(lines[b], position))
-            found.append((gap, a, b, position))
+            meetings.append((gap, a, b, position))
     corners: list[ImageCorner] = []
     taken: set[tuple[int, bool]] = set()
-    for _, a, b, position in sorted(found, key=lambda corner: corner[:3]):
+    for _, a, b, position in sorted(meetings, key=lambda meeting: meeting[:3]):
         ends = {(n, bool(lines[n].positions(position[None])[0] > 0)) for n in (a, b)}
         if taken.isdisjoint(ends):
             taken |= ends
@@ -156,7 +156,7 @@ def find_corners(lines: list[ImageLine], pixels: Floats, leave_out_px: float = 5
 
 
 def _grow_all(pixels: Floats) -> list[NDArray[np.intp]]:
-    """Members of each piece, from the straightest place on."""
+    """The members of each piece, starting at the straightest places."""
     straightness, angle = _local_lines(pixels)
     near = cKDTree(pixels)
     free = np.ones(len(pixels), np.bool_)
@@ -177,7 +177,7 @@ def _grow_all(pixels: Floats) -> list[NDArray[np.intp]]:
 
 
 def _local_lines(pixels: Floats) -> tuple[Floats, Floats]:
-    """How far the points around each are off a line (N,) px, infinite for a blot, and the line's angle (N,)."""
+    """Distance of the points around each point from a line (N,) px, infinite for a blot, and the line's angle (N,)."""
     pairs = cKDTree(pixels).query_pairs(SEED_PX, output_type="ndarray")
     here, there = np.concatenate([pairs, pairs[:, ::-1]]).T
     d_i, d_j = (pixels[there] - pixels[here]).T
@@ -191,20 +191,20 @@ def _local_lines(pixels: Floats) -> tuple[Floats, Floats]:
     root = np.hypot(0.5 * (ii - jj), ij)
     least, most = 0.5 * (ii + jj) - root, 0.5 * (ii + jj) + root
     straight = (count >= 0.5 * SEED_PX) & (most > 9.0 * np.maximum(least, 0.0))
-    off = np.sqrt(np.maximum(least, 0.0) / count)  # of two equally straight places the one with more points
+    off = np.sqrt(np.maximum(least, 0.0) / count)  # prefers, of two equally straight places, the one with more points
     return np.where(straight, off, np.inf), 0.5 * np.arctan2(2.0 * ij, ii - jj)
 
 
 def _grow(pixels: Floats, members: NDArray[np.intp], free: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """The piece that begins with `members`, of points that are free."""
+    """Grow the piece that starts with `members`, over free points."""
     candidates = np.flatnonzero(free)
-    for _ in range(40):
+    for _ in range(GROWTHS):
         if len(members) < 4:
             return members
         line = _line(pixels, members)
         s = line.positions(pixels[candidates])
         half = 0.5 * line.length
-        # A short piece tells little of what lies far beyond its ends.
+        # A short piece does not predict places far beyond its ends.
         off = np.abs(line.distances(pixels[candidates]))
         near = (np.abs(s) < 2.0 * half + STEP_PX) & (off < _tolerance(pixels, line))
         inside, where = candidates[near], s[near]
@@ -217,13 +217,13 @@ def _grow(pixels: Floats, members: NDArray[np.intp], free: NDArray[np.bool_]) ->
 
 
 def _tolerance(pixels: Floats, line: ImageLine) -> float:
-    """How far off the piece a point of it may lie, by the median of those that it has; px."""
+    """The largest distance of a point from a piece, px, by the median of its points."""
     spread = _spread(np.abs(line.distances(pixels[line.points])))
     return min(max(4.0 * spread, TOLERANCE_PX[0]), TOLERANCE_PX[1])
 
 
 def _unbroken(s: Floats) -> slice:
-    """The run of sorted positions `s` around 0, or the one nearest to it, without a gap."""
+    """The run of sorted positions `s` without a gap that is nearest to 0."""
     if not len(s):
         return slice(0, 0)
     breaks = np.flatnonzero(np.diff(s) > STEP_PX)
@@ -233,7 +233,7 @@ def _unbroken(s: Floats) -> slice:
 
 
 def _join(pixels: Floats, pieces: list[NDArray[np.intp]]) -> list[NDArray[np.intp]]:
-    """Pieces of one parabola with a short gap between them made one, the nearest first."""
+    """Join pieces on one parabola with a short gap between them, the nearest first."""
     pieces = list(pieces)
     while True:
         lines = [_line(pixels, members) for members in pieces]
@@ -250,6 +250,7 @@ def _join(pixels: Floats, pieces: list[NDArray[np.intp]]) -> list[NDArray[np.int
 
 
 def _on_one_parabola(pixels: Floats, a: ImageLine, b: ImageLine) -> bool:
+    """True if two pieces lie on one parabola, one behind the other."""
     if abs(a.normal @ b.normal) < np.cos(SMALLEST_ANGLE):
         return False
     s = a.positions(b.ends)
@@ -264,7 +265,7 @@ def _on_one_parabola(pixels: Floats, a: ImageLine, b: ImageLine) -> bool:
 
 
 def _share(pixels: Floats, pieces: list[NDArray[np.intp]]) -> list[NDArray[np.intp]]:
-    """Each point that a piece has or might have goes to the piece nearest to it."""
+    """Assign each point to the nearest of the pieces to which it may belong."""
     if not pieces:
         return []
     lines = [_line(pixels, members) for members in pieces]
@@ -289,12 +290,12 @@ def _line(pixels: Floats, members: NDArray[np.intp]) -> ImageLine:
 
 
 def _end(length: float) -> float:
-    """How much of each end of a piece of that length is not fitted, px."""
+    """The length of each end of a piece that is not fitted, px."""
     return min(END_PX, 0.2 * length)
 
 
 def _fit(pixels: Floats, members: NDArray[np.intp], fitted: NDArray[np.intp]) -> ImageLine:
-    """The line of total least squares through `pixels[fitted]`, and the parabola along it, as far as members reach."""
+    """The line of total least squares through `pixels[fitted]`, and the parabola along it, from end to end."""
     inner = pixels[fitted]
     along = _direction(inner)
     normal = np.array([-along[1], along[0]])
@@ -310,7 +311,7 @@ def _fit(pixels: Floats, members: NDArray[np.intp], fitted: NDArray[np.intp]) ->
 
 
 def _direction(points: Floats) -> Floats:
-    """Unit vector (2,) along which `points` (n, 2) are spread most."""
+    """Unit vector (2,) along which `points` (n, 2) have the largest spread."""
     away = points - points.mean(axis=0)
     (ii, ij), (_, jj) = away.T @ away
     angle = 0.5 * np.arctan2(2.0 * ij, ii - jj)
@@ -318,14 +319,11 @@ def _direction(points: Floats) -> Floats:
 
 
 def _parabola(s: Floats, off: Floats) -> tuple[Floats, Floats, float]:
-    """Coefficients (3,) of the parabola through `off` (n,) px at `s` (n,) px, their covariance (3, 3), the rms, px.
-
-    Least squares with Huber's weights, and with the bend drawn to zero as far as lenses make it likely.
-    """
+    """Robust parabola through `off` (n,) px at `s` (n,) px: its coefficients (3,), their covariance, the rms, px."""
     matrix = np.vander(s, 3, increasing=True)
-    prior = np.diag([0.0, NOISE_PX**2, (NOISE_PX / BEND_PER_PX) ** 2])  # the slope counts from the line, and is small
+    prior = np.diag([0.0, NOISE_PX**2, (NOISE_PX / BEND_PER_PX) ** 2])  # the slope is relative to the line
     weights = np.ones(len(s))
-    for _ in range(3):
+    for _ in range(REWEIGHTINGS):
         normal_matrix = (matrix.T * weights) @ matrix + prior
         bend = np.asarray(np.linalg.solve(normal_matrix, (matrix.T * weights) @ off), np.float64)
         residuals = np.abs(off - matrix @ bend)
@@ -346,7 +344,7 @@ def _extent(points: Floats) -> float:
 
 
 def _meet(a: ImageLine, b: ImageLine) -> Floats | None:
-    """Where two neighbouring pieces meet, (2,) px; None where they do not."""
+    """The place in which two neighbouring pieces meet, (2,) px; None if they do not meet."""
     if abs(a.normal @ b.normal) > np.cos(SMALLEST_ANGLE):
         return None
     straight = np.linalg.solve(np.array([a.normal, b.normal]), np.array([a.offset, b.offset]))
@@ -358,21 +356,21 @@ def _meet(a: ImageLine, b: ImageLine) -> Floats | None:
 
 
 def _gap(line: ImageLine, position: Floats) -> float:
-    """How far beyond the nearer end of the piece a position lies, px; negative within it."""
+    """Distance of a position beyond the nearer end of the piece, px; negative within the piece."""
     return float(abs(line.positions(position[None])[0])) - 0.5 * line.length
 
 
 def _intersection(a: ImageLine, b: ImageLine) -> Floats:
     """Intersection (2,) px of two parabolas, by Newton's method from that of the lines."""
     position = np.linalg.solve(np.array([a.normal, b.normal]), np.array([a.offset, b.offset]))
-    for _ in range(5):
+    for _ in range(NEWTON_STEPS):
         off = np.array([line.distances(position[None])[0] for line in (a, b)])
         position = position - np.linalg.solve(np.array([_gradient(line, position) for line in (a, b)]), off)
     return position
 
 
 def _gradient(line: ImageLine, position: Floats) -> Floats:
-    """Gradient (2,) of the distance off the parabola."""
+    """Gradient (2,) of the distance from the parabola."""
     s = line.positions(position[None])[0]
     return np.asarray(line.normal - (line.bend[1] + 2.0 * line.bend[2] * s) * line.along)
 
@@ -380,7 +378,7 @@ def _gradient(line: ImageLine, position: Floats) -> Floats:
 def _corner(
     lines: list[ImageLine], pair: tuple[int, int], pixels: Floats, position: Floats, leave_out_px: float
 ) -> ImageCorner:
-    """The corner near `position`, from the points that are not too near."""
+    """The corner near `position`, from the points that are not too near to it."""
     refits, variances = [], []
     for line in (lines[n] for n in pair):
         points = pixels[line.points]

@@ -1,14 +1,14 @@
-"""Which edge of the reference object each straight piece of the stripe lies on: the first map of a camera, unaided.
+"""Recognition of the reference object: the first map of a camera, from the straight pieces of its stripe.
 
-Four lines of the image and four of the cross-section, no three of them through one point, determine a homography. All
-ways to name four pieces are tried; a camera sees only edges that face it, which leaves few. The right one explains the
-stripe in all placements. An object that is symmetric looks the same from several sides; which of them it is, placements
-that break the symmetry tell, or else where the camera stands.
+Four lines of the image and four lines of the cross-section, no three of which meet in one point, determine a
+homography. All assignments of edges to four pieces are tried. Few are possible, since a camera sees only edges that
+face it. The right one explains the stripe in all placements. A symmetric object looks the same from several sides;
+placements that break the symmetry, or else the mounting of the camera, decide between them.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,47 +23,60 @@ from schemas.mounting import Mounting, Sign
 Floats = NDArray[np.float64]
 
 SHORTEST_LINE_PX = 25.0
+"""Length from which a piece of the stripe is used. Chosen by hand."""
 LINES_A_FRAME = 6
-"""The longest pieces of a frame are those of the object."""
+"""Number of the longest pieces of a frame that are used. Chosen by hand."""
 QUADRUPLES = 16
-"""So many sets of four pieces are tried, the best conditioned first."""
-TRIED_BEFORE_STOPPING = 4
+"""Number of sets of four pieces that are tried, the best conditioned first: a bound of time."""
+TRIED_BEFORE_STOPPING, GOOD_SCORE = 4, 0.85
+"""Number of sets that are tried at least, and the score of a map above which no further sets are tried. Chosen by
+hand."""
 SAMPLE = 120
-"""Points of a frame by which a map is judged before it is refined."""
+"""Points of a frame by which maps are judged: a bound of time."""
 REACH_MM = 4.0
-"""A point farther from every edge than this is not explained at all: lens distortion is not known yet."""
+"""Bound of a point's distance from the nearest edge in the misfit of a map without distortion. Chosen by hand."""
 REFINED = 12
-"""So many maps are refined."""
+"""Number of maps that are refined: a bound of time."""
 GATES_MM = (4.0, 3.0, 2.0, 1.5, 1.5)
+"""Distances from an edge within which points are used, in each step of the refinement. Chosen by hand."""
+FEWEST_POINTS = 12
+"""Points that a refinement needs. Chosen by hand."""
 EXPLAINED_MM = 1.5
-"""A point as near to an edge as this is explained by a homography that knows of no distortion."""
+"""Distance from an edge up to which a point is explained by a map without distortion. Chosen by hand."""
 STRAY_SHARE = 0.1
-"""So many points may be nearest to an edge that the camera does not see, at a corner or by chance."""
+"""Share of points that may be nearest to a hidden edge, at a corner or by chance. Chosen by hand."""
 SHARP_MM = 0.75
-"""At this distance a point speaks no more for a map: what lies near an edge, not on it, does so by chance."""
+"""Distance from an edge at which a point no longer adds to a map's score. Chosen by hand."""
 FEWEST_EXPLAINED = 0.4
-"""A map with a lower score is none."""
+"""Least score of a map. Chosen by hand."""
 AS_GOOD = 0.9
-"""A map with this share of the best one's score may be the right one."""
+"""Ratio to the best score from which a map may be the right one. Chosen by hand."""
 LEVEL = 0.15
-"""Edges that face a side by less, in the mean, do not say that they are seen from there."""
+"""Least mean component of the seen edges' normals that shows the side from which they are seen. Chosen by hand."""
 UNKNOWN = Mounting(0, 0, 0)
+"""No side is known."""
 APART_MM = 5.0
-"""Maps that place more than stray points farther apart than this are two."""
+"""Distance from which two maps place a point differently; maps differ if more than `STRAY_SHARE` of the points do.
+Chosen by hand."""
+MIDDLE_PX, REACH_PX = (320.0, 240.0), 200.0
+"""Middle and scale of an image by which lines are normalised when the condition of four of them is judged."""
+FROM_PAIR, FROM_ALL = 3, 8
+"""Number of the longest pieces of each of two frames, and of all frames, from which sets are formed if single frames
+give too few: a bound of time."""
 
 
 @dataclass(frozen=True)
 class FirstMap:
-    """A homography that knows of no distortion, good to a millimetre or two."""
+    """A homography without distortion, accurate to a millimetre or two."""
 
     matrix: Floats
     """(3, 3) from (i, j, 1) to (Y, Z, 1), mm."""
     explained: Floats
-    """(K,) share of the stripe in each placement that lies near an edge; NaN where there is no stripe."""
+    """(K,) share of the stripe in each placement that lies near an edge; NaN for a placement without stripe."""
     score: float
-    """Share of the stripe that is explained, over all placements; a point counts less the farther off it lies."""
+    """Explained share of the stripe, over all placements; points count less with their distance from the edge."""
     seen_from: Mounting = UNKNOWN
-    """Where the camera stands by what it sees."""
+    """The side from which the camera sees the object."""
 
     def world(self, pixels: Floats) -> Floats:
         """Y and Z, (N, 2) mm, of `pixels` (N, 2)."""
@@ -71,30 +84,30 @@ class FirstMap:
 
 
 class UnrecognisedError(Exception):
-    """The object is not to be recognised."""
+    """The object cannot be recognised."""
 
 
 def recognise(stripes: Sequence[Floats], edges: Edges, placements: Floats, mounting: Mounting) -> FirstMap:
-    """The first map of a camera from the stripe over the reference object.
+    """Find the first map of a camera from the stripe over the reference object.
 
     Parameters
     ----------
-    stripes : for each of K placements the stripe's points (N, 2), px; empty where there are none.
-    edges : of the object's cross-section, E of them.
+    stripes : for each of K placements the points (N, 2) of the stripe, px, N >= 0.
+    edges : the E edges of the object's cross-section.
     placements : (K, 2) shift of the object in each placement, mm.
-    mounting : where the camera stands; it decides where the stripe alone cannot.
+    mounting : where the camera is mounted; it decides between maps that explain the stripe equally well.
 
     Raises
     ------
     UnrecognisedError
-        Too few straight pieces, or no map explains them, or several do.
+        There are too few straight pieces, or no map explains them, or several do.
     """
     lines = [[line for line in find_lines(s) if line.length >= SHORTEST_LINE_PX][:LINES_A_FRAME] for s in stripes]
-    pieces = [(placement, line) for placement, found in enumerate(lines) for line in found]
+    pieces = [(placement, line) for placement, of_frame in enumerate(lines) for line in of_frame]
     if len(pieces) < 4:
         raise UnrecognisedError(f"{len(pieces)} straight pieces of the stripe in all frames, expected at least four")
     frames = _Frames.of(stripes, edges, placements)
-    found: list[FirstMap] = []
+    candidates: list[FirstMap] = []
     names = facing_names(edges)
     for number, quadruple in enumerate(_quadruples(pieces)):
         four = [pieces[k][1] for k in quadruple]
@@ -102,15 +115,15 @@ def recognise(stripes: Sequence[Floats], edges: Edges, placements: Floats, mount
         image_lines = np.array([[*line.normal, line.offset] for line in four])
         ends = np.concatenate([line.ends for line in four])
         maps = named_maps(names, image_lines, ends, seen_in, placements[seen_in], edges)
-        found += _refined(maps, frames)
-        if number + 1 >= TRIED_BEFORE_STOPPING and found and max(m.score for m in found) > 0.85:
+        candidates += _refined(maps, frames)
+        if number + 1 >= TRIED_BEFORE_STOPPING and candidates and max(m.score for m in candidates) > GOOD_SCORE:
             break
-    if not found:
+    if not candidates:
         raise UnrecognisedError("no view of the object explains the stripe")
-    best = max(found, key=lambda m: m.score)
+    best = max(candidates, key=lambda m: m.score)
     if best.score < FEWEST_EXPLAINED:
         raise UnrecognisedError(f"the best view of the object explains {best.score:.0%} of the stripe")
-    chosen = _decide([m for m in found if m.score >= AS_GOOD * best.score], frames, mounting)
+    chosen = _decide([m for m in candidates if m.score >= AS_GOOD * best.score], frames, mounting)
     return replace(chosen, seen_from=_seen_from(chosen, frames))
 
 
@@ -119,16 +132,18 @@ class _Frames:
     """A sample of the stripe's points in all placements."""
 
     pixels: Floats
-    """(N, 2)."""
+    """(N, 2) px."""
     placement: NDArray[np.intp]
-    """(N,)."""
+    """(N,) number of the placement."""
     shift: Floats
     """(N, 2) of the object, mm."""
     edges: Edges
     count: int
+    """Number of placements."""
 
     @staticmethod
     def of(stripes: Sequence[Floats], edges: Edges, placements: Floats) -> "_Frames":
+        """Draw an evenly spread sample of each stripe."""
         chosen = []
         for stripe in stripes:
             order = np.lexsort((stripe[:, 1], stripe[:, 0]))
@@ -137,14 +152,14 @@ class _Frames:
         return _Frames(np.concatenate(chosen), placement, placements[placement], edges, len(stripes))
 
     def distances(self, matrix: Floats) -> tuple[NDArray[np.intp], Floats]:
-        """The nearest edge (N,), and the distance from it (N,)."""
+        """The nearest edge (N,) and the distance from it (N,), mm, under a map (3, 3)."""
         return edge_distances(self.edges, project(matrix, self.pixels)[0] - self.shift)
 
 
 def _quadruples(pieces: list[tuple[int, ImageLine]]) -> list[tuple[int, ...]]:
-    """Sets of four pieces, of which no three meet in one point, the best conditioned first; within a frame if any."""
-    middle = np.array([320.0, 240.0])
-    rows = np.array([[*line.normal, (line.normal @ middle - line.offset) / 200.0] for _, line in pieces])
+    """Choose sets of four pieces, of one frame if possible, best conditioned first: no three meet in one point."""
+    middle = np.array(MIDDLE_PX)
+    rows = np.array([[*line.normal, (line.normal @ middle - line.offset) / REACH_PX] for _, line in pieces])
     rows /= np.linalg.norm(rows, axis=1, keepdims=True)
     by_frame: dict[int, list[int]] = {}
     for k, (placement, _) in enumerate(pieces):
@@ -153,11 +168,10 @@ def _quadruples(pieces: list[tuple[int, ImageLine]]) -> list[tuple[int, ...]]:
     if len(sets) < QUADRUPLES:
         frames = list(by_frame.values())
         for a, b in combinations(range(len(frames)), 2):
-            sets += [
-                (*p, *q) for p in combinations(frames[a][:3], 2) for q in combinations(frames[b][:3], 2)
-            ]  # fmt: skip
+            from_a, from_b = (combinations(frames[k][:FROM_PAIR], 2) for k in (a, b))
+            sets += [(*p, *q) for p, q in product(from_a, from_b)]
     if not sets:
-        sets = list(combinations(range(min(len(pieces), 8)), 4))
+        sets = list(combinations(range(min(len(pieces), FROM_ALL)), 4))
 
     def quality(members: tuple[int, ...]) -> float:
         volumes = [abs(float(np.linalg.det(rows[list(three)]))) for three in combinations(members, 3)]
@@ -167,21 +181,18 @@ def _quadruples(pieces: list[tuple[int, ImageLine]]) -> list[tuple[int, ...]]:
 
 
 def _refined(maps: Floats, frames: _Frames) -> list[FirstMap]:
-    """Those of `maps` (M, 3, 3) that explain most, each fitted to all the points that it explains."""
+    """Refine the best of `maps` (M, 3, 3) on all points that they explain."""
     misfit = misfits(maps, frames.pixels, frames.shift, frames.edges, REACH_MM)
-    found = []
-    for k in np.argsort(misfit, kind="stable")[:REFINED]:
-        refined = _refine(maps[k], frames)
-        if refined is not None:
-            found.append(refined)
-    return found
+    refined = [_refine(maps[k], frames) for k in np.argsort(misfit, kind="stable")[:REFINED]]
+    return [candidate for candidate in refined if candidate is not None]
 
 
 def _refine(matrix: Floats, frames: _Frames) -> FirstMap | None:
+    """Fit a map (3, 3) to the points near edges, again and again; None if it is not a possible view."""
     for gate in GATES_MM:
         index, distance = frames.distances(matrix)
         near = distance < gate
-        if near.sum() < 12:
+        if near.sum() < FEWEST_POINTS:
             return None
         normals = frames.edges.normal[index[near]]
         offsets = frames.edges.offset[index[near]] + np.sum(normals * frames.shift[near], axis=1)
@@ -200,10 +211,10 @@ def _refine(matrix: Floats, frames: _Frames) -> FirstMap | None:
     return FirstMap(matrix, shares, float(np.mean(np.clip(1.0 - (distance / SHARP_MM) ** 2, 0.0, None))))
 
 
-def _decide(found: list[FirstMap], frames: _Frames, mounting: Mounting) -> FirstMap:
-    """The best of maps that differ; where several explain the stripe as well, the one that fits the mounting."""
+def _decide(candidates: list[FirstMap], frames: _Frames, mounting: Mounting) -> FirstMap:
+    """Choose among good maps: if they differ, the one that fits the mounting best."""
     kept: list[FirstMap] = []
-    for candidate in sorted(found, key=lambda m: -m.score):
+    for candidate in sorted(candidates, key=lambda m: -m.score):
         explained = frames.pixels[frames.distances(candidate.matrix)[1] < EXPLAINED_MM]
         places = candidate.world(explained)
         apart = [np.linalg.norm(places - other.world(explained), axis=1) > APART_MM for other in kept]
@@ -215,22 +226,23 @@ def _decide(found: list[FirstMap], frames: _Frames, mounting: Mounting) -> First
     best = max(ranks)
     if ranks.count(best) > 1:
         raise UnrecognisedError(
-            f"{ranks.count(best)} views of the object explain the stripe as well; "
-            "say where the camera stands, or add a placement that tells them apart"
+            f"{ranks.count(best)} views of the object explain the stripe equally well; "
+            "state where the camera stands, or add a placement in which the views differ"
         )
     return kept[ranks.index(best)]
 
 
 def _agreement(seen_from: Mounting, mounting: Mounting) -> tuple[int, int]:
-    """How well a map fits the mounting: the side from which the edges are seen, then the side of the laser's plane."""
+    """Rank the agreement with the mounting: by the side from which the edges are seen, then that of the laser plane."""
     side = int(seen_from.y * mounting.y > 0) + int(seen_from.z * mounting.z > 0)
     return side, int(seen_from.x * mounting.x > 0)
 
 
 def _seen_from(candidate: FirstMap, frames: _Frames) -> Mounting:
-    """The side from which the edges are seen, and the side of the laser's plane.
+    """The side from which the edges are seen, and the side of the laser plane.
 
-    Seen from +X with Z up, Y runs to the right; i runs to the right and j down, so the map turns the image over.
+    Seen from +X with Z up, Y points to the right. In an image i points to the right and j down, so that the map of a
+    camera at +X changes the orientation.
     """
     index, distance = frames.distances(candidate.matrix)
     facing = frames.edges.normal[index[distance < EXPLAINED_MM]].mean(axis=0)
@@ -241,6 +253,7 @@ def _seen_from(candidate: FirstMap, frames: _Frames) -> Mounting:
 
 
 def _sign(value: float, level: float) -> Sign:
+    """The sign of a value; 0 up to `level`."""
     if abs(value) <= level:
         return 0
     return 1 if value > 0 else -1

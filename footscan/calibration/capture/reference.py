@@ -1,4 +1,4 @@
-"""The cross-section of the reference object as edges, and which of them is nearest to a point."""
+"""The cross-section of the reference object as edges, and the edge nearest to a point."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,17 +12,18 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 STRAIGHT_MM = 1e-6
-"""A corner as near as this to the line between its neighbours is none."""
+"""Distance of a corner from the line between its neighbours up to which the profile is straight there: rounding."""
 BELOW_MM = 0.5
+"""Depth below the glass from which a placement is doubtful. Chosen by hand."""
 FAR_MM = 250.0
-"""So far from the middle of the glass no foot reaches."""
+"""Distance from the middle of the glass that no foot reaches. Chosen by hand."""
 BLOCK = 1024
-"""Points at a time: what is known of them stays in the fastest cache while edge after edge is held against them."""
+"""Points that are processed at a time, so that their data stay in the fastest cache: a bound of time."""
 
 
 @dataclass(frozen=True)
 class Edges:
-    """The straight edges of a closed profile, counter-clockwise seen from +X, the object in its own position."""
+    """The straight edges of a closed profile, counter-clockwise as seen from +X, in the object's own frame."""
 
     start: Floats
     """(E, 2) Y and Z in mm."""
@@ -37,7 +38,7 @@ class Edges:
 
 
 def edges_of(profile: Sequence[Sequence[float]]) -> Edges:
-    """The edges of a simple polygon of corners (Y, Z) in mm, given in either direction; edges in one line are joined.
+    """Compute the edges of a simple polygon of corners (Y, Z), mm, in either direction; collinear edges are joined.
 
     >>> square = edges_of([[0, 0], [0, 10], [10, 10], [10, 0], [5, 0]])
     >>> square.start.tolist()
@@ -54,8 +55,12 @@ def edges_of(profile: Sequence[Sequence[float]]) -> Edges:
     return Edges(start, end, normal, np.sum(normal * start, axis=1), length)
 
 
-def doubts_about(profile: Sequence[Sequence[float]], placements: Sequence[Sequence[float]]) -> list[str]:
-    """What looks like a mistake in where a profile of corners (Y, Z), mm, stands in its placements (dY, dZ), mm."""
+def placement_doubts(profile: Sequence[Sequence[float]], placements: Sequence[Sequence[float]]) -> list[str]:
+    """Describe possible mistakes in the `placements` (dY, dZ), mm, of a profile of corners (Y, Z), mm.
+
+    >>> placement_doubts([[0, 0], [10, 0], [10, 10]], [[0, 0], [0, -3]])
+    ['placement 1 reaches down to Z = -3 mm, below the glass at 0']
+    """
     doubts = []
     for number, (shift_y, shift_z) in enumerate(placements):
         lowest, highest = min(z for _, z in profile) + shift_z, max(z for _, z in profile) + shift_z
@@ -68,24 +73,32 @@ def doubts_about(profile: Sequence[Sequence[float]], placements: Sequence[Sequen
 
 
 def nearest_edge(edges: Edges, points: Floats) -> tuple[Indices, Floats, Floats]:
-    """The edge nearest to each of `points` (N, 2), Y and Z in mm in the object's own position.
+    """Find the edge nearest to each of `points` (N, 2), Y and Z in mm, in the object's own frame.
 
-    Nearest is measured to the edge itself, the distance that is returned to the line it lies on. A point beyond a
-    corner of the object is as far from both edges there as from the corner, and belongs to either of them.
+    The nearest edge is found by the distance from the edge itself; the returned distance is from its line. A point
+    beyond a corner of the object is equally far from both edges there, and is assigned to either of them.
 
     Returns
     -------
-    index : (N,) of the edge.
-    distance : (N,) mm from the edge's line, positive outside; NaN for a point that is not finite.
-    along : (N,) mm from the edge's start; below 0 or above its length for a point beyond its ends.
+    index : (N,) number of the edge.
+    distance : (N,) float64, mm, from the edge's line, positive outside; NaN for a point that is not finite.
+    along : (N,) float64, mm, from the edge's start; below 0 or above its length for a point beyond its ends.
+
+    Examples
+    --------
+    >>> square = edges_of([[0, 0], [10, 0], [10, 10], [0, 10]])
+    >>> index, distance, along = nearest_edge(square, np.array([[12.0, 4.0]]))
+    >>> print(square.normal[index], distance, along)
+    [[1. 0.]] [2.] [4.]
     """
-    found: tuple[Indices, Floats, Floats] = _nearest(
+    nearest: tuple[Indices, Floats, Floats] = _nearest(
         edges.start, edges.normal, edges.offset, edges.length, np.ascontiguousarray(points, np.float64)
     )
-    return found
+    return nearest
 
 
 def _signed_area(corners: Floats) -> float:
+    """The area of a polygon of corners (N, 2), positive if they are counter-clockwise."""
     y, z = (corners - corners[0]).T
     return float(np.sum(y * np.roll(z, -1) - z * np.roll(y, -1)) / 2.0)
 
@@ -102,7 +115,8 @@ def _true_corners(corners: Floats) -> Floats:
 def _nearest(
     start: Floats, normal: Floats, offset: Floats, length: Floats, points: Floats
 ) -> tuple[Indices, Floats, Floats]:
-    # The edges run along their normals, turned by a quarter counter-clockwise.
+    """The result of `nearest_edge`."""
+    # An edge runs along its normal, turned by 90 degrees counter-clockwise.
     origin = start[:, 1] * normal[:, 0] - start[:, 0] * normal[:, 1]
     count = len(points)
     index = np.empty(count, np.intp)
@@ -115,7 +129,7 @@ def _nearest(
             least[p], nearest[p] = np.inf, 0.0
         for e in range(len(offset)):
             n_y, n_z, line, zero, whole = normal[e, 0], normal[e, 1], offset[e], origin[e], length[e]
-            for p in range(size):  # without a branch, so that several points are done at once
+            for p in range(size):  # without a branch, so that the compiler vectorises the loop
                 off = n_y * y[p] + n_z * z[p] - line
                 reach = n_y * z[p] - n_z * y[p] - zero
                 beyond = -reach if -reach > reach - whole else reach - whole

@@ -1,4 +1,4 @@
-"""What is wrong with a capture as a whole, and what shows it: an object that stood elsewhere, or is not recognised."""
+"""Refusal of a capture, with evidence: the reference object was placed differently, or is not recognised."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.capture.edge_points import from_object
-from footscan.calibration.capture.from_capture import SEEN, CameraView, Recognised, as_said, fit_view
+from footscan.calibration.capture.from_capture import SEEN, CameraView, Recognised, fit_view, nominal_poses
 from footscan.calibration.capture.placement import CameraFit, departure
 from footscan.calibration.capture.reference import Edges
 from footscan.calibration.models.fit import UndeterminedError
@@ -19,34 +19,38 @@ from schemas.calibration import CameraCalibration
 Floats = NDArray[np.float64]
 
 FEWEST_POINTS = 40
-"""With fewer points of the stripe, all cameras together, a placement shows nothing."""
-FOUND = 0.5
-"""An object is where a departure says when so much of the stripe lies on its edges."""
+"""Points of the stripe, of all cameras together, that a placement needs. Chosen by hand."""
+LEAST_SHARE = 0.5
+"""Share of the stripe on the object's edges from which its departure is known. Chosen by hand."""
 SURE_MM = 0.25
-"""A camera whose map, fitted without a placement, is less sure than this of what it shows there has no say in it."""
+"""Standard deviation of a map, fitted without a placement, up to which its camera judges the placement. Chosen by
+hand."""
 SIGMAS = 3.0
-"""How far beyond the tolerance a departure may be by what the maps do not know."""
+"""Standard deviations of the best map that are added to the tolerance of a departure."""
 LEVER_MM = 50.0
-"""A turn moves the object's corners by this times its angle."""
+"""Distance of the object's corners from its origin, about: a rotation moves them by this times its angle."""
 OUTLINE_STEP_MM = 1.0
+"""Distance of the points of a drawn outline."""
+MOSTLY = 0.5
+"""Share of the placements in which a camera must recognise the object to be trusted."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What one camera shows of a refused capture in one frame."""
+    """One frame of one camera that shows why a capture is refused."""
 
     camera: int
     frame: int
     stripe: Floats
     """(N, 2) px."""
     expected: Floats
-    """(M, 2) px: the outline of the object where it should stand; empty where the camera does not know."""
+    """(M, 2) px: the outline of the object in its nominal pose; empty if the camera has no map."""
     found: Floats
-    """(M, 2) px: the outline where it stood; empty where it was not found."""
+    """(M, 2) px: the outline in its actual pose; empty if that is unknown."""
 
 
 class RefusedCapture(RefusedInput):
-    """A capture that does not show what it should."""
+    """A capture from which the cameras cannot be calibrated, with the evidence."""
 
     def __init__(self, source: str, problem: str, *, field: str, evidence: Sequence[Evidence]) -> None:
         super().__init__(source, problem, field=field)
@@ -61,17 +65,17 @@ def check_placements(
     tolerance_mm: float,
     source: str,
 ) -> None:
-    """Refuses the placement, of (K, 2) mm, in which the object stood farthest from where it was said.
+    """Refuse the placement, of (K, 2) mm, with the largest departure of the object from it.
 
-    It is judged by maps that do not rest on it, of cameras that recognise the object in most placements; with a single
-    placement there are none.
+    A placement is judged by maps that were fitted without it, of cameras that recognise the object in most placements.
+    A single placement is not judged.
 
     Raises
     ------
     RefusedCapture
-        A frame shows no stripe, or the object stood elsewhere than said by more than `tolerance_mm`.
+        A frame shows no stripe, or the object departs from a placement by more than `tolerance_mm`.
     """
-    poses = as_said(placements)
+    poses = nominal_poses(placements)
     for number in range(len(poses)):
         if sum(len(view.stripes[number]) for view in views.values()) < FEWEST_POINTS:
             shown = [Evidence(camera, number, view.stripes[number], *_NOTHING) for camera, view in views.items()]
@@ -80,27 +84,26 @@ def check_placements(
     worst: tuple[float, RefusedCapture] | None = None
     for number in range(len(poses)) if len(poses) > 1 else ():
         maps = _maps_without(number, recognised, edges, poses)
-        sigmas = {camera: known.fit.region_sigma(views[camera].stripes[number]) for camera, known in maps.items()}
-        unsure = {camera: sigma for camera, sigma in sigmas.items() if sigma is not None and sigma <= SURE_MM}
-        maps = {camera: maps[camera] for camera in unsure}
+        all_sigmas = {camera: map_.fit.region_sigma(views[camera].stripes[number]) for camera, map_ in maps.items()}
+        sigmas = {camera: sigma for camera, sigma in all_sigmas.items() if sigma is not None and sigma <= SURE_MM}
+        maps = {camera: maps[camera] for camera in sigmas}
         if not maps:
             continue
-        found = departure(
-            [known.world(views[camera].stripes[number]) for camera, known in maps.items()], edges, poses[number]
-        )
-        allowed = tolerance_mm + SIGMAS * min(unsure.values())
-        size = max(float(np.hypot(*found.pose[:2])), float(abs(found.pose[2])) * LEVER_MM)
-        said, stood = poses[number], poses[number] + found.pose
-        if found.share >= FOUND:
+        worlds = [map_.world(views[camera].stripes[number]) for camera, map_ in maps.items()]
+        change = departure(worlds, edges, poses[number])
+        allowed = tolerance_mm + SIGMAS * min(sigmas.values())
+        size = max(float(np.hypot(*change.pose[:2])), float(abs(change.pose[2])) * LEVER_MM)
+        nominal, actual = poses[number], poses[number] + change.pose
+        if change.share >= LEAST_SHARE:
             problem = (
-                f"the object stood at ({stood[0]:.1f}, {stood[1]:.1f}) mm, "
-                f"turned by {np.degrees(stood[2]):.1f} degrees, "
-                f"expected ({said[0]:g}, {said[1]:g}) as placements_mm says"
+                f"the object stood at ({actual[0]:.1f}, {actual[1]:.1f}) mm, "
+                f"turned by {np.degrees(actual[2]):.1f} degrees, "
+                f"expected ({nominal[0]:g}, {nominal[1]:g}) as placements_mm says"
             )
         else:
             size = np.inf
             problem = (
-                "the reference object is not recognised where it should stand, nor near to it, "
+                "the reference object is not recognised in its placement or near it "
                 f"by {_cameras(maps)}, which recognise it in the other frames"
             )
         if size > allowed and (worst is None or size > worst[0]):
@@ -109,10 +112,10 @@ def check_placements(
                     camera,
                     number,
                     views[camera].stripes[number],
-                    _outline(known, views[camera], edges, said),
-                    _outline(known, views[camera], edges, stood) if found.share >= FOUND else _NOTHING[0],
+                    _outline(map_, views[camera], edges, nominal),
+                    _outline(map_, views[camera], edges, actual) if change.share >= LEAST_SHARE else _NOTHING[0],
                 )
-                for camera, known in maps.items()
+                for camera, map_ in maps.items()
             ]
             worst = (size, RefusedCapture(source, problem, field=f"frame {number}", evidence=shown))
     if worst is not None:
@@ -120,7 +123,7 @@ def check_placements(
 
 
 def refuse_unrecognised(views: Mapping[int, CameraView], reasons: Mapping[int, str], source: str) -> None:
-    """Refuses a capture with cameras that do not recognise the object, for `reasons`; the first of them is shown.
+    """Refuse a capture with cameras that do not recognise the object, for `reasons`; the first of them is shown.
 
     Raises
     ------
@@ -137,63 +140,66 @@ def refuse_unrecognised(views: Mapping[int, CameraView], reasons: Mapping[int, s
 
 
 def refuse_contradictions(recognised: Mapping[int, Recognised], source: str) -> None:
-    """Refuses cameras that see the object from another side than they stand on: their films are exchanged, or the
-    placements or the profile are mirrored.
+    """Refuse cameras that see the object from a side other than that of their mounting.
+
+    Their films are exchanged, or the placements or the profile are mirrored.
 
     Raises
     ------
     RefusedCapture
         There is such a camera.
     """
-    wrong = {camera: known for camera, known in sorted(recognised.items()) if known.contradiction}
+    wrong = {camera: result for camera, result in sorted(recognised.items()) if result.contradiction}
     if not wrong:
         return
     camera, first = next(iter(wrong.items()))
     if len(wrong) == len(recognised) > 1:
         cause = (
-            "and every other one another side than its own: check the signs and the order of placements_mm, profile_mm"
+            "and all other cameras see it from a wrong side too: check the signs and the order of placements_mm, "
+            "profile_mm"
         )
     else:
         others = f", and {_cameras([c for c in wrong if c != camera])} likewise" if len(wrong) > 1 else ""
         cause = f"by its number or `stands`{others}: is this its film?"
-    shown = [Evidence(number, 0, known.view.stripes[0], *_NOTHING) for number, known in wrong.items()]
+    shown = [Evidence(number, 0, result.view.stripes[0], *_NOTHING) for number, result in wrong.items()]
     raise RefusedCapture(source, f"{first.contradiction}, {cause}", field=f"camera {camera}", evidence=shown)
 
 
 def _cameras(numbers: Iterable[int]) -> str:
-    """Their numbers in words."""
+    """The cameras in words."""
     listed = ", ".join(map(str, sorted(numbers)))
     return f"cameras {listed}" if "," in listed else f"camera {listed}"
 
 
 _NOTHING = (np.empty((0, 2)), np.empty((0, 2)))
+"""No outlines."""
 
 
 def _maps_without(
     number: int, recognised: Mapping[int, Recognised], edges: Edges, poses: Floats
 ) -> dict[int, CameraFit]:
-    """The maps of all cameras that are to be trusted, fitted without one of the placements."""
-    mostly = {c: known for c, known in recognised.items() if np.nanmean(known.first.explained >= SEEN) > 0.5}
+    """The maps of all trusted cameras, fitted without one of the placements."""
+    trusted = {c: result for c, result in recognised.items() if np.nanmean(result.first.explained >= SEEN) > MOSTLY}
     maps = {}
-    for camera, known in (mostly or recognised).items():
+    for camera, result in (trusted or recognised).items():
         try:
-            maps[camera] = fit_view(known.view, known.first, edges, poses, without=number)
+            maps[camera] = fit_view(result.view, result.first, edges, poses, without=number)
         except UndeterminedError:
             continue
     return maps
 
 
-def _outline(known: CameraFit, view: CameraView, edges: Edges, pose: Floats) -> Floats:
-    """Where a camera would see the edges of an object that stands in `pose` (3,): (M, 2) px within its image."""
+def _outline(map_: CameraFit, view: CameraView, edges: Edges, pose: Floats) -> Floats:
+    """The edges of an object in `pose` (3,) as a camera would see them: (M, 2) px within its image."""
     steps = [np.arange(0.0, length, OUTLINE_STEP_MM) / length for length in edges.length]
     own = np.concatenate(
         [a + t[:, np.newaxis] * (b - a) for a, b, t in zip(edges.start, edges.end, steps, strict=True)]
     )
-    pixels = known.points.pixels
+    pixels = map_.points.pixels
     camera = CameraCalibration(
         camera=view.camera,
         image_px=view.image_px,
-        map=known.fit.model.as_map(known.fit.parameters),
+        map=map_.fit.model.as_map(map_.fit.parameters),
         region_px=region_of(pixels),
         points=len(pixels),
     )

@@ -11,7 +11,20 @@ Floats = NDArray[np.float64]
 def stripe_arrays(
     stripes: Sequence[Floats], image_px: tuple[int, int], lost: Sequence[int]
 ) -> dict[str, NDArray[np.generic]]:
-    """The stripes of one camera, (N, 2) px for each of K frames, the size of its images, px, and its lost frames."""
+    """Convert the stripes of one camera to arrays.
+
+    Parameters
+    ----------
+    stripes : for each of K frames the points (N, 2), px.
+    image_px : columns and rows of the images.
+    lost : numbers of the frames that cannot be decoded.
+
+    Examples
+    --------
+    >>> arrays = stripe_arrays([np.zeros((3, 2)), np.zeros((1, 2))], (640, 480), [])
+    >>> arrays["pixels"].shape, arrays["counts"].tolist()
+    ((4, 2), [3, 1])
+    """
     return {
         "pixels": np.concatenate([np.empty((0, 2)), *stripes]),
         "counts": np.array([len(stripe) for stripe in stripes], np.int64),

@@ -1,4 +1,4 @@
-"""A calibration chart: control points whose world position and pixel are known, one CSV for all cameras."""
+"""Calibration charts: control points with known world position and pixel, in one CSV file for all cameras."""
 
 import re
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from schemas.base.units import LengthUnit
 from schemas.tables import finite, read_records
 
 MAX_MAGNITUDE = 1e6
-"""No coordinate of a foot scanner is larger, in any unit; its powers stay finite."""
+"""Largest coordinate, in any unit: beyond any foot scanner, and its powers stay finite."""
 
 _WORLD: dict[LengthUnit, tuple[str, str, str]] = {
     "cm": ("x_cm", "y_cm", "z_cm"),
@@ -28,7 +28,7 @@ class Chart:
 
     camera: int
     points: tuple[str, ...]
-    """Their names, each once."""
+    """Names of the points, all different."""
     world: NDArray[np.float64]
     """(N, 3): X, Y, Z in the chart's own `unit`, scanner frame."""
     unit: LengthUnit
@@ -46,14 +46,18 @@ class _Row:
 
 
 def read_chart(path: Path) -> dict[int, Chart]:
-    """The charts of all cameras in the CSV file `path`, by camera.
+    """Read the charts of all cameras from the CSV file `path`.
 
-    Columns `camera,point,x_cm,y_cm,z_cm,i,j`, or the same in `_mm`, in any order, one control point a row.
+    Columns are `camera,point,x_cm,y_cm,z_cm,i,j`, or `_mm` instead of `_cm`, in any order, one control point a row.
+
+    Returns
+    -------
+    Camera -> chart, by ascending number.
 
     Raises
     ------
     RefusedInput
-        The file breaks the format; one line names file, line and column and what was expected.
+        The file does not follow the format; the message names file, line, column and what was expected.
     """
     records = read_records(path)
     try:
@@ -77,7 +81,7 @@ def read_chart(path: Path) -> dict[int, Chart]:
 
 
 def _columns(path: Path, line: int, header: list[str]) -> tuple[LengthUnit, dict[str, int]]:
-    """The unit of the chart, and where each column stands."""
+    """The unit of the chart, and the index of each column."""
     where = f"line {line}"
     names = [name.lower() for name in header]
     units: list[LengthUnit] = [unit for unit, world in _WORLD.items() if set(world) & set(names)]
@@ -85,16 +89,16 @@ def _columns(path: Path, line: int, header: list[str]) -> tuple[LengthUnit, dict
         raise RefusedInput(path, "mixes cm and mm, expected one unit for x, y and z", field=where)
     unit = units[0] if units else "mm"
     expected = _header(unit) if units else f"{_header('cm')} or {_header('mm')}"
-    known = {"camera", "point", "i", "j", *_WORLD[unit]}
+    valid_names = {"camera", "point", "i", "j", *_WORLD[unit]}
     if len(header) == 1:
         raise RefusedInput(path, f"one column, expected {expected}, with commas between them", field=where)
     for name in header:
-        if name.lower() not in known:
+        if name.lower() not in valid_names:
             raise RefusedInput(
                 path, f"unknown column, expected {expected}", field=f"{where}, column {name or '(empty)'}"
             )
         if names.count(name.lower()) > 1:
-            raise RefusedInput(path, "stands twice, expected each column once", field=f"{where}, column {name}")
+            raise RefusedInput(path, "is listed twice, expected each column once", field=f"{where}, column {name}")
     for name in _header(unit).split(","):
         if name not in names:
             raise RefusedInput(path, f"is missing, expected {expected}", field=f"{where}, column {name}")
@@ -107,12 +111,12 @@ def _header(unit: LengthUnit) -> str:
 
 def _row(path: Path, line: int, cells: list[str], unit: LengthUnit, columns: dict[str, int]) -> _Row:
     if len(cells) != len(columns):
-        problem = f"expected {len(columns)} values as the header has columns, found {len(cells)}"
+        problem = f"expected {len(columns)} values, one for each column of the header, found {len(cells)}"
         raise RefusedInput(path, problem, field=f"line {line}")
 
     def refuse(column: str, expected: str) -> RefusedInput:
-        found = cells[columns[column]][:80]
-        return RefusedInput(path, f"expected {expected}, found {found!r}", field=f"line {line}, column {column}")
+        text = cells[columns[column]][:80]
+        return RefusedInput(path, f"expected {expected}, found {text!r}", field=f"line {line}, column {column}")
 
     def number(column: str) -> float:
         text = cells[columns[column]]

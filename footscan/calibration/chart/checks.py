@@ -1,14 +1,14 @@
-"""Mistakes in a chart, told by what a chart must be: points of a plane, in mm, seen by a camera of known size.
+"""Detection of mistakes in a chart: its points must lie in a plane and be seen by a camera with a known image size.
 
-What a mistake leaves is judged in px, against the homography of the camera's other points and against other cameras.
+Residuals are judged in px, against the homography of the camera's other points and against other cameras.
 
-Certain, and to be refused: a point outside of the image; columns swapped for a whole camera; another unit than the
-header's for a camera or for several of its rows. No calibration of such a chart is of use, and the remedy is plain.
+Certain mistakes are refused: a point outside the image; columns swapped for a whole camera; another unit than in the
+header, for a camera or for several of its rows. A calibration of such a chart is of no use, and the remedy is obvious.
 
-Told, and calibrated all the same: a coordinate or pixel that does not fit with the others, with the value that would;
-a residual that no single change explains; a point on the image's border, where its true place may lie beyond; one
-corner at two pixels; points nearly on a line; a camera that sees the plane mirrored; points below the glass. With five
-points a camera each of them can be moved to fit, so what is said there is a guess, and the user knows the chart.
+Other findings are warnings: a coordinate or pixel that does not fit the others, with the value that would; a residual
+that no single change explains; a point on the border of the image, whose true place may lie outside; one corner at two
+pixels; points nearly on a line; a camera that sees the plane mirrored; points below the glass. With five points a
+camera, each of them could be moved to fit, so that the warning is a guess, and the user decides.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -40,32 +40,34 @@ Kind = Literal[
 ]
 
 CERTAIN: frozenset[Kind] = frozenset({"outside", "swapped", "unit"})
+"""Kinds of mistakes that are refused."""
 USUAL = 3.0
-"""A camera's residual may be so many times that of the others."""
+"""Ratio of a camera's residual to that of the others from which it is too large. Chosen by hand."""
 LEVEL_PX = (1.5, 4.0)
-"""A residual below is never too much, one above always."""
+"""Residual below which it is never too large, and above which it always is. Chosen by hand."""
 MANY_POINTS = 12
-"""So many tell by themselves how well they were clicked."""
+"""Number of points from which a camera's own residual shows how well they were clicked. Chosen by hand."""
 ONE_OF_FEW = np.sqrt(5.0)
-"""A point that adds so many times the level to the misfit brings five points to it."""
+"""Misfit that one point adds, relative to the level: it brings the root mean square of five points to the level."""
 ON_A_LINE = 0.03
-"""Width over length of points that tell nothing across their line."""
+"""Ratio of width to length up to which points lie on a line. Chosen by hand."""
 SAME_PLACE_MM = 3.0
+"""Distance up to which two corners may have one pixel. Chosen by hand."""
 
 
 @dataclass(frozen=True)
 class ChartWarning:
-    """A mistake, or what looks like one."""
+    """A mistake, certain or possible."""
 
     camera: int
     point: str | None
-    """None where it is about the camera's points together."""
+    """Name of the point; None for a mistake of all points of the camera."""
     kind: Kind
     message: str
 
     @property
     def place(self) -> str:
-        """Which camera, and which point."""
+        """The camera and the point, as text."""
         return f"camera {self.camera}" + ("" if self.point is None else f", point {self.point}")
 
     def __str__(self) -> str:
@@ -73,25 +75,25 @@ class ChartWarning:
 
 
 def check_charts(charts: Mapping[int, Chart]) -> list[ChartWarning]:
-    """What looks like a mistake in the charts of all cameras, by camera; empty where nothing does."""
+    """Find possible mistakes in the charts of all cameras, ordered by camera."""
     usual = {camera: rms for camera, chart in charts.items() if (rms := _usual_rms(chart)) is not None}
-    known = [sorted({value for chart in charts.values() for value in chart.world[:, k].tolist()}) for k in (1, 2)]
+    values = [sorted({value for chart in charts.values() for value in chart.world[:, k].tolist()}) for k in (1, 2)]
     warnings: list[ChartWarning] = []
     for camera in sorted(charts):
         others = [rms for other, rms in usual.items() if other != camera]
-        warnings += _check_camera(charts[camera], usual.get(camera), others, known)
+        warnings += _check_camera(charts[camera], usual.get(camera), others, values)
     misled = {warning.camera for warning in warnings if warning.kind not in ("border", "twice", "plane", "below")}
     warnings += _mirrored([chart for camera, chart in charts.items() if camera not in misled])
     return sorted(warnings, key=lambda warning: warning.camera)
 
 
 def refuse_mistakes(warnings: Iterable[ChartWarning], source: Path | str) -> None:
-    """Refuses a chart for the first of its mistakes that is certain.
+    """Refuse a chart for its first certain mistake.
 
     Raises
     ------
     RefusedInput
-        One line that names file, camera and point, and what was expected.
+        The message names file, camera, point and what was expected.
     """
     certain = [warning for warning in warnings if warning.kind in CERTAIN]
     if certain:
@@ -100,7 +102,7 @@ def refuse_mistakes(warnings: Iterable[ChartWarning], source: Path | str) -> Non
 
 
 def _usual_rms(chart: Chart) -> float | None:
-    """Residual of the points that agree on a homography, px rms; None where points are too few to have any."""
+    """Residual of the points that agree on a homography, px rms; None if the points are too few or on a line."""
     if len(chart.points) <= PASSED or _line(chart) is not None:
         return None
     world = _millimetres(chart)
@@ -110,9 +112,9 @@ def _usual_rms(chart: Chart) -> float | None:
 
 
 def _check_camera(
-    chart: Chart, own_rms: float | None, others_rms: list[float], known: Sequence[Sequence[float]]
+    chart: Chart, own_rms: float | None, others_rms: list[float], chart_values: Sequence[Sequence[float]]
 ) -> Iterator[ChartWarning]:
-    """Mistakes of one camera; one that concerns all its points hides the rest."""
+    """Find the mistakes of one camera; a mistake of all its points hides the others."""
     level = _level(chart, own_rms, others_rms)
     limit = ONE_OF_FEW * level
     for message, kind in _of_all_points(chart, limit):
@@ -120,7 +122,7 @@ def _check_camera(
             yield ChartWarning(chart.camera, None, kind, message)
             return
     yield from _off_plane(chart)
-    suspected = suspects(chart, limit, known)
+    suspected = suspects(chart, limit, chart_values)
     if suspected and (rows := rows_in_other_unit(chart, limit)) is not None:
         yield ChartWarning(chart.camera, None, "unit", rows)
         return
@@ -145,7 +147,7 @@ def _check_camera(
 
 
 def _level(chart: Chart, own_rms: float | None, others_rms: list[float]) -> float:
-    """The residual, px rms, that is too much for this camera."""
+    """The residual, px rms, above which that of this camera is too large."""
     if own_rms is not None and len(chart.points) >= MANY_POINTS:
         others_rms = [own_rms]
     elif len(others_rms) < 2:
@@ -154,6 +156,7 @@ def _level(chart: Chart, own_rms: float | None, others_rms: list[float]) -> floa
 
 
 def _of_all_points(chart: Chart, limit: float) -> Iterator[tuple[str | None, Kind]]:
+    """Check for mistakes of all points, one after the other; None for each that is absent."""
     yield swapped_columns(chart, limit), "swapped"
     unit = other_unit(chart)
     yield unit and (rows_in_other_unit(chart, limit) or unit), "unit"
@@ -161,15 +164,16 @@ def _of_all_points(chart: Chart, limit: float) -> Iterator[tuple[str | None, Kin
 
 
 def _line(chart: Chart) -> str | None:
-    for what, points in (("pixels", chart.pixels), ("world positions", chart.world[:, 1:])):
+    """Describe points that lie nearly on a line; None if they cover an area."""
+    for name, points in (("pixels", chart.pixels), ("world positions", chart.world[:, 1:])):
         length, width = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[[0, -1]]
         if len(points) > 2 and width <= ON_A_LINE * length:
-            return f"the {what} of all points lie nearly on one line, expected them to cover an area"
+            return f"the {name} of all points lie nearly on one line, expected them to cover an area"
     return None
 
 
 def _off_plane(chart: Chart) -> Iterator[ChartWarning]:
-    """A single point at another X; several may have been clicked in frames of other travel."""
+    """Find a single point at another X; several may have been clicked in frames at another position of the head."""
     values, counts = np.unique(chart.world[:, 0], return_counts=True)
     if len(values) == 2 and counts.min() == 1 and len(chart.points) > PASSED:
         usual, odd = values[counts.argmax()], values[counts.argmin()]
@@ -179,6 +183,7 @@ def _off_plane(chart: Chart) -> Iterator[ChartWarning]:
 
 
 def _below(chart: Chart, named: set[int | None]) -> Iterator[ChartWarning]:
+    """Find points below the glass, without those already `named`."""
     below = [point for point in np.flatnonzero(is_below_glass(chart)).tolist() if point not in named]
     if below:
         lowest = chart.world[:, 2].min()
@@ -187,7 +192,7 @@ def _below(chart: Chart, named: set[int | None]) -> Iterator[ChartWarning]:
 
 
 def _border(chart: Chart, named: set[int | None], limit: float) -> Iterator[ChartWarning]:
-    """Points on the border, unless the others are enough to place them there, too."""
+    """Find points on the border of the image, unless many other points confirm their place."""
     count = len(chart.points)
     for point in np.flatnonzero(is_on_border(chart.pixels)).tolist():
         others = np.delete(np.arange(count), point)
@@ -199,14 +204,15 @@ def _border(chart: Chart, named: set[int | None], limit: float) -> Iterator[Char
 
 
 def _twice(chart: Chart, named: set[int | None], limit: float) -> Iterator[ChartWarning]:
+    """Find one corner at two pixels, and two corners at one pixel."""
     world = _millimetres(chart)
-    for one, name in enumerate(chart.points):
-        in_mm, in_px = (np.hypot(*(p[one] - p[one + 1 :]).T) for p in (world, chart.pixels))
+    for first, name in enumerate(chart.points):
+        in_mm, in_px = (np.hypot(*(places[first] - places[first + 1 :]).T) for places in (world, chart.pixels))
         is_twin = ((in_mm == 0.0) & (in_px > limit)) | ((in_px == 0.0) & (in_mm > SAME_PLACE_MM))
         for k in np.flatnonzero(is_twin).tolist():
-            if one in named or one + 1 + k in named:
+            if first in named or first + 1 + k in named:
                 continue
-            twin = chart.points[one + 1 + k]
+            twin = chart.points[first + 1 + k]
             if in_mm[k] == 0.0:
                 message = f"is where {name} is, but seen {in_px[k]:.1f} px away, expected one pixel for one corner"
             else:
@@ -215,7 +221,7 @@ def _twice(chart: Chart, named: set[int | None], limit: float) -> Iterator[Chart
 
 
 def _mirrored(charts: list[Chart]) -> Iterator[ChartWarning]:
-    """Cameras of odd and of even number look from the two sides of the laser's plane, which they see mirrored."""
+    """Find cameras that see the plane mirrored; those of odd and of even number look at it from opposite sides."""
     mirrored: dict[int, bool] = {}
     for chart in charts:
         if len(chart.points) >= PASSED:
@@ -237,8 +243,10 @@ def _mirrored(charts: list[Chart]) -> Iterator[ChartWarning]:
 
 
 def _beside_others(others_rms: list[float]) -> str:
+    """The usual residual of the other cameras, as the end of a message."""
     return f"; {np.median(others_rms):.1f} px is usual for the other cameras" if others_rms else ""
 
 
 def _millimetres(chart: Chart) -> Floats:
+    """Y and Z (N, 2) of the points, mm."""
     return np.asarray(MILLIMETRES[chart.unit] * chart.world[:, 1:])

@@ -1,4 +1,4 @@
-"""Mistakes of a whole camera in a chart: its columns swapped, or its coordinates or some of them in another unit."""
+"""Mistakes in a chart that concern a whole camera: swapped columns, or coordinates in another unit."""
 
 from itertools import combinations
 
@@ -22,36 +22,43 @@ from schemas.base.units import MILLIMETRES
 Floats = NDArray[np.float64]
 
 OUTSIDE_PX = 2.5
-"""Pixels are counted from 0 or from 1, and clicks err: so little beyond the last is still the image's border."""
+"""Distance outside the image up to which a pixel is on its border: pixels may be counted from 1, and clicks have
+errors. Chosen by hand."""
 BORDER_PX = 0.5
+"""Distance from the outermost pixels within which a pixel is on the border."""
 VIEW_MM = (30.0, 600.0)
-"""An image that is less or more wide where the laser stands is none of a foot: 107 mm in the thesis."""
+"""Range of the width of the image in the laser plane; 107 mm in the thesis. Chosen by hand."""
 GLASS_MM = 5.0
-"""Nothing is seen so far below the glass."""
+"""Depth below the glass from which no point is visible. Chosen by hand."""
 OTHER_UNIT = (10.0, 0.1)
+"""Factors between cm and mm."""
 CLEARLY = 20.0
-"""With few points another unit must lessen the misfit so many times: chance does it a few times."""
+"""Factor by which another unit must lower the misfit of few points; chance lowers it a few times. Chosen by hand."""
+MOST_AGREE, NEARLY_ALL = 0.75, 0.8
+"""Least share of points that agree if rows have different units, and if columns are judged. Chosen by hand."""
+MOST_NAMED = 10
+"""Points that a message names at most."""
 
 
 def outside_image(pixels: Floats) -> NDArray[np.bool_]:
-    """Which of `pixels` (N, 2) lie beyond the image and its border: (N,)."""
+    """Select the `pixels` (N, 2) that lie outside the image and its border; (N,)."""
     low, high = -OUTSIDE_PX, np.array(IMAGE_PX) - 1.0 + OUTSIDE_PX
     return np.asarray(((pixels < low) | (pixels > high)).any(axis=1))
 
 
 def is_on_border(pixels: Floats) -> NDArray[np.bool_]:
-    """Which of `pixels` (N, 2) lie on the border of the image, be they counted from 0 or from 1: (N,)."""
+    """Select the `pixels` (N, 2) on the border of the image, whether counted from 0 or from 1; (N,)."""
     high = np.array(IMAGE_PX) - 1.0 - BORDER_PX
     return np.asarray(((pixels <= BORDER_PX) | (pixels >= high)).any(axis=1) & ~outside_image(pixels))
 
 
 def is_below_glass(chart: Chart) -> NDArray[np.bool_]:
-    """Which points of a chart, (N,), lie where nothing can be seen."""
+    """Select the points of a chart that lie below the glass, where no camera sees them; (N,)."""
     return np.asarray(MILLIMETRES[chart.unit] * chart.world[:, 2] < -GLASS_MM)
 
 
 def swapped_columns(chart: Chart, limit_px: float) -> str | None:
-    """What to say of a camera whose columns are certainly swapped; None where they are not."""
+    """Describe the swapped columns of a camera; None unless they are certainly swapped."""
     x, y, z = chart.world.T
     pixels = chart.pixels
     for name, column in (("y", y), ("z", z)):
@@ -74,7 +81,7 @@ def swapped_columns(chart: Chart, limit_px: float) -> str | None:
 
 
 def other_unit(chart: Chart) -> str | None:
-    """What to say of a camera whose coordinates cannot be in the chart's unit; None where they can."""
+    """Describe a camera whose coordinates cannot be in the chart's unit; None if they can."""
     view = _view_mm(chart)
     if VIEW_MM[0] <= view <= VIEW_MM[1]:
         return None
@@ -84,7 +91,7 @@ def other_unit(chart: Chart) -> str | None:
 
 
 def rows_in_other_unit(chart: Chart, limit_px: float) -> str | None:
-    """What to say of several rows that fit with the others when read in another unit; None where there are none."""
+    """Describe the rows that fit the others if read in another unit; None if there are none."""
     world = MILLIMETRES[chart.unit] * chart.world[:, 1:]
     scales_of = _scales_of_few if len(world) < ROBUST_POINTS else _scales_of_many
     scales = scales_of(world, chart.pixels, limit_px)
@@ -95,12 +102,12 @@ def rows_in_other_unit(chart: Chart, limit_px: float) -> str | None:
     rows = [int(row) for row in np.flatnonzero(scales != usual)]
     factor = float(scales[rows[0]]) / usual
     times = "ten times" if factor > 1 else "a tenth of"
-    names = ", ".join(chart.points[row] for row in rows[:10])
+    names = ", ".join(chart.points[row] for row in rows[:MOST_NAMED])
     return f"{times} their y and z would fit with the other points, expected one unit: {names}"
 
 
 def _scales_of_few(world: Floats, pixels: Floats, limit_px: float) -> Floats | None:
-    """The factor (N,) of each row that brings the residual below the limit, where two rows or more need one."""
+    """The factors (N,) of the rows that bring the residual below the limit; None unless two rows or more need one."""
     count = len(world)
     if count <= PASSED:
         return None
@@ -117,7 +124,7 @@ def _scales_of_few(world: Floats, pixels: Floats, limit_px: float) -> Floats | N
 
 
 def _scales_of_many(world: Floats, pixels: Floats, limit_px: float) -> Floats | None:
-    """As by `agreeing`, with each row in the unit in which it fits best."""
+    """The factors (N,) as in `_scales_of_few`, by the method of `agreeing` with each row in its best unit."""
     options = np.array([1.0, *OTHER_UNIT])
     chosen = samples(len(world))
     homographies = fit_homographies(world[chosen], pixels[chosen])
@@ -129,13 +136,13 @@ def _scales_of_many(world: Floats, pixels: Floats, limit_px: float) -> Floats | 
     scales = np.where(own[0] <= limit_px, 1.0, options[own.argmin(axis=0)])
     agree = agreeing(scales[:, np.newaxis] * world, pixels, limit_px)
     values, counts = np.unique(scales[agree], return_counts=True)
-    if agree.mean() < 0.75 or len(values) < 2 or np.sort(counts)[-2] < 2:
+    if agree.mean() < MOST_AGREE or len(values) < 2 or np.sort(counts)[-2] < 2:
         return None
     return np.where(agree, scales, values[counts.argmax()])
 
 
 def _view_mm(chart: Chart) -> float:
-    """How wide the image is in the laser's plane, by the middle ratio of distances: mistakes of a few do not count."""
+    """The width of the image in the laser plane, mm, by the median ratio of distances, which ignores a few mistakes."""
     world, pixels = MILLIMETRES[chart.unit] * chart.world[:, 1:], chart.pixels
     first, second = np.triu_indices(len(world), 1)
     in_mm, in_px = (np.linalg.norm(p[first] - p[second], axis=1) for p in (world, pixels))
@@ -146,13 +153,14 @@ def _view_mm(chart: Chart) -> float:
 
 
 def _exchanged(chart: Chart) -> Chart:
+    """The chart with Y, Z and i, j exchanged."""
     world = np.column_stack([chart.world[:, 0], chart.pixels])
     return Chart(chart.camera, chart.points, world, chart.unit, chart.world[:, 1:])
 
 
 def _fits(chart: Chart, limit_px: float) -> bool:
-    """Whether nearly all points agree on a homography; four points or fewer always do."""
+    """True if nearly all points agree on a homography; four points or fewer always do."""
     world = MILLIMETRES[chart.unit] * chart.world[:, 1:]
     agree = agreeing(world, chart.pixels, limit_px)
     squares = float(np.sum(misfits(world[np.newaxis, agree], chart.pixels[np.newaxis, agree]) ** 2))
-    return bool(agree.mean() > 0.8) and squares <= (2.0 * limit_px) ** 2 * max(1.0, agree.sum() - PASSED)
+    return bool(agree.mean() > NEARLY_ALL) and squares <= (2.0 * limit_px) ** 2 * max(1.0, agree.sum() - PASSED)

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from footscan.calibration.chart.chart import Chart
 from footscan.calibration.chart.quadratic import ORDER as QUADRATIC
 from footscan.calibration.chart.quadratic import QuadraticFit, fit_quadratic
-from footscan.calibration.models.fit import Fit
+from footscan.calibration.models.fit import ModelFit
 from footscan.calibration.models.maps import IMAGE_PX, Model
 from footscan.calibration.models.observations import Observations, of_points
 from footscan.calibration.models.polynomial import PolynomialModel, terms
 from footscan.calibration.models.region import region_of
-from footscan.calibration.models.selection import ModelTrial, asked_for, candidates, rms, select, try_model
+from footscan.calibration.models.selection import ModelTrial, candidates, requested_models, rms, select, try_model
 from footscan.rows import distinct_rows
 from schemas.base.errors import RefusedInput
 from schemas.base.units import MILLIMETRES
@@ -22,9 +22,10 @@ from schemas.calibration import Calibration, CameraCalibration, Residual, Source
 from schemas.parameters.calibration import CalibrationParameters
 
 PLAIN_QUADRATIC = PolynomialModel(QUADRATIC, (0.0, 0.0), 1.0)
-"""The thesis's model: of pixels that are not normalised."""
+"""The model of the thesis, of pixels that are not normalised."""
 FEWEST_POINTS = 4
-"""A plane has three unknowns, and one more point tells how well it fits."""
+"""Number of control points a camera needs: an affine map of the plane has three unknowns, and one more point shows how
+well it fits."""
 
 
 def calibrate_chart(
@@ -34,14 +35,21 @@ def calibrate_chart(
     source: Source,
     software: str,
 ) -> tuple[Calibration, list[ModelTrial]]:
-    """A calibration in mm from charts, and what each model achieved, camera by camera.
+    """Calibrate cameras from charts. The order of the points does not matter.
 
-    `source` names the chart in messages and in the calibration. The order of the points does not matter.
+    Parameters
+    ----------
+    charts : camera -> chart.
+    source : names the chart in messages and in the calibration.
+
+    Returns
+    -------
+    The calibration, in mm, and the trials of all models, camera by camera.
 
     Raises
     ------
     RefusedInput
-        A camera has too few control points, or they lie on one line, or cannot carry the model that was asked for.
+        A camera has too few control points, or they lie on one line, or do not determine the requested model.
     """
     cameras: list[CameraCalibration] = []
     trials: list[ModelTrial] = []
@@ -53,7 +61,7 @@ def calibrate_chart(
 
 
 def compare_models(chart: Chart, source: str = "chart") -> list[ModelTrial]:
-    """What every model achieves on the chart of one camera, that of the thesis first.
+    """Try every model on the chart of one camera, that of the thesis first.
 
     Raises
     ------
@@ -67,7 +75,7 @@ def compare_models(chart: Chart, source: str = "chart") -> list[ModelTrial]:
 
 
 def observe(chart: Chart) -> Observations:
-    """The control points of a camera as observations, in mm. Corners clicked twice are held out together."""
+    """Convert the control points of a camera to observations, in mm. Corners clicked twice are held out together."""
     return of_points(chart.pixels, MILLIMETRES[chart.unit] * chart.world[:, 1:], _groups(chart))
 
 
@@ -78,19 +86,19 @@ def _calibrate_camera(
     observations = observe(chart)
     if parameters.model == "quadratic":
         return _quadratic(chart, observations)
-    tried = asked_for(candidates(chart.pixels, IMAGE_PX), parameters)
-    found, trials = select(tried, observations, chart.camera, robust=False)
-    if found is None and len(tried) == 1:  # it was asked for by name: what cannot be judged is taken all the same
-        found, _ = try_model(tried[0], observations, chart.camera, robust=False)
-    if found is None:
+    tried = requested_models(candidates(chart.pixels, IMAGE_PX), parameters)
+    fitted, trials = select(tried, observations, chart.camera, robust=False)
+    if fitted is None and len(tried) == 1:  # a single requested model is used even if its error is unknown
+        fitted, _ = try_model(tried[0], observations, chart.camera, robust=False)
+    if fitted is None:
         reasons = "; ".join(f"{trial.model}: {trial.remark or 'no point can be held out'}" for trial in trials[:1])
         raise RefusedInput(source, f"no model can be judged: {reasons}", field=f"camera {chart.camera}")
     chosen = next((trial for trial in trials if trial.status == "chosen"), trials[0])
-    return calibrated(found, observations, chosen, IMAGE_PX), trials
+    return calibrated(fitted, observations, chosen, IMAGE_PX), trials
 
 
 def _refuse_poor(chart: Chart, source: str) -> None:
-    """Refuses control points that cannot carry any model."""
+    """Refuse control points that do not determine any model."""
     if len(chart.points) < FEWEST_POINTS:
         problem = f"{len(chart.points)} control points, expected at least {FEWEST_POINTS}"
         raise RefusedInput(source, problem, field=f"camera {chart.camera}")
@@ -100,39 +108,39 @@ def _refuse_poor(chart: Chart, source: str) -> None:
 
 
 def calibrated(
-    found: Fit, observations: Observations, trial: ModelTrial, image_px: tuple[int, int]
+    fitted: ModelFit, observations: Observations, trial: ModelTrial, image_px: tuple[int, int]
 ) -> CameraCalibration:
-    """What goes into the calibration file for a camera."""
+    """Build the entry of a camera in the calibration file."""
     covariance: list[list[float]] = []
-    if found.covariance is not None:
-        covariance = [row[: k + 1].tolist() for k, row in enumerate(found.covariance)]
+    if fitted.covariance is not None:
+        covariance = [row[: k + 1].tolist() for k, row in enumerate(fitted.covariance)]
     return CameraCalibration(
         camera=trial.camera,
         image_px=image_px,
-        map=found.model.as_map(found.parameters),
+        map=fitted.model.as_map(fitted.parameters),
         covariance=covariance,
-        condition=found.condition,
+        condition=fitted.condition,
         region_px=region_of(observations.pixels),
         points=observations.points,
         rms_mm=trial.rms_mm,
         held_out_rms_mm=trial.held_out_rms_mm,
         worst_mm=trial.worst_mm,
-        residuals=_residuals(found.model, found.parameters, observations),
+        residuals=_residuals(fitted.model, fitted.parameters, observations),
     )
 
 
 def _residuals(model: Model, parameters: NDArray[np.float64], observations: Observations) -> list[Residual]:
-    """What the fit leaves at each place, in an order that does not depend on that of the observations."""
-    known = observations.sorted()
-    pixels, errors = known.errors(known.across(model.world(parameters, known.pixels)))
+    """The residual at each place, in an order that does not depend on that of the observations."""
+    ordered = observations.sorted()
+    pixels, errors = ordered.errors(ordered.across(model.world(parameters, ordered.pixels)))
     rows = np.column_stack([pixels.round(2), errors.round(5)]).tolist()
     return [(i, j, y, z) for i, j, y, z in rows]
 
 
 def _quadratic(chart: Chart, observations: Observations) -> tuple[CameraCalibration, list[ModelTrial]]:
-    """The thesis's model: second order of the plain pixels; its held-out error is that of any second order."""
+    """Calibrate by the model of the thesis; its held-out error is that of the normalised polynomial of second order."""
     second_order = CalibrationParameters(model="polynomial", order=QUADRATIC)
-    (normalised,) = asked_for(candidates(chart.pixels, IMAGE_PX), second_order)
+    (normalised,) = requested_models(candidates(chart.pixels, IMAGE_PX), second_order)
     _, trial = try_model(normalised, observations, chart.camera, robust=False)
     result = fit_quadratic(chart)
     parameters = _in_mm(result)
@@ -162,7 +170,7 @@ def _quadratic(chart: Chart, observations: Observations) -> tuple[CameraCalibrat
 
 
 def _thesis_trial(chart: Chart, observations: Observations) -> ModelTrial:
-    """The quadratic of the thesis; held out is each group of points in turn from its basic solution."""
+    """Try the quadratic of the thesis, by its basic solution; each group of points is held out in turn."""
     world = MILLIMETRES[chart.unit] * chart.world[:, 1:]
     group = observations.group[: len(world)]
     distances = np.linalg.norm(_quadratic_world(chart, chart.pixels) - world, axis=1)
@@ -196,18 +204,20 @@ def _quadratic_world(chart: Chart, pixels: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def _in_mm(result: QuadraticFit) -> NDArray[np.float64]:
+    """The coefficients (12,) of Y and Z, in mm."""
     return MILLIMETRES[result.unit] * np.array(result.alpha_y + result.alpha_z)
 
 
 def _part(chart: Chart, chosen: NDArray[np.bool_]) -> Chart:
+    """The points of a chart selected by `chosen` (N,)."""
     names = tuple(name for name, taken in zip(chart.points, chosen, strict=True) if taken)
     return Chart(chart.camera, names, chart.world[chosen], chart.unit, chart.pixels[chosen])
 
 
 def _groups(chart: Chart) -> NDArray[np.intp]:
-    """A number (N,) for each point, the same for points that share a world position or a pixel.
+    """Number the points (N,), with equal numbers for points that share a world position or a pixel.
 
-    The numbers follow from the points' places, not from their order.
+    The numbers depend on the positions of the points, not on their order.
     """
     places = np.column_stack([chart.world, chart.pixels])
     order = np.lexsort(places.T[::-1])

@@ -1,4 +1,4 @@
-"""The thesis's calibration: Y and Z as second-order polynomials of the plain pixel coordinates."""
+"""The calibration of the thesis: Y and Z as second-order polynomials of the pixel coordinates, not normalised."""
 
 from dataclasses import dataclass
 
@@ -11,6 +11,7 @@ from footscan.calibration.models.polynomial import design_matrix, terms
 from schemas.base.units import LengthUnit
 
 ORDER = 2
+"""Order of the polynomials."""
 
 
 @dataclass(frozen=True)
@@ -24,18 +25,18 @@ class QuadraticFit:
     """Coefficients of 1, i, j, i^2, ij, j^2."""
     alpha_z: tuple[float, ...]
     r2_y: float | None
-    """1 - SSE / SST about the mean; None where all control points have the same Y."""
+    """1 - SSE / SST about the mean; None if all control points have the same Y."""
     r2_z: float | None
     points: int
 
     @property
     def determined(self) -> bool:
-        """Whether the polynomial passes through its points by construction: R^2 is 1 then and says nothing."""
+        """True if the polynomial passes through its points by construction, so that R^2 is always 1."""
         return self.points <= terms(ORDER)
 
     @property
     def remark(self) -> str | None:
-        """What a reader of R^2 must know; None where it means what it seems to."""
+        """A warning about the meaning of R^2; None if it is meaningful."""
         if not self.determined:
             return None
         return (
@@ -45,11 +46,11 @@ class QuadraticFit:
 
 
 def fit_quadratic(chart: Chart) -> QuadraticFit:
-    """The least-squares polynomials of second order of a chart.
+    """Fit the least-squares polynomials of second order to a chart.
 
-    Where points are fewer than unknowns, or do not tell all terms apart, there are many solutions; this is the basic
-    one, with the terms left at zero that pivoting picks last, as MATLAB's backslash has it. With the thesis's five
-    points that is the constant term, and these are its coefficients.
+    If the points do not determine all terms, there are many solutions. This is the basic one, as of MATLAB's backslash
+    operator: the terms that pivoting picks last are zero. With the five points of the thesis that is the constant term,
+    and the result is the coefficients of the thesis.
     """
     matrix = design_matrix(chart.pixels[:, 0], chart.pixels[:, 1], ORDER)
     world = chart.world[:, 1:]
@@ -67,7 +68,7 @@ def fit_quadratic(chart: Chart) -> QuadraticFit:
 
 
 def r_squared(observed: NDArray[np.float64], predicted: NDArray[np.float64]) -> float | None:
-    """Coefficient of determination 1 - SSE / SST of (N,) values; None where the observed ones are all the same.
+    """Compute the coefficient of determination 1 - SSE / SST of (N,) values; None if all observed ones are equal.
 
     >>> r_squared(np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 4.0]))
     0.5
@@ -79,10 +80,10 @@ def r_squared(observed: NDArray[np.float64], predicted: NDArray[np.float64]) -> 
 
 
 def _basic_solution(matrix: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Least squares by QR with column pivoting: as many coefficients other than zero as the matrix has rank.
+    """Least squares by QR with column pivoting; the number of non-zero coefficients is the rank of the matrix.
 
-    The columns are not scaled, since that would change which of them come first; Householder's QR is stable column by
-    column, so their different sizes cost no accuracy.
+    The columns are not scaled, since that would change their order in the pivoting. Householder QR is stable column by
+    column, so that columns of different size do not reduce its accuracy.
     """
     q, r, order = qr(matrix, mode="economic", pivoting=True)
     diagonal = np.abs(np.diagonal(r))

@@ -1,4 +1,4 @@
-"""What a person may have meant to type: the small changes of one control point that make it fit with the others."""
+"""Proposals for mistyped control points: small changes of one point by which it fits the others."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,72 +15,79 @@ Values = tuple[float, float, float, float]
 """Y and Z in the chart's own unit, i and j."""
 
 LARGEST_DIGITS = 8
-"""Longer numbers are not typed by hand."""
+"""Digits of the longest number that is typed by hand."""
+LARGEST = 1e6
+"""Bound of a proposed value: no chart has larger ones."""
 
 
 @dataclass(frozen=True)
 class Repair:
-    """Another reading of one control point."""
+    """A changed reading of one control point."""
 
     words: str
     surprise: int
-    """0 for one slip of the mind (swapped, a sign, a decimal point), 1 for a coordinate that other points have, 2 for
-    one slip of a finger."""
+    """0 for swapped values, a sign or a decimal point, 1 for a coordinate of another point, 2 for a typing error."""
     values: Values
 
 
 @dataclass(frozen=True)
-class Found:
-    """A repair that fits."""
+class FittingRepair:
+    """A repair that fits the other points."""
 
     point: int
+    """Index of the repaired point."""
     repair: Repair
     misfit_px: float
 
 
 def fitting_repairs(
-    chart: Chart, point: int, others: NDArray[np.intp], known: Sequence[Sequence[float]], limit_px: float
-) -> list[Found]:
-    """The repairs of one point that bring its misfit below `limit_px`, the least surprising and best one first.
+    chart: Chart, point: int, others: NDArray[np.intp], chart_values: Sequence[Sequence[float]], limit_px: float
+) -> list[FittingRepair]:
+    """Find the repairs of one point that bring its misfit to `limit_px` at most, the least surprising and best first.
 
-    `point` is an index, `others` are those of the points that it has to fit with, and `known` holds the values of Y and
-    of Z that occur in the charts.
+    Parameters
+    ----------
+    point : index of the point.
+    others : indices of the points that it has to fit.
+    chart_values : the values of Y and of Z that occur in the charts, in the chart's own unit.
     """
-    repairs = list(_repairs(_values(chart, point), known, chart.unit))
+    repairs = list(_repairs(_values(chart, point), chart_values, chart.unit))
     if not repairs:
         return []
     changed = np.array([repair.values for repair in repairs]).reshape(-1, 4)
     scale = MILLIMETRES[chart.unit]
-    kept = np.broadcast_to(np.column_stack([scale * chart.world[others, 1:], chart.pixels[others]]),
-                           (len(repairs), len(others), 4))  # fmt: skip
+    kept = np.column_stack([scale * chart.world[others, 1:], chart.pixels[others]])
+    kept = np.broadcast_to(kept, (len(repairs), len(others), 4))
     own = np.concatenate([scale * changed[:, :2], changed[:, 2:]], axis=1)
     together = np.concatenate([kept, own[:, np.newaxis]], axis=1)
     without = float(np.sum(misfits(kept[:1, :, :2], kept[:1, :, 2:]) ** 2))
     misfit = plausible_misfits(together[:, :, :2], together[:, :, 2:])
     added = np.sqrt(np.clip(misfit**2 - without, 0.0, None))
-    found = [Found(point, repairs[k], float(added[k])) for k in np.flatnonzero(added <= limit_px)]
-    return sorted(found, key=lambda one: (one.repair.surprise, one.misfit_px))
+    fitting = [FittingRepair(point, repairs[k], float(added[k])) for k in np.flatnonzero(added <= limit_px)]
+    return sorted(fitting, key=lambda candidate: (candidate.repair.surprise, candidate.misfit_px))
 
 
 def place_of(chart: Chart, point: int, others: NDArray[np.intp]) -> Floats:
-    """The pixel (2,) at which the other points place a point."""
+    """Predict the pixel (2,) of a point, by index, from the homography of the points `others`."""
     world = MILLIMETRES[chart.unit] * chart.world[:, 1:]
     homography = fit_homographies(world[np.newaxis, others], chart.pixels[np.newaxis, others])
     return np.asarray(project(homography, world[np.newaxis, [point]])[0, 0])
 
 
 def _values(chart: Chart, point: int) -> Values:
+    """The values of a point, by index."""
     (_, y, z), (i, j) = chart.world[point].tolist(), chart.pixels[point].tolist()
     return y, z, i, j
 
 
-def _repairs(values: Values, known: Sequence[Sequence[float]], unit: str) -> Iterator[Repair]:
+def _repairs(values: Values, chart_values: Sequence[Sequence[float]], unit: str) -> Iterator[Repair]:
+    """Propose changed readings of one point, each once."""
     names = (f"y_{unit}", f"z_{unit}", "i", "j")
     y, z, i, j = values
     seen = {values}
 
     def changed(words: str, surprise: int, new: Values) -> Iterator[Repair]:
-        if new not in seen and max(map(abs, new)) < 1e6:
+        if new not in seen and max(map(abs, new)) < LARGEST:
             seen.add(new)
             yield Repair(words, surprise, new)
 
@@ -99,7 +106,7 @@ def _repairs(values: Values, known: Sequence[Sequence[float]], unit: str) -> Ite
     for factor, words in ((10.0, "ten times"), (0.1, "a tenth of")):
         yield from changed(f"it fits with {words} its y and z: another unit", 0, (factor * y, factor * z, i, j))
     for column in (0, 1):
-        for value in known[column]:
+        for value in chart_values[column]:
             yield from single(column, value, 1)
     for column, value in enumerate(values):
         for typed in _slips(value):
@@ -107,7 +114,7 @@ def _repairs(values: Values, known: Sequence[Sequence[float]], unit: str) -> Ite
 
 
 def _slips(value: float) -> Iterator[float]:
-    """Numbers of which `value` is one slip of a finger away: two digits swapped, one replaced, left out or added."""
+    """Numbers that differ from `value` by one typing error: two digits swapped, one replaced, left out or added."""
     text = f"{abs(value):.{LARGEST_DIGITS}g}"
     if not text.replace(".", "").isdecimal():
         return
@@ -123,4 +130,5 @@ def _slips(value: float) -> Iterator[float]:
 
 
 def _rounded(value: float) -> float:
+    """The value without the rounding errors of its last digits."""
     return float(f"{value:.12g}")

@@ -1,1 +1,1 @@
-"""Two calibrations side by side, and the drift since the last one."""
+"""Comparison of two calibrations, and the drift of a camera since the last one."""

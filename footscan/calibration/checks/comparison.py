@@ -1,4 +1,4 @@
-"""How two calibrations of one scanner differ, camera by camera."""
+"""Comparison of two calibrations of one scanner, camera by camera."""
 
 from dataclasses import dataclass, replace
 
@@ -12,30 +12,30 @@ from schemas.calibration import Calibration, CameraCalibration
 Floats = NDArray[np.float64]
 
 MOST_A_SIDE = 800
-"""Every pixel is looked at, or every second, third, ... where there are more a side."""
+"""Number of pixels a side that are compared at most: every pixel, or every second, third, ...: a bound of time."""
 FOLDS_EVERY = 7
-"""One in so many of those is looked at for folds, whose slopes take longer than all else."""
+"""Step of the pixels at which folds are searched, since slopes take longer than all the rest: a bound of time."""
 FARTHEST_MM = 1e6
-"""A map that takes a pixel of its region farther away has its horizon there, and says nothing of lengths."""
+"""Distance from which a map of a pixel is beyond its horizon, so that lengths have no meaning: a kilometre."""
 
 
 @dataclass(frozen=True)
 class CameraComparison:
-    """One camera in two calibrations, A and B; differences are B minus A over the pixels that both hold for."""
+    """One camera in two calibrations, A and B; differences are B minus A over the pixels for which both hold."""
 
     camera: int
     model_a: str | None
-    """None where A has no such camera."""
+    """None if A has no such camera."""
     model_b: str | None
     image_a_px: tuple[int, int] | None
-    """Columns and rows; None where A does not say."""
+    """Columns and rows; None if A does not state them."""
     image_b_px: tuple[int, int] | None
     shared_fraction: float | None = None
-    """Pixels in both regions, of those in either; None where a region is not known."""
+    """Pixels in both regions, of those in either; None if a region is unknown."""
     pixels: int = 0
-    """How many were compared."""
+    """Number of compared pixels."""
     mean_y_mm: float | None = None
-    """None, like all figures below, where there is nothing to compare; `remarks` then says why."""
+    """None, like all figures below, without a comparison; `remarks` then gives the reason."""
     mean_z_mm: float | None = None
     rms_mm: float | None = None
     """Root mean square distance."""
@@ -43,29 +43,31 @@ class CameraComparison:
     largest_at_px: tuple[float, float] | None = None
     """The pixel (i, j) with the largest distance."""
     turn_deg: float | None = None
-    """By which B is turned against A, from Y towards Z, for the least distances."""
+    """Rotation of B against A, from Y towards Z, with the least distances."""
     left_rms_mm: float | None = None
-    """Root mean square distance after that turn and the best shift: what no move of the scanner explains."""
+    """Root mean square distance after that rotation and the best shift: the part that no motion of the scanner
+    explains."""
     remarks: tuple[str, ...] = ()
 
 
 def compare_calibrations(a: Calibration, b: Calibration) -> list[CameraComparison]:
-    """Every camera of either calibration, in the order of their numbers."""
+    """Compare all cameras of both calibrations, in the order of their numbers."""
     in_a = {camera.camera: camera for camera in a.cameras}
     in_b = {camera.camera: camera for camera in b.cameras}
     return [_compare(number, in_a.get(number), in_b.get(number)) for number in sorted(in_a | in_b)]
 
 
 def worst_beyond(comparisons: list[CameraComparison], tolerance_mm: float) -> CameraComparison | None:
-    """The camera with the largest difference (rms) above the tolerance; None where all are within.
+    """Find the camera with the largest difference (rms) above the tolerance; None if all are within.
 
     A camera that could not be compared counts as the worst.
     """
-    worst = max(comparisons, key=lambda found: np.inf if found.rms_mm is None else found.rms_mm)
+    worst = max(comparisons, key=lambda camera: np.inf if camera.rms_mm is None else camera.rms_mm)
     return None if worst.rms_mm is not None and worst.rms_mm <= tolerance_mm else worst
 
 
 def _compare(number: int, a: CameraCalibration | None, b: CameraCalibration | None) -> CameraComparison:
+    """Compare one camera, which one of the calibrations may not have."""
     common = CameraComparison(
         number,
         None if a is None else model_of(a.map)[0].name,
@@ -91,21 +93,21 @@ def _compare(number: int, a: CameraCalibration | None, b: CameraCalibration | No
 
 
 def _remarks(a: CameraCalibration, b: CameraCalibration) -> list[str]:
-    """What makes the comparison less than one of two maps over their regions."""
+    """Limits of the comparison: images of different sizes, unknown regions."""
     remarks = []
     if a.image_px and b.image_px and a.image_px != b.image_px:
         sizes = ["{} x {}".format(*image_px) for image_px in (a.image_px, b.image_px)]
         remarks.append(f"A holds for images of {sizes[0]} pixels, B for {sizes[1]}")
-    unknown = [name for name, camera in (("A", a), ("B", b)) if not camera.region_px]
-    if len(unknown) == 2:
+    without_region = [name for name, camera in (("A", a), ("B", b)) if not camera.region_px]
+    if len(without_region) == 2:
         remarks.append("neither says its region: compared over the image")
-    elif unknown:
-        remarks.append(f"{unknown[0]} does not say its region: compared over that of the other")
+    elif without_region:
+        remarks.append(f"{without_region[0]} does not say its region: compared over that of the other")
     return remarks
 
 
 def _shared_pixels(a: CameraCalibration, b: CameraCalibration) -> tuple[Floats, float | None]:
-    """The pixels (N, 2) in both regions, and their part of those in either; None where a region is not known."""
+    """The pixels (N, 2) in both regions, and their share of those in either; None if a region is unknown."""
     corners = np.array([*a.region_px, *b.region_px], np.float64)
     if len(corners) == 0:
         images = [image_px for image_px in (a.image_px, b.image_px) if image_px] or [IMAGE_PX]
@@ -127,7 +129,7 @@ def _grid(low: Floats, high: Floats) -> Floats:
 
 
 def _is_one_to_one(camera: CameraCalibration, pixels: Floats) -> bool:
-    """Whether the map keeps its sense of turning: it loses it at a fold, and beyond a horizon."""
+    """True if the map keeps its orientation, which changes at a fold and beyond a horizon."""
     model, parameters = model_of(camera.map)
     slope = model.by_pixels(parameters, pixels[::FOLDS_EVERY])
     areas = slope[:, 0, 0] * slope[:, 1, 1] - slope[:, 0, 1] * slope[:, 1, 0]
@@ -135,7 +137,7 @@ def _is_one_to_one(camera: CameraCalibration, pixels: Floats) -> bool:
 
 
 def _with_figures(common: CameraComparison, pixels: Floats, a: Floats, b: Floats) -> CameraComparison:
-    """With the figures of two maps that take `pixels` (N, 2) to the places `a` and `b`, each (N, 2), mm."""
+    """Add the figures of two maps that take `pixels` (N, 2) to the places `a` and `b`, each (N, 2), mm."""
     distances = np.hypot(*(b - a).T)
     largest = int(distances.argmax())
     mean_y, mean_z = (b - a).mean(axis=0).tolist()
@@ -153,10 +155,11 @@ def _with_figures(common: CameraComparison, pixels: Floats, a: Floats, b: Floats
 
 
 def _rigid(a: Floats, b: Floats) -> tuple[float, Floats]:
-    """The turn, rad, that with a shift takes points `a` nearest to `b`, each (N, 2), and the distances (N,) left.
+    """The rotation, rad, of the rigid transform that takes points `a` nearest to `b`, and the distances (N,) left.
 
-    In the plane it is the direction of the sum of b conj(a), with (Y, Z) from their means as Y + iZ: the least squares
-    of S. Umeyama, IEEE PAMI 13 (1991) 376-380, for two dimensions.
+    Both are (N, 2). With (Y, Z) relative to their means as Y + iZ, the rotation is the argument of the sum of
+    b conj(a): the least squares of S. Umeyama, IEEE TPAMI 13(4), 1991, 376-380, doi:10.1109/34.88573, in two
+    dimensions.
     """
     from_a, from_b = (points - points.mean(axis=0) for points in (a, b))
     along = float(np.sum(from_a * from_b))

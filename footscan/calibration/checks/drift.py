@@ -1,4 +1,4 @@
-"""How far a camera has drifted since its calibration: where the old map puts what the stripe shows today."""
+"""Drift of a camera since its calibration: the error of the old map on today's stripe over the reference object."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -14,10 +14,13 @@ from schemas.calibration import CameraCalibration
 Floats = NDArray[np.float64]
 
 MARGIN_PX = 2.0
-"""The calibration's region ends at its outermost pixels; today's stripe may lie a little beyond them."""
+"""Distance outside the calibration's region up to which today's stripe is compared. Chosen by hand."""
 FEWEST_POINTS = 20
+"""Number of points that a comparison needs. Chosen by hand."""
 REACH_MM = 50.0
-"""About the object's extent: it makes the field's terms alike."""
+"""Scale of the affine field: about the object's extent, so that its terms have similar size."""
+RANK = 1e-6
+"""Singular values, relative to the largest, up to which a direction of the field is undetermined."""
 
 Verdict = Literal[
     "steady", "drifted", "not comparable", "not recognised", "not in the capture", "not in the calibration"
@@ -26,26 +29,26 @@ Verdict = Literal[
 
 @dataclass(frozen=True)
 class Drift:
-    """What became of one camera. Lengths are mm; None where there is nothing to compare."""
+    """The drift of one camera. Lengths are in mm, and None without a comparison."""
 
     camera: int
     verdict: Verdict
     points: int = 0
-    """Of today's stripe on the object, where data support the calibration."""
+    """Number of compared points: of today's stripe on the object, in the region that data support."""
     shift_mm: tuple[float, float] | None = None
-    """By how much, in the mean, the calibration puts them off their place in Y and Z."""
+    """Mean error of the calibration in Y and Z."""
     rms_mm: float | None = None
-    """How far off they are, root mean square."""
+    """Root mean square distance of the error."""
     worst_mm: float | None = None
     remark: str = ""
 
 
 def drift_of(calibration: CameraCalibration, today: CalibratedView, tolerance_mm: float) -> Drift:
-    """The drift of a camera, from the stripe over the reference object today.
+    """Measure the drift of a camera from today's stripe over the reference object.
 
-    Truth are the object's edges, to which today's stripe was assigned by the map that it gives on its own. Across an
-    edge the calibration's error is seen; along it, it is that of the affine field which explains the errors across all
-    edges best.
+    The truth is the edges of the object, to which today's stripe was assigned by a map fitted to itself. The
+    calibration's error across an edge is measured. The error along an edge is that of the affine field that fits the
+    errors across all edges best.
     """
     camera = calibration.camera
     points = today.points.part(is_supported(calibration, today.points.pixels, MARGIN_PX))
@@ -56,16 +59,16 @@ def drift_of(calibration: CameraCalibration, today: CalibratedView, tolerance_mm
     place = to_world(today.calibration, points.pixels)
     terms = np.column_stack([np.ones(len(points)), (place - place.mean(axis=0)) / REACH_MM])
     design = np.concatenate([points.normals[:, [axis]] * terms for axis in (0, 1)], axis=1)
-    field = np.linalg.lstsq(design, across, rcond=1e-6)[0].reshape(2, 3)
+    field = np.linalg.lstsq(design, across, rcond=RANK)[0].reshape(2, 3)
     along = terms @ field.T
-    off = along + (across - np.sum(points.normals * along, axis=1))[:, np.newaxis] * points.normals
-    distance = np.hypot(off[:, 0], off[:, 1])
+    error = along + (across - np.sum(points.normals * along, axis=1))[:, np.newaxis] * points.normals
+    distance = np.hypot(error[:, 0], error[:, 1])
     rms_mm = rms(distance)
     return Drift(
         camera,
         "steady" if rms_mm <= tolerance_mm else "drifted",
         len(points),
-        (float(off[:, 0].mean()), float(off[:, 1].mean())),
+        (float(error[:, 0].mean()), float(error[:, 1].mean())),
         rms_mm,
         float(distance.max()),
     )

@@ -1,1 +1,1 @@
-"""Models from pixels to the plane of the laser: fitting them and choosing between them."""
+"""Models from pixels to the laser plane: fit and selection."""

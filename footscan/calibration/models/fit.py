@@ -1,4 +1,4 @@
-"""The parameters of a model that bring pixels closest to where they belong, and how sure they are."""
+"""Robust least-squares fit of a model's parameters, with their covariance."""
 
 from dataclasses import dataclass
 
@@ -14,32 +14,45 @@ from schemas.calibration import LARGEST
 Floats = NDArray[np.float64]
 
 WORST_CONDITION = 1e7
-"""Condition number beyond which the observations do not tell the parameters apart."""
+"""Condition number from which the observations do not determine the parameters. Chosen by hand, below 1e8, up to which
+the normal matrix shows it."""
 STEPS = 40
+"""Steps of a minimisation at most: a bound of time."""
 ROUNDS = 4
-"""How often the weights of outliers are found anew."""
+"""How often the weights of outliers are updated: a bound of time."""
 TUKEY = 4.685
-"""Residuals beyond so many standard deviations have no weight (Tukey's biweight, 95 % efficient)."""
+"""Residual, in standard deviations, from which an observation has no weight (Tukey's biweight): 95 % efficiency for
+normal errors."""
 LEAST_SPREAD_MM = 0.01
-"""Residuals of exact data are no reason to call the largest of them outliers."""
+"""Lower bound of the residuals' standard deviation, so that exact data have no outliers. Chosen by hand."""
+ATTEMPTS = 12
+"""Dampings that are tried for a step."""
+REGULARISATION, FIRST_DAMPING, DAMPING_FACTOR = 1e-14, 1e-6, 10.0
+"""Damping, relative to the scaled normal matrix: of every step, so that the matrix is regular; of the first damped
+step; and the ratio of each damping to the next."""
+CONVERGED, CONVERGED_MM2 = 1e-12, 1e-24
+"""Decrease of the squares at which a minimisation ends: relative, and absolute."""
 
 
 @dataclass(frozen=True)
-class Fit:
-    """A model with the parameters that were found."""
+class ModelFit:
+    """A model with fitted parameters."""
 
     model: Model
     parameters: Floats
     """(P,)."""
     covariance: Floats | None
-    """(P, P); None where there are as many unknowns as observations, which leave nothing to judge by."""
+    """(P, P) of the parameters; None if there are as many unknowns as observations, so that no residuals remain."""
     condition: float
+    """Condition number of the scaled Jacobian."""
     residuals: Floats
     """(N,) normal . (Y, Z) - offset, mm."""
 
     def region_sigma(self, pixels: Floats) -> float | None:
-        """Standard deviation, mm, of what the model says of (Y, Z) at `pixels` (N, 2), root mean square over them; None
-        where it is not known."""
+        """Predicted standard deviation of (Y, Z) at `pixels` (N, 2), mm, root mean square over them.
+
+        None if there is no covariance or no pixel.
+        """
         if self.covariance is None or not len(pixels):
             return None
         by_parameters = self.model.by_parameters(self.parameters, pixels)
@@ -51,15 +64,27 @@ class UndeterminedError(Exception):
     """The observations do not determine the parameters."""
 
 
-def fit(model: Model, observations: Observations, *, robust: bool) -> Fit:
-    """Least squares of the distances from the observed lines, in mm, by the method of Levenberg and Marquardt.
+def fit(model: Model, observations: Observations, *, robust: bool) -> ModelFit:
+    """Fit a model by least squares of the distances from the observed lines (Levenberg-Marquardt).
 
-    Each block of observations counts as one, however many pixels it has. With `robust`, outliers lose their weight.
+    Each block counts as one observation, however many pixels it has. With `robust`, outliers lose their weight.
 
     Raises
     ------
     UndeterminedError
-        More unknowns than the observations carry, or observations that do not tell them apart.
+        There are more unknowns than independent observations, or the observations do not determine the unknowns.
+
+    Examples
+    --------
+    A camera with 0.5 mm a px, from nine control points:
+
+    >>> from footscan.calibration.models.observations import of_points
+    >>> from footscan.calibration.models.polynomial import PolynomialModel
+    >>> pixels = np.array([[i, j] for i in (0.0, 320.0, 640.0) for j in (0.0, 240.0, 480.0)])
+    >>> observations = of_points(pixels, 0.5 * pixels, np.arange(9))
+    >>> camera = fit(PolynomialModel(1, (320.0, 240.0), 320.0), observations, robust=False)
+    >>> print(camera.parameters.round(6) + 0.0)
+    [160. 160.   0. 120.   0. 160.]
     """
     if observations.independent < model.unknowns:
         raise UndeterminedError(f"{observations.independent} observations for {model.unknowns} unknowns")
@@ -74,16 +99,16 @@ def fit(model: Model, observations: Observations, *, robust: bool) -> Fit:
     normal, _ = _normal_equations(jacobian, weights, np.zeros(len(weights)))
     condition = _condition(normal + np.diag(model.prior_precision()))
     if not (condition < WORST_CONDITION and np.abs(parameters).max() <= LARGEST):
-        raise UndeterminedError("the data lie so that they do not tell all unknowns apart")
+        raise UndeterminedError("the arrangement of the data does not determine all unknowns")
     residuals = _residuals(model, observations, parameters)
     remoteness = _remoteness(residuals) if robust else np.zeros(len(residuals))
     covariance = _covariance(observations, jacobian, residuals, remoteness, model.prior_precision())
-    return Fit(model, parameters, covariance, condition, residuals)
+    return ModelFit(model, parameters, covariance, condition, residuals)
 
 
-def predict(found: Fit, observations: Observations) -> Floats:
-    """Residuals (N,), mm, of observations that the fit need not have seen."""
-    return _residuals(found.model, observations, found.parameters)
+def predict(fitted: ModelFit, observations: Observations) -> Floats:
+    """Residuals (N,), mm, of observations under a fit to the same or to other observations."""
+    return _residuals(fitted.model, observations, fitted.parameters)
 
 
 def _residuals(model: Model, observations: Observations, parameters: Floats) -> Floats:
@@ -95,13 +120,13 @@ def _jacobian(model: Model, observations: Observations, parameters: Floats) -> F
 
 
 def _remoteness(residuals: Floats) -> Floats:
-    """(residual / largest with weight)^2, 1 for those beyond: the weight of Tukey's biweight is (1 - that)^2."""
+    """(residual / least residual without weight)^2, 1 at most; the weight of Tukey's biweight is (1 - that)^2."""
     spread = max(MAD_TO_SD * float(np.median(np.abs(residuals))), LEAST_SPREAD_MM)
     return np.asarray(np.clip((residuals / (TUKEY * spread)) ** 2, None, 1.0))
 
 
 def _minimise(model: Model, observations: Observations, weights: Floats, start: Floats) -> Floats:
-    """The parameters of the least weighted squares; steps that do not lower them are damped and tried again."""
+    """The parameters of the least weighted squares; steps that do not lower the squares are damped and repeated."""
     precision = model.prior_precision()
 
     def cost_of(parameters: Floats) -> tuple[float, Floats]:
@@ -111,7 +136,7 @@ def _minimise(model: Model, observations: Observations, weights: Floats, start: 
     parameters = start
     cost, residuals = cost_of(parameters)
     if not np.isfinite(cost):
-        raise UndeterminedError("no homography takes the pixels near to where they belong")
+        raise UndeterminedError("no homography maps the pixels near their world points")
     damping = 0.0
     for _ in range(STEPS):
         jacobian = _jacobian(model, observations, parameters)
@@ -121,18 +146,18 @@ def _minimise(model: Model, observations: Observations, weights: Floats, start: 
         scale = np.sqrt(np.diagonal(normal))
         scale[scale == 0.0] = 1.0
         scaled = normal / np.outer(scale, scale)
-        for _ in range(12):
-            damped = scaled + max(damping, 1e-14) * np.eye(len(scale))
+        for _ in range(ATTEMPTS):
+            damped = scaled + max(damping, REGULARISATION) * np.eye(len(scale))
             step = -np.linalg.solve(damped, gradient / scale) / scale
             lower, moved = cost_of(parameters + step)
             if lower <= cost:
                 break
-            damping = max(10.0 * damping, 1e-6)
+            damping = max(DAMPING_FACTOR * damping, FIRST_DAMPING)
         else:
             return parameters
         parameters, residuals = parameters + step, moved
-        damping = 0.0 if damping <= 1e-6 else damping / 10.0
-        if cost - lower <= 1e-12 * cost + 1e-24:
+        damping = 0.0 if damping <= FIRST_DAMPING else damping / DAMPING_FACTOR
+        if cost - lower <= CONVERGED * cost + CONVERGED_MM2:
             break
         cost = lower
     return parameters
@@ -140,7 +165,7 @@ def _minimise(model: Model, observations: Observations, weights: Floats, start: 
 
 @compiled
 def _along(normals: Floats, by_parameters: Floats) -> Floats:
-    """(N, P) derivatives along the normals (N, 2), of those of places (N, 2, P)."""
+    """(N, P) components along the normals (N, 2) of derivatives (N, 2, P)."""
     along = np.empty((by_parameters.shape[0], by_parameters.shape[2]))
     for n in range(along.shape[0]):
         for p in range(along.shape[1]):
@@ -150,7 +175,7 @@ def _along(normals: Floats, by_parameters: Floats) -> Floats:
 
 @compiled
 def _normal_equations(jacobian: Floats, weights: Floats, residuals: Floats) -> tuple[Floats, Floats]:
-    """J^T W J and J^T W r. Not by BLAS, whose sums depend on the number of its threads."""
+    """J^T W J and J^T W r, without BLAS, whose sums depend on the number of its threads."""
     unknowns = jacobian.shape[1]
     normal, gradient = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
     for n in range(jacobian.shape[0]):
@@ -166,10 +191,11 @@ def _normal_equations(jacobian: Floats, weights: Floats, residuals: Floats) -> t
 
 
 def _condition(normal: Floats) -> float:
-    """Of the weighted Jacobian, prior included, with its columns scaled to one length: within sqrt P the best scaling.
+    """Condition number of the weighted Jacobian, prior included, with its columns scaled to equal length.
 
-    From its normal matrix, which tells condition numbers up to about 1e8. A. van der Sluis, "Condition numbers and
-    equilibration of matrices", Numer. Math. 14 (1969) 14-23.
+    That is within sqrt P of the best scaling (A. van der Sluis, "Condition numbers and equilibration of matrices",
+    Numerische Mathematik 14, 1969, 14-23, doi:10.1007/BF02165096). It is computed from the normal matrix, which shows
+    condition numbers up to about 1e8.
     """
     lengths = np.sqrt(np.diagonal(normal))
     if not lengths.all() or not np.isfinite(lengths).all():
@@ -181,19 +207,19 @@ def _condition(normal: Floats) -> float:
 def _covariance(
     observations: Observations, jacobian: Floats, residuals: Floats, remoteness: Floats, precision: Floats
 ) -> Floats | None:
-    """The variance of a block times the inverse of the normal matrix.
+    """The covariance (P, P) of the parameters: the variance of a block times the inverse of the normal matrix.
 
-    The variance is that of the blocks' mean residuals: what neighbours err in common does not average out. Residuals
-    count as far as their weight lets them pull, and what the weights cost is made up for: P. J. Huber, "Robust
-    regression: asymptotics, conjectures and Monte Carlo", Ann. Statist. 1 (1973) 799-821. Without outliers to guard
-    against (`remoteness` zero) this is the ordinary covariance of least squares.
+    The variance is that of the blocks' mean residuals, since common errors of neighbours do not average out. Residuals
+    enter by their influence, with a factor for the loss of efficiency by the weights (P. J. Huber, "Robust regression:
+    asymptotics, conjectures and Monte Carlo", Annals of Statistics 1(5), 1973, 799-821, doi:10.1214/aos/1176342503).
+    Without outliers (`remoteness` zero) this is the ordinary covariance of least squares.
     """
     share = observations.share
     pulls = np.bincount(
         np.unique(observations.block, return_inverse=True)[1], share * residuals * (1.0 - remoteness) ** 2
     )
     blocks, unknowns = len(pulls), jacobian.shape[1]
-    slopes = (1.0 - remoteness) * (1.0 - 5.0 * remoteness)  # of the pull by the residual
+    slopes = (1.0 - remoteness) * (1.0 - 5.0 * remoteness)  # derivative of the influence by the residual
     slope = float(np.sum(share * slopes)) / blocks
     if blocks <= unknowns or slope <= 0.0:
         return None
@@ -205,5 +231,6 @@ def _covariance(
 
 
 def _inverse(normal: Floats) -> Floats:
+    """The inverse of a normal matrix (P, P), computed in scaled form."""
     scale = np.sqrt(np.diagonal(normal))
     return np.asarray(np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale))

@@ -1,8 +1,9 @@
-"""A plane seen by a pinhole camera, with the distortion of its lens and a smooth correction for what is left.
+"""Homography of a plane as a model of a camera, with lens distortion and a smooth correction.
 
-The map from a laser's plane to the image of a pinhole is a homography (Hartley & Zisserman 2004, section 8.1). A lens
-bends it: D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37 (1971) 855-866, whose terms run
-from the seen to the ideal place. What a glass plate in the way adds is smooth, and small enough for a polynomial.
+The map from the laser plane to the image of a pinhole camera is a homography (R. Hartley and A. Zisserman, "Multiple
+View Geometry in Computer Vision", 2nd edition, 2004, section 8.1). Lens distortion follows D. C. Brown, "Close-range
+camera calibration", Photogrammetric Engineering 37, 1971, 855-866; its terms lead from the seen to the ideal place. A
+glass plate in the line of sight adds a smooth error that is small enough for a polynomial.
 """
 
 from dataclasses import dataclass
@@ -18,48 +19,54 @@ from schemas.parameters.calibration import ModelName
 Floats = NDArray[np.float64]
 
 MATRIX = 8
+"""Number of parameters of the matrix; its ninth number is 1."""
 LINEAR = 3
-"""Terms of degree 0 and 1, which a correction leaves to the homography."""
+"""Number of terms of degree 0 and 1, which a correction does not have: the homography expresses them."""
 PRIOR_DISTORTION = (0.03, 0.02, 0.003, 0.003)
-"""Standard deviation of k1, k2, p1 and p2 among webcams' lenses, in units of half an image's diagonal: where the data
-say nothing of them, they are small."""
+"""Prior standard deviations of k1, k2, p1 and p2 among webcam lenses, for coordinates in units of half an image's
+diagonal: the parameters stay small where the data do not determine them. Chosen by hand."""
 PRIOR_CORRECTION_MM = 5.0
-"""The same for a correction's coefficients, of which the homography can express some too."""
+"""Prior standard deviation of a correction's coefficients, which the homography can express in part. Chosen by hand."""
 NOISE_MM = 0.015
-"""What the data are thought to be good for when they are weighed against what is known beforehand."""
+"""Standard deviation of the data by which they are weighed against the priors. Chosen by hand."""
+ROUNDING = 1e-12
+"""Least last number of a matrix, relative to its largest, by which it is divided. It is 0 if the origin lies on the
+horizon."""
+HORIZON = 1e-9
+"""Depth below which a point lies on the horizon: it is mapped far away, not to infinity."""
 
 
 @dataclass(frozen=True)
 class HomographyModel:
-    """A homography of u = (i - centre_i) / scale and v = (j - centre_j) / scale, and what is added to it."""
+    """A homography of u = (i - centre_i) / scale and v = (j - centre_j) / scale, with its extensions."""
 
     centre_px: tuple[float, float]
     scale_px: float
     distorted: bool = False
     correction: int | None = None
-    """Order of the correction; None is none."""
+    """Order of the correction; None for no correction."""
 
     @property
     def kind(self) -> ModelName:
-        """What it is asked for by."""
+        """Name of this kind of model in the parameters."""
         if self.correction is not None:
             return "homography-correction"
         return "homography-distortion" if self.distorted else "homography"
 
     @property
     def name(self) -> str:
-        """As it stands in tables."""
+        """Name of the model in tables."""
         distortion = ", distortion" if self.distorted else ""
         correction = f", correction {self.correction}" if self.correction is not None else ""
         return f"homography{distortion}{correction}"
 
     @property
     def unknowns(self) -> int:
-        """Eight of the matrix, four of the distortion, those of the correction to Y and to Z."""
+        """Number of parameters P: 8 of the matrix, 4 of the distortion, and those of the correction in Y and Z."""
         return self._corrected + 2 * self._correction_terms
 
     def start(self, pixels: Floats, normals: Floats, offsets: Floats) -> Floats:
-        """Parameters (P,) from which a fit begins: the homography that an algebraic error gives, and nothing else.
+        """Parameters (P,) from which a fit starts: the homography of least algebraic error, without extensions.
 
         `pixels` (N, 2), px; `normals` (N, 2) and `offsets` (N,), mm: each pixel's world point lies on the line
         normal . (Y, Z) = offset.
@@ -69,7 +76,7 @@ class HomographyModel:
         return parameters
 
     def prior_precision(self) -> Floats:
-        """How strongly each parameter is held to zero, (P,), where an error of 1 mm counts as 1."""
+        """Weight (P,) of the square of each parameter, in units of the square of an error of 1 mm."""
         precision = np.zeros(self.unknowns)
         if self.distorted:
             precision[MATRIX : MATRIX + 4] = (NOISE_MM / np.array(PRIOR_DISTORTION)) ** 2
@@ -77,7 +84,7 @@ class HomographyModel:
         return precision
 
     def world(self, parameters: Floats, pixels: Floats) -> Floats:
-        """Y and Z, (N, 2) mm, of `pixels` (N, 2)."""
+        """Y and Z, (N, 2) mm, of `pixels` (N, 2), px."""
         uv = self._normalised(pixels)
         plane, _ = project(_matrix(parameters), self._ideal(parameters, uv))
         if self.correction is not None:
@@ -111,7 +118,7 @@ class HomographyModel:
         return np.asarray(by_uv / self.scale_px)
 
     def as_map(self, parameters: Floats) -> HomographyMap:
-        """For the calibration file."""
+        """The map for the calibration file."""
         distortion = correction = None
         if self.distorted:
             k1, k2, p1, p2 = parameters[MATRIX : MATRIX + 4].tolist()
@@ -129,17 +136,20 @@ class HomographyModel:
 
     @property
     def _corrected(self) -> int:
-        """Where the parameters of the correction begin."""
+        """Index of the first parameter of the correction."""
         return MATRIX + 4 * self.distorted
 
     @property
     def _correction_terms(self) -> int:
+        """Number of the correction's coefficients in Y, and in Z."""
         return 0 if self.correction is None else terms(self.correction) - LINEAR
 
     def _correction(self, parameters: Floats) -> Floats:
+        """The coefficients (2, T) of the correction in Y and in Z."""
         return parameters[self._corrected :].reshape(2, -1)
 
     def _correction_matrix(self, uv: Floats) -> Floats:
+        """The terms (N, T) of the correction at `uv` (N, 2)."""
         assert self.correction is not None
         return design_matrix(uv[:, 0], uv[:, 1], self.correction)[:, LINEAR:]
 
@@ -147,11 +157,13 @@ class HomographyModel:
         return np.asarray((pixels - np.array(self.centre_px)) / self.scale_px)
 
     def _ideal(self, parameters: Floats, uv: Floats) -> Floats:
+        """Ideal places (N, 2), without distortion, of seen places `uv` (N, 2)."""
         if not self.distorted:
             return uv
         return _through_lens(uv, _distortion_terms(uv), parameters[MATRIX : MATRIX + 4])
 
     def _ideal_by_uv(self, parameters: Floats, uv: Floats) -> Floats:
+        """Derivatives (N, 2, 2) of `_ideal` by u and v."""
         identity = np.broadcast_to(np.eye(2), (len(uv), 2, 2))
         if not self.distorted:
             return identity
@@ -166,20 +178,38 @@ class HomographyModel:
 
 
 def algebraic_homography(uv: Floats, normals: Floats, offsets: Floats) -> Floats:
-    """The (3, 3) matrix that takes points (u, v) onto lines, by the least algebraic error; its last number is 1.
+    """Compute the homography of least algebraic error that maps points (u, v) onto lines.
 
-    Each row is n_y (h1 x) + n_z (h2 x) - d (h3 x) = 0 with x = (u, v, 1): linear in the nine entries (direct linear
-    transformation, Hartley & Zisserman 2004, section 4.1, with lines for points on the world's side). Points and lines
-    are brought to about unit size first, without which it is not to be trusted.
+    Each observation is the equation n_y (h1 x) + n_z (h2 x) - d (h3 x) = 0 with x = (u, v, 1), linear in the nine
+    entries of the matrix (direct linear transformation, Hartley and Zisserman 2004, section 4.1, with lines instead of
+    points in the world). Points and lines are scaled to about unit size first; otherwise the solution is unstable.
 
     Parameters
     ----------
-    uv : (N, 2), N >= 8.
-    normals, offsets : (N, 2) unit and (N,), any unit of length: the lines normal . (Y, Z) = offset.
+    uv : (N, 2) float64, N >= 8.
+    normals, offsets : (N, 2) of unit length and (N,), in any unit of length: the lines normal . (Y, Z) = offset.
+
+    Returns
+    -------
+    (3, 3) float64; its last number is 1.
+
+    Examples
+    --------
+    Four points, each on a line for its Y and a line for its Z, with Y = 2 u + 1 and Z = 3 v:
+
+    >>> uv = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    >>> offsets = np.concatenate([2.0 * uv[:, 0] + 1.0, 3.0 * uv[:, 1]])
+    >>> matrix = algebraic_homography(np.tile(uv, (2, 1)), np.repeat(np.eye(2), 4, axis=0), offsets)
+    >>> print(matrix.round(6) + 0.0)
+    [[2. 0. 1.]
+     [0. 3. 0.]
+     [0. 0. 1.]]
     """
     middle = uv.mean(axis=0)
     size = float(np.sqrt(np.mean(np.sum((uv - middle) ** 2, axis=1)))) or 1.0
-    origin = np.linalg.pinv(_inner(normals, normals)) @ _inner(normals, offsets[:, np.newaxis])[:, 0]  # their middle
+    origin = (
+        np.linalg.pinv(_inner(normals, normals)) @ _inner(normals, offsets[:, np.newaxis])[:, 0]
+    )  # nearest to all lines
     distances = offsets - np.sum(normals * origin, axis=1)
     reach = float(np.sqrt(np.mean(distances**2))) or 1.0
     x = np.column_stack([(uv - middle) / size, np.ones(len(uv))])
@@ -188,18 +218,30 @@ def algebraic_homography(uv: Floats, normals: Floats, offsets: Floats) -> Floats
     to_unit = np.array([[1.0 / size, 0.0, -middle[0] / size], [0.0, 1.0 / size, -middle[1] / size], [0.0, 0.0, 1.0]])
     from_unit = np.array([[reach, 0.0, origin[0]], [0.0, reach, origin[1]], [0.0, 0.0, 1.0]])
     matrix = from_unit @ matrix @ to_unit
-    least = 1e-12 * float(np.abs(matrix).max())  # of the last number, which is 0 where the origin lies on the horizon
+    least = ROUNDING * float(np.abs(matrix).max())
     return np.asarray(matrix / (matrix[2, 2] if abs(matrix[2, 2]) > least else least))
 
 
 @compiled
 def project(matrix: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Where a homography (3, 3) takes `points` (N, 2), (N, 2), and the depths (N,) by which they were divided."""
+    """Map `points` (N, 2) by a homography (3, 3).
+
+    Returns
+    -------
+    plane : (N, 2) float64, the mapped points.
+    depth : (N,) float64, the third homogeneous coordinate by which they were divided.
+
+    Examples
+    --------
+    >>> plane, depth = project(np.array([[1.0, 0, 0], [0, 1, 0], [0.5, 0, 1]]), np.array([[2.0, 4.0]]))
+    >>> print(plane, depth)
+    [[1. 2.]] [2.]
+    """
     plane, depth = np.empty((len(points), 2)), np.empty(len(points))
     for n in range(len(points)):
         x, y = points[n, 0], points[n, 1]
         by = x * matrix[2, 0] + y * matrix[2, 1] + matrix[2, 2]
-        depth[n] = 1e-9 if abs(by) < 1e-9 else by  # on the horizon: far away, not infinite
+        depth[n] = HORIZON if abs(by) < HORIZON else by
         for k in range(2):
             plane[n, k] = (x * matrix[k, 0] + y * matrix[k, 1] + matrix[k, 2]) / depth[n]
     return plane, depth
@@ -207,7 +249,7 @@ def project(matrix: Floats, points: Floats) -> tuple[Floats, Floats]:
 
 @compiled
 def slopes(matrix: Floats, plane: Floats, depth: Floats) -> Floats:
-    """Derivatives (N, 2, 2) of what `project` gave by its points."""
+    """Derivatives (N, 2, 2) of the result of `project` by its points."""
     by_points = np.empty((len(plane), 2, 2))
     for n in range(len(plane)):
         for k in range(2):
@@ -217,35 +259,50 @@ def slopes(matrix: Floats, plane: Floats, depth: Floats) -> Floats:
 
 
 def image_frame(image_px: tuple[int, int]) -> tuple[tuple[float, float], float]:
-    """Centre and scale, px, to which homographies of an image of so many columns and rows are normalised."""
+    """Centre and scale, px, by which homographies of an image of (columns, rows) are normalised.
+
+    >>> image_frame((641, 481))
+    ((320.0, 240.0), 400.0)
+    """
     middle = ((image_px[0] - 1) / 2, (image_px[1] - 1) / 2)
     return middle, float(np.hypot(*middle))
 
 
 def _inner(a: Floats, b: Floats) -> Floats:
-    """The transpose of (N, P) times (N, Q). Not by BLAS, whose sums depend on the number of its threads."""
+    """The transpose of (N, P) times (N, Q), without BLAS, whose sums depend on the number of its threads."""
     return np.asarray(np.einsum("np,nq->pq", a, b))
 
 
 def _matrix(parameters: Floats) -> Floats:
+    """The homography (3, 3) of `parameters` (P,)."""
     return np.append(parameters[:MATRIX], 1.0).reshape(3, 3)
 
 
 @compiled
 def _distortion_terms(uv: Floats) -> Floats:
-    """(N, 2, 4): what k1, k2, p1 and p2 are multiplied with."""
-    found = np.empty((len(uv), 2, 4))
+    """(N, 2, 4): the factors of k1, k2, p1 and p2 in the distortion of u and of v."""
+    factors = np.empty((len(uv), 2, 4))
     for n in range(len(uv)):
         u, v = uv[n, 0], uv[n, 1]
         r2 = u * u + v * v
-        found[n, 0, 0], found[n, 0, 1], found[n, 0, 2], found[n, 0, 3] = u * r2, u * r2 * r2, 2 * u * v, r2 + 2 * u * u
-        found[n, 1, 0], found[n, 1, 1], found[n, 1, 2], found[n, 1, 3] = v * r2, v * r2 * r2, r2 + 2 * v * v, 2 * u * v
-    return found
+        factors[n, 0, 0], factors[n, 0, 1], factors[n, 0, 2], factors[n, 0, 3] = (
+            u * r2,
+            u * r2 * r2,
+            2 * u * v,
+            r2 + 2 * u * u,
+        )
+        factors[n, 1, 0], factors[n, 1, 1], factors[n, 1, 2], factors[n, 1, 3] = (
+            v * r2,
+            v * r2 * r2,
+            r2 + 2 * v * v,
+            2 * u * v,
+        )
+    return factors
 
 
 @compiled
 def _through_lens(uv: Floats, distortion: Floats, lens: Floats) -> Floats:
-    """(N, 2) ideal places of what is seen at `uv` (N, 2), by what k1, k2, p1 and p2 are multiplied with (N, 2, 4)."""
+    """(N, 2) ideal places of seen places `uv` (N, 2), by the factors (N, 2, 4) of `_distortion_terms`."""
     ideal = uv.copy()
     for n in range(len(uv)):
         for k in range(2):
@@ -256,17 +313,17 @@ def _through_lens(uv: Floats, distortion: Floats, lens: Floats) -> Floats:
 
 @compiled
 def _fill_by_matrix(jacobian: Floats, ideal: Floats, plane: Floats, depth: Floats) -> None:
-    """Derivatives of the (N, 2) places on the plane by the matrix, into (N, 2, P)."""
+    """Write the derivatives of the places on the plane (N, 2) by the matrix into `jacobian` (N, 2, P)."""
     for n in range(len(ideal)):
-        x, y, one = ideal[n, 0] / depth[n], ideal[n, 1] / depth[n], 1.0 / depth[n]
+        x, y, unit = ideal[n, 0] / depth[n], ideal[n, 1] / depth[n], 1.0 / depth[n]
         for k in range(2):
-            jacobian[n, k, 3 * k], jacobian[n, k, 3 * k + 1], jacobian[n, k, 3 * k + 2] = x, y, one
+            jacobian[n, k, 3 * k], jacobian[n, k, 3 * k + 1], jacobian[n, k, 3 * k + 2] = x, y, unit
             jacobian[n, k, 6], jacobian[n, k, 7] = -plane[n, k] * x, -plane[n, k] * y
 
 
 @compiled
 def _fill_by_lens(jacobian: Floats, by_ideal: Floats, distortion: Floats) -> None:
-    """Those by k1, k2, p1 and p2, into (N, 2, P)."""
+    """Write the derivatives by k1, k2, p1 and p2 into `jacobian` (N, 2, P)."""
     for n in range(len(jacobian)):
         for k in range(2):
             for t in range(4):

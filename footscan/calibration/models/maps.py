@@ -1,4 +1,4 @@
-"""What a calibrated camera says: pixels to Y and Z in mm, back, and how sure it is."""
+"""Maps of a calibrated camera: pixels to Y and Z in mm and back, with their uncertainty."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +13,21 @@ Floats = NDArray[np.float64]
 Model = PolynomialModel | HomographyModel
 
 IMAGE_PX = (640, 480)
-"""Columns and rows of what the scanner's cameras film, where nothing says it."""
+"""Default columns and rows of the images: those of the scanner's cameras."""
 STARTS = 12
-"""Newton's method begins at the nearest of so many places a side in the region."""
+"""Places a side of the region; Newton's method starts at the nearest. Chosen by hand."""
 STEPS = 30
+"""Newton steps at most: a bound of time."""
 CONVERGED_PX = 1e-6
+"""Largest last step of a converged pixel."""
 SINGULAR = 1e-12
-"""mm^2/px^2: a map that takes a pixel to so small an area cannot be turned round there."""
+"""Area of a mapped pixel, mm^2/px^2, up to which a map has no inverse there: rounding."""
+FARTHEST_STEP_PX = 100.0
+"""A Newton step is limited to the extent of the image plus so much."""
 
 
 def to_world(camera: CameraCalibration, pixels: NDArray[np.floating]) -> Floats:
-    """Y and Z of pixels.
+    """Map pixels to Y and Z.
 
     Parameters
     ----------
@@ -31,15 +35,25 @@ def to_world(camera: CameraCalibration, pixels: NDArray[np.floating]) -> Floats:
 
     Returns
     -------
-    (N, 2) float64, mm, scanner frame: Y and Z. What lies outside of the camera's region is extrapolated; see
+    (N, 2) float64, mm, scanner frame: Y and Z. Pixels outside the camera's region are extrapolated; see
     `is_supported`.
+
+    Examples
+    --------
+    >>> map_ = PolynomialMap(order=1, centre_px=(320, 240), scale_px=100, alpha_y=[0, 50, 0], alpha_z=[0, 0, -50])
+    >>> camera = CameraCalibration(camera=1, map=map_, region_px=[], points=0)
+    >>> print(to_world(camera, np.array([[340.0, 200.0]])))
+    [[10. 20.]]
     """
     model, parameters = model_of(camera.map)
     return model.world(parameters, np.asarray(pixels, np.float64))
 
 
 def to_pixels(camera: CameraCalibration, world: NDArray[np.floating]) -> Floats:
-    """The pixels at which the camera sees points of the laser's plane.
+    """Find the pixels at which the camera sees points of the laser plane.
+
+    They are the solution of `to_world` by Newton's method, from the nearest of a grid of pixels over the camera's
+    region.
 
     Parameters
     ----------
@@ -47,8 +61,14 @@ def to_pixels(camera: CameraCalibration, world: NDArray[np.floating]) -> Floats:
 
     Returns
     -------
-    (N, 2) float64, px, image frame; NaN where there is none to be found. Newton's method on `to_world`, from the
-    nearest of a grid of pixels over the camera's region.
+    (N, 2) float64, px, image frame; NaN where no solution is found.
+
+    Examples
+    --------
+    >>> map_ = PolynomialMap(order=1, centre_px=(320, 240), scale_px=100, alpha_y=[0, 50, 0], alpha_z=[0, 0, -50])
+    >>> camera = CameraCalibration(camera=1, map=map_, region_px=[], points=0)
+    >>> print(to_pixels(camera, np.array([[10.0, 20.0]])).round(6))
+    [[340. 200.]]
     """
     model, parameters = model_of(camera.map)
     world = np.asarray(world, np.float64)
@@ -59,9 +79,9 @@ def to_pixels(camera: CameraCalibration, world: NDArray[np.floating]) -> Floats:
 
 
 def prediction_covariance(camera: CameraCalibration, pixels: NDArray[np.floating]) -> Floats | None:
-    """How sure `to_world` is because of what the map was fitted to: covariance (N, 2, 2) of Y and Z, mm^2.
+    """Predict the covariance (N, 2, 2) of Y and Z, mm^2, at `pixels` (N, 2), px; None if the calibration has none.
 
-    None where the calibration does not say. It tells of chance, not of a model that is too stiff.
+    It covers random errors of the data to which the map was fitted, not the error of a model that is too stiff.
     """
     if not camera.covariance:
         return None
@@ -75,12 +95,12 @@ def prediction_covariance(camera: CameraCalibration, pixels: NDArray[np.floating
 
 
 def is_supported(camera: CameraCalibration, pixels: NDArray[np.floating], margin_px: float = 0.0) -> NDArray[np.bool_]:
-    """Which of `pixels` (N, 2) lie where data support the camera's map, or at most `margin_px` beside it: (N,)."""
+    """Select the `pixels` (N, 2), px, in the region that data support, or at most `margin_px` outside; (N,) bool."""
     return supported(camera.region_px, pixels, margin_px)
 
 
 def model_of(pixel_map: PolynomialMap | HomographyMap) -> tuple[Model, Floats]:
-    """The model behind a map, and its parameters (P,) in the order of the map's covariance."""
+    """The model of a map, and its parameters (P,) in the order of the map's covariance."""
     if isinstance(pixel_map, PolynomialMap):
         polynomial = PolynomialModel(pixel_map.order, pixel_map.centre_px, pixel_map.scale_px)
         return polynomial, np.array(pixel_map.alpha_y + pixel_map.alpha_z)
@@ -97,10 +117,10 @@ def model_of(pixel_map: PolynomialMap | HomographyMap) -> tuple[Model, Floats]:
 
 
 def _newton(model: Model, parameters: Floats, world: Floats, starts: Floats) -> Floats:
-    """The pixels (N, 2) of finite `world` (N, 2), each sought from that of `starts` (M, 2) which maps nearest to it."""
+    """The pixels (N, 2) of finite `world` (N, 2), each from the pixel of `starts` (M, 2) that maps nearest to it."""
     pixels = starts[cKDTree(model.world(parameters, starts)).query(world)[1]]
     step = np.zeros_like(pixels)
-    longest = np.abs(starts).max() + 100.0
+    longest = np.abs(starts).max() + FARTHEST_STEP_PX
     for _ in range(STEPS):
         slope = model.by_pixels(parameters, pixels)
         regular = np.abs(slope[:, 0, 0] * slope[:, 1, 1] - slope[:, 0, 1] * slope[:, 1, 0]) > SINGULAR
@@ -115,6 +135,7 @@ def _newton(model: Model, parameters: Floats, world: Floats, starts: Floats) -> 
 
 
 def _grid(camera: CameraCalibration) -> Floats:
+    """(M, 2) pixels over the camera's region, or over its image."""
     if camera.region_px:
         low, high = np.min(camera.region_px, axis=0), np.max(camera.region_px, axis=0)
     else:

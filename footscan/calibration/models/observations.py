@@ -1,6 +1,6 @@
-"""What a map is fitted to: pixels, and for each the line of the laser's plane on which its world point lies.
+"""Observations to which a map is fitted: pixels, each with the line of the laser plane on which its world point lies.
 
-A control point is two observations, its Y and its Z; a pixel of the stripe over a known edge is one.
+A control point gives two observations, its Y and its Z; a pixel of the stripe on a known edge gives one.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Observations:
-    """Of one camera. The world point (Y, Z) of pixel k satisfies normal . (Y, Z) = offset."""
+    """The observations of one camera. The world point (Y, Z) of each pixel satisfies normal . (Y, Z) = offset."""
 
     pixels: Floats
     """(N, 2), px."""
@@ -22,46 +22,47 @@ class Observations:
     offsets: Floats
     """(N,), mm."""
     point: NDArray[np.intp]
-    """(N,) observations of one point share a number: their errors add up to one distance."""
+    """(N,) number of the point; the errors of its observations add up to one distance."""
     block: NDArray[np.intp]
-    """(N,) what errs together shares a number, and counts as much as one observation: neighbours along the stripe."""
+    """(N,) number of the block. Observations with correlated errors, as of neighbours along the stripe, form a block,
+    which counts as one observation."""
     group: NDArray[np.intp]
-    """(N,) what is held out together shares a number; blocks do not straddle groups."""
+    """(N,) number of the group. Observations of one group are held out together; a block lies in one group."""
 
     def __len__(self) -> int:
         return len(self.offsets)
 
     @property
     def independent(self) -> int:
-        """How many observations there are whose errors have nothing to do with each other."""
+        """Number of independent observations: that of the blocks."""
         return len(np.unique(self.block))
 
     @property
     def points(self) -> int:
-        """How many points they tell of."""
+        """Number of points."""
         return len(np.unique(self.point))
 
     @property
     def share(self) -> Floats:
-        """The weight (N,) of each in its block: all of a block count as one."""
+        """The weights (N,) of the observations; those of a block add up to 1."""
         _, number, count = np.unique(self.block, return_inverse=True, return_counts=True)
         return np.asarray(1.0 / count[number])
 
     def across(self, world: Floats) -> Floats:
-        """Residuals (N,), mm, where the pixels are mapped to `world` (N, 2)."""
+        """Residuals (N,), mm, if the pixels are mapped to `world` (N, 2)."""
         return np.asarray(np.einsum("nk,nk->n", self.normals, world) - self.offsets)
 
     def part(self, chosen: NDArray[np.bool_]) -> "Observations":
-        """Those that are chosen, (N,)."""
+        """The observations selected by `chosen` (N,)."""
         return Observations(
             self.pixels[chosen], self.normals[chosen], self.offsets[chosen],
             self.point[chosen], self.block[chosen], self.group[chosen],
         )  # fmt: skip
 
     def sorted(self) -> "Observations":
-        """In an order of their own, so that a fit does not depend on the order in which they came.
+        """The observations sorted by their values, so that a fit does not depend on the order of the input.
 
-        Blocks are numbered anew in that order.
+        Blocks are renumbered in that order.
         """
         keys = np.column_stack([self.pixels, self.normals, self.offsets])
         order = np.lexsort(keys.T[::-1])
@@ -72,18 +73,18 @@ class Observations:
         )  # fmt: skip
 
     def distances(self, residuals: Floats) -> Floats:
-        """Distance of each point, in the order of their numbers, from `residuals` (N,) of the observations."""
+        """The distance of each point, mm, by number, from the `residuals` (N,) of its observations."""
         _, number = np.unique(self.point, return_inverse=True)
         return np.asarray(np.sqrt(np.bincount(number, residuals**2)))
 
     def errors(self, residuals: Floats) -> tuple[Floats, Floats]:
-        """Where in the image the `residuals` (N,) leave what error: pixels (M, 2) and Y and Z (M, 2), mm.
+        """The places of the `residuals` (N,) in the image: pixels (M, 2), and errors in Y and Z (M, 2), mm.
 
-        There is one for each control point, and one for each block of pixels on an edge, across it: along the edge
-        nothing is known.
+        There is one place for each control point, and one for each block of pixels on an edge. An error on an edge is
+        across it, since the error along it is unknown.
         """
         first = np.full(self.point.max(initial=-1) + 1, np.iinfo(np.intp).max)
-        np.minimum.at(first, self.point, self.block)  # the two blocks of a control point have one place
+        np.minimum.at(first, self.point, self.block)  # a control point has two blocks
         _, place, count = np.unique(first[self.point], return_inverse=True, return_counts=True)
 
         def summed(values: Floats) -> Floats:
@@ -97,7 +98,20 @@ class Observations:
 
 
 def of_points(pixels: Floats, world: Floats, group: NDArray[np.intp]) -> Observations:
-    """Control points: `pixels` (N, 2), their `world` (N, 2) Y and Z in mm, and the `group` (N,) of each."""
+    """Convert control points to observations.
+
+    Parameters
+    ----------
+    pixels : (N, 2) float64, px.
+    world : (N, 2) float64, Y and Z, mm.
+    group : (N,) the points with one number are held out together.
+
+    Examples
+    --------
+    >>> observations = of_points(np.array([[10.0, 20.0]]), np.array([[1.5, 2.5]]), np.array([0]))
+    >>> print(len(observations), observations.points, observations.across(np.array([[1.5, 2.0], [1.5, 2.0]])))
+    2 1 [ 0.  -0.5]
+    """
     count = len(pixels)
     number = np.arange(count)
     return Observations(

@@ -1,4 +1,4 @@
-"""Pixel coordinates out of a CSV file."""
+"""Reading of pixel coordinates from a CSV file."""
 
 from pathlib import Path
 
@@ -9,16 +9,20 @@ from schemas.base.errors import RefusedInput
 from schemas.tables import finite, read_records
 
 LARGEST_PX = 1e6
-"""No pixel of any camera lies farther out; the powers of it that a map takes stay finite."""
+"""Largest coordinate of a pixel: beyond any camera, and its powers in a map stay finite."""
 
 
 def read_pixels(path: Path) -> NDArray[np.float64]:
-    """(N, 2) columns `i` and `j` of a CSV file, in px; other columns are passed over.
+    """Read the columns `i` and `j` of a CSV file; other columns are ignored.
+
+    Returns
+    -------
+    (N, 2) float64, px.
 
     Raises
     ------
     RefusedInput
-        The file or a column is missing, or a value is no pixel of any camera.
+        The file or a column is missing, or a value is not a pixel of any camera.
     """
     records = read_records(path)
     _, header = next(records, (1, []))
@@ -32,8 +36,9 @@ def read_pixels(path: Path) -> NDArray[np.float64]:
 
 
 def _number(path: Path, line: int, name: str, cell: list[str]) -> float:
+    """The number in a `cell`, which is empty if the line is too short."""
     value = finite(cell[0]) if cell else LARGEST_PX + 1
     if not abs(value) <= LARGEST_PX:
-        found = cell[0][:80] if cell else ""
-        raise RefusedInput(path, f"expected a number of pixels, found {found!r}", field=f"line {line}, column {name}")
+        text = cell[0][:80] if cell else ""
+        raise RefusedInput(path, f"expected a number of pixels, found {text!r}", field=f"line {line}, column {name}")
     return value

@@ -25,25 +25,25 @@ class PolynomialModel:
 
     @property
     def name(self) -> str:
-        """As it stands in tables."""
+        """Name of the model in tables."""
         return f"polynomial {self.order}"
 
     @property
     def unknowns(self) -> int:
-        """Coefficients of Y and of Z."""
+        """Number of parameters P: the coefficients of Y and of Z."""
         return 2 * terms(self.order)
 
     def start(self, pixels: Floats, normals: Floats, offsets: Floats) -> Floats:
-        """Parameters (P,) from which a fit begins; the fit is linear, so any will do."""
+        """Parameters (P,) from which a fit starts: zeros, since the fit is linear."""
         del pixels, normals, offsets
         return np.zeros(self.unknowns)
 
     def prior_precision(self) -> Floats:
-        """Nothing is known beforehand: (P,) zeros."""
+        """Weights (P,) of the squares of the parameters: zeros, since a polynomial has no prior."""
         return np.zeros(self.unknowns)
 
     def world(self, parameters: Floats, pixels: Floats) -> Floats:
-        """Y and Z, (N, 2) mm, of `pixels` (N, 2)."""
+        """Y and Z, (N, 2) mm, of `pixels` (N, 2), px."""
         matrix = design_matrix(*self._normalised(pixels), self.order)
         return sum_terms(matrix, parameters.reshape(2, -1))
 
@@ -63,7 +63,7 @@ class PolynomialModel:
         return np.stack([by_u @ alpha, by_v @ alpha], axis=-1) / self.scale_px
 
     def as_map(self, parameters: Floats) -> PolynomialMap:
-        """For the calibration file."""
+        """The map for the calibration file."""
         alpha_y, alpha_z = parameters.reshape(2, -1).tolist()
         return PolynomialMap(
             order=self.order, centre_px=self.centre_px, scale_px=self.scale_px, alpha_y=alpha_y, alpha_z=alpha_z
@@ -75,7 +75,7 @@ class PolynomialModel:
 
 
 def terms(order: int) -> int:
-    """How many terms a polynomial of two variables has.
+    """The number of terms of a polynomial of two variables.
 
     >>> [terms(order) for order in (1, 2, 3, 4, 5)]
     [3, 6, 10, 15, 21]
@@ -107,7 +107,11 @@ def derivatives(u: ArrayLike, v: ArrayLike, order: int) -> tuple[Floats, Floats]
 
 @compiled
 def sum_terms(matrix: Floats, coefficients: Floats) -> Floats:
-    """(N, K) sums of the terms (N, T) with K sets of `coefficients` (K, T)."""
+    """(N, K) sums of the terms (N, T) with K sets of `coefficients` (K, T), in a fixed order of summation.
+
+    >>> sum_terms(np.array([[1.0, 2.0]]), np.array([[3.0, 4.0], [0.0, 1.0]]))
+    array([[11.,  2.]])
+    """
     sums = np.zeros((len(matrix), len(coefficients)))
     for n in range(len(matrix)):
         for k in range(len(coefficients)):
@@ -118,6 +122,7 @@ def sum_terms(matrix: Floats, coefficients: Floats) -> Floats:
 
 @compiled
 def _design(u: Floats, v: Floats, order: int) -> Floats:
+    """The matrix of `design_matrix` for `u` and `v` (N,)."""
     matrix = np.empty((len(u), (order + 1) * (order + 2) // 2))
     u_power, v_power = np.ones(order + 1), np.ones(order + 1)
     for n in range(len(u)):
@@ -132,10 +137,12 @@ def _design(u: Floats, v: Floats, order: int) -> Floats:
 
 
 def _exponents(order: int) -> list[tuple[int, int]]:
+    """The exponents of u and v of each term."""
     return [(degree - k, k) for degree in range(order + 1) for k in range(degree + 1)]
 
 
 def _powers(values: ArrayLike, order: int) -> list[Floats]:
+    """The powers 0 to `order` of `values`."""
     base = np.asarray(values, np.float64)
     powers = [np.ones_like(base)]
     for _ in range(order):

@@ -1,9 +1,10 @@
-"""Where a camera stands, from its map of the laser's plane alone.
+"""Position of a camera from its map of the laser plane.
 
-The plane's picture is a homography K (r1 r2 t), and r1, r2 are unit vectors at right angles: two equations for what is
-not known of the camera (Z. Zhang, "A flexible new technique for camera calibration", IEEE TPAMI 22 (2000) 1330-1334,
-doi:10.1109/34.888718). With square pixels and the principal point at the image's middle that is the focal length.
-A map that is none of a pinhole's still tells in which direction the plane is foreshortened, and where it looks larger.
+The image of the plane is a homography K (r1 r2 t), where r1 and r2 are orthogonal unit vectors: two equations for the
+unknowns of the camera (Z. Zhang, "A flexible new technique for camera calibration", IEEE TPAMI 22(11), 2000, 1330-1334,
+doi:10.1109/34.888718). With square pixels and the principal point in the middle of the image, the only unknown is the
+focal length. A map that is not that of a pinhole camera still shows the direction in which the plane is foreshortened,
+and the direction in which it appears larger.
 """
 
 from collections.abc import Iterable
@@ -19,23 +20,30 @@ from schemas.mounting import CaptureCamera, mounting_of
 Floats = NDArray[np.float64]
 
 SAMPLES = 15
-"""Pixels a side of the region that are mapped."""
+"""Pixels a side of the region that are mapped: a bound of time."""
 FOCAL_WIDTHS = (0.4, 6.0)
-"""Focal lengths of cameras, in widths of their images: views of 100 to 10 degrees."""
+"""Range of focal lengths of cameras, in widths of their images: views of 100 to 10 degrees."""
 DISTANCES_MM = (40.0, 2000.0)
-"""How far cameras stand from the middle of what they film."""
+"""Range of distances of cameras from the middle of their region. Chosen by hand."""
 TYPICAL_MM = 300.0
-"""Where one stands of which no more than the direction is known."""
+"""Distance assumed for a camera of which only the direction is known. Chosen by hand."""
 LARGEST_MISFIT = 0.02
-"""Of a homography from a map that a camera could have made: root mean square in parts of the region's diagonal."""
+"""Misfit (rms), relative to the region's diagonal, up to which a map is that of a pinhole. Chosen by hand."""
 LEAST_TILT = 0.1
-"""Sine of the angle to the plane's normal below which a view is frontal, and says nothing of focal length or tilt."""
+"""Sine of the angle to the plane's normal below which a view is frontal and does not determine focal length or tilt.
+Chosen by hand."""
 SAME_SIDE, SAME_WAY = 0.95, 0.9
-"""Least share of samples that see the plane from one side; least cosine between foreshortening and growth."""
+"""Least share of samples that see the plane from one side; least cosine between the directions of foreshortening and
+of growth. Chosen by hand."""
 
 
 def camera_centres(cameras: Iterable[CameraCalibration]) -> dict[int, Floats]:
-    """For each camera its `camera_centre`; where its map does not say it, what its number says, if that does."""
+    """Find the position of each camera, by `camera_centre` or else by the mounting that belongs to its number.
+
+    Returns
+    -------
+    Camera -> position (3,), mm, as in `camera_centre`; without the cameras whose position remains unknown.
+    """
     centres = {}
     for camera in cameras:
         centre = camera_centre(camera)
@@ -49,11 +57,24 @@ def camera_centres(cameras: Iterable[CameraCalibration]) -> dict[int, Floats]:
 
 
 def camera_centre(camera: CameraCalibration) -> Floats | None:
-    """The place of the camera's centre of projection, (3,) float64, mm: X from the laser's plane, Y and Z.
+    """Find the position of a camera's centre of projection from its map.
 
-    None where its map does not say it: one without perspective, or one that too few control points bent. A view along
-    the plane's normal gives the side of the plane and a typical distance. Glass in the way is not thought of: seen
-    through a plate of 6 mm a camera is taken to stand some 5 mm nearer.
+    A view along the plane's normal gives only the side of the plane; a typical distance is then assumed. Glass in the
+    line of sight is ignored: through a plate of 6 mm a camera appears some 5 mm nearer.
+
+    Returns
+    -------
+    (3,) float64, mm: X from the laser plane, Y and Z. None if the map does not determine it: a map without
+    perspective, or one distorted by too few control points.
+
+    Examples
+    --------
+    A frontal view gives the side of the plane and a typical distance:
+
+    >>> from schemas.calibration import PolynomialMap
+    >>> map_ = PolynomialMap(order=1, centre_px=(319.5, 239.5), scale_px=100, alpha_y=[0, 50, 0], alpha_z=[0, 0, -50])
+    >>> print(camera_centre(CameraCalibration(camera=1, map=map_, region_px=[], points=0)).round(3) + 0.0)
+    [300.   0.   0.]
     """
     pixels = _samples(camera)
     plane = to_world(camera, pixels)
@@ -73,6 +94,7 @@ def _samples(camera: CameraCalibration) -> Floats:
 
 
 def _by_homography(camera: CameraCalibration, pixels: Floats, plane: Floats) -> Floats | None:
+    """The camera's position from the homography of its map; None if the map is not that of a pinhole camera."""
     middle, image_middle = plane.mean(axis=0), (np.array(camera.image_px or IMAGE_PX) - 1) / 2
     if isinstance(camera.map, HomographyMap):
         image = _without_distortion(camera.map, plane) - image_middle
@@ -94,7 +116,7 @@ def _by_homography(camera: CameraCalibration, pixels: Floats, plane: Floats) -> 
         return None
     taken = to_image / np.array([[focal], [focal], [1.0]])
     left, lengths, right = np.linalg.svd(taken[:, :2], full_matrices=False)
-    axes = left @ right  # the nearest two vectors of unit length at right angles
+    axes = left @ right  # the nearest orthonormal vectors
     rotation = np.column_stack([np.cross(axes[:, 0], axes[:, 1]), axes])
     centre = -rotation.T @ taken[:, 2] / lengths.mean()
     tilt = np.hypot(centre[1], centre[2])
@@ -136,15 +158,15 @@ def _normalisation(points: Floats) -> Floats:
 
 
 def _by_foreshortening(camera: CameraCalibration, pixels: Floats, plane: Floats) -> Floats | None:
-    """The camera's place by how its map shrinks the plane along one direction, and shows its nearer part larger.
+    """The camera's position from the foreshortening of the plane and the growth of its nearer part.
 
-    A plane that is tilted by an angle is shrunk by its cosine; and at a distance D its picture's area grows with the
-    cube of the nearness, by 3 sin / D a mm towards the camera.
+    A plane tilted by an angle is foreshortened by the cosine of the angle. At a distance D, the area of its image grows
+    with the inverse cube of the distance: relatively by 3 sin / D a mm towards the camera.
     """
     model, parameters = model_of(camera.map)
     slopes = np.linalg.det(model.by_pixels(parameters, pixels))
     sides = np.sign(slopes)
-    side = 1.0 if sides.sum() < 0 else -1.0  # of the mirror image that a camera in front, at +X, sees
+    side = 1.0 if sides.sum() < 0 else -1.0  # a camera in front, at +X, sees Y and Z mirrored
     regular = sides == -side
     if np.mean(regular) < SAME_SIDE:
         return None

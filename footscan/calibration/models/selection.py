@@ -1,4 +1,4 @@
-"""The choice among models of a camera, by the error on what was held out of the fit."""
+"""Selection of a camera's model by the error on held-out data."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.models.fit import Fit, UndeterminedError, fit, predict
+from footscan.calibration.models.fit import ModelFit, UndeterminedError, fit, predict
 from footscan.calibration.models.homography import HomographyModel, image_frame
 from footscan.calibration.models.maps import Model
 from footscan.calibration.models.observations import Observations
@@ -18,47 +18,53 @@ from schemas.parameters.calibration import CalibrationParameters
 Floats = NDArray[np.float64]
 
 LEAVE_ONE_OUT = 12
-"""Up to so many groups each is held out by itself; more are dealt out to `FOLDS` folds."""
+"""Number of groups up to which each is a fold of its own; more are dealt to `FOLDS` folds: a bound of time."""
 FOLDS = 10
+"""Number of folds."""
 ORDERS = (1, 2, 3, 4, 5)
 """Orders of the polynomials that are tried."""
 CORRECTIONS = (2, 3, 4)
 """Orders of the smooth correction that are tried."""
 SMALLEST_EXTENT_PX = 1e-6
+"""Lower bound of the scale of a polynomial: a single pixel has no extent."""
 AS_GOOD = 1.02
-"""A model with fewer unknowns is taken where its expected error is this near to the least."""
+"""Ratio of expected errors up to which a model with fewer unknowns is preferred. Chosen by hand."""
 REGION_GRID = 16
-"""Places a side at which the region between the data is looked at."""
+"""Places a side at which the uncertainty is sampled in the region between the data."""
 
 
 @dataclass(frozen=True)
 class ModelTrial:
-    """How well a model describes what a camera saw."""
+    """The result of fitting one model to the observations of a camera."""
 
     camera: int
     model: str
     unknowns: int
     observations: int
-    """Whose errors have nothing to do with each other; a control point gives two."""
+    """Number of independent observations; a control point gives two."""
     points: int
     rms_mm: float | None
-    """Distance from what it was fitted to, root mean square; None where there is no fit."""
+    """Root mean square distance from the fitted data; None without a fit."""
     held_out_rms_mm: float | None
-    """The same on what was left out of the fit; None where nothing can be left out."""
+    """Root mean square distance on held-out data; None if no data can be held out."""
     region_sigma_mm: float | None
-    """Standard deviation of what the model says of (Y, Z), root mean square over the region between the data."""
+    """Predicted standard deviation of (Y, Z), root mean square over the region between the data."""
     worst_mm: float | None
-    """Largest distance, held out where that is known."""
+    """Largest distance, on held-out data if there are any."""
     worst_point: int | None
-    """The number of the point that has it."""
+    """The number of the point with that distance."""
     condition: float | None
     status: Literal["chosen", "tried", "determined", "refused"]
-    """`determined`: it passes through its points by construction, so nothing is known of its error."""
+    """`determined`: the model passes through its points by construction, so that its error is unknown."""
     remark: str = ""
 
 
 def candidates(pixels: Floats, image_px: tuple[int, int]) -> list[Model]:
-    """All models: polynomials normalised to the extent of `pixels` (N, 2), homographies to the image."""
+    """List all models: polynomials normalised to the extent of `pixels` (N, 2), homographies to the image.
+
+    >>> [model.name for model in candidates(np.array([[0.0, 0.0], [639.0, 479.0]]), (640, 480))][4:7]
+    ['polynomial 5', 'homography', 'homography, distortion']
+    """
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     centre = ((low + high) / 2).tolist()
     extent = max(float((high - low).max() / 2), SMALLEST_EXTENT_PX)
@@ -71,8 +77,8 @@ def candidates(pixels: Floats, image_px: tuple[int, int]) -> list[Model]:
     ]
 
 
-def asked_for(models: Sequence[Model], parameters: CalibrationParameters) -> list[Model]:
-    """Those that the parameters leave to choose from."""
+def requested_models(models: Sequence[Model], parameters: CalibrationParameters) -> list[Model]:
+    """Select the models that the parameters admit."""
     return [
         model
         for model in models
@@ -83,12 +89,16 @@ def asked_for(models: Sequence[Model], parameters: CalibrationParameters) -> lis
 
 def select(
     models: Sequence[Model], observations: Observations, camera: int, *, robust: bool
-) -> tuple[Fit | None, list[ModelTrial]]:
-    """The fit of the model with the least expected error, and how each fared; None where none can be judged.
+) -> tuple[ModelFit | None, list[ModelTrial]]:
+    """Select the model with the least expected error.
 
-    What is held out lies where the data lie, on few lines perhaps: it tells nothing of the region between them, where a
-    model with many unknowns is free to swing, and one without a lens is stiff. How far off it may be there, covariances
-    say; the two are added as squares.
+    Held-out data lie where the data lie, perhaps on few lines. They do not show the error in the region between, where
+    a model with many unknowns may oscillate and one without distortion is too stiff. There the covariance predicts the
+    error. The squares of both are added.
+
+    Returns
+    -------
+    The fit of the selected model, None if no model can be judged; and the trials of all `models`, in their order.
     """
     attempts = [try_model(model, observations, camera, robust=robust) for model in models]
     trials = _with_a_lens(models, [trial for _, trial in attempts])
@@ -103,52 +113,58 @@ def select(
 
 
 def _with_a_lens(models: Sequence[Model], trials: list[ModelTrial]) -> list[ModelTrial]:
-    """No model can be surer between the data than the homography with a lens, whose covariance knows what a lens may
-    do there: a model without one leaves that out of its own."""
-    known = [
+    """Raise the predicted standard deviation of each trial to that of the homography with distortion.
+
+    The covariance of a model without distortion ignores what a lens may do between the data.
+    """
+    with_distortion = [
         trial.region_sigma_mm
         for model, trial in zip(models, trials, strict=True)
         if model.kind == "homography-distortion" and trial.region_sigma_mm
     ]
     return [
-        replace(trial, region_sigma_mm=max([trial.region_sigma_mm, *known])) if trial.region_sigma_mm else trial
+        replace(trial, region_sigma_mm=max([trial.region_sigma_mm, *with_distortion]))
+        if trial.region_sigma_mm
+        else trial
         for trial in trials
     ]
 
 
-def try_model(model: Model, observations: Observations, camera: int, *, robust: bool) -> tuple[Fit | None, ModelTrial]:
-    """The fit of one model, and its errors in mm."""
+def try_model(
+    model: Model, observations: Observations, camera: int, *, robust: bool
+) -> tuple[ModelFit | None, ModelTrial]:
+    """Fit one model, and measure its errors; without a fit if the observations do not determine it."""
     observations = observations.sorted()
     common = ModelTrial(
         camera, model.name, model.unknowns, observations.independent, observations.points,
         None, None, None, None, None, None, "refused",
     )  # fmt: skip
     try:
-        found = fit(model, observations, robust=robust)
+        fitted = fit(model, observations, robust=robust)
     except UndeterminedError as undetermined:
         return None, replace(common, remark=str(undetermined))
-    held_out = held_out_residuals(found, observations, robust=robust)
-    residuals = found.residuals if held_out is None else held_out
+    held_out = held_out_residuals(fitted, observations, robust=robust)
+    residuals = fitted.residuals if held_out is None else held_out
     distances = observations.distances(residuals)
     worst = int(distances.argmax())
     determined = observations.independent == model.unknowns
-    return found, replace(
+    return fitted, replace(
         common,
-        rms_mm=rms(observations.distances(found.residuals)),
+        rms_mm=rms(observations.distances(fitted.residuals)),
         held_out_rms_mm=None if held_out is None else rms(distances),
-        region_sigma_mm=_region_sigma(found, observations.pixels),
+        region_sigma_mm=_region_sigma(fitted, observations.pixels),
         worst_mm=float(distances[worst]),
         worst_point=int(np.unique(observations.point)[worst]),
-        condition=found.condition,
+        condition=fitted.condition,
         status="determined" if determined else "tried",
         remark="passes through its points by construction" if determined else "",
     )
 
 
-def held_out_residuals(found: Fit, observations: Observations, *, robust: bool) -> Floats | None:
-    """Residuals (N,), mm, of each observation under the model fitted without its group, or without its fold of groups.
+def held_out_residuals(fitted: ModelFit, observations: Observations, *, robust: bool) -> Floats | None:
+    """Cross-validate a fit: residuals (N,), mm, of each observation under the model fitted without its fold of groups.
 
-    None where the rest does not determine the model.
+    None if the other folds do not determine the model.
     """
     residuals = np.empty(len(observations))
     fold = _folds(observations.group)
@@ -157,7 +173,7 @@ def held_out_residuals(found: Fit, observations: Observations, *, robust: bool) 
     for number in range(int(fold.max()) + 1):
         held_out = fold == number
         try:
-            rest = fit(found.model, observations.part(~held_out), robust=robust)
+            rest = fit(fitted.model, observations.part(~held_out), robust=robust)
         except UndeterminedError:
             return None
         residuals[held_out] = predict(rest, observations.part(held_out))
@@ -165,25 +181,31 @@ def held_out_residuals(found: Fit, observations: Observations, *, robust: bool) 
 
 
 def rms(distances: Floats) -> float:
-    """Root mean square; the same to the bit in every order."""
+    """Root mean square of `distances` (N,); the same to the bit in any order.
+
+    >>> rms(np.array([3.0, 0.0, 0.0, 4.0]))
+    2.5
+    """
     return float(np.sqrt(np.mean(np.sort(distances**2))))
 
 
 def _expected(trial: ModelTrial) -> float:
+    """The expected error of a trial, mm; infinite if it is unknown."""
     if trial.held_out_rms_mm is None or trial.region_sigma_mm is None:
         return np.inf
     return float(np.hypot(trial.held_out_rms_mm, trial.region_sigma_mm))
 
 
-def _region_sigma(found: Fit, pixels: Floats) -> float | None:
+def _region_sigma(fitted: ModelFit, pixels: Floats) -> float | None:
+    """The predicted standard deviation over the convex hull of `pixels` (N, 2), mm."""
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     i, j = np.meshgrid(*(np.linspace(low[k], high[k], REGION_GRID) for k in (0, 1)))
     grid = np.column_stack([i.ravel(), j.ravel()])
     grid = grid[supported(region_of(pixels), grid)]
-    return found.region_sigma(grid)
+    return fitted.region_sigma(grid)
 
 
 def _folds(group: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The fold (N,) of each observation; groups are dealt out one by one."""
+    """The fold (N,) of each observation; groups are dealt to the folds in turn."""
     number = np.unique(group, return_inverse=True)[1]
     return number if number.max(initial=0) < LEAVE_ONE_OUT else number % FOLDS

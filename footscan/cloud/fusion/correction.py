@@ -1,4 +1,4 @@
-"""Small motions of the cameras by which they agree better on the skin that they share."""
+"""Correction of the cameras: small motions by which they agree better on the skin that they share."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.fusion.agreement import Overlaps, find_overlaps
-from footscan.cloud.fusion.correction_model import EVERY, STRETCHES, choose_terms, held_out, hold_the_middle
-from footscan.cloud.fusion.motion import MOST, SCALE_MM, TERMS, motion_terms, moved
+from footscan.cloud.fusion.correction_model import ALL_STRETCHES, STRETCHES, choose_terms, held_out, hold_the_middle
+from footscan.cloud.fusion.motion import MOST_TERMS, SCALE_MM, TERMS, motion_terms, moved
 from footscan.cloud.fusion.pair_least_squares import Forms, solve, sum_up
 from footscan.cloud.fusion.stripes import Floats, Stripes
 from footscan.robust import MAD_TO_SD
@@ -16,15 +16,22 @@ from schemas.fusion import CameraCorrection
 from schemas.parameters.fusion import FusionParameters
 
 ROUNDS = 2
-"""What lies opposite of what is looked up again after the cameras were moved."""
+"""Rounds of the fit; the comparisons are repeated after the cameras were moved: a bound of time."""
 LEAST_POINTS = 200
 LEAST_STRETCHES = 6
-"""A camera that is compared at fewer places, or over fewer stretches, stays where it is."""
+"""Comparisons, and stretches with comparisons, from which a camera may be moved. Chosen by hand."""
 TUKEY = 4.685
-"""Comparisons beyond so many standard deviations count for nothing (Beaton and Tukey 1974)."""
+"""Residual, in standard deviations, from which a comparison has no weight, in the last iteration: 95 % efficiency for
+normal errors (A. E. Beaton and J. W. Tukey, Technometrics 16(2), 1974, doi:10.1080/00401706.1974.10489171)."""
 HUBER = 1.345
-"""Up to so many they count in full, in the first turns (Huber 1964)."""
+"""Residual, in standard deviations, up to which a comparison counts in full, in the first iterations: 95 % efficiency
+for normal errors (P. J. Huber, Annals of Mathematical Statistics 35(1), 1964, doi:10.1214/aoms/1177703732)."""
 REWEIGHTINGS = 6
+"""Iterations of the robust least squares: a bound of time."""
+GRID = 9
+"""Points of a camera's range in Y and in Z at which its largest motion is searched."""
+SHORTEST_MM = 1e-9
+"""Lower bound of the travel by which is divided."""
 
 
 class Corrected(NamedTuple):
@@ -33,13 +40,13 @@ class Corrected(NamedTuple):
     yz: Floats
     """(N, 2) mm."""
     corrections: list[CameraCorrection]
-    """One a camera, in their order."""
+    """One for each camera, in the order of `Stripes.cameras`."""
     too_far: dict[int, float]
-    """Cameras that were not moved, since it would have been too far: by number, how far, mm."""
+    """Number of each camera that was not moved because its motion would be too large -> that motion, mm."""
 
 
 class Frame(NamedTuple):
-    """In which motions are counted."""
+    """The coordinates in which motions are expressed."""
 
     centre: Floats
     """(2,) mm."""
@@ -49,38 +56,39 @@ class Frame(NamedTuple):
 
 @dataclass(frozen=True)
 class Comparisons:
-    """What cameras saw of each other, from where their points were mapped to."""
+    """The comparisons of the cameras, before any motion."""
 
     forms: Forms
     frame: Frame
     points: NDArray[np.intp]
-    """(C,) how many comparisons each camera takes part in."""
+    """(C,) number of comparisons of each camera."""
     enough: NDArray[np.bool_]
-    """(C,) whether a camera may be moved by them."""
+    """(C,) True if they are enough to move the camera."""
 
 
-class Fit(NamedTuple):
-    """Where the cameras are moved to."""
+class CorrectionFit(NamedTuple):
+    """Fitted motions of all cameras."""
 
     yz: Floats
+    """(N, 2) the moved points, mm."""
     comparisons: Comparisons
     terms: NDArray[np.intp]
-    """(C,) how many each camera has."""
+    """(C,) number of terms of each camera."""
     coefficients: Floats
     """(C, 12) mm."""
 
 
 def correct(stripes: Stripes, overlaps: Overlaps, parameters: FusionParameters) -> Corrected:
-    """Moves the cameras that stand off the others.
+    """Move the cameras that deviate from the others.
 
-    The coefficients of all cameras are sought together, by robust least squares over all pairs. That all move alike is
-    nothing that pairs can tell: as few cameras are moved as possible, for it is one that was knocked, not seven. A
-    camera gets the terms, first rigid, then smooth, that lower the disagreement over stretches of the travel which took
-    no part in the fit, and stays where it is without.
+    The coefficients of all cameras are estimated together, by robust least squares over all pairs. Pairs do not
+    determine a common motion of all cameras. As few cameras are moved as possible, since it is more likely that one
+    camera was knocked than seven. A camera gets the terms, first rigid, then smooth, that lower the disagreement on
+    stretches of the travel that were held out of the fit; without such terms it does not move.
 
     Parameters
     ----------
-    overlaps : of the points as they stand
+    overlaps : the comparisons of the unmoved points
     """
     if not parameters.correct_cameras or not len(overlaps.point):
         return Corrected(stripes.yz, [_unmoved(int(camera)) for camera in stripes.cameras], {})
@@ -95,29 +103,32 @@ def correct(stripes: Stripes, overlaps: Overlaps, parameters: FusionParameters) 
         too_far |= {int(stripes.cameras[k]): float(motions[k]) for k in far}
 
 
-def _fit(stripes: Stripes, overlaps: Overlaps, trusted: NDArray[np.bool_], parameters: FusionParameters) -> Fit:
-    coefficients = np.zeros((len(stripes.cameras), MOST))
+def _fit(
+    stripes: Stripes, overlaps: Overlaps, trusted: NDArray[np.bool_], parameters: FusionParameters
+) -> CorrectionFit:
+    """Fit the motions of all `trusted` cameras (C,)."""
+    coefficients = np.zeros((len(stripes.cameras), MOST_TERMS))
     for round_ in range(ROUNDS):
         comparisons = _compare(stripes, overlaps, coefficients, trusted)
         terms = choose_terms(comparisons.forms, comparisons.enough, parameters.smallest_correction_mm)
-        coefficients = solve(comparisons.forms, EVERY, terms)
+        coefficients = solve(comparisons.forms, ALL_STRETCHES, terms)
         hold_the_middle(coefficients, terms, comparisons.enough)
         yz = _moved_all(stripes, comparisons.frame, coefficients)
         if not np.any(terms):
             break
         if round_ < ROUNDS - 1:
             overlaps = find_overlaps(stripes, yz, parameters.overlap_mm)
-    return Fit(yz, comparisons, terms, coefficients)
+    return CorrectionFit(yz, comparisons, terms, coefficients)
 
 
 def _compare(stripes: Stripes, overlaps: Overlaps, coefficients: Floats, trusted: NDArray[np.bool_]) -> Comparisons:
-    """The overlaps of trusted cameras, found after the cameras were moved by `coefficients`, as quadratic forms."""
+    """Sum up the overlaps of trusted cameras, which were found after the cameras were moved by `coefficients`."""
     count = len(stripes.cameras)
     cameras = np.column_stack([stripes.camera[overlaps.point], overlaps.other])
     use = trusted[cameras].all(axis=1)
     cameras, point = cameras[use], overlaps.point[use]
     yz, x = stripes.yz[point], stripes.x[point]
-    stretch = np.floor((x - stripes.x[0]) / max(stripes.x[-1] - stripes.x[0], 1e-9) * STRETCHES).astype(np.intp)
+    stretch = np.floor((x - stripes.x[0]) / max(stripes.x[-1] - stripes.x[0], SHORTEST_MM) * STRETCHES).astype(np.intp)
     stretch = np.clip(stretch, 0, STRETCHES - 1)
     points = np.bincount(cameras.ravel(), minlength=count)
     seen = np.zeros((count, STRETCHES), np.bool_)
@@ -141,9 +152,9 @@ def _compare(stripes: Stripes, overlaps: Overlaps, coefficients: Floats, trusted
 def _robust_weights(
     rows: Floats, distances: Floats, variances: Floats, cameras: NDArray[np.intp], enough: NDArray[np.bool_]
 ) -> Floats:
-    """(M,) weights 1 / mm^2 of the comparisons, held against rigid motions of all cameras.
+    """(M,) weights 1 / mm^2 of the comparisons, by their residuals from rigid motions of all cameras.
 
-    Huber's weights first, which find their way from anywhere, then Tukey's, for which strays count nothing.
+    Huber's weights come first, since they converge from any start; then Tukey's, which reject outliers completely.
     """
     once = np.zeros(len(rows), np.intp)
     rigid = TERMS["rigid"] * enough.astype(np.intp)
@@ -163,6 +174,7 @@ def _robust_weights(
 
 
 def _moved_all(stripes: Stripes, frame: Frame, coefficients: Floats) -> Floats:
+    """(N, 2) the points of all cameras moved by `coefficients` (C, 12), mm."""
     yz = stripes.yz.copy()
     for k in np.flatnonzero(np.any(coefficients != 0, axis=1)):
         mine = stripes.camera == k
@@ -170,20 +182,21 @@ def _moved_all(stripes: Stripes, frame: Frame, coefficients: Floats) -> Floats:
     return yz
 
 
-def _largest_motions(fit: Fit) -> Floats:
-    """(C,) how far a point is moved at most where the camera was compared, mm."""
+def _largest_motions(fit: CorrectionFit) -> Floats:
+    """(C,) the largest motion of a point in the range where each camera was compared, mm."""
     frame = fit.comparisons.frame
     motions = np.zeros(len(fit.terms))
     for k in np.flatnonzero(fit.terms):
         (low_y, low_z), (high_y, high_z) = frame.ranges[k]
-        y, z = np.meshgrid(np.linspace(low_y, high_y, 9), np.linspace(low_z, high_z, 9))
+        y, z = np.meshgrid(np.linspace(low_y, high_y, GRID), np.linspace(low_z, high_z, GRID))
         yz = np.column_stack([y.ravel(), z.ravel()])
         away = moved(yz, fit.coefficients[k], frame.centre, frame.ranges[k]) - yz
         motions[k] = np.hypot(away[:, 0], away[:, 1]).max()
     return motions
 
 
-def _reports(stripes: Stripes, fit: Fit, motions: Floats) -> list[CameraCorrection]:
+def _reports(stripes: Stripes, fit: CorrectionFit, motions: Floats) -> list[CameraCorrection]:
+    """Describe the correction of each camera."""
     forms, frame = fit.comparisons.forms, fit.comparisons.frame
     before, after, weight = (
         (by_pair.sum(axis=1) + by_pair.sum(axis=2)).sum(axis=0)
@@ -193,7 +206,7 @@ def _reports(stripes: Stripes, fit: Fit, motions: Floats) -> list[CameraCorrecti
     reports = []
     for k, camera in enumerate(stripes.cameras):
         coefficients = fit.coefficients[k, : fit.terms[k]].tolist()
-        known = fit.comparisons.enough[k] and weight[k] > 0
+        is_compared = fit.comparisons.enough[k] and weight[k] > 0
         reports.append(
             CameraCorrection(
                 camera=int(camera),
@@ -206,8 +219,8 @@ def _reports(stripes: Stripes, fit: Fit, motions: Floats) -> list[CameraCorrecti
                 rotation_deg=float(np.degrees(coefficients[2] / SCALE_MM)) if coefficients else 0.0,
                 largest_mm=float(motions[k]),
                 points=int(fit.comparisons.points[k]),
-                held_out_before_mm=float(np.sqrt(before[k] / weight[k])) if known else None,
-                held_out_after_mm=float(np.sqrt(after[k] / weight[k])) if known else None,
+                held_out_before_mm=float(np.sqrt(before[k] / weight[k])) if is_compared else None,
+                held_out_after_mm=float(np.sqrt(after[k] / weight[k])) if is_compared else None,
             )
         )
     return reports

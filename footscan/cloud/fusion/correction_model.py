@@ -1,4 +1,4 @@
-"""Which camera is given which terms of motion: as few as explain what the cameras see of each other."""
+"""Selection of the terms of motion of each camera: as few as explain the comparisons of the cameras."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,27 +9,38 @@ from footscan.cloud.fusion.pair_least_squares import Forms, solve, squares
 Floats = NDArray[np.float64]
 
 STRETCHES = 16
-"""Into so many equal ones the travel is divided."""
+"""Number of equal stretches into which the travel is divided. Chosen by hand."""
 FOLDS = 4
-"""Each of so many sets of stretches is held out in turn."""
+"""Number of sets of stretches, each of which is held out in turn. Chosen by hand."""
 LEAST_GAIN = 0.25
-"""A term has to take so much of the mean square off what a camera's held-out comparisons leave, and so much of what
-points that are as sure as they say would leave. Stripes are biased a little by how obliquely a camera sees the skin,
-over all of the travel: terms that gain less follow that bias, and take the points away from the truth."""
+"""Least gain of a term, relative to the squares of the camera's held-out comparisons and to the squares that the sigmas
+predict. Stripes are slightly biased by the angle at which a camera sees the skin, over the whole travel: terms that
+gain less follow that bias, away from the truth. Chosen by hand."""
 GAIN_ERRORS = 2.0
-"""The gain has to be so many times its standard error over the stretches, too."""
+"""Least gain of a term in units of its standard error over the stretches: about 95 % for normal errors."""
 SHRINKINGS = 12
+"""Iterations of the reweighted least squares: a bound of time."""
 PENALTY = 50.0
-"""On the length of a camera's motion, 1 / mm: it decides what the pairs leave open, and little else."""
+"""Penalty on the length of a camera's motion, 1 / mm: it decides what the pairs leave undetermined, and little else.
+Chosen by hand."""
 SHORT_MM = 1e-3
-"""Motions are not told from none below this."""
-EVERY = np.ones(STRETCHES, np.bool_)
+"""Length below which a motion counts as none; keeps the weights finite."""
+ALL_STRETCHES = np.ones(STRETCHES, np.bool_)
+"""Selects all stretches."""
 
 
 def choose_terms(forms: Forms, enough: NDArray[np.bool_], smallest_mm: float) -> NDArray[np.intp]:
-    """(C,) how many terms each camera is given: those that earn their place on what is held out.
+    """Choose the number of terms of each camera: those that improve the agreement on held-out stretches.
 
-    Cameras that are not seen `enough` (C,), or whose coefficients would be less than `smallest_mm`, get none.
+    Parameters
+    ----------
+    forms : the comparisons of all pairs, in `STRETCHES` stretches.
+    enough : (C,) bool, False for cameras with too few comparisons; they get no terms.
+    smallest_mm : length of the coefficients below which a camera gets no terms.
+
+    Returns
+    -------
+    (C,) int, values of `TERMS`.
     """
     terms = _sparse_rigid(forms, enough, smallest_mm)
     left = held_out(forms, terms)
@@ -45,10 +56,10 @@ def choose_terms(forms: Forms, enough: NDArray[np.bool_], smallest_mm: float) ->
             for more in (count for count in TERMS.values() if count > terms[k]):
                 trial = terms.copy()
                 trial[k] = more
-                fitted = solve(forms, EVERY, trial)
-                # What is held out can hardly gain where what was fitted to does not.
+                fitted = solve(forms, ALL_STRETCHES, trial)
+                # Held-out data can hardly gain if the fitted data do not.
                 if np.linalg.norm(fitted[k]) < smallest_mm or not _gain(
-                    forms, left, squares(forms, fitted, EVERY), int(k)
+                    forms, left, squares(forms, fitted, ALL_STRETCHES), int(k)
                 ):
                     continue
                 left_by_trial = held_out(forms, trial)
@@ -61,12 +72,21 @@ def choose_terms(forms: Forms, enough: NDArray[np.bool_], smallest_mm: float) ->
 
 
 def hold_the_middle(coefficients: Floats, terms: NDArray[np.intp], enough: NDArray[np.bool_]) -> None:
-    """Takes the geometric median of the rigid motions of all cameras off each; it is 0 where more than half stay."""
+    """Subtract the geometric median of the cameras' rigid motions from each; it is 0 if more than half do not move.
+
+    The median is found by the iteration of E. Weiszfeld, Tohoku Mathematical Journal 43, 1937, 355-386.
+
+    Parameters
+    ----------
+    coefficients : (C, 12) float64, mm, changed in place.
+    terms : (C,) int, changed in place: cameras that move now have rigid terms at least.
+    enough : (C,) bool, False for cameras that are left out.
+    """
     if not np.any(terms) or 2 * np.count_nonzero(terms[enough] == 0) > np.count_nonzero(enough):
         return
     rigid = coefficients[enough, : TERMS["rigid"]]
     middle = rigid.mean(axis=0)
-    for _ in range(SHRINKINGS):  # E. Weiszfeld, Tohoku Mathematical Journal 43 (1937) 355-386
+    for _ in range(SHRINKINGS):
         weights = 1.0 / (np.linalg.norm(rigid - middle, axis=1) + SHORT_MM)
         middle = np.sum(weights[:, np.newaxis] * rigid, axis=0) / weights.sum()
     coefficients[enough, : TERMS["rigid"]] -= middle
@@ -74,7 +94,7 @@ def hold_the_middle(coefficients: Floats, terms: NDArray[np.intp], enough: NDArr
 
 
 def held_out(forms: Forms, terms: NDArray[np.intp]) -> Floats:
-    """(B, C, C) what is left in each stretch by coefficients that were fitted to others."""
+    """(B, C, C) weighted squares left in each stretch by coefficients that were fitted to other folds."""
     left = forms.constant.copy()
     fold = np.arange(STRETCHES) % FOLDS
     if np.any(terms):
@@ -84,21 +104,22 @@ def held_out(forms: Forms, terms: NDArray[np.intp]) -> Floats:
 
 
 def _sparse_rigid(forms: Forms, enough: NDArray[np.bool_], smallest_mm: float) -> NDArray[np.intp]:
-    """(C,) the terms of rigid motions of as few cameras as explain what was seen.
+    """(C,) the terms of rigid motions of as few cameras as explain the comparisons.
 
-    Each camera's motion is penalised by its length, not by its square, found by reweighted least squares (the group
-    lasso of Yuan and Lin 2006).
+    The penalty on each camera's motion is its length, not its square (the group lasso: M. Yuan and Y. Lin, "Model
+    selection and estimation in regression with grouped variables", Journal of the Royal Statistical Society B 68(1),
+    2006, doi:10.1111/j.1467-9868.2005.00532.x), minimised by reweighted least squares.
     """
     rigid = TERMS["rigid"] * enough.astype(np.intp)
     precision = np.zeros(len(rigid))
     for _ in range(SHRINKINGS):
-        length = np.linalg.norm(solve(forms, EVERY, rigid, precision), axis=1)
+        length = np.linalg.norm(solve(forms, ALL_STRETCHES, rigid, precision), axis=1)
         precision = PENALTY / (length + SHORT_MM)
     return np.where(length >= smallest_mm, rigid, 0)
 
 
 def _gain(forms: Forms, before: Floats, after: Floats, camera: int) -> float:
-    """How much less is left, over all pairs; 0 if that is too little for the camera's sake or may be chance."""
+    """The decrease of the squares over all pairs; 0 if it is too small or not significant."""
     by_stretch = (before - after).sum(axis=(1, 2))
     gain = float(by_stretch.sum())
     of_camera = max(float(left[:, camera].sum() + left[:, :, camera].sum()) for left in (before, forms.expected))

@@ -1,4 +1,4 @@
-"""The stripes of several cameras in one laser plane to one."""
+"""Merging of the stripes of several cameras in one laser plane."""
 
 from typing import NamedTuple
 
@@ -10,9 +10,11 @@ from footscan.compiled import compiled
 from schemas.parameters.fusion import FusionParameters
 
 UNSUPPORTED = 1e3
-"""Points without support by the calibration count as if so many times less sure: only where nothing else is."""
+"""Factor on the sigma of points that the calibration does not support: they count only where there are no others."""
 BUCKETS = 1 << 18
-"""Of the table of places, by squares of the grid."""
+"""Size of the hash table of grid squares: a bound of memory and time."""
+SMALLEST_SPACING_MM, LARGEST_CELL = 1e-3, 1e9
+"""Bounds of the spacing and of the number of a grid's columns: numbers of cells stay within 64 bits."""
 
 
 class Merged(NamedTuple):
@@ -21,23 +23,24 @@ class Merged(NamedTuple):
     points: NDArray[np.void]
     """(M,) of `POINT_DTYPE`, by plane, then by Y, then by Z."""
     contradicted: dict[int, int]
-    """How many points of each camera gave way to those of others."""
+    """Camera -> the number of its points that were dropped in favour of other cameras."""
 
 
 def merge(stripes: Stripes, yz: Floats, reach: Floats, deviations: Floats, parameters: FusionParameters) -> Merged:
-    """The surest points, thinned out, each moved along its normal to the mean of what all cameras see there.
+    """Merge the stripes of all cameras in each laser plane.
 
-    Nothing is averaged along the stripe, so that edges stay. Weights are 1 / sigma^2. Where cameras contradict each
-    other, those stay that most others agree with, of as many the surest; the points of the others are dropped. Camera,
-    frame and source are those of the surest one. Its sigma is that of the mean, the larger the farther its parts lie
-    apart.
+    The most certain points are kept, thinned out, and moved along their normals to the weighted mean of all cameras
+    there, with weights 1 / sigma^2. There is no averaging along the stripe, which preserves edges. If cameras
+    contradict each other, the largest group that agrees is kept, or of equally large groups the most certain; the
+    points of the others are dropped. A merged point has the camera, frame and source of its most certain point. Its
+    sigma is that of the mean, and larger if the points differ by more than their sigmas.
 
     Parameters
     ----------
-    yz : (N, 2) mm, the points after the cameras were moved
-    reach : (C,) mm, how far from its own place a camera may see what others see
-    deviations : (C, C) standard deviations of the cameras' distances from each other, mm; by these they differ without
-        contradicting each other
+    yz : (N, 2) float64, mm, the points after the cameras were moved
+    reach : (C,) mm, largest distance at which a camera's stripe counts as the same skin
+    deviations : (C, C) mm, standard deviations of the distances between two cameras, by which they may differ without a
+        contradiction
     """
     supported = stripes.points["supported"]
     sigma = np.where(supported, stripes.sigma, UNSUPPORTED * stripes.sigma)
@@ -69,8 +72,15 @@ def _merge(
     deviations: Floats,
     traces: Traces,
 ) -> tuple[Floats, NDArray[np.intp], NDArray[np.intp], Floats]:
-    """Where each point moves to, (N, 3); the surest of those that it is made of; of how many cameras, 0 where it is
-    thinned out and -1 where it is contradicted; and its standard deviation."""
+    """Merge the points in the order `by_sigma`.
+
+    Returns
+    -------
+    places : (N, 3), where each point is moved to, mm.
+    surest : (N,), the most certain point of those that it is made of.
+    members : (N,), the number of its cameras; 0 if it is thinned out, -1 if it is contradicted.
+    spread : (N,), its standard deviation, mm.
+    """
     _, plane, _, x, yz, sigma, normals, _, _ = traces
     count = yz.shape[0]
     cameras = deviations.shape[0]
@@ -100,7 +110,8 @@ def _merge(
         if contradicted:
             members[n] = -1
             continue
-        # R. T. Birge, Physical Review 40 (1932) 207-227: what does not agree is less sure than it says.
+        # The sigma of the mean grows with the scatter (R. T. Birge, Physical Review 40, 1932,
+        # doi:10.1103/PhysRev.40.207).
         ratio = (squares - mean**2 * weight) / max(agree - 1, 1)
         spread[n] = np.sqrt(max(1.0, ratio) / weight)
         places[n, 0] += mean_x
@@ -122,10 +133,10 @@ def _look(
     sights: Floats,
     seen_by: NDArray[np.intp],
 ) -> int:
-    """How many cameras see what point `n` does: its own, and those whose stripe its normal meets.
+    """Count the cameras that see the skin of point `n`: its own, and those whose stripe its normal meets.
 
-    Filled in are, by camera, `sights`, how far along the normal and in X it sees it, mm, and the variance of that,
-    mm^2; and `seen_by`, the camera and its nearest point.
+    Fills, for each of them, `sights` with the distance along the normal and in X, mm, and the variance of the former,
+    mm^2; and `seen_by` with the camera and its nearest point.
     """
     camera, plane, starts, x, yz, sigma, normals, linked, around = traces
     cameras = len(reach)
@@ -156,7 +167,7 @@ def _vote(
     deviations: Floats,
     agreeing: NDArray[np.bool_],
 ) -> tuple[int, float]:
-    """Fills in which sights agree with the one that most do, of as many the surest; how many, and their weight."""
+    """Mark in `agreeing` the largest (or most certain) group of sights that agree; returns its size and weight."""
     best, best_count, best_weight = 0, 0, 0.0
     for k in range(seen):
         count, weight = 0, 0.0
@@ -173,7 +184,7 @@ def _vote(
 
 @compiled
 def _agree(k: int, m: int, sights: Floats, seen_by: NDArray[np.intp], sigmas: float, deviations: Floats) -> bool:
-    """Whether two sights are of the same; where their planes are not quite one, the skin may slope by 45 degrees."""
+    """True if two sights agree. Between planes that differ in X, the skin may slope by 45 degrees."""
     apart = abs(sights[k, 0] - sights[m, 0]) - abs(sights[k, 1] - sights[m, 1])
     variance = sights[k, 2] + sights[m, 2] + deviations[seen_by[k, 0], seen_by[m, 0]] ** 2
     return bool(k == m or apart <= sigmas * np.sqrt(variance))
@@ -189,7 +200,7 @@ def _is_free(
     table: NDArray[np.intp],
     previous: NDArray[np.intp],
 ) -> bool:
-    """Whether no kept point of the plane is nearer than `spacing`."""
+    """True if no kept point of the plane is nearer than `spacing`."""
     if spacing <= 0.0:
         return True
     column, row = _cell(yz[0], spacing), _cell(yz[1], spacing)
@@ -204,11 +215,13 @@ def _is_free(
 
 @compiled
 def _cell(place: float, spacing: float) -> int:
-    """The column or row of a grid; far beyond any foot, where numbers might not fit, all is one."""
-    return int(min(max(np.floor(place / max(spacing, 1e-3)), -1e9), 1e9))
+    """The column or row of a place in the grid, limited to +-`LARGEST_CELL`, far beyond any foot."""
+    return int(min(max(np.floor(place / max(spacing, SMALLEST_SPACING_MM)), -LARGEST_CELL), LARGEST_CELL))
 
 
 @compiled
 def _bucket(plane: int, column: int, row: int) -> int:
-    """The place in the table of a square of the grid, by three large primes."""
+    """The bucket of a grid square: a hash by three large primes (M. Teschner et al., "Optimized spatial hashing for
+    collision detection of deformable objects", Vision, Modeling and Visualization, 2003).
+    """
     return (plane * 83492791 ^ column * 73856093 ^ row * 19349663) % BUCKETS

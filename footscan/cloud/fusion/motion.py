@@ -1,4 +1,4 @@
-"""How a camera's points may be moved in the laser's plane: as a rigid body, or smoothly."""
+"""Motions of a camera's points in the laser plane: rigid or smooth."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,20 +8,38 @@ from schemas.fusion import Kind
 Floats = NDArray[np.float64]
 
 SCALE_MM = 50.0
-"""At this distance from the centre every term moves a point by about its coefficient."""
+"""Distance from the centre at which each term moves a point by about its coefficient. Chosen by hand."""
 TERMS: dict[Kind, int] = {"none": 0, "rigid": 3, "affine": 6, "quadratic": 12}
-"""Each kind has the terms of those before it, and more."""
-MOST = TERMS["quadratic"]
+"""Number of terms of each kind of motion; a kind contains the terms of the kinds before it."""
+MOST_TERMS = TERMS["quadratic"]
+"""Largest number of terms."""
 
 
 def motion_terms(yz: Floats, centre: Floats, ranges: Floats) -> Floats:
-    """(N, 2, 12) what each coefficient moves the points (N, 2) by, as `schemas.fusion.CameraCorrection` lists them.
+    """Evaluate the terms of motion, in the order of `schemas.fusion.CameraCorrection`.
 
-    Terms that are not rigid take points outside of `ranges`, the (2, 2) or (N, 2, 2) least and greatest Y and Z, to its
-    border first: a polynomial is good for nothing beyond what it was fitted to.
+    Parameters
+    ----------
+    yz : (N, 2) float64, mm
+    centre : (2,) mm
+    ranges : (2, 2) or (N, 2, 2), least and greatest Y and Z, mm. For terms that are not rigid, points outside are moved
+        to its border first, since a polynomial does not hold beyond the data that it was fitted to
+
+    Returns
+    -------
+    (N, 2, 12) float64, the motion in Y and Z for a coefficient of 1.
+
+    Examples
+    --------
+    The rigid terms of a point 50 mm beside the centre: two shifts and the rotation.
+
+    >>> terms = motion_terms(np.array([[50.0, 0.0]]), np.zeros(2), np.array([[-60.0, -60.0], [60.0, 60.0]]))
+    >>> print(terms[0, :, :3] + 0.0)
+    [[1. 0. 0.]
+     [0. 1. 1.]]
     """
     u, v = ((yz - centre) / SCALE_MM).T
-    terms = np.zeros((len(yz), 2, MOST))
+    terms = np.zeros((len(yz), 2, MOST_TERMS))
     terms[:, 0, 0] = terms[:, 1, 1] = 1.0
     terms[:, 0, 2], terms[:, 1, 2] = -v, u
     u, v = ((np.clip(yz, ranges[..., 0, :], ranges[..., 1, :]) - centre) / SCALE_MM).T
@@ -34,7 +52,12 @@ def motion_terms(yz: Floats, centre: Floats, ranges: Floats) -> Floats:
 
 
 def moved(yz: Floats, coefficients: Floats, centre: Floats, ranges: Floats) -> Floats:
-    """(N, 2) points moved by one camera's (12,) coefficients, mm."""
+    """Move points (N, 2) by one camera's coefficients (12,), all in mm; other parameters as for `motion_terms`.
+
+    >>> shift = np.array([0.5, -0.5] + 10 * [0.0])
+    >>> print(moved(np.array([[10.0, 20.0]]), shift, np.zeros(2), np.array([[0.0, 0.0], [50.0, 50.0]])))
+    [[10.5 19.5]]
+    """
     if not np.any(coefficients):
         return yz
     return np.asarray(yz + np.einsum("nkt,t->nk", motion_terms(yz, centre, ranges), coefficients))

@@ -1,8 +1,9 @@
-"""Least squares over the disagreements of all pairs of cameras: what was seen, summed up by stretch of the travel.
+"""Least squares over the disagreements of all pairs of cameras, as sums by stretch of the travel.
 
-A comparison of cameras a and b says n . (D_a - D_b) = s, where D moves a point, n is the normal and s the distance
-along it. Since D is linear in the coefficients of its camera, what a pair saw over a stretch is a quadratic form of the
-difference of the coefficients of its two cameras, and any choice of terms and stretches is solved from these forms.
+A comparison of cameras a and b is the equation n . (D_a - D_b) = s, where D is the motion of a point, n the normal and
+s the distance along it. D is linear in the coefficients of its camera. So the squares of a pair in a stretch are a
+quadratic form of the difference of the two cameras' coefficients. Any choice of terms and stretches is solved from
+these forms.
 """
 
 from typing import NamedTuple
@@ -10,21 +11,25 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.fusion.motion import MOST
+from footscan.cloud.fusion.motion import MOST_TERMS
 from footscan.compiled import compiled
 
 Floats = NDArray[np.float64]
 
 INDEPENDENT = 0.02
-"""Neighbouring points err alike, for stripes are smoothed along: so many comparisons count as one when they are held
-against what is known beforehand."""
+"""Weight of a comparison against the prior. Errors of neighbouring points are correlated, since stripes are smoothed:
+50 comparisons count as one. Chosen by hand."""
 PRIOR_MM = 0.3
-"""Standard deviation of a coefficient before anything is seen."""
+"""Prior standard deviation of a coefficient. Chosen by hand."""
+SINGULAR = 1e-12
+"""Lower bound of a pivot of the Cholesky factorisation: rounding."""
 
 
 class Forms(NamedTuple):
-    """By stretch, first and second camera: t' square t - 2 linear . t + constant, where t is how their coefficients
-    differ."""
+    """Quadratic forms t' square t - 2 linear . t + constant by stretch, first and second camera.
+
+    t is the difference of the two cameras' coefficients.
+    """
 
     square: Floats
     """(B, C, C, 12, 12)."""
@@ -35,7 +40,7 @@ class Forms(NamedTuple):
     weight: Floats
     """(B, C, C) the sum of the weights."""
     expected: Floats
-    """(B, C, C) what would be left, weighted, by errors of the size that is to be expected."""
+    """(B, C, C) the weighted squares that remain if the errors are as expected."""
 
 
 def sum_up(
@@ -48,19 +53,25 @@ def sum_up(
     stretches: int,
     count: int,
 ) -> Forms:
-    """The forms of M comparisons; only those of pairs (a, b) with a < b are filled.
+    """Sum up M comparisons; only the forms of pairs (a, b) with a < b are filled.
 
     Parameters
     ----------
     rows : (M, 12) n . D of each term
-    distances, weights, variances : (M,) s, mm; 1 / mm^2; and what is to be expected of its square, mm^2
-    cameras : (M, 2) indices of the point's camera and of the other
-    stretch : (M,) below `stretches`
-    count : C, of the cameras
+    distances : (M,) s, mm
+    weights : (M,) 1 / mm^2
+    variances : (M,) expected value of s^2, mm^2
+    cameras : (M, 2) indices of the point's camera and of the other one
+    stretch : (M,) the stretch of each comparison, from 0 to `stretches` - 1
+    count : C, the number of cameras
     """
     pairs = (stretches, count, count)
     forms = Forms(
-        np.zeros((*pairs, MOST, MOST)), np.zeros((*pairs, MOST)), np.zeros(pairs), np.zeros(pairs), np.zeros(pairs)
+        np.zeros((*pairs, MOST_TERMS, MOST_TERMS)),
+        np.zeros((*pairs, MOST_TERMS)),
+        np.zeros(pairs),
+        np.zeros(pairs),
+        np.zeros(pairs),
     )
     _sum_up(rows, distances, weights, variances, cameras, stretch, forms)
     return forms
@@ -69,13 +80,21 @@ def sum_up(
 def solve(
     forms: Forms, stretches: NDArray[np.bool_], terms: NDArray[np.intp], precision: Floats | None = None
 ) -> Floats:
-    """(C, 12) coefficients by what was seen over some stretches; only the first `terms` (C,) of each camera are not 0.
+    """Solve for the coefficients of all cameras.
 
-    `precision` (C,) holds all coefficients of a camera to 0, beyond what is known beforehand.
+    Parameters
+    ----------
+    stretches : (B,) bool, the stretches to use
+    terms : (C,) the number of terms of each camera; its other coefficients are 0
+    precision : (C,) 1 / mm^2, additional prior precision of all coefficients of a camera about 0
+
+    Returns
+    -------
+    (C, 12) float64, mm.
     """
     count = len(terms)
     square, linear = forms.square[stretches].sum(axis=0), forms.linear[stretches].sum(axis=0)
-    matrix, right = np.zeros((count, MOST, count, MOST)), np.zeros((count, MOST))
+    matrix, right = np.zeros((count, MOST_TERMS, count, MOST_TERMS)), np.zeros((count, MOST_TERMS))
     for a in range(count):
         for b in range(a + 1, count):
             matrix[a, :, a] += square[a, b]
@@ -84,19 +103,19 @@ def solve(
             matrix[b, :, a] -= square[a, b]
             right[a] += linear[a, b]
             right[b] -= linear[a, b]
-    free = np.flatnonzero((np.arange(MOST) < terms[:, np.newaxis]).ravel())
-    held = np.full((count, MOST), PRIOR_MM**-2)
+    free = np.flatnonzero((np.arange(MOST_TERMS) < terms[:, np.newaxis]).ravel())
+    held = np.full((count, MOST_TERMS), PRIOR_MM**-2)
     if precision is not None:
         held += precision[:, np.newaxis]
-    normal = INDEPENDENT * matrix.reshape(count * MOST, count * MOST)[np.ix_(free, free)]
+    normal = INDEPENDENT * matrix.reshape(count * MOST_TERMS, count * MOST_TERMS)[np.ix_(free, free)]
     normal[np.diag_indices(len(free))] += held.ravel()[free]
-    solution = np.zeros(count * MOST)
+    solution = np.zeros(count * MOST_TERMS)
     solution[free] = _solve_definite(normal, INDEPENDENT * right.ravel()[free])
-    return solution.reshape(count, MOST)
+    return solution.reshape(count, MOST_TERMS)
 
 
 def squares(forms: Forms, coefficients: Floats, stretches: NDArray[np.bool_]) -> Floats:
-    """(S, C, C) weighted sums of the squares that coefficients (C, 12) leave, by stretch and pair."""
+    """(S, C, C) weighted sums of the squares that coefficients (C, 12) leave, by selected stretch and pair."""
     apart = coefficients[:, np.newaxis] - coefficients[np.newaxis]
     taken = np.einsum("nabtu,abu->nabt", forms.square[stretches], apart) - 2.0 * forms.linear[stretches]
     left = forms.constant[stretches] + np.einsum("nabt,abt->nab", taken, apart)
@@ -113,7 +132,7 @@ def _sum_up(
     stretch: NDArray[np.intp],
     forms: Forms,
 ) -> None:
-    """Adds the comparisons to `forms`."""
+    """Add the comparisons to `forms`."""
     square, linear, constant, weight, expected = forms
     terms = rows.shape[1]
     for m in range(rows.shape[0]):
@@ -141,7 +160,7 @@ def _solve_definite(matrix: Floats, right: Floats) -> Floats:
             total = matrix[k, m]
             for n in range(m):
                 total -= lower[k, n] * lower[m, n]
-            lower[k, m] = np.sqrt(max(total, 1e-12)) if k == m else total / lower[m, m]
+            lower[k, m] = np.sqrt(max(total, SINGULAR)) if k == m else total / lower[m, m]
     solution = right.copy()
     for k in range(size):
         for n in range(k):

@@ -1,4 +1,4 @@
-"""The points of all cameras in the order of laser planes, cameras and stripes, and where stripes meet."""
+"""The points of all cameras, sorted by laser plane, camera and stripe, and the intersection of normals with stripes."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,16 +13,18 @@ from footscan.compiled import compiled
 Floats = NDArray[np.float64]
 
 LINK_MM = 1.5
-"""Consecutive points of a stripe that are farther apart belong to different pieces of it."""
+"""Distance of consecutive points up to which they belong to one piece of the stripe. Chosen by hand."""
 REACH = 3
-"""The stripe runs from so many points before a point to so many after it."""
+"""Points before and after a point between which the direction of the stripe is taken. Chosen by hand."""
 BENT_MM = 0.15
-"""Where a point lies farther from the line through the ends of these, the stripe has a corner."""
+"""Distance of a point from the line between these from which the stripe has a corner. Chosen by hand."""
 BLOCK = 16
-"""So many consecutive points share a box, by which what is far away is passed over."""
+"""Consecutive points that share a bounding box, by which distant points are skipped: a bound of time."""
 LEAST_COSINE = 0.85
-"""Stripes whose normals differ by more than 32° show different surfaces, or one of them turns a corner."""
+"""Cosine of the angle between the normals of two stripes, 32 degrees, beyond which they show different surfaces, or one
+of them turns a corner. Chosen by hand."""
 SMALLEST_SIGMA_MM = 1e-3
+"""Lower bound of the standard deviations: weights stay finite."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Stripes:
     points: NDArray[np.void]
     """(N,) of `POINT_DTYPE`."""
     cameras: NDArray[np.intp]
-    """(C,) their numbers, ascending."""
+    """(C,) the numbers of the cameras, ascending."""
     camera: NDArray[np.intp]
     """(N,) index into `cameras`."""
     plane: NDArray[np.intp]
@@ -46,15 +48,15 @@ class Stripes:
     sigma: Floats
     """(N,) standard deviation, mm, never 0."""
     linked: NDArray[np.bool_]
-    """(N,) whether the stripe goes on to the next point."""
+    """(N,) True if the stripe continues to the next point."""
     normals: Floats
-    """(N, 2) unit normals of the stripes in their planes, of any sign; 0 where a point stands alone."""
+    """(N, 2) unit normals of the stripes in their planes, of either sign; 0 for a single point."""
     bent: NDArray[np.bool_]
-    """(N,) whether the stripe turns a corner."""
+    """(N,) True where the stripe has a corner."""
 
 
 class Traces(NamedTuple):
-    """What compiled loops take of `Stripes`, with the coordinates and sigmas that hold at the time."""
+    """The arrays of `Stripes` that compiled loops need, with current coordinates and sigmas."""
 
     camera: NDArray[np.intp]
     plane: NDArray[np.intp]
@@ -65,20 +67,26 @@ class Traces(NamedTuple):
     normals: Floats
     linked: NDArray[np.bool_]
     around: Floats
-    """As `boxes` gives it."""
+    """The bounding boxes of `boxes`."""
 
 
 def traces_of(stripes: Stripes, yz: Floats, sigma: Floats) -> Traces:
-    """The stripes with points at `yz` (N, 2), mm, of standard deviations `sigma` (N,), mm."""
+    """Select the traces of stripes, with points at `yz` (N, 2), mm, and standard deviations `sigma` (N,), mm."""
     return Traces(
         stripes.camera, stripes.plane, stripes.starts, stripes.x, yz, sigma, stripes.normals, stripes.linked, boxes(yz)
     )
 
 
 def sort_stripes(points_by_camera: Iterable[NDArray[np.void]]) -> Stripes:
-    """The stripes of several clouds of `POINT_DTYPE`; points without finite coordinates are left out.
+    """Sort the points of several cameras (arrays of `POINT_DTYPE`, mm, scanner frame) into stripes.
 
-    The result does not depend on the order of cameras.
+    Points without finite coordinates are left out. The result does not depend on the order of cameras.
+
+    >>> from footscan.cloud.points import make_points
+    >>> xyz = np.array([[0.0, 0.0, 5.0], [0.0, 1.0, 5.0], [0.0, 9.0, 5.0]])
+    >>> stripes = sort_stripes([make_points(xyz, camera=2, source=np.arange(3))])
+    >>> print(stripes.cameras, stripes.linked)
+    [2] [ True False False]
     """
     points = np.concatenate([np.empty(0, POINT_DTYPE), *points_by_camera])
     points = points[np.isfinite(points["x"]) & np.isfinite(points["y"]) & np.isfinite(points["z"])]
@@ -111,7 +119,12 @@ def sort_stripes(points_by_camera: Iterable[NDArray[np.void]]) -> Stripes:
 
 
 def boxes(yz: Floats) -> Floats:
-    """(ceil(N / BLOCK), 4) least and greatest Y, least and greatest Z of each block of points and the next point."""
+    """Compute the bounding box of each block of points (N, 2) and the point that follows it.
+
+    Returns
+    -------
+    (ceil(N / BLOCK), 4) float64: least Y, greatest Y, least Z, greatest Z, mm.
+    """
     starts = np.arange(0, len(yz), BLOCK)
     if not len(starts):
         return np.zeros((0, 4))
@@ -132,16 +145,16 @@ def meet(
     linked: NDArray[np.bool_],
     around: Floats,
 ) -> tuple[int, float, float]:
-    """Where the normal of one point meets the stripe of the points from `first` to before `last`, in its plane.
+    """Intersect the normal of one point with the stripe of the points `first` to `last` - 1, in the plane (Y, Z).
 
     Returns
     -------
-    The point at which that stretch of the stripe begins, -1 where there is none within `reach` mm; how far along the
-    stretch it lies, 0 to 1; and the distance along the normal, mm.
+    The point at which the intersected segment of the stripe begins, -1 if there is none within `reach` mm; the place
+    on the segment, 0 to 1; and the distance along the normal, mm.
     """
     y, z = yz[point]
     normal_y, normal_z = normals[point]
-    found, share, distance = -1, 0.0, reach
+    nearest, share, distance = -1, 0.0, reach
     for block in range(first // BLOCK, (last - 1) // BLOCK + 1):
         low_y, high_y, low_z, high_z = around[block]
         if y < low_y - reach or y > high_y + reach or z < low_z - reach or z > high_z + reach:
@@ -155,16 +168,16 @@ def meet(
             part = here / (here - there)
             met_y, met_z = yz[k, 0] + part * (yz[k + 1, 0] - yz[k, 0]), yz[k, 1] + part * (yz[k + 1, 1] - yz[k, 1])
             away = (met_y - y) * normal_y + (met_z - z) * normal_z
-            if abs(away) > abs(distance) or (found >= 0 and abs(away) == abs(distance)):
+            if abs(away) > abs(distance) or (nearest >= 0 and abs(away) == abs(distance)):
                 continue
             if abs(normals[k, 0] * normal_y + normals[k, 1] * normal_z) < LEAST_COSINE:
                 continue
-            found, share, distance = k, part, away
-    return found, share, distance
+            nearest, share, distance = k, part, away
+    return nearest, share, distance
 
 
 def _planes(x: NDArray[np.float32]) -> NDArray[np.intp]:
-    """(N,) the number of the laser plane of each of (N,) X: from the first on, each reaches as far as `PLANE_MM`."""
+    """(N,) the number of the laser plane at each X (N,): a plane extends by `PLANE_MM` from its first X."""
     places, place = np.unique(x, return_inverse=True)
     number = np.zeros(len(places), np.intp)
     start = 0
@@ -177,7 +190,7 @@ def _planes(x: NDArray[np.float32]) -> NDArray[np.intp]:
 
 @compiled
 def _normals(yz: Floats, linked: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.bool_]]:
-    """(N, 2) normals to the lines from `REACH` points before each point to `REACH` points behind it, and (N,) bends."""
+    """(N, 2) normals to the lines from `REACH` points before each point to `REACH` after it, and (N,) corners."""
     normals = np.zeros(yz.shape)
     bent = np.zeros(yz.shape[0], np.bool_)
     for n in range(yz.shape[0]):

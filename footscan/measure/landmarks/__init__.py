@@ -1,1 +1,1 @@
-"""Landmarks of the foot, by the part of the foot where they lie."""
+"""Landmarks of the foot, by the part of the foot on which they lie."""

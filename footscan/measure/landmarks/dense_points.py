@@ -1,4 +1,4 @@
-"""Points that stand for a surface wherever its triangles are large."""
+"""Points that represent a surface also where its triangles are large."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,14 +8,22 @@ from footscan.compiled import compiled
 Floats = NDArray[np.float64]
 
 MOST = 64
-"""Parts that an edge is divided into, at most."""
+"""Bound of memory: parts into which an edge is divided."""
 
 
 def dense_points(vertices: Floats, faces: NDArray[np.integer], spacing: float) -> Floats:
-    """(N, 3) the vertices, followed by points on edges and in triangles whose longest edge exceeds `spacing`.
+    """Returns (N, 3) the vertices, followed by points in triangles whose longest edge exceeds `spacing` mm.
 
-    Each such triangle holds an even lattice, the same however the mesh lies in space: what is measured on these points
-    moves and is mirrored with the mesh. On edges that two triangles share they stand twice.
+    Each such triangle holds an even lattice that does not depend on its pose, so that measures on these points move and
+    are mirrored with the mesh. Points on edges that two triangles share are listed twice.
+
+    Examples
+    --------
+    A triangle with edges of at most 2 mm gets a point in the middle of each edge:
+
+    >>> corners = np.array([[0.0, 0, 0], [2, 0, 0], [0, 1, 0]])
+    >>> dense_points(corners, np.array([[0, 1, 2]]), spacing=1.5)[3:].tolist()
+    [[0.0, 0.5, 0.0], [1.0, 0.5, 0.0], [1.0, 0.0, 0.0]]
     """
     return _lattices(np.ascontiguousarray(vertices, np.float64), np.ascontiguousarray(faces, np.int64), spacing)
 
@@ -33,7 +41,7 @@ def _lattices(vertices: Floats, faces: NDArray[np.int64], spacing: float) -> Flo
                 squared += (vertices[end, axis] - vertices[start, axis]) ** 2
             longest = max(longest, squared)
         parts[face] = min(max(np.ceil(np.sqrt(longest) / spacing - 1e-6), 1), MOST)
-        total += (parts[face] + 1) * (parts[face] + 2) // 2 - 3  # the corners stand among the vertices
+        total += (parts[face] + 1) * (parts[face] + 2) // 2 - 3  # the corners are vertices already
     points = np.empty((total, 3))
     points[: len(vertices)] = vertices
     place = len(vertices)

@@ -1,6 +1,6 @@
 """Landmarks on the back of the foot and on the leg.
 
-All take (N, 3) `points` of the surface of a right foot in its own frame, mm, and its length.
+All functions take (N, 3) `points` of the surface of a right foot in its own frame, mm, and its length in mm.
 """
 
 import numpy as np
@@ -13,30 +13,42 @@ from footscan.mesh.rigid_transform import points_within
 from footscan.mesh.topology import used_vertices
 
 CORNER_MM = (50.0, 20.0)
-"""X and Z of the corner that the crease between foot and leg is nearest to, on a foot of `FULL_SIZE_MM` and more."""
+"""X and Z of the corner inside the heel to which the crease between foot and leg is nearest, on a foot of
+`FULL_SIZE_MM` or more; chosen by hand."""
 CREASE_MM = 100.0
-"""It lies lower than this."""
+"""Height below which the crease lies on such a foot; chosen by hand."""
 SECTOR_DEG = (10.0, 88.0)
+"""Directions from the corner, above X, in which the outline is taken; chosen by hand."""
 SECTORS = 39
+"""Sectors of these directions, 2 degrees each."""
 FRONT, SPACING_MM = 0.70, 1.5
+"""Share of the length behind which the crease lies, and distance of the points used there; chosen by hand."""
+NEAR_OUTLINE = 0.6
+"""Points nearer to the corner than this share of the outline's distance belong to another part of the skin."""
 INSTEP = (0.45, 0.60)
-INSTEP_OTHERWISE = 0.50
+"""Shares of the length between which the instep point is sought; chosen by hand."""
+INSTEP_FALLBACK = 0.50
+"""Share of the length at which the instep point is placed if the ridge has no bend."""
 STATION_MM = 2.0
+"""Distance of the stations along the ridge."""
 BEND_MM = 16.0
-"""Half of the ridge's length over which its bend is taken."""
+"""Half the length of the ridge over which its bend is fitted; chosen by hand."""
 NOTABLE = 3.0
-"""Standard deviations of its fit by which a bend exceeds those at the borders of the window: others are the skin's
-roughness."""
+"""Standard deviations by which a bend exceeds those at the borders of the window; smaller ones are the roughness of the
+skin."""
 LEAST_BEND = 0.01
-"""1/mm: what bends less than a circle of 100 mm radius is the even back of the foot, not a bone."""
+"""1/mm. Less bend than that of a circle of 100 mm radius is the even back of the foot, not a bone. Chosen by hand."""
 NEAR_MM = 10.0
+"""Radius of the surface that is fitted around a landmark; chosen by hand."""
 BELOW_CUT_MM = 3.0
+"""Margin below the end of the leg in which no landmark is sought; chosen by hand."""
 
 
 def junction_point(vertices: Floats, faces: NDArray[np.integer], length: float, top: float) -> tuple[Point, Cap] | None:
-    """Where the front of the leg meets the back of the foot: the point of the outline, seen from the side, that is
-    nearest to a corner inside the heel, and the cap that it was found by. None where the leg was cut, at `top` mm,
-    before it rises.
+    """Find the junction of the front of the leg and the back of the foot, and the cap that was fitted there.
+
+    The junction is the point of the outline, seen from the side, that is nearest to a corner inside the heel. None if
+    the leg was cut, at the height `top` in mm, below it.
     """
     scale = min(1.0, length / FULL_SIZE_MM)
     x, z = vertices[:, 0], vertices[:, 2]
@@ -51,24 +63,26 @@ def junction_point(vertices: Floats, faces: NDArray[np.integer], length: float, 
     sector = np.clip(np.searchsorted(edges, angle) - 1, 0, SECTORS - 1)
     farthest = highest_of_each(sector, radius, SECTORS)
     outline = np.where(farthest >= 0, radius[farthest], np.inf) if len(radius) else np.full(SECTORS, np.inf)
-    outline[z[farthest] > min(top - BELOW_CUT_MM, CREASE_MM * scale)] = np.inf  # the cut is no outline
+    outline[z[farthest] > min(top - BELOW_CUT_MM, CREASE_MM * scale)] = np.inf  # the cut does not belong to the outline
     nearest = int(np.argmin(outline))
     if nearest in (0, SECTORS - 1) or not np.isfinite(outline[nearest - 1 : nearest + 2]).all():
         return None
     start = np.array([y[farthest[nearest]], (edges[nearest] + edges[nearest + 1]) / 2])
-    near = radius > 0.6 * outline[nearest]
+    near = radius > NEAR_OUTLINE * outline[nearest]
     across = np.column_stack([y, angle * outline[nearest]])[near]
-    found = saddle(across, radius[near], start * [1.0, outline[nearest]], NEAR_MM)
-    if found is None:
+    fitted = saddle(across, radius[near], start * [1.0, outline[nearest]], NEAR_MM)
+    if fitted is None:
         return None
-    (y_found, arc), distance, cap = found
+    (saddle_y, arc), distance, cap = fitted
     turn = arc / outline[nearest]
-    return np.array([corner_x + distance * np.cos(turn), y_found, corner_z + distance * np.sin(turn)]), cap
+    return np.array([corner_x + distance * np.cos(turn), saddle_y, corner_z + distance * np.sin(turn)]), cap
 
 
 def instep_point(points: Floats, length: float) -> tuple[Point, bool] | None:
-    """Where the ridge of the foot's back bends most, at the cuneiform bones, and whether it was told by its bend;
-    otherwise half way along the foot."""
+    """Find where the ridge of the foot's back bends most, at the cuneiform bones; True if there is such a bend.
+
+    Without a notable bend it is the point of the ridge half way along the foot.
+    """
     stations, ridge, ridge_y = _ridge(points, length)
     if len(stations) < 3:
         return None
@@ -78,17 +92,22 @@ def instep_point(points: Floats, length: float) -> tuple[Point, bool] | None:
         return None
     k = int(inside[np.argmax(bend[inside])])
     stands_out = bend[k] - max(bend[inside[0]], bend[inside[-1]], 0.0) > NOTABLE * sd[k]
-    told = inside[0] < k < inside[-1] and stands_out and bend[k] > LEAST_BEND
-    x = float(stations[k]) if told else INSTEP_OTHERWISE * length
-    if told:  # between the stations
+    is_bend = inside[0] < k < inside[-1] and stands_out and bend[k] > LEAST_BEND
+    x = float(stations[k]) if is_bend else INSTEP_FALLBACK * length
+    if is_bend:  # between the stations
         before, at, after = bend[k - 1 : k + 2]
         x += STATION_MM * 0.5 * (before - after) / min(before - 2 * at + after, -1e-9)
     y, z = (float(np.interp(x, stations, values)) for values in (ridge_y, ridge))
-    return np.array([x, y, z]), bool(told)
+    return np.array([x, y, z]), bool(is_bend)
 
 
 def metatarsal_top(points: Floats, tibiale: Point, fibulare: Point, share: float) -> Point | None:
-    """The back of the foot above the line between both metatarsal points, a `share` of the way from the medial one."""
+    """Find the back of the foot above the line between both metatarsal points; None if there is no surface.
+
+    Parameters
+    ----------
+    share : of the way from the medial point to the lateral one
+    """
     place = tibiale[:2] + share * (fibulare[:2] - tibiale[:2])
     x, y = ((float(at) - NEAR_MM, float(at) + NEAR_MM) for at in place)
     above = points_within(points, x, y, ((tibiale[2] + fibulare[2]) / 2, np.inf))
@@ -97,7 +116,7 @@ def metatarsal_top(points: Floats, tibiale: Point, fibulare: Point, share: float
 
 
 def _ridge(points: Floats, length: float) -> tuple[Floats, Floats, Floats]:
-    """X of stations along the instep, and Z and Y of the highest point at each."""
+    """Returns X of stations along the instep, and Z and Y of the highest point at each."""
     first, last = INSTEP[0] * length - BEND_MM, INSTEP[1] * length + BEND_MM
     back = points[(points[:, 0] >= first) & (points[:, 0] < last)]
     station = ((back[:, 0] - first) / STATION_MM).astype(np.intp)
@@ -107,7 +126,7 @@ def _ridge(points: Floats, length: float) -> tuple[Floats, Floats, Floats]:
 
 
 def _bend(stations: Floats, ridge: Floats, x: float) -> tuple[float, float]:
-    """Curvature of the ridge at `x`, 1/mm, convex upwards, and its standard deviation."""
+    """Returns the curvature of the ridge at `x`, 1/mm, positive if convex upwards, and its standard deviation."""
     near = np.abs(stations - x) <= BEND_MM
     terms = np.vander((stations[near] - x) / BEND_MM, 3)
     factors = np.linalg.lstsq(terms, ridge[near], rcond=None)[0]

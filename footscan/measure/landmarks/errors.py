@@ -1,7 +1,7 @@
-"""How landmarks follow the errors of the vertices around them.
+"""Derivatives of landmarks by the displacements of the vertices around them.
 
-Landmarks are found as summits of polynomials fitted to the surface. Where such a polynomial is highest, and how high it
-is there, follows from its coefficients, and those are weighted sums of the heights of the vertices.
+Landmarks are summits of polynomials fitted to the surface. Place and height of a summit follow from the coefficients of
+the polynomial, which are weighted sums of the heights of the vertices.
 """
 
 import numpy as np
@@ -13,16 +13,20 @@ from footscan.measure.landmarks.polynomial import terms_at
 Floats = NDArray[np.float64]
 
 LEAST_VERTICES = 8
+"""With fewer vertices in the cap the derivatives are 0; chosen by hand."""
 LEAST_FACING = 0.3
+"""Least cosine between the normal of a vertex and the direction of height; chosen by hand."""
 
 
 def summit_gradient(vertices: Floats, normals: Floats, point: Floats, direction: Floats, cap: Cap) -> Floats:
-    """(3, V) derivatives of a summit's coordinates by the displacements of the vertices, outwards.
+    """Returns (3, V) derivatives of a summit's coordinates by the displacements of the vertices outwards.
 
     Parameters
     ----------
-    vertices, normals : (V, 3) mm, (V, 3)
-    point, direction : (3,) mm, (3,) unit vector, one of the axes or its opposite
+    vertices : (V, 3) mm
+    normals : (V, 3) unit vectors
+    point : (3,) mm, the summit
+    direction : (3,) unit vector, one of the axes or its opposite
     cap : over which the summit was fitted
     """
     axis = int(np.argmax(np.abs(direction)))
@@ -34,7 +38,7 @@ def summit_gradient(vertices: Floats, normals: Floats, point: Floats, direction:
     if len(inside) < LEAST_VERTICES:
         return gradient
     which = near[inside]
-    moved = 1.0 / (normals[which] @ direction)  # along `direction`, where the surface moves along its normal
+    moved = 1.0 / (normals[which] @ direction)  # displacement along `direction` where the surface moves outwards by 1
     shift = np.linalg.inv(cap.spread) @ _shift(weights, away[inside] @ direction, cap.depth)
     gradient[axis, which] = weights[0] * moved * direction[axis]
     for k, moves in zip(across, shift * moved, strict=True):
@@ -43,7 +47,10 @@ def summit_gradient(vertices: Floats, normals: Floats, point: Floats, direction:
 
 
 def saddle_gradient(vertices: Floats, normals: Floats, point: Floats, corner: Floats, cap: Cap) -> Floats:
-    """(3, V) the same for where the surface, seen from the side, is nearest to a corner within, (3,) mm."""
+    """Returns (3, V) derivatives of the point that is nearest, seen from the side, to a corner within; (3,) mm.
+
+    Parameters are those of `summit_gradient`, with the corner instead of a direction.
+    """
     gradient = np.zeros((3, len(vertices)))
     reach, start = vertices - corner, point - corner
     distance = np.hypot(reach[:, 0], reach[:, 2])
@@ -65,8 +72,12 @@ def saddle_gradient(vertices: Floats, normals: Floats, point: Floats, corner: Fl
 
 
 def _weights(places: Floats, cap: Cap) -> tuple[Floats, NDArray[np.intp]]:
-    """(K, N) that take heights to the polynomial's factors, by the fit that found the landmark, and (N,) which of the
-    places, in radii of the cap, they belong to."""
+    """Returns (15, N) weights from heights to the coefficients of the fit, and (N,) the numbers of the places used.
+
+    Parameters
+    ----------
+    places : (P, 2) in radii of the cap
+    """
     squared = np.einsum("ni,ni->n", places, places)
     inside = np.flatnonzero(squared < 1.0)
     terms, weight = terms_at(places[inside]), (1.0 - squared[inside]) ** 2
@@ -76,14 +87,17 @@ def _weights(places: Floats, cap: Cap) -> tuple[Floats, NDArray[np.intp]]:
 
 
 def _second(coefficients: Floats) -> Floats:
-    """(2, 2) second derivatives at the middle."""
+    """Returns (2, 2) the second derivatives at the middle."""
     uu, uv, vv = coefficients[3:6]
     return np.array([[2 * uu, uv], [uv, 2 * vv]])
 
 
 def _shift(weights: Floats, height: Floats, depth: float) -> Floats:
-    """(2, N) how the place where the polynomial is level moves with the heights: -H⁻¹ times the slope, H its second
-    derivatives; in radii. A flat summit is known to a radius at most: H is taken as no flatter than the cap is deep."""
+    """Returns (2, N) derivatives by the heights of the place, in radii, where the polynomial is level.
+
+    They are -H⁻¹ times those of the slope, H being the second derivatives. A flat summit is located within a radius:
+    the curvature is taken as at least the depth of the cap.
+    """
     curvature, axes = np.linalg.eigh(_second(weights @ height))
     steep = np.where(np.abs(curvature) < depth, np.copysign(depth, curvature), curvature)
     moved: Floats = -(axes / steep) @ axes.T @ weights[1:3]

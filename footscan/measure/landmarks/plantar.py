@@ -1,4 +1,4 @@
-"""Where the heel stands on the floor."""
+"""The landing point: the middle of the heel's contact with the floor."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,19 +8,32 @@ from footscan.measure.landmarks.extreme import Floats, Point
 CONTACT_MM = 1.0
 """Up to this height above the floor the sole counts as touching it."""
 HEEL = (0.05, 0.25)
-"""Parts of the length."""
+"""Shares of the length between which the contact is taken; chosen by hand."""
 LEAST_AREA_MM2 = 60.0
+"""A heel with less contact does not stand on the floor; chosen by hand."""
 
 
 def landing_point(vertices: Floats, faces: NDArray[np.integer], length: float) -> Point | None:
-    """The middle of the heel's contact with the floor; None where the heel touches it with no area.
+    """Find the middle of the heel's contact with the floor; None if the heel does not stand on it.
 
-    It is the centroid of what lies within the section of the foot at `CONTACT_MM` between two straight lines across
-    the axis, by Green's theorem: those lines run along Y and add nothing to integrals over dX.
+    The contact is the section of the foot at `CONTACT_MM` between two lines across the axis. Its centroid follows from
+    Green's theorem: the two lines run along Y and add nothing to integrals over dX.
 
     Parameters
     ----------
-    vertices, faces : the mesh in the foot's own frame, faces looking outward
+    vertices : (V, 3) mm, foot frame
+    faces : (F, 3), looking outward
+    length : mm, foot length
+
+    Examples
+    --------
+    A box from the floor up, 100 mm long and 60 mm broad, for a foot of 200 mm: its contact runs from X = 10 to 50.
+
+    >>> x, y, z = np.meshgrid([0.0, 100.0], [-30.0, 30.0], [0.0, 50.0], indexing="ij")
+    >>> box = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    >>> sides = [[0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5]]
+    >>> bool(np.allclose(landing_point(box, np.array(sides), length=200.0), [30, 0, 0]))
+    True
     """
     start, end = _outline(vertices, faces)
     first, last = HEEL[0] * length, HEEL[1] * length
@@ -39,7 +52,7 @@ def landing_point(vertices: Floats, faces: NDArray[np.integer], length: float) -
 
 
 def _outline(vertices: Floats, faces: NDArray[np.integer]) -> tuple[Floats, Floats]:
-    """(S, 2) starts and ends of the pieces of the section, the foot on their left."""
+    """Returns (S, 2) starts and (S, 2) ends of the pieces of the section, the foot on their left."""
     height = vertices[:, 2] - CONTACT_MM
     above = height >= 0
     count = above[faces].sum(axis=1)

@@ -1,4 +1,4 @@
-"""Polynomials of fourth order in two variables, fitted to scattered heights; compiled, since many are."""
+"""Polynomials of fourth order in two variables, fitted to scattered heights; compiled, since there are many fits."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,35 +10,39 @@ Floats = NDArray[np.float64]
 
 ORDER = 4
 POWERS = np.array([(n - j, j) for n in range(ORDER + 1) for j in range(n + 1)])
-"""(15, 2) of the two variables in the terms, by their order."""
+"""(15, 2) powers of the two variables in the terms, sorted by order"""
 QUADRIC = 6
-"""Terms of up to second order."""
+"""Number of terms of up to second order"""
 REWEIGHTED = 3
+"""Rounds of reweighting."""
 TUKEY, LEAST_MISFIT_MM = 4.7, 0.04
-"""What is farther off by so many times the noise does not count; a polynomial misses a smooth foot by the second."""
+"""Tuning constant of Tukey's biweight, 4.685 for 95 % efficiency; misfit of a polynomial to a smooth foot."""
 LEAST_NOISE_MM = 0.01
-"""What scatters less is no noise."""
+"""Smaller scatter is not noise."""
 LEAST_FREE = 0.2
+"""Least share of the points that counts as degrees of freedom; chosen by hand."""
 ENOUGH = 2
-"""Points for each term from which on a fit may be free."""
+"""Points per term from which the noise is estimated by a fit without penalty; chosen by hand."""
 RIDGE = 1e-9
+"""Keeps the normal equations regular."""
 NEWTON_STEPS, LONGEST_STEP = 3, 0.2
+"""Steps towards a summit; the longest step, in radii."""
 LEAST_BEND_MM = 0.1
-"""A cap that bends by less towards its border has no summit of its own."""
+"""A cap that bends less towards its border has no summit of its own; chosen by hand."""
 
 
 @compiled
 def robust_fit(places: Floats, height: Floats, noise: float, unevenness: float) -> tuple[Floats, float]:
-    """(15,) factors of the polynomial over the unit circle and the noise of the points, mm; -1 where too few points
-    lie within.
+    """Fit a polynomial over the unit circle; returns (15,) coefficients and the noise of the points, mm.
 
-    Points count the less the nearer they are to the border, and those off the surface not at all (Tukey's biweight).
+    The noise is -1 if too few points lie within. The weight of a point falls to zero at the border, and with the
+    distance from the surface (Tukey's biweight).
 
     Parameters
     ----------
     places, height : (N, 2) in radii, (N,) mm
-    noise : what it may be, mm
-    unevenness : terms of third and fourth order are expected to be so large, mm, and noise may not make larger ones
+    noise : mm, a first estimate
+    unevenness : mm, expected size of the terms of third and fourth order; the penalty suppresses larger ones
     """
     squared = places[:, 0] ** 2 + places[:, 1] ** 2
     inside = np.flatnonzero(squared < 1.0)
@@ -49,7 +53,7 @@ def robust_fit(places: Floats, height: Floats, noise: float, unevenness: float) 
     weight = (1.0 - squared[inside]) ** 2
     kept, away, factors = weight.copy(), np.empty(count), np.zeros(size)
     for _ in range(REWEIGHTED):
-        both = np.zeros((size, size + 1))  # the right side, and the normal equations: they tell how many terms count
+        both = np.zeros((size, size + 1))  # the right side, then the normal equations, which give the number of terms
         for k in range(count):
             for i in range(size):
                 weighted = kept[k] * terms[k, i]
@@ -61,8 +65,8 @@ def robust_fit(places: Floats, height: Floats, noise: float, unevenness: float) 
                 both[j, i + 1] = both[i, j + 1]
         solved = np.linalg.solve(both[:, 1:] + np.diag(held_back(noise, unevenness)), both)
         factors[:] = solved[:, 0]
-        # What holds terms back may not count as noise, which would hold them back: noise is told by a fit that is free,
-        # where there are points enough for one.
+        # The penalty grows with the noise and must not add to it: with enough points, the noise is estimated by a fit
+        # without penalty.
         free = solved if count < ENOUGH * size else np.linalg.solve(both[:, 1:] + np.diag(np.full(size, RIDGE)), both)
         used = 0.0
         for i in range(size):
@@ -77,7 +81,15 @@ def robust_fit(places: Floats, height: Floats, noise: float, unevenness: float) 
 
 @compiled
 def terms_at(places: Floats) -> Floats:
-    """(N, 15) of the polynomial at (N, 2) places."""
+    """Returns (N, 15) terms of the polynomial at (N, 2) places.
+
+    Examples
+    --------
+    1, u, v, u², uv, v² and so on, at u = 2, v = 3:
+
+    >>> terms_at(np.array([[2.0, 3.0]]))[0, :6].tolist()
+    [1.0, 2.0, 3.0, 4.0, 6.0, 9.0]
+    """
     terms = np.empty((len(places), len(POWERS)))
     powers = np.ones((2, ORDER + 1))
     for k in range(len(places)):
@@ -90,8 +102,10 @@ def terms_at(places: Floats) -> Floats:
 
 @compiled
 def held_back(noise: float, unevenness: float) -> Floats:
-    """(15,) by which the terms' squares are held back against those of the residuals: as far as those are noise, and
-    no form that the polynomial misses."""
+    """Returns (15,) weights that penalise the squares of the coefficients against those of the residuals.
+
+    The penalty follows the part of the residuals that is noise, and not form that the polynomial misses.
+    """
     hold = np.full(len(POWERS), RIDGE)
     hold[QUADRIC:] += max(noise**2 - LEAST_MISFIT_MM**2, LEAST_NOISE_MM**2) / unevenness**2
     return hold
@@ -99,7 +113,7 @@ def held_back(noise: float, unevenness: float) -> Floats:
 
 @compiled
 def slope(factors: Floats, place: Floats) -> tuple[Floats, Floats]:
-    """(2,) gradient and (2, 2) second derivatives at (2,) a place."""
+    """Returns the gradient (2,) and the second derivatives (2, 2) at a place (2,)."""
     gradient, second = np.zeros(2), np.zeros((2, 2))
     u, v = place[0], place[1]
     for k in range(len(POWERS)):
@@ -120,7 +134,7 @@ def slope(factors: Floats, place: Floats) -> tuple[Floats, Floats]:
 
 @compiled
 def climb(factors: Floats, place: Floats) -> Floats:
-    """(2,) the summit near a place, by Newton's method; the place where none is near."""
+    """Returns (2,) the summit near a place, by Newton's method; the place itself if there is no summit near it."""
     place = place.copy()
     for _ in range(NEWTON_STEPS):
         gradient, second = slope(factors, place)

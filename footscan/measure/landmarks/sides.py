@@ -1,7 +1,8 @@
-"""The outermost points of a foot that its frame rests on: heel, heads of the first and fifth metatarsal, longest toe.
+"""The outermost points of a foot that define its frame: heel, heads of the first and fifth metatarsal, longest toe.
 
-All take (N, 3) `points` of the surface of a right foot in its own frame (mm, toes towards +X, medial side towards +Y,
-floor at Z = 0) and its length; windows are parts of the length. None where a window holds no surface.
+All functions take (N, 3) `points` of the surface of a right foot in its own frame (mm, toes towards +X, medial side
+towards +Y, floor at Z = 0) and its length in mm; windows are shares of the length. They return None if the window holds
+no surface.
 """
 
 import numpy as np
@@ -13,18 +14,23 @@ from footscan.mesh.rigid_transform import FREE, points_within
 Floats = NDArray[np.float64]
 
 HEEL = 0.15
+"""Share of the length, from the rearmost point, that holds the rear of the heel; chosen by hand."""
 LONGEST_TOE = 0.80
+"""Share of the length ahead of which the longest toe ends; chosen by hand."""
 MEDIAL_BALL, LATERAL_BALL = (0.66, 0.80), (0.56, 0.72)
+"""Windows of the heads of the first and fifth metatarsal; chosen by hand."""
 MEDIAL_BALL_MM, LATERAL_BALL_MM, HEEL_MM = 45.0, 40.0, 40.0
-"""Heights up to which the sides of the ball and of the heel are sought, ..."""
+"""Heights up to which the sides of ball and heel are sought, on a foot of `FULL_SIZE_MM` or more; chosen by hand."""
 FULL_SIZE_MM = 200.0
-"""... on a foot of this length and more; on a child's they shrink with it."""
+"""Length of a foot below which such heights shrink in proportion; chosen by hand."""
 HEEL_BREADTH = (0.10, 0.20)
+"""Window of the heel's breadth; part of its definition."""
 HEEL_SIDE = (0.05, 0.30)
+"""Window of the heel's side for the medial tangent of the Brannock axis; chosen by hand."""
 END_DEPTH_MM, SIDE_DEPTH_MM = 1.0, 0.7
-"""Of the caps that are fitted: along the foot it is round, sideways flat."""
+"""Depths of the caps that are fitted: the ends of the foot are round, its sides flat. Chosen by hand."""
 REACH = 0.06
-"""Surface so far outside a window supports the fit at its border."""
+"""Surface up to this share of the length outside a window supports the fit at its border; chosen by hand."""
 
 
 def pternion(points: Floats, length: float, low: float) -> Summit | None:
@@ -61,7 +67,14 @@ def heel_lateral(points: Floats, length: float) -> Summit | None:
 
 
 def outermost(points: Floats, length: float, side: int, along: tuple[float, float], height_mm: float) -> Summit | None:
-    """The point farthest to one `side`, 1 medial and -1 lateral, in a window along the foot and up to a height."""
+    """Find the point farthest to one side in a window along the foot and up to a height.
+
+    Parameters
+    ----------
+    side : 1 medial, -1 lateral
+    along : shares of the length
+    height_mm : on a foot of `FULL_SIZE_MM` or more; less on a smaller one
+    """
     height = height_mm * min(1.0, length / FULL_SIZE_MM)
     first, last = along[0] * length, along[1] * length
     return outermost_in(points, side, (first, last), (-np.inf, height), REACH * length)
@@ -70,6 +83,6 @@ def outermost(points: Floats, length: float, side: int, along: tuple[float, floa
 def outermost_in(
     points: Floats, side: int, along: tuple[float, float], heights: tuple[float, float], reach: float
 ) -> Summit | None:
-    """The point farthest to one `side` in a window of X and Z; `reach` is how far outside it the fit may lean on. mm"""
+    """Find the point farthest to one `side` in a window of X and Z, mm; the fit uses surface up to `reach` outside."""
     x, z = ((first - reach, last + reach) for first, last in (along, heights))
     return summit(points_within(points, x=x, z=z), 1, side, (along, heights), SIDE_DEPTH_MM)

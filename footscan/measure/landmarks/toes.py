@@ -1,6 +1,6 @@
-"""The tips of the toes, told apart by the outline of the forefoot as it is seen from above.
+"""The tips of the toes, separated by the outline of the forefoot seen from above.
 
-A right foot in its own frame: mm, toes towards +X, medial side towards +Y.
+All functions take a right foot in its own frame: mm, toes towards +X, medial side towards +Y.
 """
 
 from collections.abc import Collection, Mapping
@@ -13,31 +13,36 @@ from footscan.measure.landmarks.extreme import Floats, Point, Summit, highest_of
 from footscan.mesh.rigid_transform import points_within
 
 FOREFOOT = 0.74
-"""Toes lie ahead of this part of the length."""
+"""Share of the length ahead of which the toes lie; chosen by hand."""
 STRIP_MM = 1.0
+"""Breadth of the strips along X in which the outline is taken."""
 PROMINENCE_MM = 0.6
-"""A tip lies so far ahead of the cleft beside it."""
+"""Least distance of a tip ahead of the cleft beside it; chosen by hand."""
 SPACING_MM = 5.0
+"""Least distance of two tips; chosen by hand."""
 CLEFT = 0.12
-"""What lies so far behind, in parts of the length, belongs to no tip."""
+"""Surface farther behind the curve of the tips than this share of the length belongs to no tip; chosen by hand."""
 DEPTH_MM = 1.0
+"""Depth of the cap that is fitted to a tip; chosen by hand."""
 TOES = (1, 2, 3, 4, 5)
 ACROSS = (0.23, 0.465, 0.625, 0.775, 0.93)
-"""Where tips lie, in parts of the way from the first to the fifth metatarsal's side ..."""
+"""Usual places of the tips as shares of the way from the first to the fifth metatarsal's side. With `AHEAD` they number
+the toes if not all five are seen. Chosen by hand."""
 AHEAD = (1.0, 0.985, 0.95, 0.91, 0.86)
-"""... and of the length: by this toes get their numbers where not all five are seen."""
+"""Usual places of the tips as shares of the length; chosen by hand."""
 ACROSS_SCATTER, AHEAD_SCATTER = 0.08, 0.03
+"""Usual scatter of these places; chosen by hand."""
 MISSED = 4.0
-"""A tip that is no toe counts like one that is so many scatters off its place."""
+"""Cost of a tip that gets no number, in scatters from a toe's place; chosen by hand."""
 
 
 class ToeTips(NamedTuple):
-    """The foremost points of toes."""
+    """The foremost points of the toes."""
 
     tips: dict[int, Summit]
-    """By the number of the toe, 1 to 5; those that were told apart."""
+    """Tips of the toes that were separated, by the number of the toe, 1 to 5."""
     is_whole: bool
-    """Whether five were seen; otherwise their numbers were chosen by where they lie."""
+    """True if five toes were seen; otherwise their numbers are inferred from their places."""
 
 
 def toe_tips(
@@ -48,16 +53,17 @@ def toe_tips(
     sides: tuple[float, float],
     wanted: Collection[int] = TOES,
 ) -> ToeTips:
-    """The tips of the toes.
+    """Find the tips of the toes.
 
     Parameters
     ----------
-    dense : (M, 3) of the surface, near enough to each other that each strip of `STRIP_MM` has some
-    points : (N, 3) of the surface, by which tips are placed; on large triangles denser ones would pull them inwards
-    length : of the foot, mm
-    low : height below which there is no leg, mm
-    sides : Y of the heads of the first and fifth metatarsal, mm
-    wanted : the numbers of those toes whose tips are asked for
+    dense : (M, 3) mm, points of the surface, dense enough that each strip of `STRIP_MM` holds some
+    points : (N, 3) mm, points of the surface by which tips are placed; denser ones would pull them inwards on large
+        triangles
+    length : mm, of the foot
+    low : mm, height below which there is no leg
+    sides : mm, Y of the heads of the first and fifth metatarsal
+    wanted : numbers of the toes whose tips are computed
     """
     outline, toes = (points_within(of, x=(FOREFOOT * length, np.inf), z=(-np.inf, low)) for of in (dense, points))
     if not len(outline):
@@ -69,22 +75,22 @@ def toe_tips(
 
 
 def _placed(toes: Floats, peak: Point, left: float, right: float) -> Summit:
-    """The tip between two clefts."""
+    """The tip between two clefts at Y = `left` and `right`."""
     window = ((left, right), (-np.inf, np.inf))
     tip = summit(points_within(toes, y=(left, right)), 0, 1, window, DEPTH_MM)
-    # A toe that points aside has its foremost place beside the tip.
+    # The foremost place of a toe that points aside lies beside its tip.
     return Summit(peak, 0.0, True) if tip is None or tip.at_border else tip
 
 
 def tip_near(points: Floats, tip: Point) -> Summit | None:
-    """The tip of a toe that was found at `tip` before the foot turned a little."""
+    """The tip of a toe that was at `tip` before the foot was turned a little; None without surface."""
     near = np.all(np.abs(points - tip) < 2 * SPACING_MM, axis=1)
     window = ((float(tip[1]) - SPACING_MM / 2, float(tip[1]) + SPACING_MM / 2), (-np.inf, np.inf))
     return summit(points[near], 0, 1, window, DEPTH_MM)
 
 
 def _peaks(toes: Floats, length: float, sides: tuple[float, float]) -> list[tuple[Point, float, float]]:
-    """The point of each peak of the outline over the curve on which tips lie, and Y of the clefts beside it."""
+    """Returns each peak of the outline above the curve of the tips, and Y of the clefts beside it."""
     medial, lateral = sides
     curve = np.interp((medial - toes[:, 1]) / (medial - lateral), ACROSS, AHEAD)
     rise = toes[:, 0] - curve * length
@@ -105,7 +111,7 @@ def _peaks(toes: Floats, length: float, sides: tuple[float, float]) -> list[tupl
 
 
 def _prominent(outline: Floats) -> list[int]:
-    """Places of peaks that rise `PROMINENCE_MM` above the saddle towards a higher one."""
+    """Returns the places of peaks that rise `PROMINENCE_MM` above the saddle towards a higher one."""
     peaks: list[int] = []
     for k in np.argsort(-outline, kind="stable").tolist():
         if not (0 < k < len(outline) - 1 and outline[k] >= max(outline[k - 1], outline[k + 1])):
@@ -120,7 +126,7 @@ def _prominent(outline: Floats) -> list[int]:
 
 
 def _cleft(outline: Floats, peak: int, step: int) -> int:
-    """Where the outline, followed from a peak, is lowest before it rises to another by `PROMINENCE_MM`."""
+    """Lowest place of the outline, followed from a peak, before it rises by `PROMINENCE_MM`."""
     lowest = place = peak
     while 0 <= place < len(outline):
         if outline[place] < outline[lowest]:
@@ -132,7 +138,7 @@ def _cleft(outline: Floats, peak: int, step: int) -> int:
 
 
 def _numbers(tips: list[Point], length: float, sides: tuple[float, float]) -> Mapping[int, int]:
-    """Which of the tips, in their order from the medial side, each toe is."""
+    """Returns, by the number of the toe, which of the tips (sorted from the medial side) it is."""
     if len(tips) == len(TOES):
         return dict(zip(TOES, range(len(TOES)), strict=True))
     medial, lateral = sides

@@ -1,1 +1,1 @@
-"""Files of meshes and clouds, one module a format. `footscan.mesh.formats.files` chooses by a file's name."""
+"""Files of meshes and clouds, one module per format. `footscan.mesh.formats.files` chooses by the file name."""

@@ -1,4 +1,4 @@
-"""Files of meshes and clouds, written and read by the ends of their names. Lengths are mm, but in GLB."""
+"""Reading and writing of meshes and clouds, by file suffix. Lengths are in mm, except in GLB (m)."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,7 +21,7 @@ Shape = tuple[NDArray[np.float64], NDArray[np.int32]]
 """(V, 3) vertices in mm and (F, 3) faces; a cloud is a shape without faces."""
 
 FARTHEST_MM = 1e9
-"""No coordinate of a mesh is larger, not even in micrometres: its powers stay finite."""
+"""Largest coordinate that is accepted; a mesh in micrometres stays below, and powers of coordinates stay finite."""
 PARSERS = {".stl": parse_stl, ".ply": parse_ply, ".obj": parse_obj}
 WRITERS: dict[str, Callable[[Mesh], bytes]] = {
     ".stl": stl_of,
@@ -34,17 +34,17 @@ WRITERS: dict[str, Callable[[Mesh], bytes]] = {
 
 
 def mesh_bytes(mesh: Mesh, suffix: str) -> bytes:
-    """The file of a mesh in the format of a name that ends in `suffix`, one of `WRITERS`.
+    """Encode a mesh in the format of `suffix`, one of `WRITERS`.
 
-    The same mesh gives the same bytes. What a format has no place for is left out.
+    The same mesh gives the same bytes. Properties that the format cannot hold are left out.
     """
     return WRITERS[suffix](mesh)
 
 
 def read_file(path: Path) -> Mesh:
-    """What an STL, PLY or OBJ file tells of a mesh; without faces it is a cloud.
+    """Read a mesh or a cloud from an STL, PLY or OBJ file.
 
-    Vertices that STL repeats for every triangle are merged; polygons are cut into triangles.
+    Vertices that STL repeats for every triangle are merged, and polygons are cut into triangles.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def read_file(path: Path) -> Mesh:
         raise RefusedInput(path, "no such file" if missing else f"cannot be read ({error.strerror})") from None
     try:
         mesh = parser(content)
-    except BeyondLimitError as error:  # a parser does not know whose bytes they are
+    except BeyondLimitError as error:  # the parser does not know the path
         raise BeyondLimitError(path, error.problem) from None
     except ValueError as error:
         raise RefusedInput(path, f"is no proper {path.suffix.lower()[1:].upper()} file: {error}") from None
@@ -74,20 +74,20 @@ def read_file(path: Path) -> Mesh:
     if mesh.metadata.get("unit", "mm") != "mm":
         raise RefusedInput(path, f"is in {mesh.metadata['unit']!r}, expected mm", field="unit")
     if mesh.faces.size and not 0 <= int(mesh.faces.min()) <= int(mesh.faces.max()) < len(mesh.vertices):
-        problem = f"has faces of vertices that are not there, expected numbers below {len(mesh.vertices)}"
+        problem = f"has faces of vertices that do not exist, expected numbers below {len(mesh.vertices)}"
         raise RefusedInput(path, problem)
     a, b, c = mesh.faces.T
     return replace(mesh, faces=mesh.faces[(a != b) & (b != c) & (c != a)])
 
 
 def read_shape(path: Path) -> Shape:
-    """Vertices and faces of a file; errors as in `read_file`."""
+    """Read the vertices and faces of a file; errors as in `read_file`."""
     mesh = read_file(path)
     return mesh.vertices, mesh.faces
 
 
 def read_mesh(path: Path) -> Shape:
-    """As `read_shape`, and refuses what has no faces."""
+    """Read the vertices and faces of a mesh; errors as in `read_file`, and for a file without faces."""
     vertices, faces = read_shape(path)
     if not len(faces):
         raise RefusedInput(path, "holds no triangles, expected a mesh")
@@ -95,5 +95,5 @@ def read_mesh(path: Path) -> Shape:
 
 
 def read_points(path: Path) -> NDArray[np.float64]:
-    """(N, 3) the points of a cloud, or the vertices of a mesh, mm; errors as in `read_file`."""
+    """Read (N, 3) the points of a cloud or the vertices of a mesh, mm; errors as in `read_file`."""
     return read_shape(path)[0]

@@ -1,18 +1,18 @@
-"""OBJ, text. Colours stand behind the coordinates of a vertex, as most programs read them."""
+"""OBJ files. Colours follow the coordinates of a vertex, as most programs read them."""
 
 from array import array
 
 import numpy as np
 
 from footscan.mesh.formats.polygons import PolygonList, fans
-from footscan.mesh.formats.text import coordinates, described, lines_of
+from footscan.mesh.formats.text import coordinates, lines_of, metadata_lines
 from footscan.mesh.mesh import Mesh
 
 
 def obj_of(mesh: Mesh) -> bytes:
-    """An OBJ file, with colours and normals where there are any."""
+    """Encode an OBJ file, with colours and normals if there are any."""
     rows = mesh.vertices if mesh.colours is None else np.column_stack([mesh.vertices, mesh.colours / 255])
-    lines = [f"# {line}" for line in described(mesh.metadata)]
+    lines = [f"# {line}" for line in metadata_lines(mesh.metadata)]
     lines += ["o foot", *(f"v {' '.join(row)}" for row in coordinates(rows))]
     corner = "{0}"
     if mesh.normals is not None:
@@ -23,7 +23,7 @@ def obj_of(mesh: Mesh) -> bytes:
 
 
 def parse_obj(content: bytes) -> Mesh:
-    """Vertices (`v`), with colours where all have them, and faces (`f`); all else in the file is passed over."""
+    """Read vertices (`v`), with colours if all have them, and faces (`f`); everything else in the file is ignored."""
     places, colours, faces = array("d"), array("d"), PolygonList()
     for line in lines_of(content):
         words = line.split()

@@ -1,11 +1,11 @@
-"""PLY: written binary, read of text too. It carries all that is known of a vertex."""
+"""PLY files, with all properties of the vertices; written as binary, read as binary or text."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from footscan.mesh.formats.ply_rows import Rows, ply_rows
 from footscan.mesh.formats.polygons import Polygons, fans, vertex_numbers
-from footscan.mesh.formats.text import described
+from footscan.mesh.formats.text import metadata_lines
 from footscan.mesh.mesh import Mesh
 
 FACE = np.dtype([("corners", "u1"), ("vertex_indices", "<i4", 3)])
@@ -13,9 +13,9 @@ PLACE, NORMAL, COLOUR = ("x", "y", "z"), ("nx", "ny", "nz"), ("red", "green", "b
 
 
 def ply_of(mesh: Mesh) -> bytes:
-    """A binary little-endian PLY file with normals, colours, camera of origin and filled, where known.
+    """Encode a binary little-endian PLY file with normals, colours, camera of origin and filled, if known.
 
-    Without faces it is the file of a cloud.
+    Without faces the file is that of a cloud.
     """
     columns = dict(zip(PLACE, mesh.vertices.astype("<f4").T, strict=True))
     if mesh.normals is not None:
@@ -23,9 +23,9 @@ def ply_of(mesh: Mesh) -> bytes:
     if mesh.colours is not None:
         columns |= dict(zip(COLOUR, mesh.colours.astype("u1").T, strict=True))
     columns |= {
-        name: known.astype("u1")
-        for name, known in (("camera", mesh.camera), ("filled", mesh.filled))
-        if known is not None
+        name: values.astype("u1")
+        for name, values in (("camera", mesh.camera), ("filled", mesh.filled))
+        if values is not None
     }
     vertex = np.zeros(len(mesh.vertices), [(name, column.dtype) for name, column in columns.items()])
     for name, column in columns.items():
@@ -33,7 +33,7 @@ def ply_of(mesh: Mesh) -> bytes:
     lines = [
         "ply",
         "format binary_little_endian 1.0",
-        *(f"comment {line}" for line in described(mesh.metadata)),
+        *(f"comment {line}" for line in metadata_lines(mesh.metadata)),
         f"element vertex {len(vertex)}",
         *(f"property {'float' if column.dtype.kind == 'f' else 'uchar'} {name}" for name, column in columns.items()),
     ]
@@ -46,7 +46,7 @@ def ply_of(mesh: Mesh) -> bytes:
 
 
 def parse_ply(content: bytes) -> Mesh:
-    """What a PLY file tells of a mesh, or of a cloud."""
+    """Read a mesh or a cloud from a PLY file; raises ValueError if it breaks the format."""
     header, elements = ply_rows(content)
     vertex = {name: column for name, column in elements.get("vertex", {}).items() if isinstance(column, np.ndarray)}
     if "vertex" in elements and not vertex.keys() >= set(PLACE):
@@ -65,14 +65,14 @@ def parse_ply(content: bytes) -> Mesh:
 
 
 def _columns(vertex: dict[str, NDArray[np.generic]], names: tuple[str, ...]) -> NDArray[np.float64] | None:
-    """(V, K) the properties of these names, if all are there."""
+    """Returns (V, K) the properties of these names; None if one is missing."""
     if not vertex.keys() >= set(names):
         return None
     return np.column_stack([np.asarray(vertex[name], np.float64) for name in names])
 
 
 def _colours(values: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Levels, or shares of 1 where none is above that."""
+    """Returns levels 0 to 255; values that are all at most 1 are shares of 255."""
     return _levels(values * 255 if np.nan_to_num(values).max(initial=0) <= 1 else values)
 
 

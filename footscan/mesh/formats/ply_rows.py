@@ -1,6 +1,6 @@
-"""Rows of the elements of a PLY file. What breaks the format raises a ValueError that says how.
+"""Rows of the elements of a PLY file. A file that breaks the format raises a ValueError that says how.
 
-Files come from outside: every count in one is held against the bytes that are there before anything is allocated.
+Files come from outside: every count in a file is checked against its size before memory is allocated.
 """
 
 import struct
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from footscan.mesh.formats.polygons import PolygonList, Polygons
 from footscan.mesh.formats.text import lines_of
-from footscan.mesh.mesh import KNOWN_OF_A_MESH
+from footscan.mesh.mesh import METADATA_KEYS
 from schemas.base.limits import refuse_beyond
 
 TYPES = {
@@ -27,31 +27,32 @@ TYPES = {
     **dict.fromkeys(("double", "float64"), "f8"),
 }
 CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
-"""Of the module `struct`."""
+"""Codes of the module `struct`."""
 LENGTHS = [name for name, kind in TYPES.items() if kind[0] != "f"]
 BYTE_ORDER = {"binary_little_endian": "<", "binary_big_endian": ">"}
 MAX_HEADER = 2**16
+"""Bound of memory and time: bytes of a header."""
 Property = tuple[str, str | None, str]
-"""Name, type of the length if it is a list, type of the value; types as numpy's, without byte order."""
+"""Name, type of the length (only of a list), type of the value; types of numpy without byte order."""
 Rows = dict[str, "NDArray[np.generic] | Polygons"]
-"""Property -> one value a row, or one list of integers a row; of an element with lists, its lists alone."""
+"""Property -> one value per row, or one list of integers per row; of an element with lists, only its lists."""
 
 
 class Header(NamedTuple):
-    """What a PLY file tells of itself."""
+    """Header of a PLY file."""
 
     byte_order: str | None
-    """As numpy writes it; None of text."""
+    """In the notation of numpy; None for text"""
     elements: list[tuple[str, int, list[Property]]]
-    """Name and number of rows of each, in the order of the file."""
+    """Name, number of rows and properties of each element, in the order of the file"""
     metadata: dict[str, str]
-    """Of comments that begin with a key of ours."""
+    """From comments that begin with one of `METADATA_KEYS`"""
     body: int
-    """Where the rows begin."""
+    """Offset of the rows"""
 
 
 def ply_rows(content: bytes) -> tuple[Header, dict[str, Rows]]:
-    """The header, and the rows of every element."""
+    """Read the header and the rows of every element."""
     header = _header(content)
     body = content[header.body :]
     reader = _Text(body) if header.byte_order is None else _Binary(body, header.byte_order)
@@ -59,7 +60,7 @@ def ply_rows(content: bytes) -> tuple[Header, dict[str, Rows]]:
 
 
 def _header(content: bytes) -> Header:
-    """What stands before `end_header`; ValueError where it breaks the format."""
+    """Read the header; raises ValueError if it breaks the format."""
     end = content.find(b"end_header", 0, MAX_HEADER)
     if content[:3] != b"ply" or end < 0:
         raise ValueError("expected a header from 'ply' to 'end_header'")
@@ -85,7 +86,7 @@ def _header(content: bytes) -> Header:
                 raise ValueError(f"unknown header line {line[:60]!r}")
     for name, _, properties in elements:
         if len({key for key, _, _ in properties}) < len(properties):
-            raise ValueError(f"a property of {name[:60]!r} stands twice")
+            raise ValueError(f"a property of {name[:60]!r} is listed twice")
     if form != "ascii" and form not in BYTE_ORDER:
         raise ValueError(f"format {form!r}, expected ascii or binary")
     return Header(BYTE_ORDER.get(form), elements, _metadata(lines), offset)
@@ -93,11 +94,11 @@ def _header(content: bytes) -> Header:
 
 def _metadata(lines: list[str]) -> dict[str, str]:
     comments = [line.split(maxsplit=2)[1:] for line in lines if line.split(maxsplit=1)[:1] == ["comment"]]
-    return {words[0]: words[1].strip() for words in comments if len(words) == 2 and words[0] in KNOWN_OF_A_MESH}
+    return {words[0]: words[1].strip() for words in comments if len(words) == 2 and words[0] in METADATA_KEYS}
 
 
 class _Binary:
-    """Reads element after element from the body of a binary file."""
+    """Reader of element after element from the body of a binary file."""
 
     def __init__(self, body: bytes, byte_order: str) -> None:
         self._body, self._order, self._at = body, byte_order, 0
@@ -127,7 +128,7 @@ class _Binary:
         return {name: polygons.polygons() for name, polygons in lists.items()}
 
     def _read_triangles(self, count: int, properties: list[Property]) -> Rows | None:
-        """Almost all files hold one list a face, of three vertices: those need no loop."""
+        """Read without a loop if each face is one list of three vertices, as in almost all files; None otherwise."""
         if len(properties) != 1:
             return None
         name, length, value = properties[0]
@@ -142,13 +143,13 @@ class _Binary:
         return {name: rows["items"]}
 
     def _read_list(self, count: int, length: str, value: str, polygons: PolygonList) -> None:
-        """One list a row: millions of them, so that a row must take no more than a microsecond."""
-        one, head, width = struct.Struct(self._order + CODES[length]), int(length[1]), int(value[1])
+        """Read one list per row; there are millions, so a row must take no more than a microsecond."""
+        length_of, head, width = struct.Struct(self._order + CODES[length]), int(length[1]), int(value[1])
         body, at = self._body, self._at
         for _ in range(count):
             if at + head > len(body):
                 raise self._end()
-            (items,) = one.unpack_from(body, at)
+            (items,) = length_of.unpack_from(body, at)
             at += head
             if items < 0 or at + items * width > len(body):
                 raise self._end()
@@ -175,7 +176,7 @@ class _Binary:
 
 
 class _Text:
-    """Reads element after element from the body of a text file, one row a line."""
+    """Reader of element after element from the body of a text file, one row per line."""
 
     def __init__(self, body: bytes) -> None:
         self._lines = lines_of(body)
@@ -217,7 +218,7 @@ def _lists_of(rows: Iterable[list[bytes]], properties: list[Property]) -> Rows:
 
 
 def _whole(value: float) -> int:
-    """The number of a vertex; ValueError where it is none."""
+    """The number of a vertex; raises ValueError if it is infinite or NaN."""
     try:
         return int(value)
     except OverflowError:

@@ -1,4 +1,4 @@
-"""Faces as files tell them."""
+"""Faces of files as polygons, and their triangles."""
 
 from array import array
 from collections.abc import Iterable
@@ -11,23 +11,23 @@ from schemas.base.limits import limit, refuse_beyond
 
 
 class Polygons(NamedTuple):
-    """Lists of vertices, one behind the other: a list for each of millions of faces would take ten times the memory."""
+    """Polygons in two arrays; a list for each of millions of faces would take ten times the memory."""
 
     lengths: NDArray[np.int64]
-    """(P,) how many vertices each has; fewer than three make no triangle."""
+    """(P,) number of vertices of each polygon; fewer than three make no triangle"""
     vertices: NDArray[np.int64]
-    """The vertices of the first, of the second, and so on."""
+    """The vertices of the first polygon, then of the second, and so on"""
 
 
 class PolygonList:
-    """Polygons that are read one by one; BeyondLimitError where they become too many."""
+    """Polygons that are read one by one; raises BeyondLimitError if there are too many."""
 
     def __init__(self) -> None:
         self._lengths, self._vertices = array("q"), array("q")
         self._most, self._most_corners = limit("mesh_rows"), limit("polygon_corners")
 
     def add(self, vertices: Iterable[int]) -> None:
-        """One more; ValueError of a number that no vertex can have."""
+        """Add a polygon; raises ValueError for a number that no vertex can have."""
         before = len(self._vertices)
         try:
             self._vertices.extend(vertices)
@@ -41,13 +41,15 @@ class PolygonList:
             refuse_beyond("mesh_rows", len(self._vertices), "mesh")
 
     def polygons(self) -> Polygons:
-        """Those that were added."""
+        """The polygons that were added."""
         return Polygons(np.array(self._lengths, np.int64), np.array(self._vertices, np.int64))
 
 
 def fans(polygons: Polygons) -> NDArray[np.int32]:
-    """(F, 3) the polygons cut into triangles, each into those that meet at its first corner.
+    """Returns (F, 3) the triangles of the polygons; those of one polygon meet at its first corner.
 
+    Examples
+    --------
     >>> fans(Polygons(np.array([4, 2, 3]), np.array([5, 6, 7, 8, 0, 1, 2, 3, 4]))).tolist()
     [[5, 6, 7], [5, 7, 8], [2, 3, 4]]
     """
@@ -58,7 +60,7 @@ def fans(polygons: Polygons) -> NDArray[np.int32]:
 
 
 def vertex_numbers(triangles: "NDArray[np.generic]") -> NDArray[np.int32]:
-    """(F, 3) triangles; a number that no vertex can have raises a ValueError."""
+    """Returns (F, 3) int32 triangles; raises ValueError for a number that no vertex can have."""
     limits = np.iinfo(np.int32)
     numbers = triangles.reshape(-1, 3)
     if numbers.size and not limits.min <= numbers.min() <= numbers.max() <= limits.max:  # NaN is not between them

@@ -1,4 +1,4 @@
-"""STL, binary; of text it is read too. It holds triangles alone, and 80 letters to say more."""
+"""STL files, written as binary, read as binary or text. They hold triangles and a header of 80 characters."""
 
 import re
 from array import array
@@ -8,27 +8,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.mesh.formats.text import lines_of
-from footscan.mesh.mesh import KNOWN_OF_A_MESH, Mesh
+from footscan.mesh.mesh import METADATA_KEYS, Mesh
 from footscan.rows import distinct_rows
 
 START = 84
+"""Offset of the triangles: 80 bytes of header and 4 bytes of count."""
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def stl_of(mesh: Mesh) -> bytes:
-    """A binary STL file whose header tells unit, side, and what else of the metadata there is room for."""
+    """Encode a binary STL file whose header has unit, side, and as much of the metadata as there is room for."""
     return stl_bytes(mesh.vertices, mesh.faces, _header(mesh.metadata))
 
 
 def stl_bytes(vertices: NDArray[np.floating], faces: NDArray[np.integer], header: str) -> bytes:
-    """A binary STL file.
+    """Encode a binary STL file.
 
     Parameters
     ----------
     vertices : (V, 3) mm
     faces : (F, 3)
-    header : at most 80 ASCII characters, such as "footscan unit=mm side=right"; must not begin with "solid",
-        by which readers know an STL file of text
+    header : at most 80 ASCII characters, such as "footscan unit=mm side=right"; must not begin with "solid", by which
+        readers recognise an STL file of text
+
+    Raises
+    ------
+    ValueError
+        The header is too long or begins with "solid".
     """
     encoded = header.encode("ascii", "replace")
     if encoded.lower().startswith(b"solid") or len(encoded) > 80:
@@ -43,7 +49,7 @@ def stl_bytes(vertices: NDArray[np.floating], faces: NDArray[np.integer], header
 
 
 def parse_stl(content: bytes) -> Mesh:
-    """Binary or text STL; equal vertices are merged."""
+    """Read a binary or text STL file and merge equal vertices; raises ValueError if the file breaks the format."""
     count = int.from_bytes(content[80:START], "little") if len(content) >= START else -1
     metadata: dict[str, str] = {}
     if len(content) == START + count * TRIANGLE.itemsize:
@@ -61,7 +67,7 @@ def parse_stl(content: bytes) -> Mesh:
 
 
 def _corners(content: bytes) -> NDArray[np.float64]:
-    """(3 F, 3) the vertices of a text."""
+    """Returns (3 F, 3) the vertices of a text file."""
     numbers, last = array("d"), b""
     for line in lines_of(content):
         words = line.split()
@@ -89,4 +95,4 @@ def _header(metadata: Mapping[str, str]) -> str:
 def _metadata(header: bytes) -> dict[str, str]:
     words = header.rstrip(b"\0").decode("ascii", "replace").split()
     pairs = [word.partition("=") for word in words]
-    return {key: value for key, _, value in pairs if key in KNOWN_OF_A_MESH and value}
+    return {key: value for key, _, value in pairs if key in METADATA_KEYS and value}

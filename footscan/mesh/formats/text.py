@@ -1,4 +1,4 @@
-"""Numbers and words for formats of text."""
+"""Numbers, metadata and lines of text formats."""
 
 import io
 from collections.abc import Iterator, Mapping
@@ -11,19 +11,19 @@ from schemas.base.limits import refuse_beyond
 
 
 def coordinates(values: NDArray[np.floating]) -> list[list[str]]:
-    """(N, K) numbers with as many digits as single precision needs: no format then differs from another."""
+    """Returns (N, K) numbers as text with the digits of single precision, so that all formats agree."""
     single = np.asarray(values, np.float32) + np.float32(0)  # -0 is 0
     words: list[list[str]] = single.astype("U16").tolist()
     return words
 
 
-def described(metadata: Mapping[str, str]) -> list[str]:
-    """Lines for persons and for `known`: "unit mm" first, and "side right"."""
+def metadata_lines(metadata: Mapping[str, str]) -> list[str]:
+    """Returns a line for each entry, such as "side right", after "unit mm"."""
     return [f"{key} {one_line(value)}" for key, value in {"unit": "mm", **metadata}.items()]
 
 
 def lines_of(content: bytes) -> Iterator[bytes]:
-    """The lines of a text, whichever line ends it has; BeyondLimitError of too many."""
+    """Returns the lines of a text with any kind of line ends; raises BeyondLimitError if there are too many."""
     if b"\r" in content:
         content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     refuse_beyond("mesh_rows", content.count(b"\n"), "mesh")

@@ -1,6 +1,6 @@
-"""3MF: a model in XML within a zip file, which states its unit.
+"""3MF files: a model in XML within a zip file, which states its unit.
 
-3MF Consortium, "3D Manufacturing Format, Core Specification" 1.3; of colours its "Materials and Properties Extension"
+3MF Consortium, "3D Manufacturing Format, Core Specification" 1.3; for colours, "Materials and Properties Extension"
 1.2.
 """
 
@@ -34,11 +34,11 @@ RELATIONS = f"""\
 
 
 def threemf_of(mesh: Mesh) -> bytes:
-    """A 3MF file in mm, with colours where there are any; the same bytes for the same mesh."""
+    """Encode a 3MF file in mm, with colours if there are any; the same mesh gives the same bytes."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as package:
         for name, text in (("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", RELATIONS), (MODEL, _model(mesh))):
-            part = zipfile.ZipInfo(name)  # of 1980, whenever it was written
+            part = zipfile.ZipInfo(name)  # dated 1980 always
             part.create_system, part.compress_type = 0, zipfile.ZIP_DEFLATED
             package.writestr(part, text)
     return stream.getvalue()
@@ -67,21 +67,21 @@ def _model(mesh: Mesh) -> str:
 
 
 def _metadata(mesh: Mesh) -> str:
-    """The names that the specification knows, and ours for the rest."""
-    known = {"Title": " ".join(mesh.metadata.get(key, "") for key in ("patient", "scan", "side")).strip() or "foot"}
+    """Metadata under the names of the specification, and under names of footscan."""
+    standard = {"Title": " ".join(mesh.metadata.get(key, "") for key in ("patient", "scan", "side")).strip() or "foot"}
     if "software" in mesh.metadata:
-        known["Application"] = mesh.metadata["software"]
+        standard["Application"] = mesh.metadata["software"]
     own = {f"footscan:{key}": value for key, value in mesh.metadata.items()}
     return "".join(
         f"<metadata name={quoteattr(name)}>{escape(one_line(value))}</metadata>\n"
-        for name, value in (known | own).items()
+        for name, value in (standard | own).items()
     )
 
 
 def _colour_group(
     colours: "np.ndarray[tuple[int, ...], np.dtype[np.uint8]]",
 ) -> tuple[str, "np.ndarray[tuple[int, ...], np.dtype[np.int64]]"]:
-    """Each colour once, and which of them each vertex has."""
+    """Returns the XML of the distinct colours, and (V,) the number of each vertex's colour."""
     codes, of_vertex = np.unique(colours.astype(np.int64) @ [65536, 256, 1], return_inverse=True)
     entries = "\n".join(f'<m:color color="#{code:06X}"/>' for code in codes.tolist())
     return f'<m:colorgroup id="2">\n{entries}\n</m:colorgroup>\n', of_vertex

@@ -1,14 +1,14 @@
-"""VRML 2 (ISO/IEC 14772-1), text. The norm counts in metres, but CAD programs take the numbers as mm, and so do we."""
+"""VRML 2 files (ISO/IEC 14772-1). The standard counts in metres, but CAD programs read mm, and mm are written."""
 
 import numpy as np
 
-from footscan.mesh.formats.text import coordinates, described
+from footscan.mesh.formats.text import coordinates, metadata_lines
 from footscan.mesh.mesh import Mesh
 
 
 def vrml_of(mesh: Mesh) -> bytes:
-    """A VRML 2 file in mm, Z up, with colours and normals where there are any."""
-    told = ", ".join(_quoted(line) for line in described(mesh.metadata))
+    """Encode a VRML 2 file in mm, Z up, with colours and normals if there are any."""
+    info = ", ".join(_quoted(line) for line in metadata_lines(mesh.metadata))
     of_vertices = ""
     if mesh.normals is not None:
         of_vertices += f"normal Normal {{ vector [\n{_rows(mesh.normals)}\n] }}\nnormalPerVertex TRUE\n"
@@ -17,7 +17,7 @@ def vrml_of(mesh: Mesh) -> bytes:
     triangles = ",\n".join(f"{a},{b},{c},-1" for a, b, c in mesh.faces.tolist())
     return (
         "#VRML V2.0 utf8\n"
-        f'WorldInfo {{ title "foot" info [ {told} ] }}\n'
+        f'WorldInfo {{ title "foot" info [ {info} ] }}\n'
         "Shape {\nappearance Appearance { material Material { diffuseColor 0.8 0.8 0.8 } }\n"
         "geometry IndexedFaceSet {\nccw TRUE\nsolid FALSE\n"
         f"coord Coordinate {{ point [\n{_rows(mesh.vertices)}\n] }}\n{of_vertices}"

@@ -1,4 +1,4 @@
-"""The page of an archive: a row a scan, both feet of a patient beside each other, to be filtered and sorted."""
+"""The page of an archive: a table of its scans with filters and sorting; both feet of a patient stand side by side."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -7,17 +7,17 @@ from typing import NamedTuple
 from footscan.report.archive.script import SCRIPT
 from footscan.report.markup import number, text
 from footscan.report.page import page
-from footscan.report.quality_lights import LEVELS, Light, worst
+from footscan.report.quality_lights import LEVELS, TrafficLight, worst
 from footscan.report.thumbnail import HEIGHT_PX, WIDTH_PX
 
 SIDES = ("left", "right", "unknown")
-"""In which order the feet of one day stand."""
+"""Order of the feet of one day."""
 STATUS = {"done": "ok", "finding": "uncertain"}
-"""How a status looks; any other is a failure."""
+"""CSS class of a status; any other status is a failure."""
 
 
 class ScanRow(NamedTuple):
-    """What an archive's page tells of one scan; any text is safe."""
+    """One scan on the page of an archive; any text is safe."""
 
     patient: str
     scan: str
@@ -26,47 +26,47 @@ class ScanRow(NamedTuple):
     problem: str | None = None
     side: str = "unknown"
     date: str = ""
-    """YYYY-MM-DD, where it is known."""
+    """YYYY-MM-DD; empty if unknown."""
     length_mm: float | None = None
     size: str | None = None
-    """EU."""
-    lights: Sequence[Light] = ()
+    """EU size."""
+    lights: Sequence[TrafficLight] = ()
     report: str | None = None
-    """Relative address of its page."""
+    """Relative address of its report."""
     picture: str | None = None
     """Relative address of its thumbnail."""
 
 
 def archive_page(rows: Sequence[ScanRow], mark: str) -> str:
-    """A page with relative links to the scans' own; their thumbnails are loaded as they come into view.
+    """A page with relative links to the reports of the scans; thumbnails are loaded when they come into view.
 
-    `mark` : one line of letters and digits that stands in the page, by which it is known whether it is up to date
+    `mark` : one line of letters and digits, kept in the page, that tells whether the page is up to date
     """
     patients: dict[str, list[ScanRow]] = defaultdict(list)
     for row in sorted(rows, key=_order):
         patients[row.patient].append(row)
     failed = sum(row.status not in STATUS for row in rows)
-    found = sum(row.status == "finding" for row in rows)
-    bodies = "\n".join(f"<tbody>{''.join(map(_row, of_one))}</tbody>" for of_one in patients.values())
+    with_finding = sum(row.status == "finding" for row in rows)
+    bodies = "\n".join(f"<tbody>{''.join(map(_row, scans))}</tbody>" for scans in patients.values())
     heads = "".join(
         f'<th scope="col"{" class=n" if name in _NUMERIC else ""}>'
         + (f'<button type="button" data-sort="{key}">{name}</button>' if key else name)
         + "</th>"
         for name, key in _HEADINGS.items()
     )
-    tiles = {"Scans": len(rows), "Patients": len(patients), "With a finding": found, "Failed": failed}
-    told = "".join(f"<div><span>{name}</span><b>{number(count)}</b></div>" for name, count in tiles.items())
+    tiles = {"Scans": len(rows), "Patients": len(patients), "With a finding": with_finding, "Failed": failed}
+    boxes = "".join(f"<div><span>{name}</span><b>{number(count)}</b></div>" for name, count in tiles.items())
     return page(
         title="Archive of scans",
         kicker="Archive",
         heading=f"{number(len(rows))} scan{'s' * (len(rows) != 1)}",
         parts=[
-            f'<!-- {mark} --><div class="tiles">{told}</div>',
+            f'<!-- {mark} --><div class="tiles">{boxes}</div>',
             f'<section>{_FILTERS}<table id="scans"><thead><tr>{heads}</tr></thead>\n{bodies}</table></section>',
         ],
         scripts=[SCRIPT],
         style=_STYLE,
-        pictures="'self' file:",  # of a page in a folder, `self` is not enough for every browser
+        pictures="'self' file:",  # for a page opened from a folder, some browsers do not accept `self`
     )
 
 
@@ -105,9 +105,9 @@ def _row(row: ScanRow) -> str:
     )
 
 
-def _light(light: Light) -> str:
-    told = text(f"{light.name}: {light.level}, {light.why}")
-    return f'<span class="light {light.level}" title="{told}">{text(light.name)}</span>'
+def _light(light: TrafficLight) -> str:
+    title = text(f"{light.name}: {light.level}, {light.why}")
+    return f'<span class="light {light.level}" title="{title}">{text(light.name)}</span>'
 
 
 _HEADINGS = {

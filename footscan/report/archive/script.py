@@ -1,4 +1,4 @@
-"""What filters and sorts the table of an archive: plain JavaScript, no library."""
+"""The script that filters and sorts the table of an archive: plain JavaScript, without library."""
 
 SCRIPT = """\
 (() => {

@@ -1,4 +1,4 @@
-"""What a refused capture of the reference object shows."""
+"""A figure of a refused capture of the reference object."""
 
 from collections.abc import Sequence
 
@@ -12,8 +12,11 @@ STRIPE, EXPECTED, FOUND = "#00d0ff", "#ffd000", "#ff3bd4"
 
 
 def capture_figure(reason: str, shown: Sequence[tuple[Evidence, NDArray[np.uint8] | None]]) -> bytes:
-    """A PNG with one panel for each piece of evidence: the frame (rows, columns, 3), where it can be decoded, the
-    stripe that was found in it, and the outline of the object where it should stand and where it stood."""
+    """Draw a panel for each piece of evidence, as PNG.
+
+    A panel shows the frame (rows, columns, 3), its stripe, and the outline of the object where it was expected and
+    where it stood. The frame is None if it cannot be decoded.
+    """
     from matplotlib.lines import Line2D
 
     figure, places = panels(len(shown), 0.9)

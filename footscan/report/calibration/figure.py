@@ -1,4 +1,4 @@
-"""What a calibration knows, camera by camera: where it is supported, how sure it is there, and what the fit left."""
+"""A figure of a calibration: supported region, uncertainty and residuals of each camera."""
 
 from typing import TYPE_CHECKING
 
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from footscan.calibration.models.maps import IMAGE_PX, model_of
 from footscan.report.calibration.facts import (
     LONG_PX,
+    SHARE,
     arrow_unit_mm,
     arrows_of,
     deviation_of,
@@ -25,21 +26,23 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 MOST_CAMERAS = 64
-"""More are not drawn."""
+"""Further cameras are not drawn, to bound the size of the picture."""
 RESIDUAL, SUPPORT = "#b3202c", "#b9d4e8"
 
 
 def calibration_figure(calibration: Calibration) -> bytes:
-    """A PNG: for each camera its image with the region that data support, coloured by the standard deviation of the
-    map there, and the residuals as arrows; one scale of colours and one of arrows for all."""
+    """Draw the image of each camera, as PNG: the region that data support, and the residuals as arrows.
+
+    The region is coloured by the standard deviation of the map. All cameras share one scale of colours and of arrows.
+    """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     cameras = calibration.cameras[:MOST_CAMERAS]
     sigmas = {camera.camera: deviation_of(camera) for camera in cameras}
-    known = [sigma[np.isfinite(sigma)] for sigma in sigmas.values() if sigma is not None]
-    all_sigmas = np.concatenate([np.empty(0), *known])
-    colours = Normalize(0.0, round_up(float(np.quantile(all_sigmas, 0.95))) if all_sigmas.size else 1.0)
+    finite = [sigma[np.isfinite(sigma)] for sigma in sigmas.values() if sigma is not None]
+    all_sigmas = np.concatenate([np.empty(0), *finite])
+    colours = Normalize(0.0, round_up(float(np.quantile(all_sigmas, SHARE))) if all_sigmas.size else 1.0)
     unit_mm = arrow_unit_mm(cameras)
 
     figure, places = panels(len(cameras), 0.5)

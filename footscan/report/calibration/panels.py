@@ -1,4 +1,4 @@
-"""A calibration on a page: the image of each camera with what its map is worth there. Drawn as SVG, in milliseconds."""
+"""Panels of a calibration on a page: uncertainty and residuals of each camera. Drawn as SVG, in milliseconds."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from footscan.calibration.models.maps import IMAGE_PX
 from footscan.report.calibration.facts import (
     LONG_PX,
+    SHARE,
     arrow_unit_mm,
     arrows_of,
     deviation_of,
@@ -20,24 +21,23 @@ from schemas.calibration import Calibration, CameraCalibration
 Floats = NDArray[np.float64]
 
 MOST_CAMERAS = 64
-"""More are not drawn."""
+"""Further cameras are not drawn, to bound the size of the page."""
 GRID_PX = 10
-"""Spacing of the places at which the map's uncertainty is drawn."""
+"""Spacing of the pixels at which the uncertainty of the map is drawn."""
 STOPS = np.array([[255, 255, 217], [65, 182, 196], [8, 29, 88]], np.float64)
-"""Ends and middle of YlGnBu (Brewer, ColorBrewer 2.0), light where the map is sure."""
+"""Ends and middle of YlGnBu (Brewer, ColorBrewer 2.0); light colours mean a low uncertainty."""
 
 
 def calibration_panels(calibration: Calibration) -> str:
-    """A panel a camera: the region that data support, coloured by the standard deviation of the map, and the residuals
-    as arrows; one scale of colours and one of arrows for all."""
+    """Draw a panel for each camera, as SVG; content as in `footscan.report.calibration.figure.calibration_figure`."""
     cameras = calibration.cameras[:MOST_CAMERAS]
     deviations = [deviation_of(camera, GRID_PX) for camera in cameras]
-    known = [sigma[np.isfinite(sigma)] for sigma in deviations if sigma is not None]
-    every = np.concatenate([np.empty(0), *known])
-    most = round_up(float(np.quantile(every, 0.95))) if every.size else 1.0
+    finite = [sigma[np.isfinite(sigma)] for sigma in deviations if sigma is not None]
+    all_sigmas = np.concatenate([np.empty(0), *finite])
+    most = round_up(float(np.quantile(all_sigmas, SHARE))) if all_sigmas.size else 1.0
     unit_mm = arrow_unit_mm(cameras)
     figures = [_figure(camera, sigma, most, unit_mm) for camera, sigma in zip(cameras, deviations, strict=True)]
-    scale = [(f"{share * most:g} mm", _rgb(share)) for share in (0.0, 0.5, 1.0)] if every.size else []
+    scale = [(f"{share * most:g} mm", _rgb(share)) for share in (0.0, 0.5, 1.0)] if all_sigmas.size else []
     return (
         f'<p class="note">Arrows: what the fit left, {LONG_PX:.0f} px long for {unit_mm:g} mm. Coloured: the region '
         "that data support, by the standard deviation of the map there.</p>"
@@ -70,11 +70,11 @@ def _figure(camera: CameraCalibration, sigma: Floats | None, most: float, unit_m
 
 
 def _picture(sigma: Floats, most: float) -> str:
-    """Colours of standard deviations, clear where there is none, as the address of a PNG."""
-    known = np.isfinite(sigma)
-    share = np.where(known, sigma, 0.0) / most
+    """Colours of (rows, columns) standard deviations as the data URI of a PNG; NaN is transparent."""
+    finite = np.isfinite(sigma)
+    share = np.where(finite, sigma, 0.0) / most
     channels = [np.interp(share, (0.0, 0.5, 1.0), STOPS[:, channel]) for channel in range(3)]
-    pixels = np.dstack([np.rint(channel).astype(np.uint8) for channel in channels] + [np.uint8(255) * known])
+    pixels = np.dstack([np.rint(channel).astype(np.uint8) for channel in channels] + [np.uint8(255) * finite])
     return data_uri("image/png", png_bytes(pixels))
 
 

@@ -1,1 +1,1 @@
-"""The page that holds a shape beside a reference."""
+"""The page that compares a shape with a reference."""

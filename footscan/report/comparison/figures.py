@@ -22,25 +22,25 @@ _FIGURES = {
 }
 _OF_REGIONS = ("mean", "std", "rms", "p50", "p95", "max", "signed_mean")
 _WIDTH, _HEIGHT, _LEFT, _BELOW = 600, 150, 34, 26
-"""Of the drawn classes, in units of the drawing."""
+"""Size and margins of the drawn histogram, in units of the drawing."""
 
 
 def figures_facts(figures: Figures) -> str:
-    """Name and value of every figure that is known."""
-    known = [(title, getattr(figures, name)) for name, title in _FIGURES.items()]
-    pairs = [(title, f"{number(value, 3)} mm") for title, value in known if value is not None]
+    """Name and value of each known figure."""
+    values = [(title, getattr(figures, name)) for name, title in _FIGURES.items()]
+    pairs = [(title, f"{number(value, 3)} mm") for title, value in values if value is not None]
     return facts(pairs if figures.points is None else [("Points", number(figures.points)), *pairs])
 
 
 def moved_note(transform: Sequence[Sequence[float]] | None, unmoved: str) -> str:
-    """How the surface was moved before the distances were taken; `unmoved` where it was not."""
+    """A note on the matrix that moved the surface before the comparison; `unmoved` without a matrix."""
     rows = "; ".join(", ".join(number(value, 4) for value in line) for line in transform or [])
-    said = f"The surface was moved beforehand, by the matrix {rows}." if transform else unmoved
-    return f'<p class="note">{text(said)}</p>'
+    sentence = f"The surface was moved beforehand, by the matrix {rows}." if transform else unmoved
+    return f'<p class="note">{text(sentence)}</p>'
 
 
 def regions_table(regions: Sequence[RegionFigures]) -> str:
-    """A row for each region of the foot; nothing where there is none."""
+    """A row for each region of the foot; empty without regions."""
     if not regions:
         return ""
     headings = ["Region", "Points", *(f"{_FIGURES[name]}, mm" for name in _OF_REGIONS)]
@@ -56,7 +56,7 @@ def regions_table(regions: Sequence[RegionFigures]) -> str:
 
 
 def histogram_plot(histogram: Histogram) -> str:
-    """The classes as bars over their distances in mm, and as a table that opens on demand."""
+    """Draw the classes as bars over their distances in mm, with a table that opens on demand."""
     edges, most = histogram.edges_mm, max(histogram.shares)
     across, up = (_WIDTH - _LEFT) / (edges[-1] - edges[0]), (_HEIGHT - _BELOW) / most
     bars = "".join(

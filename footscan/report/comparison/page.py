@@ -1,4 +1,4 @@
-"""The page of one comparison: how far one shape lies from another, and where."""
+"""The page of one comparison: the distances from one shape to another."""
 
 from footscan.report.colours import colour_bar, colour_limit
 from footscan.report.comparison.figures import figures_facts, histogram_plot, moved_note, regions_table
@@ -15,19 +15,19 @@ from schemas.quality import Comparison, Completeness
 def comparison_page(
     first: str, second: str, comparison: Comparison, deviation: Deviation, registration: Registration | None
 ) -> str:
-    """A self-contained HTML page, the same for the same input.
+    """Return a self-contained HTML page; the same input gives the same page.
 
     Parameters
     ----------
     first, second : names of the two shapes; any text is safe
     comparison : of the first to the second
     deviation : of each vertex of the first
-    registration : what brought the first onto the second beforehand, if anything did
+    registration : the registration of the first to the second before the comparison, if any
 
     Raises
     ------
     RefusedInput
-        The first is too small or too large for a picture in mm.
+        The first shape is too small or too large for a picture in mm.
     """
     vertices, faces, colours = drawn(deviation)
     is_mesh = len(deviation.faces) > 0
@@ -59,25 +59,26 @@ def comparison_page(
     )
 
 
-def _registration(found: Registration) -> str:
+def _registration(registration: Registration) -> str:
     names = {"rms": "RMS", "mean": "Mean", "median": "50 %"}
     rows = [
         [moment, *(number(getattr(residuals, name), 3) for name in names), number(100 * residuals.inliers, 1)]
-        for moment, residuals in (("Before", found.before), ("After", found.after))
+        for moment, residuals in (("Before", registration.before), ("After", registration.after))
     ]
     headings = ["Residuals", *(f"{name}, mm" for name in names.values()), "Inliers, %"]
-    said = f"{found.agreeing} of {found.starts} starts were followed to this pose; verdict: {found.verdict}."
-    return section("Registration", table(headings, rows, numeric=range(1, 5)), f'<p class="note">{text(said)}</p>')
+    agreeing, starts, verdict = registration.agreeing, registration.starts, registration.verdict
+    sentence = f"{agreeing} of {starts} starts were followed to this pose; verdict: {verdict}."
+    return section("Registration", table(headings, rows, numeric=range(1, 5)), f'<p class="note">{text(sentence)}</p>')
 
 
-def _completeness(found: Completeness) -> str:
-    share = f"{number(100 * found.within_share, 1)} %"
+def _completeness(completeness: Completeness) -> str:
+    share = f"{number(100 * completeness.within_share, 1)} %"
     return section(
         "Completeness",
         '<p class="note">The other way: distances of the second shape to the first.</p>',
-        facts([(f"Within {number(found.within_mm, 1)} mm", share)]),
-        figures_facts(found),
-        regions_table(found.regions),
+        facts([(f"Within {number(completeness.within_mm, 1)} mm", share)]),
+        figures_facts(completeness),
+        regions_table(completeness.regions),
     )
 
 

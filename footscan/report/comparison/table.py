@@ -1,4 +1,4 @@
-"""A comparison as CSV, for a spreadsheet."""
+"""CSV of a comparison, for a spreadsheet."""
 
 from collections.abc import Iterator
 
@@ -9,10 +9,10 @@ FIGURES = tuple(Figures.model_fields)
 
 
 def comparison_csv(comparison: Comparison) -> str:
-    """One row for the whole, one for each region and one for each class.
+    """Write one row for the whole shape, one for each region and one for each class.
 
-    The column `table` tells them apart: `whole`, `region`, `completeness` (the other way; its first row is the whole),
-    `unsigned` and `signed` (classes). Lengths are mm; what a row does not have is empty.
+    The column `table` tells them apart: `whole`, `region`, `completeness` (the reverse comparison; its first row is the
+    whole shape), `unsigned` and `signed` (classes). Lengths are mm; values that a row does not have are empty.
     """
     return csv_text(_rows(comparison))
 
@@ -21,9 +21,9 @@ def _rows(comparison: Comparison) -> Iterator[list[Cell]]:
     yield ["table", "name", "from_mm", "to_mm", "share", *FIGURES]
     yield ["whole", *_EMPTY[:4], *_cells(comparison)]
     yield from (["region", region.region, *_EMPTY[:3], *_cells(region)] for region in comparison.regions)
-    if (found := comparison.completeness) is not None:
-        yield ["completeness", "", 0, found.within_mm, found.within_share, *_cells(found)]
-        yield from (["completeness", region.region, *_EMPTY[:3], *_cells(region)] for region in found.regions)
+    if (completeness := comparison.completeness) is not None:
+        yield ["completeness", "", 0, completeness.within_mm, completeness.within_share, *_cells(completeness)]
+        yield from (["completeness", region.region, *_EMPTY[:3], *_cells(region)] for region in completeness.regions)
     for histogram in comparison.histograms:
         yield from _classes(histogram)
 

@@ -1,4 +1,4 @@
-"""How the stripe covers the foot over the travel: points of every frame, camera by camera."""
+"""Coverage of the foot by the stripe along the travel: points per frame, camera by camera."""
 
 import itertools
 from collections.abc import Sequence
@@ -10,12 +10,13 @@ from footscan.report.markup import number
 from schemas.quality import CameraQuality
 
 _MOST_TICKS = 8
+"""Numbers below the plot; chosen by hand."""
 
 
 def coverage_plot(cloud: NDArray[np.void], cameras: Sequence[CameraQuality]) -> str:
-    """A strip of each camera: points that each of its frames gave to the cloud, all to one scale.
+    """Draw a strip for each camera, as SVG: cloud points per frame, all cameras to one scale.
 
-    `cloud` is an array of `footscan.cloud.points.POINT_DTYPE`.
+    `cloud` : (N,) of `footscan.cloud.points.POINT_DTYPE`
     """
     frames = max((camera.frames for camera in cameras), default=0)
     if not frames:
@@ -24,21 +25,25 @@ def coverage_plot(cloud: NDArray[np.void], cameras: Sequence[CameraQuality]) -> 
     most = max(1, *(int(count.max()) for count in counts))
     strips = "\n".join(_strip(camera, count, most) for camera, count in zip(cameras, counts, strict=True))
     last = max(1, frames - 1)
-    figures = "".join(f'<span style="left:{100 * tick / last:.2f}%">{tick}</span>' for tick in ticks(frames))
+    labels = "".join(f'<span style="left:{100 * tick / last:.2f}%">{tick}</span>' for tick in ticks(frames))
     return (
-        f'<div class="coverage">\n{strips}\n<span></span><div class="ticks">{figures}</div><span></span>'
+        f'<div class="coverage">\n{strips}\n<span></span><div class="ticks">{labels}</div><span></span>'
         '<span></span><div class="axis">frame</div><span></span></div>'
     )
 
 
 def points_per_frame(cloud: NDArray[np.void], camera: int, frames: int) -> NDArray[np.int64]:
-    """(frames,) how many points of `cloud` came from each frame of `camera`; later frames are left out."""
+    """Count the points of `cloud` from each frame of `camera`, (frames,); points of later frames are left out."""
     frame = cloud["frame"][cloud["camera"] == camera]
     return np.bincount(frame[(frame >= 0) & (frame < frames)], minlength=frames)
 
 
 def ticks(frames: int) -> range:
-    """Frames that carry a figure: multiples of 1, 2 or 5 times a power of ten, at most `_MOST_TICKS` of them."""
+    """Frames with a label: multiples of 1, 2 or 5 times a power of ten, at most `_MOST_TICKS` of them.
+
+    >>> list(ticks(30))
+    [0, 5, 10, 15, 20, 25]
+    """
     steps = (factor * 10**power for power in itertools.count() for factor in (1, 2, 5))
     return range(0, frames, next(step for step in steps if -(-frames // step) <= _MOST_TICKS))
 

@@ -1,4 +1,6 @@
-"""What a person may see of a foot in colour: what was measured, by which camera, how surely, and how well."""
+"""Colourings of a foot: measured and filled parts, cameras, uncertainty, distance to a reference."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,55 +19,73 @@ CAMERAS = (
     (230, 159, 0), (86, 180, 233), (0, 158, 115), (240, 228, 66),
     (0, 114, 178), (213, 94, 0), (204, 121, 167), (120, 120, 120),
 )  # fmt: skip
-"""Told apart by colour-blind eyes, too: Okabe and Ito, "Color universal design", 2008; the ninth is as the first."""
+"""RGB of cameras 1 to 8, distinct for colour-blind readers (Okabe and Ito, "Color universal design", 2008).
+
+Camera 9 has the colour of camera 1 again."""
 SURE, UNSURE = np.array([253, 231, 37], np.float64), np.array([68, 1, 84], np.float64)
+"""RGB of a certain and of an uncertain point."""
 _MIDDLE = np.array([33, 145, 140], np.float64)
-"""Between them: three colours of viridis (Smith and van der Walt, 2015), lightness even."""
+"""Middle of the ramp from `SURE` to `UNSURE`; the three are colours of viridis (Smith and van der Walt, 2015)."""
 _SHARE = 0.98
-"""Of the surface, what is no less sure than the end of the scale."""
+"""Quantile of the uncertainty at which its colour scale ends; chosen by hand."""
+_LEAST_SIGMA_MM = 1e-3
+"""Shortest colour scale of the uncertainty, so that it never divides by zero."""
 
 
-def foot_colourings(
-    vertices: Floats,
-    filled: NDArray[np.bool_] | None,
-    cut_mm: float | None,
-    mesh: MeshQuality,
-    cloud: NDArray[np.void],
-    truth_distance: NDArray[np.floating] | None,
-) -> list[Colouring]:
-    """In which colours a foot is shown; parameters are those of `footscan.report.scan.page.scan_page`."""
-    plain = Colouring("Measured and filled", filled_colours(vertices, filled, cut_mm), filled_key(mesh))
-    shown = [plain]
-    if truth_distance is not None:
-        limit = colour_limit(truth_distance)
-        colours = distance_colours(truth_distance, limit)
-        shown.insert(0, Colouring("Distance to reference", colours, colour_bar(limit)))
+class FootSurface(NamedTuple):
+    """The surface of a foot, and what is known of each vertex."""
+
+    vertices: Floats
+    """(V, 3) mm, scanner frame, V > 0."""
+    faces: NDArray[np.integer]
+    """(F, 3), counter-clockwise as seen from outside."""
+    filled: NDArray[np.bool_] | None
+    """(V,) True where the surface was not measured; None if unknown."""
+    cut_mm: float | None
+    """Z of the flat cut above the ankle; None without a cut."""
+    truth_distance: NDArray[np.floating] | None
+    """(V,) mm, signed, positive outside the reference model; None without a reference model."""
+
+
+def foot_colourings(surface: FootSurface, mesh: MeshQuality, cloud: NDArray[np.void]) -> list[Colouring]:
+    """Colour the vertices of a foot in every way that its data allow; the first is shown first.
+
+    `cloud` : (N,) of `footscan.cloud.points.POINT_DTYPE`, mm, scanner frame, from which the surface was made
+    """
+    filled = surface.filled
+    plain = filled_colours(surface.vertices, filled, surface.cut_mm)
+    colourings = [Colouring("Measured and filled", plain, filled_key(mesh))]
+    if surface.truth_distance is not None:
+        limit = colour_limit(surface.truth_distance)
+        colours = distance_colours(surface.truth_distance, limit)
+        colourings.insert(0, Colouring("Distance to reference", colours, colour_bar(limit)))
     if len(cloud):
-        nearest = cloud[KDTree(coordinates(cloud)).query(vertices)[1]]
-        shown += [_by_camera(nearest, filled), _by_uncertainty(nearest, filled)]
-    return shown
+        nearest = cloud[KDTree(coordinates(cloud)).query(surface.vertices)[1]]
+        colourings += [_by_camera(nearest, filled), _by_uncertainty(nearest, filled)]
+    return colourings
 
 
 def _by_camera(nearest: NDArray[np.void], filled: NDArray[np.bool_] | None) -> Colouring:
-    """The camera of the measured point that is nearest to each vertex."""
+    """Colour each vertex by the camera of the nearest measured point."""
     palette = np.array(CAMERAS, np.uint8)
     colours = palette[(nearest["camera"].astype(int) - 1) % len(CAMERAS)]
-    seen = np.unique(nearest["camera"] if filled is None else nearest["camera"][~filled]).tolist()
-    meanings = [(f"Camera {camera}", CAMERAS[(camera - 1) % len(CAMERAS)]) for camera in seen]
+    camera_ids = np.unique(nearest["camera"] if filled is None else nearest["camera"][~filled]).tolist()
+    meanings = [(f"Camera {camera}", CAMERAS[(camera - 1) % len(CAMERAS)]) for camera in camera_ids]
     return Colouring("Camera", _with_filled(colours, filled), key([*meanings, *_filled_meaning(filled)]))
 
 
 def _by_uncertainty(nearest: NDArray[np.void], filled: NDArray[np.bool_] | None) -> Colouring:
-    """The standard deviation to be expected of the measured point that is nearest to each vertex."""
+    """Colour each vertex by the expected standard deviation of the nearest measured point."""
     sigma = nearest["sigma"].astype(np.float64)
-    most = max(float(np.quantile(sigma, _SHARE)), 1e-3)
-    steps = key([(f"{number(share * most, 3)} mm", _rgb(share)) for share in (0.0, 0.5, 1.0)] + _filled_meaning(filled))
+    limit = max(float(np.quantile(sigma, _SHARE)), _LEAST_SIGMA_MM)
+    meanings = [(f"{number(share * limit, 3)} mm", _rgb(share)) for share in (0.0, 0.5, 1.0)]
+    legend = key(meanings + _filled_meaning(filled))
     note = '<p class="note">Standard deviation to be expected of a point’s place, along the normal of the skin.</p>'
-    return Colouring("Uncertainty", _with_filled(_ramp(sigma / most), filled), steps + note)
+    return Colouring("Uncertainty", _with_filled(_ramp(sigma / limit), filled), legend + note)
 
 
 def _ramp(share: Floats) -> NDArray[np.uint8]:
-    """(N, 3) colours of (N,) values from 0, sure, to 1, unsure."""
+    """RGB, (N, 3), of (N,) values from 0 (sure) to 1 (unsure)."""
     stops = np.array([SURE, _MIDDLE, UNSURE])
     channels = [np.interp(share, (0.0, 0.5, 1.0), stops[:, channel]) for channel in range(3)]
     colours: NDArray[np.uint8] = np.rint(np.column_stack(channels)).astype(np.uint8)

@@ -1,11 +1,11 @@
-"""How far apart the cameras place the same skin, and how they were moved, as tables."""
+"""Tables of the fusion: disagreement of the cameras on the same skin, and the corrections that moved them."""
 
 from footscan.report.markup import number, table, text, words
 from schemas.fusion import CameraCorrection, FusionReport
 
 
 def disagreement_table(report: FusionReport) -> str:
-    """A row for each two cameras that see the same skin, before and after the corrections."""
+    """A row for each pair of cameras that see the same skin, before and after the corrections."""
     if not report.pairs:
         return '<p class="note">No two cameras see the same skin.</p>'
     headings = ["Cameras", "Places", *(f"{name} {when}, mm" for name in _FIGURES for when in ("before", "after"))]
@@ -21,20 +21,20 @@ def disagreement_table(report: FusionReport) -> str:
 
 
 def corrections_table(report: FusionReport) -> str:
-    """A row for each camera: how it was moved, what that is worth, and how often others were believed instead."""
+    """A row for each camera: its correction, the held-out error, and how many of its points gave way to others."""
     if not report.corrections:
         return ""
     headings = ["Camera", "Correction", "Moves at most, mm", "Held out before, mm", "Held out after, mm", "Gave way"]
-    rows = [_correction(one, report.contradicted.get(one.camera, 0)) for one in report.corrections]
+    rows = [_row(correction, report.contradicted.get(correction.camera, 0)) for correction in report.corrections]
     return table(headings, rows, numeric=range(2, len(headings)), kind="dense")
 
 
 def warnings_list(report: FusionReport) -> str:
-    """What the fusion warns of."""
+    """The warnings of the fusion, a note each."""
     return "".join(f'<p class="note">{text(warning)}</p>' for warning in report.warnings)
 
 
-def _correction(correction: CameraCorrection, contradicted: int) -> list[str]:
+def _row(correction: CameraCorrection, contradicted: int) -> list[str]:
     held_out = (correction.held_out_before_mm, correction.held_out_after_mm)
     return [
         str(correction.camera),

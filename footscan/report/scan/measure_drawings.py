@@ -1,4 +1,4 @@
-"""Where on the foot a measure was taken: sections, spans and landmarks, to be drawn over its surface."""
+"""Places of the measures on the foot: sections, spans and landmarks, drawn over the surface."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ SPANS = {
     "medial_malleolus_height": ("medial_malleolus", -_Z),
     "lateral_malleolus_height": ("lateral_malleolus", -_Z),
 }
-"""Measures that run from a landmark in a direction of the foot's own frame, +Y medial, as far as their value."""
+"""Measures that extend by their value from a landmark in a direction of the foot's own frame, +Y medial."""
 ENDS = {
     "ball_length": ("metatarsale_tibiale",),
     "lateral_ball_length": ("metatarsale_fibulare",),
@@ -41,11 +41,11 @@ ENDS = {
     "long_heel_girth": ("instep_point",),
     "ball_girth": ("metatarsale_tibiale", "metatarsale_fibulare"),
 }
-"""Other landmarks that a measure rests on; two of them alone are joined by a line."""
+"""Further landmarks of a measure. If it has two and neither section nor span, a line joins them."""
 
 
 def measure_drawings(vertices: Floats, faces: NDArray[np.integer], measures: Measures) -> dict[str, Drawing]:
-    """Of each measure that has a place on the foot what is to be drawn, in the frame of `upright`, by its name.
+    """Drawings of the measures that have a place on the foot, by measure name, mm, in the frame of `upright`.
 
     Parameters
     ----------
@@ -65,8 +65,10 @@ def measure_drawings(vertices: Floats, faces: NDArray[np.integer], measures: Mea
 
 
 def girth_loops(vertices: Floats, faces: NDArray[np.integer], measures: Measures) -> dict[str, list[Floats]]:
-    """Of each girth the closed curve (N, 3) that it was taken around, the last point the first, in the frame of
-    `upright`; none where its plane has none. Parameters as in `measure_drawings`."""
+    """Closed curves of the girths, by measure name; a list is empty if the plane of the girth does not cut the mesh.
+
+    A curve is (N, 3) mm, in the frame of `upright`; its last point is its first. Parameters as in `measure_drawings`.
+    """
     planes = {name: measure for name, measure in measures.measures.items() if measure.plane is not None}
     if not planes:
         return {}
@@ -77,21 +79,21 @@ def girth_loops(vertices: Floats, faces: NDArray[np.integer], measures: Measures
 
 
 def landmark_place(measures: Measures, name: str) -> Floats:
-    """(3,) a landmark in the frame of `upright`."""
+    """Position of a landmark, (3,) mm, in the frame of `upright`."""
     place: Floats = upright(np.array([measures.landmarks[name].point]), measures.transform)[0]
     return place
 
 
 def _loops(mesh: Cuttable, measure: Measure) -> list[Floats]:
-    """The one curve of a girth's plane that has its length, closed; none where it has none."""
+    """The closed curve in the plane of a girth whose length is nearest to the girth; empty without a curve."""
     assert measure.plane is not None
     point, normal = (np.array(part) for part in measure.plane)
     loops = [np.vstack([loop.points, loop.points[:1]]) for loop in cut(mesh, point, normal)]
-    wanted = measure.surface_length
-    if wanted is None or not loops:
+    length_mm = measure.surface_length
+    if length_mm is None or not loops:
         return []
-    lengths = [float(np.linalg.norm(np.diff(loop, axis=0), axis=1).sum()) for loop in loops]
-    return [loops[int(np.argmin(np.abs(np.array(lengths) - wanted)))]]
+    loop_lengths = [float(np.linalg.norm(np.diff(loop, axis=0), axis=1).sum()) for loop in loops]
+    return [loops[int(np.argmin(np.abs(np.array(loop_lengths) - length_mm)))]]
 
 
 def _landmarks(name: str) -> tuple[str, ...]:
@@ -104,6 +106,6 @@ def _span(name: str, measure: Measure, measures: Measures) -> list[Floats]:
         return []
     mark, direction = SPANS[name]
     start = landmark_place(measures, mark)
-    is_mirrored = np.linalg.det(np.array(measures.transform)[:3, :3]) < 0  # which `upright` undoes
+    is_mirrored = np.linalg.det(np.array(measures.transform)[:3, :3]) < 0  # `upright` undoes the mirror
     way = direction * [1.0, -1.0 if is_mirrored else 1.0, 1.0] * measure.value
     return [np.array([start, start + way])]

@@ -1,4 +1,4 @@
-"""A foot with its landmarks, its axis and its girths, so that one sees at a glance whether a landmark is wrong."""
+"""A figure of a foot with its landmarks, axis and girths, in which a wrong landmark is seen at a glance."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
@@ -19,30 +19,31 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 VIEWS = 4
-"""Above, below, both sides."""
+"""The first four of `views_of`: above, below, both sides."""
 SKIN = (225, 221, 214)
 HIDDEN_MM = 4.0
-"""What lies so far behind the surface that is seen is on the other side of the foot."""
+"""A point that lies deeper behind the visible surface is on the far side of the foot; chosen by hand."""
 CELL_MM, SAMPLES = 3.0, 60_000
+"""Grid of the depth map, and points sampled on the surface for it: several in a cell."""
 LABEL_STEP_MM, LABEL_ROWS = 7.0, 4
-"""Labels keep this distance from each other."""
+"""Spacing of the rows of labels above and below the foot, and their number; chosen by hand."""
 METHODS = {"geometric": "o", "fallback": "s", "manual": "D"}
-"""How a landmark is marked, by how it was found."""
+"""Marker of a landmark by the method that located it."""
 
 
-class _Thing(NamedTuple):
-    """A foot in the frame of the pictures: its own, a left foot as a left one."""
+class _Foot(NamedTuple):
+    """A foot in the frame of the pictures, which is that of `upright`."""
 
     vertices: Floats
     faces: NDArray[np.integer]
     landmarks: Mapping[str, tuple[Floats, str]]
-    """(3,) place and method of each."""
+    """Position, (3,) mm, and method of each landmark."""
     girths: dict[str, list[Floats]]
-    """Closed curves (N, 3), the last point the first."""
+    """Closed curves of each girth, (N, 3) mm; the last point is the first."""
 
 
 def measure_figure(vertices: NDArray[np.floating], faces: NDArray[np.integer], measures: Measures) -> bytes:
-    """A PNG: the foot from above, below and both sides. What is on the far side is drawn pale.
+    """Draw a foot from above, below and both sides, as PNG; landmarks and curves on the far side are pale.
 
     Parameters
     ----------
@@ -60,21 +61,21 @@ def measure_figure(vertices: NDArray[np.floating], faces: NDArray[np.integer], m
         figure.axes[0].plot([], [], color=colour, label=_girth_label(name, measures.measures[name]))
     figure.axes[0].plot([], [], color=INK, linestyle="--", linewidth=1, label=f"axis ({measures.axis})")
     for method, marker in METHODS.items():
-        if any(found == method for _, found in foot.landmarks.values()):
+        if any(used == method for _, used in foot.landmarks.values()):
             figure.axes[0].plot([], [], marker, color=INK, markerfacecolor="white", label=f"landmark, {method}")
     figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=10)
     return png_of(figure)
 
 
-def _in_view(vertices: Floats, faces: NDArray[np.integer], measures: Measures) -> _Thing:
+def _in_view(vertices: Floats, faces: NDArray[np.integer], measures: Measures) -> _Foot:
     landmarks = {
         name: (landmark_place(measures, name), landmark.method) for name, landmark in measures.landmarks.items()
     }
     seen = upright(vertices, measures.transform)
-    return _Thing(seen, faces, landmarks, girth_loops(vertices, faces, measures))
+    return _Foot(seen, faces, landmarks, girth_loops(vertices, faces, measures))
 
 
-def _draw_view(place: "Axes", view: View, foot: _Thing, colours: Mapping[str, str]) -> None:
+def _draw_view(place: "Axes", view: View, foot: _Foot, colours: Mapping[str, str]) -> None:
     skin = np.tile(np.array(SKIN, np.uint8), (len(foot.vertices), 1))
     picture, left, bottom = render_view(view, foot.vertices, foot.faces, skin)
     rows, columns = picture.shape[:2]
@@ -101,7 +102,7 @@ def _draw_view(place: "Axes", view: View, foot: _Thing, colours: Mapping[str, st
 
 
 class _Flat:
-    """A view's own coordinates: to the right, up, and towards the viewer."""
+    """Coordinates of a view, mm: right, up, and towards the viewer; and the depth map of the foot in it."""
 
     def __init__(self, view: View, surface: Floats) -> None:
         axes = np.zeros((2, 3))
@@ -116,12 +117,12 @@ class _Flat:
         self._front = minimum_filter(front, size=3, mode="constant", cval=-np.inf)  # the outline belongs to both sides
 
     def of(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """(N,) each, mm, of (N, 3) points."""
+        """Right, up and towards the viewer of (N, 3) points: (N,) each, mm."""
         right, up, depth = (points @ self._axes.T).T
         return right, up, depth
 
     def is_near(self, points: Floats) -> NDArray[np.bool_]:
-        """(N,) whether they are on the side of the foot that is seen."""
+        """True for each of (N, 3) points on the visible side of the foot, (N,)."""
         right, up, depth = self.of(points)
         cells = np.clip(self._cells(right, up), 0, np.array(self._front.shape) - 1)
         return depth >= self._front[cells[:, 0], cells[:, 1]] - HIDDEN_MM
@@ -131,8 +132,8 @@ class _Flat:
         return cells
 
 
-def _draw_landmarks(place: "Axes", foot: _Thing, flat: _Flat) -> None:
-    """Those on the near side with their names, which are spread above and below the foot."""
+def _draw_landmarks(place: "Axes", foot: _Foot, flat: _Flat) -> None:
+    """Draw all landmarks, with names for those on the near side; the names stand above and below the foot."""
     named = []
     for name, (point, method) in foot.landmarks.items():
         right, up, _ = flat.of(point[None])

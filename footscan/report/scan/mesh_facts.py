@@ -1,11 +1,11 @@
-"""How whole a mesh is, as facts side by side."""
+"""Facts of a mesh: counts, holes, filled shares, quality of its triangles."""
 
 from footscan.report.markup import facts, number
 from schemas.quality import MeshQuality
 
 
 def mesh_facts(mesh: MeshQuality, cloud_points: int) -> str:
-    """Counts, shares and quality of the triangles, as far as they are known; `cloud_points` is what it was made of."""
+    """Counts, shares and quality of the triangles as far as known; `cloud_points` is the size of the mesh's cloud."""
     closed = mesh.open_edges == 0 and mesh.non_manifold_edges == 0
     counts = {
         "Cloud points": cloud_points,

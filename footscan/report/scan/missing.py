@@ -1,4 +1,4 @@
-"""What a person should know of a scan before its figures are believed: what was refused, and what is missing."""
+"""Refusals and gaps of a scan: what a reader must know before trusting its measures."""
 
 from collections.abc import Iterator
 
@@ -7,11 +7,11 @@ from schemas.measures import Measures
 from schemas.quality import MeshQuality, Quality
 
 _MUCH_FILLED = 0.1
-"""Share of the area from which on it is worth a line that it was filled."""
+"""Filled share of the area above which the page mentions it; chosen by hand."""
 
 
 def missing_list(measures: Measures, quality: Quality) -> str:
-    """A line for each thing, the gravest first; one that says so where there is none."""
+    """List all defects of a scan, the gravest first, as HTML; a scan without defects gets one sentence."""
     lines = [*_measures(measures), *_cameras(quality), *_mesh(quality.mesh), *quality.fusion.warnings]
     if not lines:
         return "<p>Nothing: all measures were taken, no frame was lost, and every camera saw the foot.</p>"
@@ -23,10 +23,10 @@ def _measures(measures: Measures) -> Iterator[str]:
         yield f"Not measured: {measures.finding}."
     if measures.side_note is not None:
         yield f"{measures.side_note[:1].upper()}{measures.side_note[1:]}."
-    for status, said in (("incomplete", "could not be taken"), ("uncertain", "is uncertain")):
+    for status, reading in (("incomplete", "could not be taken"), ("uncertain", "is uncertain")):
         for name, measure in measures.measures.items():
             if measure.status == status:
-                yield f"{words(name)} {said}" + (f": {measure.note}." if measure.note else ".")
+                yield f"{words(name)} {reading}" + (f": {measure.note}." if measure.note else ".")
 
 
 def _cameras(quality: Quality) -> Iterator[str]:

@@ -1,6 +1,7 @@
-"""The page of one scan: what a person opens to see whether it is good."""
+"""The page of one scan, from which a person judges its quality."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +10,11 @@ from footscan.report.calibration.panels import calibration_panels
 from footscan.report.colours import colour_bar, colour_limit, distance_colours
 from footscan.report.comparison.figures import figures_facts, moved_note, regions_table
 from footscan.report.filled import filled_colours, filled_key
-from footscan.report.markup import number, section, table, text, words
+from footscan.report.markup import UNITS, number, section, table, text, words
 from footscan.report.page import page
 from footscan.report.sample_frames import FRAMES_SCRIPT, FrameSample, sample_frames
 from footscan.report.scan.coverage import coverage_plot
-from footscan.report.scan.foot_colours import foot_colourings
+from footscan.report.scan.foot_colours import FootSurface, foot_colourings
 from footscan.report.scan.fusion_tables import corrections_table, disagreement_table, warnings_list
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
 from footscan.report.scan.mesh_facts import mesh_facts
@@ -41,76 +42,78 @@ _FIRST = (
 )
 """Measures in the order in which they are read; others follow by name."""
 _TILES = 4
-_UNITS = {"mm": ("mm", 1), "mm2": ("mm²", 0), "mm3": ("mm³", 0), "deg": ("°", 1), "1": ("", 3)}
-"""How a unit is written, and to how many decimals its values are."""
+"""Measures that stand out above the table: the first of them that have a value."""
+
+
+class ScanTitle(NamedTuple):
+    """Names of a scan, as in scan.yaml; any text is safe."""
+
+    patient: str
+    scan: str
+    side: str
+
+
+class ScanPoints(NamedTuple):
+    """The points of a scan, mm, scanner frame, as arrays of `footscan.cloud.points.POINT_DTYPE`."""
+
+    points: NDArray[np.void]
+    """(N,) points of all cameras before the fusion."""
+    codes: NDArray[np.uint8]
+    """(N,) why each was removed, as in `footscan.cloud.outliers.Removed`."""
+    cloud: NDArray[np.void]
+    """(M,) points from which the surface was made."""
 
 
 def scan_page(
     *,
-    patient: str,
-    scan: str,
-    side: str,
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.integer],
-    filled: NDArray[np.bool_] | None,
-    cut_mm: float | None,
-    points: NDArray[np.void],
-    codes: NDArray[np.uint8],
-    cloud: NDArray[np.void],
+    title: ScanTitle,
+    surface: FootSurface,
+    points: ScanPoints,
     measures: Measures,
     quality: Quality,
     calibration: Calibration,
     samples: Sequence[FrameSample],
-    truth_distance: NDArray[np.floating] | None,
     provenance: Mapping[str, str],
 ) -> str:
-    """A self-contained HTML page of one scan, the same for the same input.
+    """Return a self-contained HTML page of one scan; the same input gives the same page.
 
     Parameters
     ----------
-    patient, scan, side : as in scan.yaml; any text is safe
-    vertices : (V, 3) float64, mm, scanner frame, V > 0
-    faces : (F, 3) int, counter-clockwise as seen from outside
-    filled : (V,) what was not measured, where that is known
-    cut_mm : Z of the flat cut above the ankle, where there is one
-    points, codes : (N,) of `footscan.cloud.points.POINT_DTYPE`, mm, scanner frame, and what became of each
-        As all cameras saw them, and as `footscan.cloud.outliers.Removed` tells it.
-    cloud : array of `footscan.cloud.points.POINT_DTYPE`, mm, scanner frame
-        What the surface was made of.
     measures, quality : the content of measures.json and quality.json
-    calibration : what its pixels were mapped by
-    samples : a frame of each camera, in the order shown
-    truth_distance : (V,) float, mm, signed, positive outside the reference model; None where there is no such model
-    provenance : name and value of what the result came from, in the order shown
+    calibration : the calibration that mapped the pixels
+    samples : frames of each camera, in the order shown
+    provenance : name and value of each source of the result, in the order shown
     """
-    seen = upright(vertices, measures.transform)
-    plain = filled_colours(vertices, filled, cut_mm)
-    drawings = measure_drawings(vertices, faces, measures)
+    faces, cloud, distance = surface.faces, points.cloud, surface.truth_distance
+    seen = upright(surface.vertices, measures.transform)
+    plain = filled_colours(surface.vertices, surface.filled, surface.cut_mm)
+    drawings = measure_drawings(surface.vertices, faces, measures)
     turned = viewer(
         seen,
         faces,
-        foot_colourings(vertices, filled, cut_mm, quality.mesh, cloud, truth_distance),
+        foot_colourings(surface, quality.mesh, cloud),
         drawings,
         {words(name): landmark_place(measures, name) for name in measures.landmarks},
     )
+    removed = removed_table(quality.cameras), removed_pictures(points.points, points.codes)
     parts = [
         section("Refused or missing", missing_list(measures, quality)),
         section("Measures", _tiles(measures), _measures(measures, drawings, turned)),
         section("Surface", _GRID_NOTE, filled_key(quality.mesh), surface_views(seen, faces, plain, measures.side)),
-        "" if truth_distance is None else _distances(seen, faces, measures, quality.truth, truth_distance),
+        "" if distance is None else _distances(seen, faces, measures, quality.truth, distance),
         section("Stripe over the frames", _FRAMES_NOTE, sample_frames(samples)) if samples else "",
         section("Mesh", mesh_facts(quality.mesh, quality.cloud_points)),
         section("Cameras", _cameras_table(quality, cloud)),
-        section("Removed points", _REMOVED_NOTE, removed_table(quality.cameras), removed_pictures(points, codes)),
+        section("Removed points", _REMOVED_NOTE, *removed),
         section("Agreement of the cameras", _AGREEMENT_NOTE, *_agreement(quality.fusion)),
         section("Stripe coverage", _COVERAGE_NOTE, coverage_plot(cloud, quality.cameras)),
         section("Calibration", _calibration(calibration, quality.calibration)),
         section("Provenance", table(["", ""], ([text(name), text(value)] for name, value in provenance.items()))),
     ]
     return page(
-        title=f"{patient} {scan}",
-        kicker={"right": "Right foot", "left": "Left foot"}.get(side, "Foot, side unknown"),
-        heading=f"{text(patient)} <span>{text(scan)}</span>",
+        title=f"{title.patient} {title.scan}",
+        kicker={"right": "Right foot", "left": "Left foot"}.get(title.side, "Foot, side unknown"),
+        heading=f"{text(title.patient)} <span>{text(title.scan)}</span>",
         parts=parts,
         scripts=[SCRIPT, *([FRAMES_SCRIPT] if samples else [])],
     )
@@ -123,10 +126,10 @@ def _distances(
     figures: Comparison | None,
     distance: NDArray[np.floating],
 ) -> str:
-    """How far the surface, its vertices in the foot's frame, lies from the reference model."""
+    """The section on the distance of the surface to the reference model; `seen` is in the foot's frame."""
     limit = colour_limit(distance)
     colours = distance_colours(distance, limit)
-    told = (
+    tables = (
         []
         if figures is None
         else [
@@ -136,7 +139,7 @@ def _distances(
         ]
     )
     views = surface_views(seen, faces, colours, measures.side)
-    return section("Distance to the reference model", colour_bar(limit), views, *told)
+    return section("Distance to the reference model", colour_bar(limit), views, *tables)
 
 
 def _ordered(measures: Measures) -> Iterator[tuple[str, Measure]]:
@@ -146,54 +149,54 @@ def _ordered(measures: Measures) -> Iterator[tuple[str, Measure]]:
 
 
 def _tiles(measures: Measures) -> str:
-    known = [(name, measure) for name, measure in _ordered(measures) if measure.value is not None][:_TILES]
+    taken = [(name, measure) for name, measure in _ordered(measures) if measure.value is not None][:_TILES]
     tiles = "".join(
-        f"<div><span>{text(words(name))}</span><b>{_value(measure)}</b> {_UNITS[measure.unit][0]}</div>"
-        for name, measure in known
+        f"<div><span>{text(words(name))}</span><b>{_value(measure)}</b> {UNITS[measure.unit][0]}</div>"
+        for name, measure in taken
     )
     return f'<div class="tiles">{tiles}</div>' if tiles else ""
 
 
 def _measures(measures: Measures, drawings: Mapping[str, Drawing], turned: str) -> str:
-    """The foot to turn, and beside it the measures, of which a click shows where they were taken."""
+    """The viewer, and beside it the table of measures; a click on a measure shows where it was taken."""
     if measures.finding is not None:
         return f'<p class="note">Not measured: {text(measures.finding)}</p>{turned}'
     rows = (
         [
             _name(name, measure, name in drawings),
             _value(measure),
-            _UNITS[measure.unit][0],
+            UNITS[measure.unit][0],
             f'<span class="status {measure.status}">{measure.status}</span>',
             text(measure.definition) + (f'<p class="note">{text(note)}</p>' if (note := _note(measure)) else ""),
         ]
         for name, measure in _ordered(measures)
     )
     listed = table(["Measure", "Value", "Unit", "Status", "Definition"], rows, numeric=[1], kind="measures")
-    said = '<p class="note">A click on a measure shows where it was taken.</p>' if drawings else ""
-    return f'<div class="foot">{turned}<div class="list">{said}{listed}</div></div>'
+    hint = '<p class="note">A click on a measure shows where it was taken.</p>' if drawings else ""
+    return f'<div class="foot">{turned}<div class="list">{hint}{listed}</div></div>'
 
 
 def _name(name: str, measure: Measure, is_drawn: bool) -> str:
     if not is_drawn:
         return text(words(name))
-    told = f"{words(name)} {_value(measure)} {_UNITS[measure.unit][0]}: {measure.definition}"
+    caption = f"{words(name)} {_value(measure)} {UNITS[measure.unit][0]}: {measure.definition}"
     return (
-        f'<button type="button" data-shows="{text(name)}" data-told="{text(told)}" aria-pressed="false">'
+        f'<button type="button" data-shows="{text(name)}" data-told="{text(caption)}" aria-pressed="false">'
         f"{text(words(name))}</button>"
     )
 
 
 def _note(measure: Measure) -> str:
-    """What is told beside the definition: a remark, and how sure the value is."""
-    unit, decimals = _UNITS[measure.unit]
-    sure = None
+    """The note below the definition: a remark and the uncertainty of the value."""
+    unit, decimals = UNITS[measure.unit]
+    sigma = None
     if measure.uncertainty is not None:
-        sure = f"standard deviation {number(measure.uncertainty, decimals + 1)} {unit}".rstrip()
-    return "; ".join(part for part in (measure.note, sure) if part)
+        sigma = f"standard deviation {number(measure.uncertainty, decimals + 1)} {unit}".rstrip()
+    return "; ".join(part for part in (measure.note, sigma) if part)
 
 
 def _value(measure: Measure) -> str:
-    return "–" if measure.value is None else number(measure.value, _UNITS[measure.unit][1])
+    return "–" if measure.value is None else number(measure.value, UNITS[measure.unit][1])
 
 
 def _cameras_table(quality: Quality, cloud: NDArray[np.void]) -> str:
@@ -222,8 +225,8 @@ def _agreement(report: FusionReport) -> list[str]:
 
 
 def _calibration(calibration: Calibration, file: Source) -> str:
-    made = f"{calibration.created:%Y-%m-%d %H:%M} UTC" if calibration.created else "unknown"
-    rows = [["File", text(file.name)], ["SHA-256", text(file.sha256)], ["Made", made]]
+    created = f"{calibration.created:%Y-%m-%d %H:%M} UTC" if calibration.created else "unknown"
+    rows = [["File", text(file.name)], ["SHA-256", text(file.sha256)], ["Made", created]]
     return table(["", ""], rows) + calibration_panels(calibration)
 
 

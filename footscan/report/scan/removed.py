@@ -1,4 +1,4 @@
-"""What was removed of each camera's points, and why: counts, and pictures coloured by reason."""
+"""Points of each camera that were removed, and why: counts, and pictures coloured by reason."""
 
 import io
 from collections.abc import Sequence
@@ -21,20 +21,24 @@ _COLOURS = {
     "glass": (0, 90, 170),
     "clutter": (0, 158, 115),
 }
-"""All but the first are told apart by colour-blind eyes, too: Okabe and Ito, "Color universal design", 2008."""
+"""All but the first are distinct for colour-blind readers (Okabe and Ito, "Color universal design", 2008)."""
 _KEPT_COLOUR, _GROUND, _GLASS = (190, 197, 204), (255, 255, 255), (221, 226, 231)
 _PALETTE = [_KEPT_COLOUR, *(_COLOURS[reason] for reason in REASONS), _GROUND, _GLASS]
-"""Colour of a pixel by its code, so that reasons keep theirs; ground and glass follow."""
+"""Colours of the pixels by code: kept, then the reasons in their order, then ground and glass."""
 _PIXELS_PER_MM = 1.5
+"""Resolution of the pictures; chosen by hand."""
 _BEYOND_MM, _MARGIN_MM = 110.0, 5.0
-"""How far the pictures reach at most beyond what was kept, for what was removed may lie anywhere, and their margin."""
+"""Largest extent of a picture beyond the kept points (removed points may lie anywhere), and its margin.
+
+Chosen by hand."""
 _GAP_PX = 12
+"""Gap between the two views of a camera."""
 
 
 def removed_table(cameras: Sequence[CameraQuality]) -> str:
-    """A row a camera: how many of its points were removed, their share, and how many for each reason."""
-    found = {reason for camera in cameras for reason, count in camera.removed.items() if count}
-    reasons = [*(r for r in REASONS if r in found), *sorted(found.difference(REASONS))]
+    """A row for each camera: number and share of its removed points, and the number for each reason."""
+    used = {reason for camera in cameras for reason, count in camera.removed.items() if count}
+    reasons = [*(r for r in REASONS if r in used), *sorted(used.difference(REASONS))]
     rows = [[camera.points, *(camera.removed.get(reason, 0) for reason in reasons)] for camera in cameras]
     names = [str(camera.camera) for camera in cameras]
     if len(rows) > 1:
@@ -49,28 +53,28 @@ def removed_table(cameras: Sequence[CameraQuality]) -> str:
 
 
 def removed_pictures(points: NDArray[np.void], codes: NDArray[np.uint8]) -> str:
-    """A picture of each camera's points, from the side and along the travel; nothing where there are no points.
+    """Draw the points of each camera from the side and along the travel; empty without points.
 
     Parameters
     ----------
-    points : (N,) array of `footscan.cloud.points.POINT_DTYPE`, mm, scanner frame: of all cameras, before the fusion
-    codes : (N,) as `footscan.cloud.outliers.Removed` has them
+    points : (N,) array of `footscan.cloud.points.POINT_DTYPE`, mm, scanner frame, of all cameras, before the fusion
+    codes : (N,) uint8, as in `footscan.cloud.outliers.Removed`
     """
     places = coordinates(points)
-    known = np.isfinite(places).all(axis=1)
-    if not known.any():
+    finite = np.isfinite(places).all(axis=1)
+    if not finite.any():
         return ""
-    kept = places[known & (codes == KEPT)] if (codes[known] == KEPT).any() else places[known]
-    low = np.maximum(places[known].min(axis=0), kept.min(axis=0) - _BEYOND_MM) - _MARGIN_MM
-    high = np.minimum(places[known].max(axis=0), kept.max(axis=0) + _BEYOND_MM) + _MARGIN_MM
-    inside = known & (places >= low).all(axis=1) & (places <= high).all(axis=1)
+    kept = places[finite & (codes == KEPT)] if (codes[finite] == KEPT).any() else places[finite]
+    low = np.maximum(places[finite].min(axis=0), kept.min(axis=0) - _BEYOND_MM) - _MARGIN_MM
+    high = np.minimum(places[finite].max(axis=0), kept.max(axis=0) + _BEYOND_MM) + _MARGIN_MM
+    inside = finite & (places >= low).all(axis=1) & (places <= high).all(axis=1)
     figures = []
     for camera in np.unique(points["camera"]).tolist():
-        own = points["camera"] == camera
-        seen = own & inside
+        of_camera = points["camera"] == camera
+        seen = of_camera & inside
         picture = data_uri("image/png", _picture(places[seen], codes[seen], low, high))
-        beyond = int(np.count_nonzero(own & ~inside))
-        caption = f"{number(int(np.count_nonzero(own & (codes != KEPT))))} removed" + (
+        beyond = int(np.count_nonzero(of_camera & ~inside))
+        caption = f"{number(int(np.count_nonzero(of_camera & (codes != KEPT))))} removed" + (
             f", {number(beyond)} of them beyond the picture" if beyond else ""
         )
         figures.append(
@@ -89,13 +93,13 @@ def removed_pictures(points: NDArray[np.void], codes: NDArray[np.uint8]) -> str:
 def _picture(
     places: NDArray[np.float64], codes: NDArray[np.uint8], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> bytes:
-    """PNG of points within the box from `low` to `high`: X to the right and Z up; beside it Y to the left and Z up."""
+    """PNG of the points in the box from `low` to `high`: X right and Z up; beside it Y left and Z up."""
     long, wide, tall = np.ceil((high - low) * _PIXELS_PER_MM).astype(int) + 2
     pixels = np.full((tall, long + _GAP_PX + wide), len(REASONS) + 1, np.uint8)
     glass = round(high[2] * _PIXELS_PER_MM)
     if 0 <= glass < tall:
         pixels[glass, :long] = pixels[glass, long + _GAP_PX :] = len(REASONS) + 2
-    order = np.argsort(codes, kind="stable")  # what was kept lies below
+    order = np.argsort(codes, kind="stable")  # kept points are drawn first, below the removed ones
     column, across, row = ((places - low) * _PIXELS_PER_MM).astype(int)[order].T
     for down in (0, 1):
         for right in (0, 1):

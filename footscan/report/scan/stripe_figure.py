@@ -1,4 +1,4 @@
-"""What the extraction found: stripe points over a frame, or over frames of a film, and what was measured along them."""
+"""Figures of an extraction: stripe points over one frame or over frames of a film, and their measured values."""
 
 from collections.abc import Iterable, Sequence
 from textwrap import wrap
@@ -25,52 +25,54 @@ MEASURED = {
     "saturation": "saturation, share",
     "sigma": "expected sigma, px",
 }
-"""What is drawn of each point, with the label of its axis."""
+"""Columns of the stripe points that are drawn, with the labels of their axes."""
 ENDS = {"peak": 260.0, "saturation": 1.03}
-"""Where axes of a known range end."""
+"""Ends of the axes whose range is known."""
 DIMMED = 0.7
-"""Brightness of a frame under its points: the stripe is seen, and so are they."""
+"""Brightness of a frame under its points; chosen by hand so that both stripe and points are visible."""
 GROUND = "#262626"
-"""Below points alone: their colours look as they do over a dark frame."""
+"""Background of the panels: the colours of the points look as they do over a dark frame."""
 LINE, BAND, COLUMNS, ROWS, LOST = "#1f4e79", "#b9d4e8", "#2a9d6f", "#d9822b", "#c9c9c9"
 
 DPI = 150
 PICTURE_INCHES = 8.5
 """Longer side of the picture of a single frame."""
 LEAST_INCHES = 2.8
-"""Its shorter side at least: an image that is one pixel high is drawn stretched."""
+"""Least length of its shorter side: an image that is one pixel high is drawn stretched."""
 PANEL_INCHES, APART_INCHES = 1.35, 0.25
+"""Size of a panel across the stripe, and the gap between panels."""
 LEFT, RIGHT, TOP, BOTTOM = 0.8, 1.0, 0.37, 0.6
-"""Margins of the figure of a single frame, inches. Its parts are placed by hand: rows and columns stand in line."""
+"""Margins of the figure of a single frame, inches. Its parts are placed explicitly so that rows and columns align."""
 TITLE_POINTS, LINE_INCHES, LETTER_INCHES = 11, 0.19, 0.095
-"""The title's letters, and how high a line and how wide a letter of it is; its lines add to the margin above."""
+"""Size of the title's letters in points, height of a line and width of a letter in inches."""
 NOTE_INCHES = 0.6
-"""Where the panels would be, for the words that there is no stripe."""
+"""Room for the words "no stripe" in place of the panels."""
 
 SHOWN_FRAMES, SHOWN_COLUMNS = 8, 4
+"""Most frames in the figure of a film, and frames in a row."""
 SHOWN_BARE = 2
-"""So many of the frames shown may be such in which nothing was found, although there is a stripe in others."""
+"""Most frames without points among the frames shown, if other frames hold points."""
 FILM_INCHES = 13.0
 """Width of the figure of a film."""
 SHOWN_PX = 700
-"""Longer side of a film's frame as it is drawn; larger ones are scaled down."""
+"""Longest side of a drawn frame of a film; larger frames are scaled down."""
 
 
 def frame_figure(image: Rgb, points: StripePoints, about: str = "") -> bytes:
-    """A PNG of one frame with its stripe points, and of what was measured along the stripe.
+    """Draw one frame with its stripe points and the values measured along the stripe, as PNG.
 
     Parameters
     ----------
     image : (rows, columns, 3) uint8, RGB.
     points : (N,) of `STRIPE_DTYPE`, px, image frame.
     about : str
-        First line of the title: whose frame this is, and how it was extracted.
+        First line of the title: source of the frame, and how the points were extracted.
 
     Notes
     -----
-    Points are coloured by score. What was measured of each stands beside the picture at the point's row where the
-    stripe runs down the image rather than across it, and below the picture at the point's column otherwise; where the
-    stripe ends, nothing is drawn. Without points, words stand for the panels. The same input gives the same bytes.
+    Points are coloured by score. If the stripe runs down the image, the panels of the measured values stand beside
+    the picture and share its rows; if it runs across, they stand below and share its columns. Without points, a note
+    replaces the panels. The same input gives the same bytes.
     """
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
@@ -87,7 +89,7 @@ def frame_figure(image: Rgb, points: StripePoints, about: str = "") -> bytes:
     figure = Figure(figsize=(width, height), dpi=DPI)
 
     def place(left: float, below: float, wide: float, high: float) -> "Axes":
-        """Axes so many inches right of and below the picture's corner."""
+        """Add axes; `left` and `below` are inches from the upper left corner of the picture."""
         bottom = height - top - below - high
         return figure.add_axes(((LEFT + left) / width, bottom / height, wide / width, high / height))
 
@@ -131,32 +133,32 @@ def frame_figure(image: Rgb, points: StripePoints, about: str = "") -> bytes:
 def film_figure(
     frames: Iterable[Rgb | None], count: int, points: StripePoints, lost: Sequence[int] = (), about: str = ""
 ) -> bytes:
-    """A PNG of some frames of a film with their stripe points, and of what was found and measured over the travel.
+    """Draw some frames of a film with their stripe points, and the values measured along the travel, as PNG.
 
     Parameters
     ----------
     frames : iterable of (rows, columns, 3) uint8, RGB
-        Read once; None stands for a lost frame. Each needs to be valid until the next only.
+        Read once; None stands for a lost frame. A frame may become invalid when the next one is read.
     count : int
         Number of frames.
     points : (N,) of `STRIPE_DTYPE`, px, image frame, in the order of the frames.
     lost : sequence of int
         Numbers of the frames that are None.
     about : str
-        First line of the title: which film this is, and how it was extracted.
+        First line of the title: name of the film, and how the points were extracted.
 
     Notes
     -----
-    The frames shown are spread over those that hold points; up to two without any are among them, from between them or
-    else from beside them. The share of the image's columns that hold a point tells of a stripe across the image; one
-    that runs down it fills rows. Without points, words stand for the panels. The same input gives the same bytes.
+    The frames shown are spread over those that hold points. Up to `SHOWN_BARE` frames without points are among them:
+    between the others if there are any, or next to them. A stripe across the image fills its columns; a stripe that
+    runs down fills its rows. Without points, a note replaces the panels. The same input gives the same bytes.
     """
     from matplotlib.figure import Figure
 
     shown, (rows, columns) = _sample(frames, _frames_to_show(points, count, lost))
-    seen = f"{len(np.unique(points['frame']))} of " if len(points) else ""
-    gone = f"; {len(lost)} lost" if lost else ""
-    summary = f"{_counted(len(points))} in {seen}{count} frame{'s' * (count != 1)}{gone}"
+    with_points = f"{len(np.unique(points['frame']))} of " if len(points) else ""
+    lost_note = f"; {len(lost)} lost" if lost else ""
+    summary = f"{_counted(len(points))} in {with_points}{count} frame{'s' * (count != 1)}{lost_note}"
     title = _fitting([about, summary], FILM_INCHES)
     strips = -(-max(len(shown), 1) // SHOWN_COLUMNS)
     aspect = float(np.clip(rows / columns, 0.4, 1.5))
@@ -185,7 +187,7 @@ def film_figure(
 
 
 def _score_colours() -> "ScalarMappable":
-    """Viridis without its dark end, which would not be seen over a dark frame."""
+    """Viridis without its dark end, which is invisible over a dark frame."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
@@ -196,7 +198,7 @@ def _score_colours() -> "ScalarMappable":
 def _draw_frame(
     panel: "Axes", image: Rgb, size: tuple[int, int], points: StripePoints, colours: "ScalarMappable", area: float
 ) -> None:
-    """A frame of such a size (rows, columns), which may be scaled down, dimmed, under its points."""
+    """Draw a frame, dimmed, under its points; `size` is (rows, columns) of the frame before `image` was scaled down."""
     rows, columns = size
     panel.imshow(
         np.rint(image * DIMMED).astype(np.uint8), extent=(-0.5, columns - 0.5, rows - 0.5, -0.5), aspect="auto"
@@ -217,32 +219,32 @@ def _draw_points(
 
 
 def _fitting(lines: Iterable[str], inches: float) -> list[str]:
-    """Lines of a title, broken where they would be wider than the figure, without what its font cannot draw."""
+    """Wrap the lines of a title to the width of the figure; letters that its font lacks are replaced."""
     from matplotlib.font_manager import findfont, get_font
 
-    known = get_font(findfont("DejaVu Sans")).get_charmap()
-    drawable = ("".join(c if ord(c) in known else "\N{REPLACEMENT CHARACTER}" for c in line) for line in lines)
+    charmap = get_font(findfont("DejaVu Sans")).get_charmap()
+    drawable = ("".join(c if ord(c) in charmap else "\N{REPLACEMENT CHARACTER}" for c in line) for line in lines)
     return [part for line in drawable for part in wrap(line, int(inches / LETTER_INCHES))]
 
 
 def _summary(points: StripePoints, size: tuple[int, int]) -> list[str]:
     rows, columns = size
-    found = f"{_counted(len(points))} in {columns} x {rows} px"
+    counted = f"{_counted(len(points))} in {columns} x {rows} px"
     if not len(points):
-        return [found]
+        return [counted]
     filled = (
         f"in {100 * _lines(points['i']) / columns:.0f} % of the columns"
         f" and {100 * _lines(points['j']) / rows:.0f} % of the rows"
     )
     middle = {name: float(np.median(points[name])) for name in MEASURED}
     return [
-        f"{found}, {filled}",
+        f"{counted}, {filled}",
         f"medians: width {middle['width']:.1f} px, peak {middle['peak']:.0f}, expected sigma {middle['sigma']:.3f} px",
     ]
 
 
 def _lines(coordinates: NDArray[np.floating]) -> int:
-    """How many columns, or rows, hold points with such coordinates."""
+    """Number of distinct pixel columns, or rows, among `coordinates`."""
     return len(np.unique(np.rint(coordinates)))
 
 
@@ -251,13 +253,13 @@ def _counted(points: int) -> str:
 
 
 def _end(values: NDArray[np.floating]) -> float:
-    """Where an axis from 0 ends that shows all values."""
-    known = values[np.isfinite(values)]
-    return 1.05 * float(known.max()) if known.size and known.max() > 0 else 1.0
+    """End of an axis from 0 that shows all values."""
+    finite = values[np.isfinite(values)]
+    return 1.05 * float(finite.max()) if finite.size and finite.max() > 0 else 1.0
 
 
 def _scaled_down(image: Rgb, longest: int) -> Rgb:
-    """The image, or its means over blocks where a side of it is longer than so many px."""
+    """The image; if a side is longer than `longest` px, its means over blocks."""
     rows, columns = image.shape[:2]
     if max(rows, columns) <= longest:
         return image
@@ -278,20 +280,20 @@ def _frames_to_show(points: StripePoints, count: int, lost: Sequence[int]) -> li
 
 
 def _spread(numbers: NDArray[np.integer], most: int) -> list[int]:
-    """At most so many of the numbers, from the first to the last."""
+    """At most `most` of the numbers, spread from the first to the last."""
     places = np.linspace(0, len(numbers) - 1, min(most, len(numbers)))
     return [int(number) for number in numbers[np.rint(places).astype(np.intp)]]
 
 
-def _sample(frames: Iterable[Rgb | None], wanted: list[int]) -> tuple[dict[int, Rgb], tuple[int, int]]:
-    """The frames of such numbers, scaled down; rows and columns of a frame."""
+def _sample(frames: Iterable[Rgb | None], frame_numbers: list[int]) -> tuple[dict[int, Rgb], tuple[int, int]]:
+    """The frames with the given numbers, scaled down, by number; rows and columns of a frame."""
     shown: dict[int, Rgb] = {}
-    size = (3, 4)  # of a film all of whose frames are lost
+    size = (3, 4)  # aspect if all frames are lost
     for number, frame in enumerate(frames):
         if frame is None:
             continue
         size = frame.shape[0], frame.shape[1]
-        if number in wanted:
+        if number in frame_numbers:
             shown[number] = _scaled_down(frame, SHOWN_PX).copy()
     return shown, size
 
@@ -304,7 +306,7 @@ def _draw_travel(
     lost: list[int],
     shown: list[int],
 ) -> "list[Artist]":
-    """Six panels over the frames of a film; the handles of their legend."""
+    """Draw six panels over the frames of a film; return the handles of their legend."""
     from matplotlib.ticker import MaxNLocator
 
     panels = below.subplots(2, 3, sharex=True).ravel().tolist()
@@ -326,7 +328,7 @@ def _draw_travel(
 
 
 def _draw_coverage(panel: "Axes", points: StripePoints, count: int, size: tuple[int, int], lost: list[int]) -> None:
-    """The shares of columns and of rows of each frame that hold a point."""
+    """Draw the shares of the columns and of the rows of each frame that hold a point."""
     for name, lines, colour, label in (
         ("i", size[1], COLUMNS, "columns that hold a point"),
         ("j", size[0], ROWS, "rows that hold a point"),
@@ -338,7 +340,7 @@ def _draw_coverage(panel: "Axes", points: StripePoints, count: int, size: tuple[
 
 
 def _draw_quantiles(panel: "Axes", name: str, points: StripePoints, count: int) -> None:
-    """Median and middle 80 % of what was measured of the points, frame by frame; a gap where there are none."""
+    """Draw median and middle 80 % of a measured value, frame by frame, with gaps at frames without points."""
     quantiles = np.full((count, 3), np.nan)
     numbers, starts = np.unique(points["frame"], return_index=True)
     for number, values in zip(numbers, np.split(points[name], starts[1:]), strict=False):
@@ -352,7 +354,7 @@ def _draw_quantiles(panel: "Axes", name: str, points: StripePoints, count: int) 
 def _draw_line(
     panel: "Axes", values: NDArray[np.floating | np.integer], lost: list[int], colour: str, label: str
 ) -> None:
-    """A value a frame, joined by a line that has gaps where frames are lost."""
-    known = np.array(values, np.float64)
-    known[lost] = np.nan
-    panel.plot(known, color=colour, linewidth=1, marker=".", markersize=2, label=label or None)
+    """Draw one value per frame as a line with gaps at lost frames."""
+    heights = np.array(values, np.float64)
+    heights[lost] = np.nan
+    panel.plot(heights, color=colour, linewidth=1, marker=".", markersize=2, label=label or None)

@@ -1,4 +1,4 @@
-"""A first, rough cuboid in a cloud: axes from the normals of small patches, faces from where such patches crowd."""
+"""A first, rough cuboid in a cloud: axes from the normals of small patches, faces from the places with most patches."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -8,26 +8,34 @@ from footscan.verify.shapes.fitting import Floats
 from schemas.base.errors import Finding
 
 CELL_MM = 1.0
-"""Edge of the cells that the cloud is thinned to: stripes hold many more points along them than across."""
+"""Edge of the cells to which the cloud is thinned, since stripes have many more points along them than across.
+Chosen by hand."""
 NEIGHBOURS = 16
+"""Points of a patch; chosen by hand."""
 FLATNESS = 0.1
-"""Largest ratio of a patch's thickness to its width, as variances, for it to have a normal."""
+"""Largest ratio of thickness to width of a patch with a normal, as variances; chosen by hand."""
 WIDTH = 0.1
-"""Smallest ratio of a patch's width to its length, as variances; below, it is a line."""
+"""Least ratio of width to length of a patch, as variances; below, it is a line. Chosen by hand."""
 VOTERS = 400
+"""Bound of time: normals that are candidates for an axis."""
 NEAR_DEGREES = 8.0
-"""Normals this near to a direction vote for it."""
+"""Normals nearer than this to a direction vote for it; chosen by hand."""
 FACE_DEGREES = 25.0
+"""Patches whose normals are nearer than this to an axis may belong to its faces; chosen by hand."""
 BIN_MM = 0.5
+"""Width of the bins along an axis in which patches are counted."""
+CREST_MM = 2.0
+"""Distance from the foot of a crowd within which its crest is sought; chosen by hand."""
 CROWD = 0.1
-"""Share of the largest crowd along an axis below which another is no face."""
+"""Least count of patches at a face, as a share of the largest count along the axis; chosen by hand."""
 LEAST_PATCHES = 10
+"""Least number of patches for an axis or a face; chosen by hand."""
 LEAST_EXTENT_MM = 5.0
-"""Faces nearer to each other than this are one."""
+"""Faces nearer to each other than this are one; chosen by hand."""
 
 
 def rough_box(points: Floats) -> tuple[Floats, Floats]:
-    """Axes and faces of the cuboid that most of `points` lie on.
+    """Find the axes and faces of the cuboid on which most of `points` lie.
 
     Parameters
     ----------
@@ -35,13 +43,13 @@ def rough_box(points: Floats) -> tuple[Floats, Floats]:
 
     Returns
     -------
-    axes : (3, 3) unit vectors as rows, right-handed, nearest to X, Y and Z in this order, good to a degree or two
-    limits : (3, 2) mm, where along each axis the lower and the upper face stand; NaN where none was seen
+    axes : (3, 3) unit vectors as rows, right-handed, nearest to X, Y and Z in this order, accurate to a degree or two
+    limits : (3, 2) mm, places of the lower and the upper face along each axis; NaN for a face that was not seen
 
     Raises
     ------
     Finding
-        No two faces at a right angle.
+        There are no two faces at a right angle.
     """
     patches, normals = _patch_normals(points)
     axes = _axes_of(normals)
@@ -52,7 +60,7 @@ def rough_box(points: Floats) -> tuple[Floats, Floats]:
 
 
 def _patch_normals(points: Floats) -> tuple[Floats, Floats]:
-    """(P, 3) centres and (P, 3) unit normals, of either sign, of patches that are flat."""
+    """Returns (P, 3) centres and (P, 3) unit normals, of either sign, of the flat patches."""
     order, starts = group_by_cell(points, np.full(3, CELL_MM))
     thinned = cell_means(points, order, starts, np.ones(len(points)))
     if len(thinned) < NEIGHBOURS:
@@ -66,7 +74,7 @@ def _patch_normals(points: Floats) -> tuple[Floats, Floats]:
 
 
 def _axes_of(normals: Floats) -> Floats:
-    """The direction of most normals, that of most normals at a right angle to it, and the third."""
+    """Returns (3, 3) the direction of most normals, that of most normals at right angles to it, and the third."""
     first = _most_common(normals)
     second = None
     if first is not None:
@@ -80,7 +88,7 @@ def _axes_of(normals: Floats) -> Floats:
 
 
 def _most_common(normals: Floats) -> Floats | None:
-    """(3,) the direction that most normals are near to, signs apart; None where hardly any agree."""
+    """Returns (3,) the direction near most normals, regardless of sign; None if hardly any agree."""
     voters = normals[:: max(1, len(normals) // VOTERS)]
     if not len(voters):
         return None
@@ -95,7 +103,7 @@ def _most_common(normals: Floats) -> Floats | None:
 
 
 def _nearest_to_scanner(axes: Floats) -> Floats:
-    """`axes` in the order and with the signs that bring them nearest to Z, X and Y."""
+    """Order `axes` and choose their signs so that they are nearest to X, Y and Z."""
     up = int(np.argmax(np.abs(axes[:, 2])))
     rest = [k for k in range(3) if k != up]
     along = max(rest, key=lambda k: abs(axes[k, 0]))
@@ -105,7 +113,7 @@ def _nearest_to_scanner(axes: Floats) -> Floats:
 
 
 def _crowds(along: Floats, cosine: Floats) -> tuple[float, float]:
-    """Where along an axis the outermost two crowds of patches facing it stand; NaN for one that is not there."""
+    """Places of the outermost two crowds of patches that face along an axis; NaN for a crowd that does not exist."""
     facing = along[np.abs(cosine) > np.cos(np.radians(FACE_DEGREES))]
     if len(facing) < LEAST_PATCHES:
         return np.nan, np.nan
@@ -115,7 +123,7 @@ def _crowds(along: Floats, cosine: Floats) -> tuple[float, float]:
     crowded = np.flatnonzero(crowd >= max(LEAST_PATCHES, CROWD * crowd.max()))
     if not len(crowded):
         return np.nan, np.nan
-    reach = int(2 / BIN_MM)  # up to the crest of a crowd from its foot
+    reach = int(CREST_MM / BIN_MM)
     low = int(crowded[0] + np.argmax(crowd[crowded[0] : crowded[0] + reach]))
     last = int(crowded[-1])
     high = last - int(np.argmax(crowd[max(0, last - reach + 1) : last + 1][::-1]))

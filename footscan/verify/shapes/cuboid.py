@@ -1,4 +1,4 @@
-"""A cuboid fitted to a cloud: dimensions, angles and flatness, which tell what the scanner that made it is worth."""
+"""A cuboid fitted to a cloud: dimensions, angles and flatness, which show the accuracy of the scanner."""
 
 from dataclasses import dataclass
 from itertools import combinations, product
@@ -23,27 +23,34 @@ from schemas.base.errors import Finding
 from schemas.fits import Basis, CuboidDimension, CuboidFit, CuboidParameters, FaceAngle, FaceFit, FaceName
 
 NAMES: tuple[tuple[FaceName, FaceName], ...] = (("back", "front"), ("right", "left"), ("bottom", "top"))
+"""Lower and upper face of each axis: X, Y and Z"""
 LEAST_POINTS = 100
+"""Least number of distinct points; chosen by hand."""
 LEAST_SHARE = 0.6
-"""Of the points, so many must lie on the faces or near their edges."""
+"""Least share of the points on the faces or near their edges; chosen by hand."""
 MOST_UNEVEN_MM = 1.5
-"""Root mean square from which a face is none."""
+"""Largest robust standard deviation of the points of a flat face; chosen by hand."""
 CELL_MM = 10.0
-"""Edge of the cells of a face whose scatter gives its uncertainty: noise within one is of few stripes, and not free."""
+"""Edge of the cells of a face whose scatter gives its uncertainty, since points of few stripes share their errors.
+Chosen by hand."""
 LEAST_IN_CELL = 5
+"""Least number of points of such a cell; chosen by hand."""
 LEAST_CELLS = 4
+"""Least number of such cells; chosen by hand."""
 NARROW_MM = 2.0
-"""Standard deviation below which the points of a face are a line that gives no plane."""
+"""Points of a face with a smaller standard deviation are a line and give no plane; chosen by hand."""
 STANDING_DEGREES = 2.0
-"""A cuboid that leans more does not stand on the floor."""
+"""A cuboid that leans more does not stand on the floor; chosen by hand."""
 ACROSS = np.cos(np.radians(45))
+"""Least cosine between the travel and an axis whose ends are located by stripes"""
 BESIDE_MM = 1.0
-"""How far from the faces beside it the points of an end's last stripes may lie: one that is cut is displaced."""
+"""Largest distance from the adjacent faces of points of an end's last stripes, since cut stripes are displaced.
+Chosen by hand."""
 
 
 @dataclass(frozen=True)
 class _Plane:
-    """A face's own plane, fitted without regard to the others."""
+    """The plane of one face, fitted independently of the others."""
 
     centre: Floats
     normal: Floats
@@ -52,25 +59,25 @@ class _Plane:
 
 @dataclass(frozen=True)
 class _End:
-    """Where the cuboid ends in a direction of one of its axes."""
+    """An end of the cuboid along one of its axes, with the evidence for it."""
 
     basis: Basis
     stands: End
 
 
 def fit_cuboid(points: Floats, parameters: CuboidParameters | None = None, sights: Sights | None = None) -> CuboidFit:
-    """Faces, dimensions and angles of the cuboid that `points` were taken from.
+    """Fit a cuboid to `points`: its faces, dimensions and angles.
 
-    The points find their faces by themselves (see `box_search`). Planes at right angles are fitted to all faces at once
-    by least squares, with outliers beyond four robust standard deviations and edges left out, and to each face a plane
-    of its own, by total least squares. What tells the place of a face that was not seen stands in
-    `CuboidDimension.ends`.
+    The points are assigned to faces automatically (see `box_search`). Planes at right angles are fitted to all faces
+    together by least squares, without edges and without outliers beyond four robust standard deviations. In addition, a
+    plane is fitted to each face alone by total least squares. `CuboidDimension.ends` names the evidence for the place
+    of each face, including faces that were not seen.
 
     Parameters
     ----------
     points : (N, 3) float64, mm, scanner frame; in any order, of a cloud or spread over a mesh
-    parameters : how wide an edge is, and where the floor
-    sights : the same as each camera saw it; tells more of an end that only stripes tell
+    parameters : width of an edge, height of the floor and thickness of the laser sheet
+    sights : the points of each camera, which locate an end between stripes more precisely
 
     Raises
     ------
@@ -85,8 +92,8 @@ def fit_cuboid(points: Floats, parameters: CuboidParameters | None = None, sight
     on_body = _check_cuboid(points, box)
     planes = stripe_planes(points[on_body, 0])
 
-    own = {found.face: plane for found in box.faces if (plane := _own_plane(points, box, found))}
-    faces = {found.face: _face_fit(points, box, found, own.get(found.face)) for found in box.faces}
+    own = {of_face.face: plane for of_face in box.faces if (plane := _own_plane(points, box, of_face))}
+    faces = {of_face.face: _face_fit(points, box, of_face, own.get(of_face.face)) for of_face in box.faces}
     seen = sights or Sights(points, np.zeros(len(points), np.intp), {})
     ends = {face: _end(points, box, face, faces, planes, seen, parameters) for face in product(range(3), range(2))}
     along, across, up = (_dimension(box, axis, ends, own) for axis in range(3))
@@ -104,51 +111,51 @@ def fit_cuboid(points: Floats, parameters: CuboidParameters | None = None, sight
 
 
 def _check_cuboid(points: Floats, box: Box) -> NDArray[np.bool_]:
-    """(N,) which points lie on the faces or near their edges; raises where these do not make a cuboid."""
-    seen_axes = {found.face[0] for found in box.faces}
+    """Returns (N,) which points lie on the faces or near their edges; raises `Finding` if there is no cuboid."""
+    seen_axes = {of_face.face[0] for of_face in box.faces}
     if len(seen_axes) < 2:
         raise Finding("the points lie on no two faces at a right angle, expected a cuboid")
     on_body = np.zeros(len(points), np.bool_)
-    for found in box.faces:
-        on_body[found.kept] = on_body[found.near_edge] = True
+    for of_face in box.faces:
+        on_body[of_face.kept] = on_body[of_face.near_edge] = True
     share = float(on_body.mean())
     if share < LEAST_SHARE:
         raise Finding(f"{share:.0%} of the points lie on the faces of a cuboid, expected at least {LEAST_SHARE:.0%}")
-    worst = max(box.faces, key=lambda found: found.sigma_mm)
+    worst = max(box.faces, key=lambda of_face: of_face.sigma_mm)
     if worst.sigma_mm > MOST_UNEVEN_MM:
         problem = f"is uneven by {worst.sigma_mm:.1f} mm, expected a cuboid with flat faces"
         raise Finding(f"the {_name(worst.face)} {problem}")
     return on_body
 
 
-def _own_plane(points: Floats, box: Box, found: FacePoints) -> _Plane | None:
-    """The plane of least squared distances to a face's points; None where these are a line."""
-    centre = points[found.kept].mean(axis=0)
-    centred = points[found.kept] - centre
+def _own_plane(points: Floats, box: Box, of_face: FacePoints) -> _Plane | None:
+    """Fit a plane to the points of a face by total least squares; None if the points are a line."""
+    centre = points[of_face.kept].mean(axis=0)
+    centred = points[of_face.kept] - centre
     variance, vectors = np.linalg.eigh(centred.T @ centred / len(centred))
-    normal = vectors[:, 0] * np.copysign(1.0, vectors[:, 0] @ _outward(box, found.face))
+    normal = vectors[:, 0] * np.copysign(1.0, vectors[:, 0] @ _outward(box, of_face.face))
     return _Plane(centre, normal) if variance[1] > NARROW_MM**2 else None
 
 
-def _face_fit(points: Floats, box: Box, found: FacePoints, own: _Plane | None) -> FaceFit:
-    kept = points[found.kept]
-    plane = own or _Plane(kept.mean(axis=0), _outward(box, found.face))
+def _face_fit(points: Floats, box: Box, of_face: FacePoints, own: _Plane | None) -> FaceFit:
+    kept = points[of_face.kept]
+    plane = own or _Plane(kept.mean(axis=0), _outward(box, of_face.face))
     residuals = (kept - plane.centre) @ plane.normal
-    off_face = kept @ box.axes[found.face[0]] - box.limits[found.face]
+    off_face = kept @ box.axes[of_face.face[0]] - box.limits[of_face.face]
     return FaceFit(
-        name=_name(found.face),
+        name=_name(of_face.face),
         normal=as_vector(plane.normal),
         points=len(kept),
-        edge_points=len(found.near_edge),
-        outliers=found.outliers,
+        edge_points=len(of_face.near_edge),
+        outliers=of_face.outliers,
         rms_mm=float(np.sqrt(np.mean(residuals**2))),
         max_mm=float(np.abs(residuals).max()),
-        uncertainty_mm=_scatter_of_cells(kept @ box.axes.T, found.face[0], off_face),
+        uncertainty_mm=_scatter_of_cells(kept @ box.axes.T, of_face.face[0], off_face),
     )
 
 
 def _scatter_of_cells(along: Floats, axis: int, off_face: Floats) -> float:
-    """Standard uncertainty of the mean of (N,) distances `off_face`, from that of 10 mm cells of the face."""
+    """Standard uncertainty of the mean of (N,) distances `off_face`, from the scatter of 10 mm cells of the face."""
     order, starts = group_by_cell(np.delete(along, axis, axis=1), np.full(2, CELL_MM))
     counts = np.diff(np.append(starts, len(order)))
     means = cell_means(off_face[:, None], order, starts, np.ones(len(off_face)))[counts >= LEAST_IN_CELL, 0]
@@ -166,13 +173,13 @@ def _end(
     sights: Sights,
     parameters: CuboidParameters,
 ) -> _End | None:
-    """What is known of where the cuboid ends towards `face`."""
+    """Locate the end of the cuboid towards `face`; None if there is no evidence of it."""
     axis, side = face
     if face in faces:
         place = float(box.limits[face])
         return _End("faces", known_end(place if side else -place, faces[face].uncertainty_mm))
     if face == (2, 0) and (2, 1) in faces and box.axes[2, 2] >= np.cos(np.radians(STANDING_DEGREES)):
-        [top] = [found.kept for found in box.faces if found.face == (2, 1)]
+        [top] = [of_face.kept for of_face in box.faces if of_face.face == (2, 1)]
         height = float(np.mean(points[top, 2])) - parameters.floor_mm
         return _End("floor", known_end(height - float(box.limits[2, 1]), 0.0))
     if axis != 2 and len(planes) and abs(box.axes[axis, 0]) >= ACROSS:
@@ -183,7 +190,7 @@ def _end(
 
 
 def _beside(box: Box, face: Face, sights: Sights) -> tuple[Beside, float]:
-    """What is seen on the faces beside `face`, and how far along the travel the edges reach in which it meets them."""
+    """Returns the points on the faces adjacent to `face`, and the reach along the travel of its edges with them, mm."""
     axis, _ = face
     normal = _outward(box, face)
     along = sights.points @ box.axes.T
@@ -191,19 +198,19 @@ def _beside(box: Box, face: Face, sights: Sights) -> tuple[Beside, float]:
     for camera, centre in sights.centres.items():
         centres[camera] = centre
     x, outward, off_faces, slopes, views, crossing = [], [], [], [], [], 0.0
-    for number, found in enumerate(box.faces):
-        beside, side = found.face
+    for number, of_face in enumerate(box.faces):
+        beside, side = of_face.face
         if beside == axis:
             continue
         edge = 3 - axis - beside  # the axis along which the end meets this face
-        off_face = (along[:, beside] - box.limits[found.face]) * (1 if side else -1)
+        off_face = (along[:, beside] - box.limits[of_face.face]) * (1 if side else -1)
         low, high = box.bounds[edge]
         near = (np.abs(off_face) <= BESIDE_MM) & (along[:, edge] >= low) & (along[:, edge] <= high)
         to_camera = centres[sights.camera[near]] - sights.points[near] * [0.0, 1.0, 1.0]
         x.append(sights.points[near, 0])
         outward.append(sights.points[near] @ normal)
         off_faces.append(off_face[near])
-        slopes.append(np.sign(normal[0]) * (to_camera @ _outward(box, found.face)) / to_camera[:, 0])
+        slopes.append(np.sign(normal[0]) * (to_camera @ _outward(box, of_face.face)) / to_camera[:, 0])
         views.append(256 * number + sights.camera[near].astype(np.intp))
         crossing = max(crossing, abs(float(box.axes[edge, 0])) * float(high - low))
     return Beside(*map(np.concatenate, (x, outward, off_faces, slopes, views))), crossing
@@ -220,12 +227,12 @@ def _dimension(box: Box, axis: int, ends: dict[Face, _End | None], own: dict[Fac
         uncertainty_mm=uncertainty,
         free_mm=_distance(*planes) if len(planes) == 2 else None,
         ends=(lower.basis if lower else None, upper.basis if upper else None),
-        note=f"nothing tells where its {unknown} stands" if unknown else None,
+        note=f"the place of its {unknown} is unknown" if unknown else None,
     )
 
 
 def _distance(a: _Plane, b: _Plane) -> float:
-    """Mean distance of either plane's middle to the other plane."""
+    """Mean of the distances of each plane's centre to the other plane."""
     between = b.centre - a.centre
     return float((abs(between @ a.normal) + abs(between @ b.normal)) / 2)
 

@@ -1,4 +1,4 @@
-"""What the fits of known bodies to points have in common."""
+"""Helpers of the fits of reference bodies to points."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 
 def distinct_points(points: Floats) -> Floats:
-    """(M, 3) the points, mm, without doubles, in an order that does not depend on the one they came in.
+    """Returns (M, 3) the distinct points, mm, in an order that does not depend on that of the input.
 
     Raises
     ------
@@ -26,7 +26,13 @@ def distinct_points(points: Floats) -> Floats:
 
 
 def robust_deviation(values: Floats) -> float:
-    """Standard deviation of a normal distribution with the median absolute deviation of (N,) `values`; 0 for none."""
+    """Standard deviation of the normal distribution that has the median absolute deviation of `values`; 0 without any.
+
+    Examples
+    --------
+    >>> round(robust_deviation(np.array([1.0, 2.0, 3.0, 4.0, 100.0])), 4)
+    1.4826
+    """
     return MAD_TO_SD * float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
 
 

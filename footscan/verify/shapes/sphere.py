@@ -1,9 +1,9 @@
 """Spheres of known diameter in a cloud: the errors of their size and form.
 
-ISO 20685-2 tests the surfaces of body scanners, those of feet among them, with calibrated bodies in several places of
-the volume. What is evaluated here is what such tests with spheres have in common: the error of the diameter, and how
-far the points lie from the sphere of least squares. The thickness of the shell of 95 % of them, as in ISO 10360-8 and
--13, is one that a few stray points do not decide.
+ISO 20685-2 tests the surfaces of body scanners, including foot scanners, with calibrated bodies in several places of
+the volume. This module evaluates what such tests with spheres have in common: the error of the diameter, and the
+distances of the points from the sphere of least squares. The thickness of the shell that holds 95 % of them, as in ISO
+10360-8 and -13, is not decided by a few stray points.
 """
 
 import numpy as np
@@ -16,44 +16,51 @@ from schemas.base.errors import Finding
 from schemas.fits import SphereFit
 
 LEAST_POINTS = 50
+"""Least number of points of a sphere; chosen by hand."""
 LEAST_IN_CAP = 8
+"""Least number of points of a cap; chosen by hand."""
 MOST_UNEVEN = 0.015
-"""Standard deviation of the patches' mean distances, in radii, from which a form is no sphere, as heels are none."""
+"""Largest standard deviation of the patches' mean distances, in radii, of a sphere; heels exceed it. Chosen by hand."""
 LEAST_COVERED = 0.4
-"""Share of a sphere's surface that must have points."""
+"""Least share of a sphere's surface that has points; chosen by hand."""
 SEEDS = 200
+"""Bound of time: caps to which a first sphere is fitted."""
 CAP = 0.7
-"""Reach in radii of the cap around a seed through which a first sphere is put."""
+"""Reach in radii of the cap around a seed; chosen by hand."""
 TRIMMINGS, TRIM = 5, 3.0
-"""So often it is put through anew, without points beyond so many times the median distance from it."""
+"""Number of fits to a cap; each leaves out points beyond this multiple of the median distance. Chosen by hand."""
 SIZE_TOLERANCE = 0.15
-"""Share of the radius by which that first sphere may be wrong."""
+"""Largest error of the radius of that first sphere, as a share of it; chosen by hand."""
 CELL = 1 / 15
-"""Edge in radii of the cells that the cloud is thinned to for the search."""
+"""Edge in radii of the cells to which the cloud is thinned for the search; chosen by hand."""
 SHELL = 0.05
-"""Share of the radius within which points belong to a sphere."""
+"""Points nearer to a sphere than this share of its radius belong to it; chosen by hand."""
 OUTLIER_SIGMAS = 5.0
+"""Points farther off than this number of robust standard deviations are outliers; chosen by hand."""
 LEAST_REACH_MM = 0.01
+"""Points nearer than this are never outliers."""
 ROUGH_PASSES, PASSES = 3, 10
+"""Steps of the fit in the search and in the evaluation."""
 CONVINCING = 0.6
-"""Share of a sphere's surface from which no better one is sought."""
+"""The search ends at a sphere that covers at least this share of its surface; chosen by hand."""
 SHARE = 0.95
+"""Share of the points in the thinnest shell, as in ISO 10360-8 and -13."""
 
 DIRECTIONS = 400
-"""Patches, of about 10 degrees across, that a sphere's surface is divided into."""
+"""Number of patches, about 10 degrees across, into which a sphere's surface is divided."""
 _NUMBER = np.arange(DIRECTIONS)
 _Z = 1 - (2 * _NUMBER + 1) / DIRECTIONS
 _TURN = _NUMBER * np.pi * (3 - np.sqrt(5))
 PATCHES = cKDTree(np.column_stack([np.sqrt(1 - _Z**2) * np.cos(_TURN), np.sqrt(1 - _Z**2) * np.sin(_TURN), _Z]))
-"""Their middles, unit vectors spread evenly along the spiral of Fibonacci."""
+"""Middles of the patches: unit vectors, spread evenly along the spiral of Fibonacci"""
 
 
 def fit_sphere(points: Floats, diameter_mm: float) -> SphereFit:
-    """The sphere of known diameter that most of `points` lie on.
+    """Fit the sphere of known diameter on which most of `points` lie.
 
     Parameters
     ----------
-    points : (N, 3) float64, mm, of any order
+    points : (N, 3) float64, mm, in any order
     diameter_mm : calibrated diameter
 
     Raises
@@ -65,27 +72,27 @@ def fit_sphere(points: Floats, diameter_mm: float) -> SphereFit:
 
 
 def find_spheres(points: Floats, diameter_mm: float) -> list[SphereFit]:
-    """All spheres of known diameter in `points`, those with most points first; else as `fit_sphere`."""
+    """Fit all spheres of known diameter in `points`, those with most points first; parameters as in `fit_sphere`."""
     left = distinct_points(points)
     count = len(left)
-    found = []
+    fits = []
     while (centre := _rough_centre(left, diameter_mm / 2)) is not None:
         fit = _evaluated(left, centre, diameter_mm)
         if fit is not None:
-            found.append(fit)
+            fits.append(fit)
         taken = np.linalg.norm(left - centre, axis=1) <= (1 + 2 * SHELL) * diameter_mm / 2
         if fit is not None:
             taken |= np.linalg.norm(left - fit.centre_mm, axis=1) <= (1 + 2 * SHELL) * diameter_mm / 2
         left = left[~taken]
-    if not found:
+    if not fits:
         raise Finding(f"no sphere of about {diameter_mm:g} mm among {count} distinct points, expected one or more")
-    return sorted(found, key=lambda fit: (-fit.points, fit.centre_mm))
+    return sorted(fits, key=lambda fit: (-fit.points, fit.centre_mm))
 
 
 def _rough_centre(points: Floats, radius: float) -> Floats | None:
-    """(3,) centre of the sphere of about `radius` of which the points cover most; None where they cover none.
+    """Returns (3,) the centre of the sphere of about `radius` of which the points cover most; None without a sphere.
 
-    Through the points of a cap around each of many seeds a sphere is put, and moved onto all points near it.
+    A sphere is fitted to a cap around each of many seeds, and then moved onto all points near it.
     """
     if len(points) < LEAST_POINTS:
         return None
@@ -114,7 +121,7 @@ def _rough_centre(points: Floats, radius: float) -> Floats | None:
 
 
 def _cap_centre(cap: Floats, radius: float) -> Floats | None:
-    """Centre of the algebraic sphere x² + y² + z² = 2 c.p + k through most of `cap`; None if of another size."""
+    """Centre c of the algebraic sphere |p|² = 2 c·p + k through most points p of `cap`; None if its size is wrong."""
     for _ in range(TRIMMINGS):
         if len(cap) < LEAST_IN_CAP:
             return None
@@ -137,7 +144,7 @@ def _near_shell(points: Floats, centre: Floats, radius: float, share: float) -> 
 
 
 def _stepped(points: Floats, centre: Floats, radius: float) -> Floats:
-    """`centre` after one step of Gauss and Newton on the distances of `points` to the sphere of given `radius`."""
+    """`centre` after one Gauss-Newton step on the distances of `points` to the sphere of the given `radius`."""
     outward = points - centre
     distance = np.linalg.norm(outward, axis=1)
     step: Floats = np.linalg.lstsq(outward / distance[:, None], distance - radius, rcond=None)[0]
@@ -145,7 +152,7 @@ def _stepped(points: Floats, centre: Floats, radius: float) -> Floats:
 
 
 def _evaluated(points: Floats, centre: Floats, diameter_mm: float) -> SphereFit | None:
-    """The figures of the sphere near `centre`; None where too little of it is left on a closer look."""
+    """Evaluate the sphere near `centre`; None if the points are too few, too uneven or cover too little of it."""
     nominal = diameter_mm / 2
     radius, reach = nominal, SHELL * nominal
     for _ in range(PASSES):
@@ -191,7 +198,7 @@ def _evaluated(points: Floats, centre: Floats, diameter_mm: float) -> SphereFit 
 
 
 def _jacobian(points: Floats, centre: Floats) -> Floats:
-    """(N, 4) of the distances to a sphere, by a step of its centre against it and by one of its radius."""
+    """Returns (N, 4) the derivatives of the distances to a sphere by its centre and radius, all with opposite sign."""
     outward = points - centre
     return np.column_stack([outward / np.linalg.norm(outward, axis=1, keepdims=True), np.ones(len(points))])
 
@@ -206,8 +213,8 @@ def _thinnest_shell(distances: Floats) -> float:
 def _diameter_uncertainty(points: Floats, centre: Floats, radius: float) -> float:
     """Standard uncertainty of the diameter from the scatter of the patches' means.
 
-    Points of one patch share the errors of few stripes and cameras, so patches count and not points. The part of the
-    sphere that is covered decides how far centre and diameter may trade: that is in the least squares' covariance.
+    Points of one patch share the errors of few stripes and cameras, so patches count and not points. The covered part
+    of the sphere decides the correlation of centre and diameter, which is in the covariance of the least squares.
     """
     means, directions = _patch_means(points, centre, radius)
     jacobian = _jacobian(directions, np.zeros(3))
@@ -216,7 +223,7 @@ def _diameter_uncertainty(points: Floats, centre: Floats, radius: float) -> floa
 
 
 def _patch_means(points: Floats, centre: Floats, radius: float) -> tuple[Floats, Floats]:
-    """(K,) mean distances from the sphere, mm, of the points in its filled patches, and (K, 3) where these are."""
+    """Returns (K,) the mean distances from the sphere, mm, in its filled patches, and (K, 3) their directions."""
     patch = _patches(points - centre)
     counts = np.bincount(patch, minlength=DIRECTIONS)
     filled = counts > 0
@@ -225,11 +232,11 @@ def _patch_means(points: Floats, centre: Floats, radius: float) -> tuple[Floats,
 
 
 def _covered(outward: Floats) -> float:
-    """Share of the patches of a sphere that hold one of the points in (N, 3) directions `outward`."""
+    """Share of the patches of a sphere that hold a point; `outward` are (N, 3) directions of the points."""
     return len(np.unique(_patches(outward))) / DIRECTIONS
 
 
 def _patches(outward: Floats) -> NDArray[np.intp]:
-    """(N,) which of the sphere's patches each direction falls into."""
+    """Returns (N,) the number of the patch of each direction."""
     lengths = np.linalg.norm(outward, axis=1, keepdims=True)
     return np.asarray(PATCHES.query(outward / np.maximum(lengths, 1e-12))[1], np.intp)

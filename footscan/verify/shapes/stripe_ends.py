@@ -1,10 +1,10 @@
-"""Where a body ends that is seen by stripes alone: somewhere about the last stripe that hits it, and before the next.
+"""Place of an end of a body that only stripes see: about at the last stripe that hits the body, and before the next.
 
-Laser light is a sheet with a Gaussian profile of some standard deviation s. An end that stands e beyond the middle of
-the sheet leaves the share Phi(e/s) of its light on the body, and the middle of that lies s phi(e/s) / Phi(e/s) farther
-in (mean of a truncated normal distribution). A camera that looks askew at the sheet takes this for a displacement of
-the surface, one before the sheet to the one side and one behind it to the other. Nothing in a cloud tells s, so the
-place of an end is worked out for each s that may be, and what is told of it is the mean over all of them.
+Laser light is a sheet with a Gaussian profile of some standard deviation s. An end that lies e beyond the middle of the
+sheet leaves the share Phi(e/s) of its light on the body, and the middle of that light lies s phi(e/s) / Phi(e/s)
+farther in (mean of a truncated normal distribution). A camera that looks obliquely at the sheet sees this as a
+displacement of the surface; the sign differs between cameras before and behind the sheet. A cloud does not determine s.
+Therefore the place of an end is computed for each possible s, and the mean over all s is reported.
 """
 
 from collections.abc import Mapping
@@ -18,43 +18,48 @@ from footscan.cloud.points import PLANE_MM
 from footscan.verify.shapes.fitting import Floats, robust_deviation
 
 LEAST_PLANES = 5
+"""Least number of stripe planes; chosen by hand."""
 LEAST_POINTS = 5
+"""Least number of points of a stripe; chosen by hand."""
 FROM_END = 3
-"""Of the points of a stripe, the third from the end counts, against outliers."""
+"""The third point from the end of a stripe is taken as its end, against outliers; chosen by hand."""
 LAST_PLANES = 10
+"""Number of planes near the end from which the step is taken; chosen by hand."""
 SHARP = 0.25
-"""Largest standard deviation of the points of a stripe plane along the travel, in steps."""
+"""Largest standard deviation of the points of a stripe plane along the travel, in steps; chosen by hand."""
 
 SHEETS = 9
-"""Standard deviations between the least and the largest one that are tried."""
+"""Number of standard deviations of the sheet that are tried, from the least to the largest"""
 THINNEST_MM = 1e-3
+"""Least standard deviation of the sheet"""
 AGREEMENT = np.linspace(0.8, 1.2, 5)
-"""What is seen of a displacement, in parts of what theory says: light lies wider on one face than on another, and where
-a camera stands is known to some per cent."""
+"""Ratios of observed to theoretical displacement that are tried: light lies wider on one face than on another, and the
+place of a camera is known to some per cent. Chosen by hand."""
 FAINTEST = (0.01, 0.5)
-"""A stripe is seen of which more than some share of its light is left. Nobody knows which, nor its order."""
-OTHERWISE = 1e-6
-"""Likelihood that a displacement has other causes, and says nothing of the end."""
+"""Bounds of the unknown least share of its light with which a stripe is still seen; chosen by hand."""
+OTHER_CAUSES = 1e-6
+"""Likelihood that a displacement has other causes and does not depend on the end; chosen by hand."""
 REACH_SIGMAS = 4.0
+"""Distance from the last stripe up to which ends are tried, in standard deviations of the sheet"""
 FINE_MM = 0.005
-"""Distance of the places that are tried, and the least uncertainty of a displacement."""
+"""Step of the places that are tried; least uncertainty of a displacement"""
 
 
 @dataclass(frozen=True)
 class Sights:
-    """What each camera saw, before all of it was made one cloud, in which displacements are averaged out."""
+    """The points of each camera before fusion, which would average out displacements."""
 
     points: Floats
-    """(N, 3) mm"""
+    """(N, 3) mm, scanner frame"""
     camera: NDArray[np.integer]
-    """(N,)"""
+    """(N,) camera of each point"""
     centres: Mapping[int, Floats]
-    """Where a camera stands, (3,) mm, X from the laser's plane."""
+    """Centre of each camera, (3,) mm, X counted from the laser plane"""
 
 
 @dataclass(frozen=True)
 class Beside:
-    """Points on the faces beside an end, (N,) each."""
+    """Points on the faces adjacent to an end, (N,) each."""
 
     x: Floats
     """mm, travel coordinates"""
@@ -63,16 +68,16 @@ class Beside:
     off_face: Floats
     """mm, distances from their faces, positive outside"""
     slope: Floats
-    """How far off its face light is seen that lies 1 mm farther in than the sheet; NaN where that is not known."""
+    """Apparent distance from its face, in mm, of light 1 mm farther in than the sheet; NaN where unknown"""
     view: NDArray[np.integer]
     """A number for each camera and face"""
 
 
 @dataclass(frozen=True)
 class End:
-    """Where a body ends along an outward normal: one estimate for each of the sheets that may be, (S,) or (1,) for all.
+    """Place of an end along an outward normal: estimates for each of the possible sheets, (S,), or for all, (1,).
 
-    Both ends of a body are lit by one sheet: what is wrong with it is wrong with both.
+    Both ends of a body are lit by the same sheet, so their errors are correlated.
     """
 
     place: Floats
@@ -80,16 +85,22 @@ class End:
     variance: Floats
     """mm^2"""
     likelihood: Floats
-    """Of what was seen, were the sheet so."""
+    """Likelihood of the observation for each sheet"""
 
 
 def known_end(place: float, uncertainty: float) -> End:
-    """An end that no sheet is asked for."""
+    """Make an end that does not depend on the sheet; both arguments in mm."""
     return End(np.array([place]), np.array([uncertainty**2]), np.ones(1))
 
 
 def length_between(a: End, b: End) -> tuple[float, float]:
-    """Distance in mm of two opposite ends, places counted along opposite normals, and its standard uncertainty."""
+    """Returns the distance in mm of two opposite ends, places along opposite normals, and its standard uncertainty.
+
+    Examples
+    --------
+    >>> length_between(known_end(20.0, 0.03), known_end(-8.0, 0.04))
+    (12.0, 0.05)
+    """
     place, variance = a.place + b.place, a.variance + b.variance
     weight = a.likelihood * b.likelihood
     weight = weight / weight.sum()
@@ -98,9 +109,9 @@ def length_between(a: End, b: End) -> tuple[float, float]:
 
 
 def stripe_planes(x: Floats) -> Floats:
-    """(K,) mm, ascending: the places of the stripe planes that points with travel coordinates `x`, (N,), lie in.
+    """Returns (K,) mm, ascending, the places of the stripe planes of points with travel coordinates `x`, (N,).
 
-    Empty where they lie in no such planes, as points spread over a mesh do.
+    Empty if the points do not lie in stripe planes, such as points spread over a mesh.
     """
     ordered = np.sort(x)
     planes = np.split(ordered, np.flatnonzero(np.diff(ordered) > PLANE_MM) + 1)
@@ -115,19 +126,20 @@ def stripe_planes(x: Floats) -> Floats:
 def end_between_stripes(
     beside: Beside, planes: Floats, cosine: float, crossing_mm: float, sheet_mm: tuple[float, float]
 ) -> End:
-    """Where an end of a body stands that no point lies on.
+    """Locate an end of a body on which no points lie.
 
-    Where the end is square to the travel, the last stripe lies on the body, at least in part, and the next one does
-    not, or too little of it to be seen. How far the last one is seen displaced tells how near the end is. One that is
-    not says that the end is out of its reach, and then nothing is known between the reaches of both. Where the end is
-    askew by more than a step, stripes run out over its edge, and their last points are on it.
+    If the end is square to the travel, at least a part of the last stripe lies on the body, and too little of the next
+    one to be seen. The displacement of the last stripe shows how near the end is. Without a displacement the end lies
+    beyond the reach of that stripe, anywhere before the reach of the next. If the end is oblique by more than a step,
+    stripes cross its edge, and their last points lie on it.
 
     Parameters
     ----------
+    beside : points on the adjacent faces
     planes : (K,) mm, the stripe planes
-    cosine : of the angle of the normal to the travel, signed
-    crossing_mm : how far the end's edges reach along the travel
-    sheet_mm : least and largest standard deviation of the light across its sheet, any between them as likely
+    cosine : of the angle between the outward normal and the travel, signed
+    crossing_mm : reach of the end's edges along the travel
+    sheet_mm : least and largest standard deviation of the light across its sheet, with a uniform prior between
     """
     step = float(np.median(np.diff(planes)))
     stripes = [np.flatnonzero(np.abs(beside.x - plane) <= SHARP * step) for plane in planes]
@@ -154,7 +166,10 @@ def end_between_stripes(
 
 
 def _chance_to_see(beyond: Floats) -> Floats:
-    """Of stripes that an end stands so many standard deviations beyond; the logarithm of the share is uniform."""
+    """Probability to see a stripe for an end this many standard deviations beyond it.
+
+    The logarithm of the least visible share of light has a uniform prior.
+    """
     faintest, brightest = np.log(FAINTEST)
     return np.asarray(np.clip((log_ndtr(beyond) - faintest) / (brightest - faintest), 0.0, 1.0))
 
@@ -162,9 +177,9 @@ def _chance_to_see(beyond: Floats) -> Floats:
 def _chance_of_displacement(
     beside: Beside, stripes: list[NDArray[np.intp]], last: int, places: Floats, sheets: Floats
 ) -> Floats:
-    """(S, G, P) likelihood, were the end at `places`, (P,), of how far the last stripe is seen displaced.
+    """Returns (S, G, P) likelihoods of the displacement of the last stripe for ends at `places`, (P,).
 
-    How far stripes are that nothing cuts says how sure that is.
+    The displacements of the other stripes, which are not cut, give its uncertainty.
     """
     seen = _medians(beside, stripes)
     weight = seen.counts * np.nan_to_num(seen.slope) ** 2  # of least squares
@@ -182,14 +197,14 @@ def _chance_of_displacement(
     mills = np.exp(-0.5 * beyond**2 - 0.5 * np.log(2 * np.pi) - log_ndtr(beyond))  # phi / Phi
     expected = sheets[:, None] * np.einsum("v,svp->sp", share, mills)
     deviations = (displaced[last] - AGREEMENT[:, None] * expected[:, None]) / noise
-    return np.asarray(np.exp(-0.5 * deviations**2) + OTHERWISE)
+    return np.asarray(np.exp(-0.5 * deviations**2) + OTHER_CAUSES)
 
 
 @dataclass(frozen=True)
 class _Medians:
-    """Of the points that each view has of each stripe, (stripes, views); 0 where it has none.
+    """Medians over the points of each stripe in each view, (stripes, views); 0 without points.
 
-    How far a point is displaced falls with its own place along the normal, so their medians go together.
+    The displacement of a point depends on its place along the normal, so the medians of both are used together.
     """
 
     counts: Floats
@@ -200,11 +215,11 @@ class _Medians:
 
 def _medians(beside: Beside, stripes: list[NDArray[np.intp]]) -> _Medians:
     views = np.unique(beside.view)
-    found = np.zeros((4, len(stripes), len(views)))
+    medians = np.zeros((4, len(stripes), len(views)))
     for k, stripe in enumerate(stripes):
         for v, view in enumerate(views):
             own = stripe[beside.view[stripe] == view]
             if len(own) >= LEAST_POINTS:
                 values = (beside.off_face[own], beside.outward[own], beside.slope[own])
-                found[:, k, v] = len(own), *(float(np.median(value)) for value in values)
-    return _Medians(*found[:, :, found[0].any(axis=0)])
+                medians[:, k, v] = len(own), *(float(np.median(value)) for value in values)
+    return _Medians(*medians[:, :, medians[0].any(axis=0)])

@@ -3,7 +3,7 @@
     python -m footscan.virtual.board.board
 
 prints the terminal's name and answers there until it is ended. Heads move over time, switches trip, the laser has its
-power at every moment; what really happens can be asked for, and mishaps of every kind can be made to happen.
+power at every moment; the true state can be read, and mishaps of every kind can be caused.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from footscan.virtual.board.motion import Motion
 from footscan.virtual.board.rails import Gait, Mount, Rail, Triple
 
 TICK_SECONDS = 0.004
-"""How often the firmware looks around; the real one does so at least as often."""
+"""Period of the firmware's loop; that of the real firmware is not longer. Chosen by hand."""
 
 MOUNTS = (Mount(-20.0), Mount(-20.0), Mount(-20.0))
 """Home at X = -20, travel towards greater X: the range of the virtual films lies within."""

@@ -8,11 +8,12 @@ from dataclasses import replace
 
 from footscan.virtual.board.gcode import Block, GcodeError, Modes, read_block
 from footscan.virtual.board.machine import Machine, Work
-from footscan.virtual.board.motion import Light, Move
+from footscan.virtual.board.motion import LaserPower, Move
 from footscan.virtual.board.rails import Triple
 
 SEARCH, LOCATE = 1.5, 5.0
-"""Homing goes this often the largest travel for a switch, and this often the pull-off to find it again."""
+"""Homing searches a switch over 1.5 times the largest travel, and locates it again over 5 times the pull-off (Grbl's
+HOMING_AXIS_SEARCH_SCALAR and HOMING_AXIS_LOCATE_SCALAR)."""
 
 
 def execute_gcode(board: Machine, line: str) -> Work:
@@ -102,14 +103,14 @@ def _drive(board: Machine, cycle: tuple[int, ...], speed: float, distance: float
         toward[axis] = -distance if int(board.memory[23]) >> axis & 1 else distance
     steps = board.motion.steps
     target = (steps[0] + toward[0], steps[1] + toward[1], steps[2] + toward[2])
-    board.motion.add(_move(board, steps, target, speed * math.sqrt(len(cycle)), Light(), fixed_feed=True))
+    board.motion.add(_move(board, steps, target, speed * math.sqrt(len(cycle)), LaserPower(), fixed_feed=True))
 
 
 def _queue(
     board: Machine,
     target: Triple,
     speed: float,
-    light: Light,
+    light: LaserPower,
     state: str,
     *,
     rapid: bool = False,
@@ -131,7 +132,7 @@ def _move(
     begin: Triple,
     target: Triple,
     speed: float,
-    light: Light,
+    light: LaserPower,
     *,
     rapid: bool = False,
     fixed_feed: bool = False,
@@ -179,19 +180,19 @@ def _set_light(board: Machine, block: Block) -> Work:
 def _shine(board: Machine, spindle: str, power: float) -> None:
     """Light on heads that stand: under M4 there is none in laser mode."""
     off = spindle == "M5" or (board.memory.flag(32) and spindle == "M4")
-    board.motion.stand_in_light(Light() if off else Light(_level(board, power)))
+    board.motion.stand_in_light(LaserPower() if off else LaserPower(_level(board, power)))
     board.counters.overrides = 0
 
 
-def _light(board: Machine, modes: Modes, feed: float) -> Light:
+def _light(board: Machine, modes: Modes, feed: float) -> LaserPower:
     """Light on a motion: under M4 it follows the speed, with its full level at the programmed one."""
     if modes.spindle == "M5":
-        return Light()
+        return LaserPower()
     if not board.memory.flag(32):
-        return Light(_level(board, modes.power))
+        return LaserPower(_level(board, modes.power))
     if modes.motion == "G0":
-        return Light()
-    return Light(_level(board, modes.power), feed / 60.0 if modes.spindle == "M4" else None)
+        return LaserPower()
+    return LaserPower(_level(board, modes.power), feed / 60.0 if modes.spindle == "M4" else None)
 
 
 def _level(board: Machine, power: float) -> float:

@@ -1,6 +1,6 @@
 """The virtual board's firmware: states, realtime commands and the pump of lines, by the public protocol of Grbl 1.1.
 
-It knows no thread and no port: bytes go in by `receive`, time by `tick`, text comes out by `say`.
+It uses no thread and no port: bytes go in by `receive`, time by `tick`, text comes out by `say`.
 """
 
 from collections.abc import Callable
@@ -9,21 +9,23 @@ from dataclasses import dataclass
 from footscan.virtual.board.execute import execute_gcode
 from footscan.virtual.board.gcode import Modes
 from footscan.virtual.board.machine import Counters, Machine, Overrides, State, Work
-from footscan.virtual.board.motion import Light
+from footscan.virtual.board.motion import LaserPower
 from footscan.virtual.board.report import status_report
 from footscan.virtual.board.system import execute_system
 
 RX_BYTES = 128
 PLANNED_MOVES = 15
+"""Sizes of the receive buffer and of the planner, as Grbl 1.1 reports them (`Bf:15,128`)."""
 RESET, QUERY, START, HOLD, DOOR, JOG_CANCEL = 0x18, ord("?"), ord("~"), ord("!"), 0x84, 0x85
 FEED_STEPS = {0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}
 RAPIDS = {0x95: 100, 0x96: 50, 0x97: 25}
 LIGHT_STEPS = {0x9A: 10, 0x9B: -10, 0x9C: 1, 0x9D: -1}
 FEED_RESET, LIGHT_RESET, LIGHT_STOP = 0x90, 0x99, 0x9E
+"""Realtime commands of Grbl 1.1; the steps are changes of the overrides in percent."""
 CRITICAL = (1, 2)
-"""Alarms after which nothing but a reset is heard."""
+"""Alarms after which the firmware accepts only a reset."""
 ALARM_SECONDS = 0.5
-"""How long the firmware waits behind an alarm, for the message to leave."""
+"""Pause of the firmware after an alarm, in which the message is sent."""
 
 
 @dataclass
@@ -44,7 +46,7 @@ class Firmware(Machine):
         """
         self._work = self._waits_for = None
         self.motion.steps = (0.0, 0.0, 0.0)
-        self.motion.stand_in_light(Light())
+        self.motion.stand_in_light(LaserPower())
         self.state = "Alarm" if self.memory.flag(22) else "Idle"
         if boot_seconds:
             self._boots_at = self.now + boot_seconds
@@ -84,7 +86,7 @@ class Firmware(Machine):
     def alarm(self, number: int) -> None:
         """Stops everything. What happened is said; the two worst are followed by a reset of the host's."""
         self.motion.kill()
-        self.motion.stand_in_light(Light())
+        self.motion.stand_in_light(LaserPower())
         self.state = "Alarm"
         self.say(f"ALARM:{number}")
         if number in CRITICAL:
@@ -139,7 +141,7 @@ class Firmware(Machine):
         if self._boots_at is not None:
             return
         moving = self.state in ("Run", "Jog", "Home") or self.motion.speed > 0.0
-        self.motion.stand_in_light(Light())
+        self.motion.stand_in_light(LaserPower())
         if moving and self.state != "Alarm":
             self.alarm(6 if self.state == "Home" else 3)
         else:
@@ -182,7 +184,7 @@ class Firmware(Machine):
             self._open_door()
         self._door_seen = self.door_ajar
         if self.state == "Door" and self.motion.speed == 0.0:
-            self.motion.stand_in_light(Light())
+            self.motion.stand_in_light(LaserPower())
 
     def _open_door(self) -> None:
         if self.state == "Home":
@@ -219,7 +221,7 @@ class Firmware(Machine):
         elif byte == HOLD and self.state in ("Run", "Idle"):
             self.motion.holding = True
             if self.memory.flag(32) and self.state == "Idle":
-                self.motion.stand_in_light(Light())
+                self.motion.stand_in_light(LaserPower())
             self.state = "Hold"
 
     def _start(self) -> None:
@@ -243,7 +245,7 @@ class Firmware(Machine):
         elif byte in LIGHT_STEPS:
             now.light = min(max(now.light + LIGHT_STEPS[byte], 10), 200)
         elif byte == LIGHT_STOP and self.state == "Hold" and not self.memory.flag(32):
-            self.motion.stand_in_light(Light())
+            self.motion.stand_in_light(LaserPower())
         if now != was:
             self.counters.overrides = 0
             self.apply_overrides()

@@ -16,13 +16,13 @@ SAME_WAY = 0.999_999
 """Cosine of the angle between two moves that are passed through without slowing down."""
 TINY = 1e-9
 KEPT = 20_000
-"""Pieces of the past that are kept: far more than an hour of scanning."""
+"""Pieces of past motion that are kept: a bound of memory, far more than an hour of scanning."""
 
 Watch = Literal["none", "limits", "homing"]
 
 
 @dataclass
-class Light:
+class LaserPower:
     """What feeds the laser's PWM: `level` is its share of full power, 0 to 1."""
 
     level: float = 0.0
@@ -42,7 +42,7 @@ class Move:
     limit: float
     """Fastest speed that all axes bear, mm/s."""
     acceleration: float
-    light: Light
+    light: LaserPower
     rapid: bool = False
     fixed_feed: bool = False
     """Whether overrides leave its speed alone (jogs, homing)."""
@@ -60,7 +60,7 @@ class Piece:
     """Where the heads really stand then, mm."""
     velocity: Triple
     acceleration: Triple
-    light: Light
+    light: LaserPower
     stuck: tuple[bool, bool, bool]
 
 
@@ -81,7 +81,7 @@ class Motion:
         self.locked = [False, False, False]
         """Axes that get no pulses: those that found their switch while homing."""
         self.speed = 0.0
-        self.standing_light = Light()
+        self.standing_light = LaserPower()
         self.dark_when_held = False
         self._now = now
         self._steps: Triple = NOTHING
@@ -147,7 +147,7 @@ class Motion:
         self.holding = False
         self._note(NOTHING, NOTHING, self.standing_light)
 
-    def stand_in_light(self, light: Light) -> None:
+    def stand_in_light(self, light: LaserPower) -> None:
         """Sets the light of heads that stand."""
         self.standing_light = light
         if not self.is_moving:
@@ -233,7 +233,7 @@ class Motion:
         if move.length - move.done <= 1e-7 and self.speed <= move.exit + 1e-6:
             self._finish(move)
         elif self.holding and self.speed == 0.0:
-            self._note(NOTHING, NOTHING, Light() if self.dark_when_held else move.light)
+            self._note(NOTHING, NOTHING, LaserPower() if self.dark_when_held else move.light)
 
     def _rail_after(self, free: list[float], distance: float) -> Triple:
         moved = zip(self.rails, self._rail, free, strict=True)
@@ -243,7 +243,7 @@ class Motion:
         if not any(self.locked):
             self._steps = move.target
         self.queue.popleft()
-        self.standing_light = Light() if move.light.full_at else move.light
+        self.standing_light = LaserPower() if move.light.full_at else move.light
         if not self.queue:
             self.speed = 0.0
             self._note(NOTHING, NOTHING, self.standing_light)
@@ -277,7 +277,7 @@ class Motion:
             self._note(NOTHING, NOTHING, self.standing_light)
         self._noted = None
 
-    def _note(self, velocity: Triple, acceleration: Triple, light: Light) -> None:
+    def _note(self, velocity: Triple, acceleration: Triple, light: LaserPower) -> None:
         self._begins.append(self._now)
         stuck = (self.rails[0].stuck, self.rails[1].stuck, self.rails[2].stuck)
         self._pieces.append(Piece(self._steps, self._rail, velocity, acceleration, light, stuck))

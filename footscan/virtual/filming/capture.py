@@ -18,9 +18,10 @@ from schemas.reference import Capture, ReferenceObject
 Floats = NDArray[np.float64]
 
 HALF_LENGTH_MM = 40.0
-"""The object reaches this far before and behind the laser plane."""
+"""The object reaches this far before and behind the laser plane. Chosen by hand."""
 BESIDE_MM = 0.4
-"""A corner can be clicked where the stripe this far beside it, on one of its two sides, is lit and seen."""
+"""A corner can be clicked if the stripe this far beside it, on one of its two sides, is lit and seen.
+Chosen by hand."""
 
 
 def record_capture(
@@ -32,12 +33,13 @@ def record_capture(
     progress: Callable[[int, int], None] | None = None,
     workers: int = 2,
 ) -> None:
-    """Films the reference object in all its placements with all eight cameras, and writes the chart of its corners.
+    """Film the reference object in all its placements with all eight cameras, and write the chart of its corners.
 
-    `folder`, made if missing, gets `cam1.avi` to `cam8.avi` with one frame a placement, `reference.yaml`, `chart.csv`
-    with the columns camera,point,x_mm,y_mm,z_mm,i,j, and at last `capture.yaml`. The chart holds only corners that are
-    lit, seen and within the picture, off by `settings.click_error_px` and rounded to half a pixel. The settings' travel
-    is not used: the laser plane stands at X = 0. `workers` is the number of processes; the bytes do not depend on it.
+    `folder` (created if missing) gets `cam1.avi` to `cam8.avi` with one frame a placement, `reference.yaml`,
+    `chart.csv` with the columns camera,point,x_mm,y_mm,z_mm,i,j, and last `capture.yaml`. The chart holds only
+    corners that are lit, seen and within the picture, off by `settings.click_error_px` and rounded to half a pixel.
+    The settings' travel is not used: the laser plane stands at X = 0. `workers` is the number of
+    processes; the bytes do not depend on it.
     """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "capture.yaml").unlink(missing_ok=True)
@@ -50,13 +52,13 @@ def record_capture(
 
 
 def capture_document() -> Capture:
-    """What capture.yaml holds, of every capture."""
+    """Returns the contents of capture.yaml, the same for all captures."""
     cameras = [CaptureCamera(id=camera, file=f"cam{camera}.avi") for camera in CAMERAS]
     return Capture(format="footscan.capture/1", reference="reference.yaml", x_mm=0.0, cameras=cameras)
 
 
 def prism(profile: Floats) -> Mesh:
-    """The prism along X over a closed `profile` (C, 2) of (Y, Z) in mm; its ends are open, and dark inside."""
+    """Build the prism along X over a closed `profile` (C, 2) of (Y, Z) in mm; its ends are open, and dark inside."""
     profile = _counter_clockwise(profile)
     count = len(profile)
     front = np.column_stack([np.full(count, HALF_LENGTH_MM), profile])
@@ -71,7 +73,7 @@ def prism(profile: Floats) -> Mesh:
 def visible_corners(
     scanner: VirtualScanner, profile: Floats, settings: SimulationSettings
 ) -> dict[int, NDArray[np.bool_]]:
-    """For each camera which corners of `profile` (C, 2), mm, can be clicked: (C,) bool."""
+    """Returns for each camera which corners of `profile` (C, 2), mm, can be clicked: (C,) bool."""
     scene = Scene(prism(profile), MATT_GREY)
     turned = _signed_area(profile) < 0.0
     visible = {camera.id: np.zeros(len(profile), dtype=np.bool_) for camera in scanner.cameras}

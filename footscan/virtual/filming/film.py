@@ -8,7 +8,7 @@ import av
 
 
 def write_film(path: Path, pictures: Sequence[bytes], width: int, height: int, frames_per_second: int) -> None:
-    """Writes JPEG `pictures` as the packets of an AVI, unchanged; the film appears under its name when it is whole."""
+    """Write JPEG `pictures` unchanged as the packets of an AVI; the film appears under its name when it is complete."""
     partial = path.with_name(path.name + ".part")
     with av.open(partial, "w", format="avi", options={"fflags": "+bitexact"}) as container:
         stream = container.add_mux_stream("mjpeg", rate=frames_per_second, width=width, height=height)

@@ -1,9 +1,9 @@
-"""Recording a scan: a mesh in, `scan.yaml` and eight films out, and eight more with the laser off where asked for."""
+"""Records a scan: a mesh in, `scan.yaml` and eight films out; on request eight more films with the laser off."""
 
 import struct
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
@@ -24,72 +24,80 @@ Progress = Callable[[int, int], None]
 
 CAMERAS = range(1, 9)
 OFF = "-off"
-"""Behind the camera's number in the name of a film with the laser off."""
+"""Follows the camera's number in the name of a film with the laser off."""
+
+
+class ScanName(NamedTuple):
+    """The fields of scan.yaml that say whose foot was scanned."""
+
+    patient: str
+    scan: str
+    side: str
+
+
+class ScanExtras(NamedTuple):
+    """The optional contents of a scan folder."""
+
+    calibration: str | None = None
+    """Path of the calibration file relative to the folder, for scan.yaml."""
+    truth: bool = True
+    """True if the mesh is written as `truth.stl`."""
+    stripe_truth: bool = False
+    """True if the exact stripe centres are written as `truth/cam<n>.csv`."""
+    laser_off: bool = False
+    """True if each frame is taken again with the laser off, into `cam<n>-off.avi`, the camera's background."""
 
 
 def record_scan(
-    vertices: Floats,
-    faces: Ints,
+    mesh: Mesh,
     folder: Path,
-    *,
-    patient: str,
-    scan: str,
-    side: str,
+    name: ScanName,
     settings: SimulationSettings,
-    calibration: str | None = None,
-    truth: bool = True,
-    stripe_truth: bool = False,
-    laser_off: bool = False,
+    *,
+    extras: ScanExtras = ScanExtras(),  # noqa: B008
     surface: Surface = SKIN,
     progress: Progress | None = None,
     workers: int = 2,
 ) -> None:
-    """Films a mesh with all eight cameras while the heads travel along it; `scan.yaml` is written last.
+    """Film a mesh with all eight cameras while the heads travel along it; `scan.yaml` is written last.
 
     Parameters
     ----------
-    vertices : (N, 3) float64, mm, scanner frame: along X within the travel, on the glass at Z = 0, around Y = 0.
-    faces : (M, 3) int, counter-clockwise seen from outside.
-    folder : where the scan goes; made if missing.
-    calibration : path of the calibration file relative to `folder`, to be named in `scan.yaml`.
-    truth : whether the mesh goes with it as `truth.stl`.
-    stripe_truth : whether the exact stripe centres go with it as `truth/cam<n>.csv`.
-    laser_off : whether each frame is taken again with the laser off, into `cam<n>-off.avi`, the camera's background.
-    progress : called with frames done and frames in all; films with the laser off are counted anew.
-    workers : processes; the bytes do not depend on it.
+    mesh : mm, scanner frame: along X within the travel, on the glass at Z = 0, around Y = 0.
+    folder : folder of the scan; created if missing.
+    progress : called with the number of frames done and in total; films with the laser off are counted separately.
+    workers : number of processes; the bytes do not depend on it.
 
     Raises
     ------
     RefusedInput
-        `patient`, `scan` or `side` is not as scan.yaml must have it.
+        `patient`, `scan` or `side` breaks the format of scan.yaml.
     """
     document: dict[str, Any] = {
         "format": "footscan.scan/1",
-        "patient": patient,
-        "scan": scan,
-        "side": side,
+        **name._asdict(),
         "travel": {"start_mm": settings.start_mm, "step_mm": settings.step_mm},
-        **({"calibration": calibration} if calibration else {}),
-        **({"truth": "truth.stl"} if truth else {}),
+        **({"calibration": extras.calibration} if extras.calibration else {}),
+        **({"truth": "truth.stl"} if extras.truth else {}),
         "cameras": [
-            {"id": camera, "file": film_name(camera), **({"background": film_name(camera, OFF)} if laser_off else {})}
+            {"id": camera, "file": film_name(camera)}
+            | ({"background": film_name(camera, OFF)} if extras.laser_off else {})
             for camera in CAMERAS
         ],
     }
     validate(folder / "scan.yaml", Scan, document)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "scan.yaml").unlink(missing_ok=True)
-    mesh = Mesh(np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64))
     shots = [Shot(frame, settings.start_mm + frame * settings.step_mm, 0) for frame in range(settings.frames)]
     film_cameras([mesh], surface, shots, folder, settings, progress, workers)
-    if laser_off:
-        # Second exposures: by numbers of their own they have noise and flicker of their own.
-        again = [shot._replace(frame=settings.frames + shot.frame) for shot in shots]
+    if extras.laser_off:
+        # New frame numbers give the second exposures their own noise and flicker.
+        shots_again = [shot._replace(frame=settings.frames + shot.frame) for shot in shots]
         dark = settings.model_copy(update={"laser_exposure": 0.0})
-        film_cameras([mesh], surface, again, folder, dark, progress, workers, OFF)
-    if stripe_truth:
+        film_cameras([mesh], surface, shots_again, folder, dark, progress, workers, OFF)
+    if extras.stripe_truth:
         write_stripe_truth(mesh, surface, shots, folder / "truth", settings)
-    if truth:
+    if extras.truth:
         write_stl(folder / "truth.stl", mesh.vertices, mesh.faces)
     write_yaml(folder / "scan.yaml", document)
 
@@ -104,7 +112,7 @@ def film_cameras(
     workers: int,
     ending: str = "",
 ) -> None:
-    """Writes `cam1.avi` to `cam8.avi`, an `ending` behind the number, each with one frame for each of `shots`."""
+    """Write `cam1.avi` to `cam8.avi`, with one frame for each of `shots`; `ending` follows the camera's number."""
     total, done = len(CAMERAS) * len(shots), 0
     pictures: list[bytes] = []
     for camera, part in shoot(meshes, surface, list(CAMERAS), shots, settings, workers):
@@ -118,19 +126,22 @@ def film_cameras(
 
 
 def film_name(camera: int, ending: str = "") -> str:
-    """The film of a camera, as scan.yaml names it."""
+    """Returns the file name of a camera's film, as in scan.yaml."""
     return f"cam{camera}{ending}.avi"
 
 
 def write_yaml(path: Path, document: dict[str, Any]) -> None:
-    """`document` as YAML, its fields in their order, under its name when it is whole."""
+    """Write `document` as YAML, fields in their order; the file appears under its name when it is complete."""
     partial = path.with_name(path.name + ".part")
     partial.write_text(yaml.safe_dump(document, sort_keys=False, default_flow_style=None), encoding="utf-8")
     partial.replace(path)
 
 
 def write_stl(path: Path, vertices: Floats, faces: Ints) -> None:
-    """The mesh as binary STL, mm."""
+    """Write a mesh as binary STL, mm.
+
+    vertices : (N, 3) float64. faces : (M, 3) int64.
+    """
     corners = vertices[faces]
     crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     records = np.zeros(len(faces), dtype=[("normal", "<3f4"), ("corners", "<(3,3)f4"), ("attribute", "<u2")])

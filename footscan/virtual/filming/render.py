@@ -1,4 +1,4 @@
-"""One frame of one camera: all light that falls on its sensor, and the JPEG that it makes of it."""
+"""One frame of one camera: all light on its sensor, and the JPEG that the camera sends."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +18,22 @@ Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
 LASER_COLOUR = (1.0, 0.12, 0.09)
-"""What a red, green and blue pixel make of the laser's 650 nm; the last two are the filters' leaks."""
+"""Response of a red, green and blue pixel to the laser's 650 nm; the last two are the filters' leaks. Chosen
+by hand."""
+HALO_LIMIT = 0.9
+"""Largest share of the laser's light that the halo takes. Chosen by hand."""
 _BLOCK = 4
+"""Glow and veil are computed for blocks of 4 x 4 pixels: a bound of time."""
 _MARGIN_PX = 6
+"""Margin of the window around the stripe that is blurred. Chosen by hand."""
+GRAIN_SIGMA_PX = 0.55
+"""Of the Gaussian that gives speckle its grain. Chosen by hand."""
 
 
 class CameraRenderer:
-    """Films with one camera; what does not change from frame to frame is worked out once.
+    """Films with one camera; whatever is the same in all frames is computed once.
 
-    Raises nothing of its own; equal arguments give equal bytes, in whatever order frames are asked for.
+    Equal arguments give equal bytes, in whatever order frames are requested.
     """
 
     def __init__(self, scanner: VirtualScanner, camera_id: int, settings: SimulationSettings, texture: Texture) -> None:
@@ -41,11 +48,11 @@ class CameraRenderer:
         self._texture = texture
 
     def jpeg(self, scene: Scene, x: float, frame: int) -> bytes:
-        """Frame number `frame`, with the laser plane at X = `x` mm, as the camera sends it."""
+        """Returns the JPEG of frame number `frame`, with the laser plane at X = `x` mm."""
         return compress(self.picture(scene, x, frame), self._settings)
 
     def picture(self, scene: Scene, x: float, frame: int) -> NDArray[np.uint8]:
-        """The same before compression, (480, 640, 3) uint8 RGB."""
+        """Returns the picture before compression, (480, 640, 3) uint8 RGB."""
         random = np.random.default_rng([self._settings.seed, self.camera.id, frame, 4])
         light = self.light(scene, x, random)
         return photograph(light, random, self._settings)
@@ -77,7 +84,7 @@ def light_on_sensor(
     stripe : (480, 640) laser light that the surface sends to each pixel, before speckle, halo and lens.
     brightness, coverage : (240, 320) the object in the light of the room, and where it is; see `lit_object`.
     """
-    share = min(surface.halo * settings.halo, 0.9)
+    share = min(surface.halo * settings.halo, HALO_LIMIT)
     glow, veil = _glow(stripe, coverage, share, settings.halo)
     line = _line(stripe * (1.0 - share), settings, random)
     room_flicker, white_flicker, red_flicker = 1.0 + settings.flicker * random.normal(0.0, (0.02, 0.15, 0.15))
@@ -88,7 +95,7 @@ def light_on_sensor(
 
 
 def laser_colour(settings: SimulationSettings) -> Singles:
-    """(3,) what a red, green and blue pixel make of laser light 1."""
+    """Response (3,) of a red, green and blue pixel to laser light 1."""
     return np.array([1.0, LASER_COLOUR[1] * settings.leak, LASER_COLOUR[2] * settings.leak], dtype=np.float32)
 
 
@@ -119,9 +126,10 @@ def _line(stripe: Floats, settings: SimulationSettings, random: np.random.Genera
     )
     part = gaussian_blur(stripe[window].astype(np.float32), settings.blur_px, truncate=5.0, mode="constant")
     if settings.speckle > 0.0:
-        sigma = 0.55
-        grain = gaussian_blur(random.standard_normal(part.shape, dtype=np.float32), sigma, truncate=6.0)
-        grain /= (gaussian_kernel(sigma, 3) ** 2).sum()  # white noise keeps this share of its standard deviation
+        grain = gaussian_blur(random.standard_normal(part.shape, dtype=np.float32), GRAIN_SIGMA_PX, truncate=6.0)
+        grain /= (
+            gaussian_kernel(GRAIN_SIGMA_PX, 3) ** 2
+        ).sum()  # white noise keeps this share of its standard deviation
         part *= np.maximum(1.0 + settings.speckle * grain, 0.0)
     line[window] = part
     return line

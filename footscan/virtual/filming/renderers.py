@@ -1,4 +1,4 @@
-"""Sharing the frames of all cameras among processes; what comes out does not depend on how they are shared."""
+"""Shares the frames of all cameras among processes; the pictures do not depend on how they are shared."""
 
 import os
 import threading
@@ -16,6 +16,7 @@ from footscan.virtual.optics.texture import random_texture
 from schemas.parameters.simulation import SimulationSettings
 
 FRAMES_A_TASK = 20
+"""Frames that a process renders at a time. Chosen by hand; no byte depends on it."""
 
 
 class Shot(NamedTuple):
@@ -23,9 +24,9 @@ class Shot(NamedTuple):
 
     frame: int
     x: float
-    """mm, where the laser plane stands."""
+    """mm, X of the laser plane."""
     mesh: int
-    """Which of the meshes stands on the glass."""
+    """Index of the mesh that stands on the glass."""
 
 
 def shoot(
@@ -36,7 +37,7 @@ def shoot(
     settings: SimulationSettings,
     workers: int,
 ) -> Iterator[tuple[int, list[bytes]]]:
-    """All `shots` by all `cameras`, in order: camera and JPEG pictures of some consecutive shots at a time."""
+    """Take all `shots` with all `cameras`, in order; yields a camera and JPEG pictures of consecutive shots."""
     tasks = [
         (camera, shots[first : first + FRAMES_A_TASK])
         for camera in cameras
@@ -47,7 +48,7 @@ def shoot(
         for camera, part in tasks:
             yield camera, studio.shoot(camera, part)
         return
-    # Spawned: a forked process has locks of threads that it has not. A few tasks ahead, lest pictures pile up.
+    # Spawned: a forked process inherits locks of threads that it does not have. Few tasks ahead: pictures take memory.
     with ProcessPoolExecutor(workers, get_context("spawn"), _open_studio, (meshes, surface, settings)) as pool:
         todo = iter(tasks)
         running: deque[tuple[int, Future[list[bytes]]]] = deque()
@@ -62,7 +63,7 @@ def shoot(
 
 
 class Studio:
-    """The meshes and the camera that one process films with; a camera is kept until the next one is asked for."""
+    """The meshes and the camera that one process films with; a camera is kept until another one is requested."""
 
     def __init__(self, meshes: list[Mesh], surface: Surface, settings: SimulationSettings) -> None:
         self._settings = settings
@@ -72,7 +73,7 @@ class Studio:
         self._renderer: CameraRenderer | None = None
 
     def shoot(self, camera: int, shots: list[Shot]) -> list[bytes]:
-        """The JPEG pictures of `shots` by one camera."""
+        """Returns the JPEG pictures of `shots` by one camera."""
         if self._renderer is None or self._renderer.camera.id != camera:
             self._renderer = CameraRenderer(self._scanner, camera, self._settings, self._texture)
         return [self._renderer.jpeg(self._scenes[shot.mesh], shot.x, shot.frame) for shot in shots]
@@ -87,7 +88,7 @@ def _open_studio(meshes: list[Mesh], surface: Surface, settings: SimulationSetti
 
 
 def _end_with_parent() -> None:
-    """A pool that is killed cannot end its processes: they would wait for work for ever."""
+    """End this process with its parent: a pool that is killed cannot end its processes, which would wait forever."""
     parent = parent_process()
     assert parent is not None, "runs in a process of a pool"
     parent.join()

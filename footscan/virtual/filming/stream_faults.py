@@ -1,4 +1,4 @@
-"""What goes wrong with a camera on a cable: exposures that are dropped, repeated, torn, held back or cut off."""
+"""Faults of a camera on a cable: exposures that are dropped, repeated, torn, held back or cut off."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ KINDS: tuple[FaultKind, ...] = get_args(FaultKind)
 
 @dataclass(frozen=True)
 class StreamFault:
-    """One thing that goes wrong with the exposures `first` to `first + count - 1` of a camera."""
+    """A fault of the exposures `first` to `first + count - 1` of a camera."""
 
     kind: FaultKind
     """`drop`: never sent; `repeat`: the picture before is sent again, as by a camera that freezes; `tear`: cut short;
@@ -21,12 +21,12 @@ class StreamFault:
     count: int = 1
 
     def holds(self, number: int) -> bool:
-        """Whether exposure `number` is one of them."""
+        """Returns True if the fault affects exposure `number`."""
         return self.first <= number < self.first + self.count
 
 
 def fault_of(faults: Sequence[StreamFault], number: int) -> StreamFault | None:
-    """The first fault that holds exposure `number`; None for a sound one."""
+    """Returns the first fault that affects exposure `number`; None if there is none."""
     return next((fault for fault in faults if fault.holds(number)), None)
 
 

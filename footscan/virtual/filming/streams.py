@@ -1,8 +1,8 @@
 """Cameras on a network: Motion-JPEG over HTTP on loopback, as MJPEG-streamer and ESP32-CAM send it.
 
-Each camera exposes by its own clock, whoever looks; a picture is sent after a delay; faults happen at exposures named
-beforehand, and the servers keep a record of all they did. Each picture is marked with the number of its exposure in a
-JPEG comment, as a camera's own clock would be burnt into it: no two pictures are equal, unless a fault repeats one.
+Each camera exposes by its own clock, with or without clients; a picture is sent after a delay; faults happen at
+exposures that the caller names, and the servers keep a record of all exposures. A JPEG comment in each picture holds
+the number of its exposure: no two pictures are equal, unless a fault repeats one.
 """
 
 import itertools
@@ -24,9 +24,11 @@ from footscan.virtual.filming.stream_faults import FaultKind, StreamFault, fault
 
 BOUNDARY = "frame"
 CLIENT_FRAMES = 64
-"""What waits for a client at most; a camera then loses its pictures."""
+"""Most pictures that wait for a client; further ones are lost. A bound of memory."""
 CLIENT_SECONDS = 5.0
+"""Time limit of a client's connection, and of the end of a thread. Chosen by hand."""
 POLL_SECONDS = 0.1
+"""Longest time until a server notices its end. Chosen by hand."""
 
 Picture = Callable[[int, float], bytes]
 """The JPEG that a camera takes at `seconds` of `time.monotonic()`."""
@@ -36,14 +38,14 @@ Exposures = Callable[[int], Iterator[float]]
 
 @dataclass(frozen=True)
 class SentFrame:
-    """What became of one exposure."""
+    """The record of one exposure."""
 
     number: int
     """On the camera's own clock, from 0."""
     exposed: float
     """Seconds of `time.monotonic()`."""
     sent: float | None
-    """When its last byte was handed to the network; None: never, for a fault or because nobody looked."""
+    """When its last byte was handed to the network; None: never, because of a fault or for lack of a client."""
     fault: FaultKind | None
 
 
@@ -94,23 +96,23 @@ class VirtualStreams:
             self._cameras[camera] = _Camera(camera, picture, moments, delays, tuple((faults or {}).get(camera, ())))
 
     def url(self, camera: int) -> str:
-        """Where the stream of a camera is."""
+        """Returns the address of a camera's stream."""
         return f"http://127.0.0.1:{self._cameras[camera].port}/stream"
 
     def sent(self, camera: int) -> list[SentFrame]:
-        """What became of each exposure of a camera so far."""
+        """Returns the record of each exposure of a camera so far."""
         return self._cameras[camera].record()
 
     def fail(self, camera: int, faults: Sequence[StreamFault]) -> int:
-        """Lets faults happen from now on, their `first` counted from the next exposure, whose number is returned."""
+        """Add faults from now on, their `first` counted from the next exposure, whose number is returned."""
         return self._cameras[camera].fail(faults)
 
     def settings(self, camera: int) -> dict[str, float]:
-        """What was set by `/control?exposure=..&gain=..`: exposure in ms, gain as a share of the camera's range."""
+        """Returns the values set by `/control?exposure=..&gain=..`: exposure in ms, gain as a share of its range."""
         return dict(self._cameras[camera].settings)
 
     def close(self) -> None:
-        """No exposures, no servers any more."""
+        """End all exposures and servers."""
         for camera in self._cameras.values():
             camera.stop()
         for camera in self._cameras.values():
@@ -187,7 +189,7 @@ class _Camera:
             return list(self._record)
 
     def attach(self) -> "queue.Queue[_Outgoing | None] | None":
-        """What is to be sent to a new client, and None when it is to be hung up on; None for no queue: cut off."""
+        """Returns a new client's queue, in which None ends the connection; None while the camera is cut off."""
         client: queue.Queue[_Outgoing | None] = queue.Queue(CLIENT_FRAMES)
         with self._lock:
             if self._is_cut:

@@ -28,23 +28,26 @@ Singles = NDArray[np.float32]
 CENTRE = np.array([(WIDTH - 1) / 2.0, (HEIGHT - 1) / 2.0])
 """Middle of the picture, (i, j): curves are made around it and turn about it."""
 GHOST_STRENGTH = 0.1
-"""Of the stripe's parallel image in glass, as a share of the stripe."""
+"""Strength of the stripe's parallel image in glass, as a share of the stripe. Chosen by hand."""
 VISIBLE = 0.05
-"""The stripe is visible where it lifts some colour by so much of the sensor's white."""
+"""The stripe is visible where it raises some colour by this share of the sensor's white. Chosen by hand."""
 SHADE = (0.95, 0.35)
-"""Room light at the top and at the bottom of the picture, as a share of that on a surface that faces the lamps."""
+"""Room light at the top and at the bottom of the picture, as a share of that on a surface that faces the lamps. Chosen
+by hand."""
 _OBJECT_PX = 60.0
+"""The object reaches this far beside an open stripe. Chosen by hand."""
 _CHORD_PX = 2.0
+"""Length of the chords of a curve. Chosen by hand."""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A polyline in the image; what it was drawn after does not matter, it is itself the exact centre."""
+    """A polyline in the image. The polyline itself is the exact centre, not the curve that it approximates."""
 
     points: Floats
     """(N, 2) i, j, px."""
     closed: bool = False
-    """Whether the last point is joined to the first."""
+    """True if the last point is joined to the first."""
 
     def segments(self) -> tuple[Floats, Floats]:
         """Starts and ends, (S, 2) each."""
@@ -54,23 +57,23 @@ class Curve:
 
 @dataclass(frozen=True)
 class Clutter:
-    """Red light that is no stripe. Glints and bright hardware come with the settings, as in the virtual scanner."""
+    """Red light apart from the stripe. The settings add glints and bright hardware, as in the virtual scanner."""
 
     ghost_px: float = 25.0
-    """How far to the positive side of the stripe its ghost lies; see `signed_distance` for the side."""
+    """Distance of the ghost from the stripe, to its positive side; see `signed_distance` for the side."""
     second: Curve | None = None
     """Another stripe; it moves as the stripe does."""
     second_strength: float = 0.04
     red_thing: tuple[float, float, float] | None = None
-    """i, j and radius, px, of a broad red thing, which stands still."""
+    """i, j and radius, px, of a broad red object, which stands still."""
 
 
 @dataclass(frozen=True)
 class StripeFilm:
     """A stripe that moves through the picture.
 
-    Of `settings`, those of the object's and the scanner's geometry have no meaning here, and `blur_px` none either:
-    `sigma_px` is all that widens the stripe.
+    The `settings` of the object's and the scanner's geometry and `blur_px` are ignored: only `sigma_px` widens the
+    stripe.
     """
 
     curves: tuple[Curve, ...]
@@ -87,7 +90,7 @@ class StripeFilm:
 
 
 class StripeFilmer:
-    """Films a `StripeFilm`; equal films give equal bytes, in whatever order frames are asked for."""
+    """Films a `StripeFilm`; equal films give equal bytes, in whatever order frames are requested."""
 
     def __init__(self, film: StripeFilm) -> None:
         self._film = film
@@ -97,11 +100,11 @@ class StripeFilmer:
         self._brightness = level * _shade(film.settings)
 
     def jpeg(self, frame: int) -> bytes:
-        """Frame number `frame`, as the camera sends it."""
+        """Returns the JPEG of frame number `frame`."""
         return compress(self.picture(frame), self._settings)
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
-        """The same before compression, (480, 640, 3) uint8 RGB."""
+        """Returns the picture before compression, (480, 640, 3) uint8 RGB."""
         random = np.random.default_rng([self._settings.seed, frame, 6])
         return photograph(self.light(frame, random), random, self._settings)
 

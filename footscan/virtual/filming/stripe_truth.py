@@ -1,4 +1,4 @@
-"""The exact stripe: where the laser plane cuts the object, is lit and is seen, in mm and in pixels."""
+"""The exact stripe, in mm and in pixels: the lit and visible part of the object's cut by the laser plane."""
 
 from pathlib import Path
 
@@ -15,14 +15,17 @@ from schemas.parameters.simulation import SimulationSettings
 Floats = NDArray[np.float64]
 
 SPACING_MM = 0.25
+"""Largest distance of points along the cut. Chosen by hand."""
 LEAST_LIGHT = 0.01
-"""Dimmest laser light that counts as lit, in units of the sensor's white."""
+"""Dimmest laser light that counts as lit, in units of the sensor's white. Chosen by hand."""
+GRAZING = 0.02
+"""Least cosine between sight and normal of a surface that counts as seen. Chosen by hand."""
 
 
 def write_stripe_truth(
     mesh: Mesh, surface: Surface, shots: list[Shot], folder: Path, settings: SimulationSettings
 ) -> None:
-    """Writes `cam<n>.csv` for each camera: frame,i,j,x_mm,y_mm,z_mm of points on the exact stripe."""
+    """Write `cam<n>.csv` for each camera: frame,i,j,x_mm,y_mm,z_mm of points on the exact stripe."""
     folder.mkdir(parents=True, exist_ok=True)
     scanner = standard_scanner(settings.scanner_seed, settings.distortion)
     scene = Scene(mesh, surface)
@@ -40,7 +43,7 @@ def write_stripe_truth(
 
 
 def section(mesh: Mesh, x: float) -> tuple[Floats, Floats]:
-    """Points (N, 3), mm, frame of the heads, along the mesh's cut at X = `x`, and the triangles' normals (N, 3)."""
+    """Returns points (N, 3), mm, frame of the heads, along the mesh's cut at X = `x`, and the normals (N, 3) there."""
     corners = mesh.vertices[mesh.faces] - np.array([x, 0.0, 0.0])
     corners = corners[(corners[:, :, 0].min(axis=1) <= 0.0) & (corners[:, :, 0].max(axis=1) > 0.0)]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -66,14 +69,20 @@ def section(mesh: Mesh, x: float) -> tuple[Floats, Floats]:
 def is_lit(
     scene: Scene, scanner: VirtualScanner, x: float, points: Floats, normals: Floats, settings: SimulationSettings
 ) -> NDArray[np.bool_]:
-    """Whether a laser reaches surface `points` (N, 3) on the laser plane, in the frame of the heads, normals (N, 3)."""
+    """Returns (N,) bool: True if a laser reaches a surface point.
+
+    points, normals : (N, 3) float64, on the laser plane, mm, frame of the heads.
+    """
     hits = Hits(np.arange(len(points)), np.zeros(len(points)), normals, normals)
     light = laser_light(scene, x, scanner.lasers, points, hits, np.zeros(len(points)), settings)
     return np.asarray(light * scene.surface.laser_albedo > LEAST_LIGHT)
 
 
 def is_seen(scene: Scene, camera: Camera, x: float, points: Floats, normals: Floats) -> NDArray[np.bool_]:
-    """Whether `camera` sees surface `points` (N, 3), in the frame of the heads, within its picture."""
+    """Returns (N,) bool: True if `camera` sees a surface point within its picture.
+
+    points, normals : (N, 3) float64, mm, frame of the heads.
+    """
     if camera.below_glass:
         directions = directions_from_below(camera.position, points)
         eyes, towards = exits_above(camera.position, directions), -directions
@@ -82,7 +91,7 @@ def is_seen(scene: Scene, camera: Camera, x: float, points: Floats, normals: Flo
         towards = (eyes - points) / np.linalg.norm(eyes - points, axis=1, keepdims=True)
     centre, size = np.array([(WIDTH - 1) / 2, (HEIGHT - 1) / 2]), np.array([WIDTH, HEIGHT])
     inside = (np.abs(camera.project(points) - centre) <= size / 2).all(axis=1)
-    seen = inside & (np.einsum("ij,ij->i", normals, towards) > 0.02)
+    seen = inside & (np.einsum("ij,ij->i", normals, towards) > GRAZING)
     travel = np.array([x, 0.0, 0.0])
     seen[seen] = ~scene.hidden(points[seen] + travel, normals[seen], eyes[seen] + travel)
     return np.asarray(seen)

@@ -24,14 +24,20 @@ LEG_X, LEG_Y, LEG_DEPTH, LEG_WIDTH = range(4)
 
 BODY_TOE_BLEND_MM = 6.0
 TOE_TOE_BLEND_MM = 1.5
-LEG_BLEND_MM = (4.0, 30.0)  # at the height of the pternion, which no blend may move, and higher up
+LEG_BLEND_MM = (4.0, 30.0)
+"""At the height of the pternion, which no blend may move, and higher up."""
 LEG_BLEND_RISE_MM = 35.0
 MALLEOLUS_BLEND_MM = 16.0
 FLOOR_BLEND_MM = 5.0
+"""The radii of all blends are chosen by hand."""
 
-CAP_POWER = 2.5  # s(t) = 1 - (1 - t)^2.5 meets the tube's s = 1 with a continuous curvature
+CAP_POWER = 2.5
+"""s(t) = 1 - (1 - t)^2.5 meets the tube's s = 1 with a continuous curvature."""
 LEG_EXPONENT = 2.2
-ARCH_FULL, ARCH_NONE = 0.08, 0.69  # from the medial edge, as parts of the width: the arch is lifted to, and lies at
+"""Exponent of the leg's superellipse. Chosen by hand."""
+ARCH_FULL, ARCH_NONE = 0.08, 0.69
+"""Parts of the width from the medial edge: the arch is fully lifted up to the first and flat from the second. Chosen by
+hand."""
 
 
 class Field(NamedTuple):

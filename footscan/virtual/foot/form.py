@@ -28,11 +28,16 @@ from footscan.virtual.foot.field import (
 )
 from footscan.virtual.foot.shape import FootShape
 
-MEDIAL_PART = 0.465  # of the breadth, at the ball; the rest lies lateral of the axis to toe 2
-TOE_BREADTHS = (0.285, 0.145, 0.137, 0.132, 0.136)  # of the foot breadth
-TOE_HEIGHTS = (0.0, 0.060, 0.057, 0.054, 0.053)  # of the foot length, at the pad; toe 1 has a parameter of its own
-ROOT_CENTRES = (0.265, 0.065, -0.085, -0.232, -0.385)  # Y of the metatarsal heads, of the foot breadth
-HEEL_CAP = 0.20  # of the foot length
+MEDIAL_PART = 0.465
+"""Part of the breadth at the ball that lies medial of the axis to toe 2. Chosen by hand."""
+TOE_BREADTHS = (0.285, 0.145, 0.137, 0.132, 0.136)
+"""Breadths of toes 1 to 5, as parts of the foot breadth. Chosen by hand."""
+TOE_HEIGHTS = (0.0, 0.060, 0.057, 0.054, 0.053)
+"""Heights of the pads, as parts of the foot length; toe 1 has a parameter of its own. Chosen by hand."""
+ROOT_CENTRES = (0.265, 0.065, -0.085, -0.232, -0.385)
+"""Y of the metatarsal heads, as parts of the foot breadth. Chosen by hand."""
+HEEL_CAP = 0.20
+"""Length of the rear cap, as a part of the foot length. Chosen by hand."""
 
 
 @dataclass(frozen=True)

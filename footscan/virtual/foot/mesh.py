@@ -6,7 +6,8 @@ from skimage.measure import marching_cubes
 
 from footscan.virtual.foot.field import Field, Floats, field_grid, first_hits
 
-HALF_SPACE_MM = 85.0  # farther from the axis than any point of a foot
+HALF_SPACE_MM = 85.0
+"""Farther from the axis than any point of a foot."""
 
 Faces = npt.NDArray[np.int32]
 

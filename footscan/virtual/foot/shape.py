@@ -1,4 +1,4 @@
-"""The parameters of a foot, and how they are spread over the population."""
+"""The parameters of a foot, and their distribution over the population."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -11,7 +11,7 @@ Sex = Literal["male", "female"]
 
 @dataclass(frozen=True)
 class FootShape:
-    """What a foot is built to; lengths in mm. The default is the mean man of ANSUR II at 0.966 of his size."""
+    """The measures of a foot; lengths in mm. The default is the mean man of ANSUR II at 0.966 of his size."""
 
     foot_length: float = 262.0
     """Pternion to the tip of the longest toe, parallel to the axis pternion - tip of toe 2."""
@@ -72,7 +72,7 @@ HALLUX_LONGEST = 0.75  # part of the population; toe 2 is the longest of the oth
 
 
 def sample_shape(rng: np.random.Generator, sex: Sex) -> FootShape:
-    """A right foot drawn from the population: normal with the figures above, drawn again where one is over 3 sd away.
+    """A right foot drawn from the population: normal with the figures above, drawn again if one is over 3 sd away.
 
     Length is then clipped to 200..320 mm and breadth to 75..125 mm, so every foot fits the scan volume of 140 x 114 x
     380 mm as it is: nothing is scaled, the leg is always cut at 108 mm.

@@ -1,4 +1,4 @@
-"""The stations whose foot has the measures of its shape."""
+"""Solves for the stations whose foot has the measures of its shape."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -10,7 +10,9 @@ from footscan.virtual.foot.shape import FootShape
 from schemas.base.errors import RefusedInput
 
 TOLERANCE_MM = 0.01
+"""Largest error of a measure. Chosen by hand."""
 ROUNDS = 30
+"""A bound of time: five to ten rounds are enough."""
 GOVERNED_BY = {
     "ball_length": ("medial_x", 1.0),
     "lateral_ball_length": ("lateral_x", 1.0),
@@ -21,8 +23,10 @@ GOVERNED_BY = {
     "arch_height": ("arch", 0.65),
     "hallux_height": ("hallux_height", 1.0),
 }
-"""Each measure's control, and by about how much the measure grows with it."""
-PLAUSIBLE = (0.25, 3.0)  # times the first guess
+"""Each measure's control, and about how much the measure grows with it. Chosen by hand; a poor value
+costs rounds."""
+PLAUSIBLE = (0.25, 3.0)
+"""Range of a control, as a multiple of its first guess. Chosen by hand."""
 
 
 @lru_cache(maxsize=4)

@@ -9,7 +9,11 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 THICKNESS_MM = 6.0
+"""Chosen by hand."""
 REFRACTIVE_INDEX = 1.52
+"""Of soda-lime glass in visible light."""
+_NEWTON_STEPS = 8
+"""Chosen by hand."""
 
 
 def sine_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
@@ -23,7 +27,7 @@ def sine_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
     ----------
     source : (3,) float64, mm; below the plate.
     points : (N, 3) float64, mm; Z below 0 is taken as 0.
-    passes : how often the plate is crossed; 3 with one reflection at each of its faces.
+    passes : number of crossings of the plate; 3 with one reflection at each of its faces.
 
     Returns
     -------
@@ -35,7 +39,7 @@ def sine_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
     glass = passes * THICKNESS_MM
     n2 = REFRACTIVE_INDEX**2
     tangent = distance / (air + glass)
-    for _ in range(8):
+    for _ in range(_NEWTON_STEPS):
         # In glass: s / sqrt(n^2 - s^2) with s^2 = q^2 / (1 + q^2) is q / sqrt(n^2 + (n^2 - 1) q^2).
         root = np.sqrt(n2 + (n2 - 1.0) * tangent**2)
         excess = air * tangent + glass * tangent / root - distance
@@ -44,7 +48,7 @@ def sine_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
 
 
 def directions_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
-    """Unit directions, (N, 3), in which light leaves `source` below the plate to arrive at `points` above it."""
+    """Returns unit directions (N, 3) in which light leaves `source` below the plate to arrive at `points` above it."""
     sine = sine_from_below(source, points, passes)
     offset = points[:, :2] - source[:2]
     distance = np.maximum(np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2), 1e-12)
@@ -52,9 +56,9 @@ def directions_from_below(source: Floats, points: Floats, passes: int = 1) -> Fl
 
 
 def exits_above(source: Floats, directions: Floats, passes: int = 1) -> Floats:
-    """Where rays from `source` below the plate leave its upper face, (N, 3) with Z = 0.
+    """Returns the points (N, 3), mm, Z = 0, where rays from `source` below the plate leave its upper face.
 
-    A plane-parallel plate leaves their directions as they are.
+    A plane-parallel plate does not change the directions of rays.
     """
     sine = np.sqrt(directions[:, 0] ** 2 + directions[:, 1] ** 2)
     rise = directions[:, 2]
@@ -66,7 +70,7 @@ def exits_above(source: Floats, directions: Floats, passes: int = 1) -> Floats:
 
 
 def reflectance(cosine: Floats) -> Floats:
-    """Fresnel's share of unpolarised light that one face reflects, from the cosine of the angle of incidence in air."""
+    """Share of unpolarised light that one face reflects (Fresnel); `cosine` of the angle of incidence in air."""
     inside = np.sqrt(1.0 - (1.0 - cosine**2) / REFRACTIVE_INDEX**2)
     across = (cosine - REFRACTIVE_INDEX * inside) / (cosine + REFRACTIVE_INDEX * inside)
     along = (REFRACTIVE_INDEX * cosine - inside) / (REFRACTIVE_INDEX * cosine + inside)

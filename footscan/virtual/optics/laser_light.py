@@ -17,28 +17,34 @@ from schemas.parameters.simulation import SimulationSettings
 Floats = NDArray[np.float64]
 
 FOCUS_MM = 215.0
-"""Distance at which the sheets are thinnest."""
+"""Distance from the laser at which the sheets are thinnest. Chosen by hand."""
 DIVERGENCE = 0.0025
-"""Growth of the sheet's standard deviation away from the focus, mm a mm."""
+"""Growth of the sheet's standard deviation away from the focus, mm per mm. Chosen by hand."""
+DEFOCUS_MM = 120.0
+"""Largest distance of the object from the focus that the search for pixels allows for. Chosen by hand."""
 REACH_SIGMAS = 4.6
-"""Where the sheet's light ends: 2.5e-5 of its middle."""
+"""Half width of the sheet, in standard deviations: there its light is 2.5e-5 of that in the middle."""
+FAN_EDGE_DEGREES = 2.0
+"""Within this angle the fan of light falls to zero. Chosen by hand."""
+DARK = 1e-4
+"""Laser light below this, in units of the sensor's white, is taken as none: no shadow ray is cast. Chosen by hand."""
 
 
 def stripe_picture(
     scene: Scene, x: float, lasers: tuple[Laser, ...], view: View, texture: Texture, settings: SimulationSettings
 ) -> Floats:
-    """Laser light that each pixel receives along `view` with the laser plane at X = `x`.
+    """Laser light that each pixel receives along `view` with the laser plane at X = `x`, mm.
 
-    Each pixel is the mean of four rays, of one in reflections. For each ray the sheet's Gaussian is widened by the
-    ray's own footprint on the surface, so that the sum over the pixels is right even where the stripe is narrower than
-    a pixel.
+    Each pixel is the mean of four rays; in reflections it is a single ray. For each ray the sheet's Gaussian is
+    widened by the ray's own footprint on the surface, so that the sum over the pixels is right even where the stripe is
+    narrower than a pixel.
 
     Returns
     -------
     (480, 640) float64, in units of the sensor's white.
     """
     picture = np.zeros(HEIGHT * WIDTH)
-    reach = REACH_SIGMAS * float(np.sqrt(settings.laser_sigma_mm**2 + (DIVERGENCE * 120.0) ** 2))
+    reach = REACH_SIGMAS * float(np.sqrt(settings.laser_sigma_mm**2 + (DIVERGENCE * DEFOCUS_MM) ** 2))
     pixels = _pixels_near(scene.patches_near(x, reach) - np.array([x, 0.0, 0.0]), view)
     if not len(pixels):
         return picture.reshape(HEIGHT, WIDTH)
@@ -87,7 +93,7 @@ def laser_light(
     for laser in lasers:
         beams = _beams(laser, points)
         light = _sheet(points, beams, hits.normals, hits.facet_normals, spread, laser, settings.laser_sigma_mm)
-        lit = np.flatnonzero(light * settings.laser_exposure > 1e-4)
+        lit = np.flatnonzero(light * settings.laser_exposure > DARK)
         hidden = scene.hidden(points[lit] + travel, hits.facet_normals[lit], beams.sources[lit] + travel)
         total[lit[~hidden]] += light[lit[~hidden]]
     return total * settings.laser_exposure
@@ -122,8 +128,8 @@ def _sheet(
     distance = np.linalg.norm(points - np.asarray(laser.position), axis=1)
     variance = sigma_mm**2 + (DIVERGENCE * (distance - FOCUS_MM)) ** 2 + spread
     profile = exp(-0.5 * points[:, 0] ** 2 / variance) * sigma_mm / np.sqrt(variance)
-    # A Powell lens: even, with an edge of two degrees.
-    outer, inner = cos_sin(FAN_DEGREES / 2.0)[0], cos_sin(FAN_DEGREES / 2.0 - 2.0)[0]
+    # A Powell lens: even light with a soft edge.
+    outer, inner = cos_sin(FAN_DEGREES / 2.0)[0], cos_sin(FAN_DEGREES / 2.0 - FAN_EDGE_DEGREES)[0]
     fan = np.clip((-dot(beams.towards, np.asarray(laser.axis)) - outer) / (inner - outer), 0.0, 1.0)
     return np.asarray(profile * cosine * fan * beams.transmitted * FOCUS_MM / distance)
 

@@ -1,8 +1,9 @@
-"""Which triangle of a mesh a ray meets first, by a bounding volume hierarchy in double precision.
+"""The first triangle of a mesh that a ray meets, by a bounding volume hierarchy in double precision.
 
-Films must come out alike on every processor. Embree does not do that: it works in single precision with the widest
-vector instructions that it finds, and its reciprocals are approximations that differ between makers of processors.
-Here each result is made of single additions, multiplications, divisions and comparisons in a fixed order.
+Films must have the same bytes on every processor. Embree does not give that: it works in single precision with the
+widest vector instructions that it finds, and its reciprocals are approximations that differ between makers of
+processors. Here each result is made of single additions, multiplications, divisions and comparisons in a fixed
+order.
 
 The tree is built top down by the surface area heuristic in bins (I. Wald, "On fast construction of SAH-based bounding
 volume hierarchies", 2007, DOI 10.1109/RT.2007.4342588); triangles are met as in T. Moeller and B. Trumbore, "Fast,
@@ -20,17 +21,18 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _LEAF = 4
-"""A node of at most so many triangles is not split."""
+"""A node with at most this many triangles is not split. Chosen by hand, for time only."""
 _BINS = 16
+"""Bins of the surface area heuristic. Chosen by hand, for time only."""
 _DEPTH = 64
-"""Nodes that wait while one is looked at; halves of halves of any mesh in memory need fewer."""
+"""Size of the stack of nodes to visit: a bound of memory."""
 _EDGE = 1e-12
-"""Slack of a triangle's edges, lest rays slip through between two."""
+"""Slack of a triangle's edges, so that no ray passes between two triangles. Chosen by hand."""
 _ENDLESS = 1e300
-"""In place of the reciprocal of 0, whose product with 0 would be no number."""
+"""Replaces the reciprocal of 0, whose product with 0 would be NaN."""
 CONTACT = 1e-3
 """How far behind its origin, in lengths of its direction, a ray still meets the mesh: a sole that stands on the glass,
-where rays begin, is met there, on whichever side of the glass its corners were rounded."""
+where rays begin, is met there, on whichever side of the glass its corners were rounded. Chosen by hand."""
 
 
 class RayTree(NamedTuple):
@@ -47,7 +49,7 @@ class RayTree(NamedTuple):
 
 
 def ray_tree(vertices: Floats, faces: Ints) -> RayTree:
-    """The tree of a mesh: `vertices` (N, 3) mm, `faces` (M, 3)."""
+    """Build the tree of a mesh: `vertices` (N, 3) float64, mm; `faces` (M, 3) int64."""
     corners = vertices[faces]
     least, greatest = corners.min(axis=1), corners.max(axis=1)
     order = np.arange(len(faces))

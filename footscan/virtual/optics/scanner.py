@@ -19,10 +19,13 @@ from footscan.virtual.portable import product
 Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT = 640, 480
+"""Size of the pictures, px."""
 VOLUME_MM = ((-70.0, 70.0), (0.0, 114.0))
 """The scan volume in Y and Z."""
 VIEW_ANGLE_DEGREES = 42.0
+"""Angle between a camera's axis and the laser plane. Chosen by hand."""
 FAN_DEGREES = 80.0
+"""Full angle of a laser's fan. Chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,7 @@ class Laser:
 
     @property
     def below_glass(self) -> bool:
-        """Whether its light reaches the foot through the plate."""
+        """True if its light reaches the foot through the plate."""
         return self.position[2] < -THICKNESS_MM
 
 
@@ -52,11 +55,11 @@ class Camera:
 
     @property
     def below_glass(self) -> bool:
-        """Whether it looks through the plate."""
+        """True if it looks through the plate."""
         return bool(self.position[2] < -THICKNESS_MM)
 
     def project(self, points: Floats, passes: int = 1) -> Floats:
-        """Pixels (i, j), (N, 2) float64, of `points` (N, 3) mm; exact, through the glass where it is in the way.
+        """Project `points` (N, 3), mm, to pixels (i, j), (N, 2) float64; exact, with refraction by the plate.
 
         `passes` = 3 gives the ghost that a camera below sees: light that was reflected once at each face of the plate.
         """
@@ -85,7 +88,7 @@ class Camera:
 
 @dataclass(frozen=True)
 class VirtualScanner:
-    """One scanner: what its seed stands for, its lasers and its cameras."""
+    """One scanner: its seed, its lasers and its cameras."""
 
     seed: int
     lasers: tuple[Laser, ...]
@@ -97,17 +100,17 @@ class VirtualScanner:
 
 
 def standard_scanner(seed: int = 1, distortion: float = 1.0) -> VirtualScanner:
-    """The scanner with number `seed`: mounting and lenses differ a little from scanner to scanner, camera to camera.
+    """The scanner of a `seed`: mounting and lenses vary a little between scanners and between cameras.
 
-    `distortion` scales that of the lenses.
+    `distortion` scales the distortion of the lenses. The spreads are chosen by hand.
     """
     return VirtualScanner(seed, _lasers(), tuple(_camera(seed, camera_id, distortion) for camera_id in range(1, 9)))
 
 
-# Elevations are a compromise: the lower the upper heads, the better they see the flanks just above the glass (and the
-# corners of the reference object there); the higher, the better the lit instep.
 _UPPER_ELEVATION = 27.0
 _LOWER_ELEVATION = -60.0
+"""Degrees, chosen by hand. Low upper cameras see the flanks just above the glass better, and the corners of the
+reference object there; high ones see the lit instep better."""
 
 
 def _lasers() -> tuple[Laser, ...]:

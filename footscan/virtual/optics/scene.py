@@ -14,10 +14,12 @@ Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
 
 CREASE_DEGREES = 40.0
-"""Faces that meet more sharply than this keep an edge; others are shaded as one smooth surface."""
+"""Faces that meet more sharply than this keep an edge; others are shaded as one smooth surface. Chosen by hand."""
 PATCH_MM = 2.0
+"""Longest edge of the triangles that `patches_near` returns: a bound of time. Chosen by hand."""
 CLEARANCE_MM = 0.03
-"""How far a shadow ray starts from its facet, which stands for a smooth surface: its neighbours do not shade it."""
+"""How far a shadow ray starts from its facet, which stands for a smooth surface: its neighbours do not shade it. Chosen
+by hand."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,7 @@ class Surface:
 
 SKIN = Surface(albedo=(0.66, 0.43, 0.32), laser_albedo=0.62, halo=0.22, unevenness=0.05)
 MATT_GREY = Surface(albedo=(0.5, 0.5, 0.5), laser_albedo=0.5, halo=0.015, unevenness=0.015)
+"""The reflectances of both surfaces are chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Hits:
-    """Where rays meet the object; arrays over those rays that do."""
+    """First hits of rays on the object; the arrays hold only rays that hit it."""
 
     ray: Ints
     """(H,) index of the ray."""

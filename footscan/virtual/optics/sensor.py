@@ -11,13 +11,15 @@ Singles = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 
 FULL_WELL_ELECTRONS = 6000.0
+"""Electrons of a pixel at the sensor's white; their shot noise is the root of their number. Chosen by hand."""
 READ_NOISE = 0.0012
-"""In units of the sensor's white."""
+"""Standard deviation, in units of the sensor's white. Chosen by hand."""
 _CODES = 4096
+"""Of a converter with 12 bits."""
 
 
 def photograph(light: Singles, random: np.random.Generator, settings: SimulationSettings) -> Bytes:
-    """The picture (480, 640, 3) uint8 RGB that the camera makes of `light` (480, 640, 3) float32, 1 being its white."""
+    """Convert `light` (480, 640, 3) float32, 1 being the sensor's white, to a picture (480, 640, 3) uint8 RGB."""
     normal = random.standard_normal(light.shape if not settings.bayer else light.shape[:2], dtype=np.float32)
     tone = _tone_curve()
     if not settings.bayer:
@@ -27,7 +29,7 @@ def photograph(light: Singles, random: np.random.Generator, settings: Simulation
 
 
 def compress(picture: Bytes, settings: SimulationSettings) -> bytes:
-    """`picture` as JPEG."""
+    """Compress `picture` (480, 640, 3) uint8 RGB to JPEG."""
     jpeg = simplejpeg.encode_jpeg(
         picture, quality=settings.jpeg_quality, colorspace="RGB", colorsubsampling=settings.jpeg_chroma
     )
@@ -35,7 +37,10 @@ def compress(picture: Bytes, settings: SimulationSettings) -> bytes:
 
 
 def _tone_curve() -> Bytes:
-    """A webcam's curve on 12-bit codes: the sRGB curve with somewhat more contrast (a blend with a smooth step)."""
+    """A webcam's curve on 12-bit codes: the sRGB curve (IEC 61966-2-1), blended with a smooth step for more contrast.
+
+    The shares of the blend are chosen by hand.
+    """
     linear = np.linspace(0.0, 1.0, _CODES)
     curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
     contrast = 0.75 * curve + 0.25 * curve**2 * (3.0 - 2.0 * curve)
@@ -53,7 +58,7 @@ def _codes(signal: Singles) -> NDArray[np.int64]:
 
 @compiled
 def _expose_mosaic(light: Singles, normal: Singles, noise: np.float32) -> Singles:
-    """What the sensor reads: one colour a pixel, RG over GB, with shot and read noise, clipped at its white."""
+    """The sensor's readings: one colour a pixel, RG over GB, with shot and read noise, clipped at its white."""
     height, width, _ = light.shape
     mosaic = np.empty((height, width), dtype=np.float32)
     for j in range(height):

@@ -12,7 +12,9 @@ Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
 SPACING_MM = 1.5
+"""Distance of the grid's points. Chosen by hand."""
 _CELLS = 80
+"""Points of the grid along each axis: the field repeats after 120 mm and takes 2 MB."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class Texture:
 
 
 def random_texture(seed: int, unevenness: float) -> Texture:
-    """A texture with standard deviation `unevenness`: grain of some millimetres on patches of a centimetre or two."""
+    """Draw a texture with standard deviation `unevenness`: grain of some millimetres on patches of 1 to 2 cm."""
     random = np.random.default_rng([seed, 3])
     field = np.zeros((_CELLS, _CELLS, _CELLS), dtype=np.float32)
     for sigma in (1.0, 6.0):

@@ -14,6 +14,7 @@ Floats = NDArray[np.float64]
 
 
 _FOUR = np.array([[-0.25, -0.25], [0.25, -0.25], [-0.25, 0.25], [0.25, 0.25]])
+"""Middles of a pixel's quarters, px from its own middle."""
 _ONE = np.zeros((1, 2))
 
 
@@ -37,8 +38,7 @@ class View:
     eye: Floats
     """(3,) roughly where points are seen from, to leave out faces that look away."""
     mirrored: bool
-    """Whether it is reflected on the glass beside the object, which can then stand between there and the camera."""
-
+    """True if the light is reflected by the glass beside the object, which may then hide the reflection."""
     subpixels: Floats
     """(S, 2) px from a pixel's middle: where in it the stripe is sampled."""
 
@@ -51,11 +51,11 @@ class View:
 
 
 def camera_views(camera: Camera) -> tuple[View, View]:
-    """What `camera` sees directly or through the glass, and what it sees by reflection.
+    """The views of `camera`: direct (for a lower camera through the glass), and by reflection.
 
-    From above that is the mirror image in the glass, of which only the upper face's is drawn; the lower face's is
-    fainter, a few millimetres beside it. From below it is the inner ghost: light that was reflected at the lower and
-    then at the upper face on its way down, inside the plate.
+    An upper camera sees the mirror image in the glass. Only the reflection by the upper face is drawn; that by the
+    lower face is fainter, a few millimetres beside it. A lower camera sees the inner ghost: light that was reflected at
+    the lower and then at the upper face, inside the plate.
     """
     rows, columns = np.mgrid[0:HEIGHT, 0:WIDTH]
     directions = camera.directions(np.column_stack([columns.ravel(), rows.ravel()]).astype(np.float64))

@@ -1,4 +1,4 @@
-"""What a camera sees besides the stripe: the object in the light of the room, the hardware behind it, its glints."""
+"""The picture apart from the stripe: the object in the light of the room, the hardware behind it, its glints."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,10 +17,11 @@ Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
 COARSE = 2
-"""The room's light is cast for one pixel in COARSE x COARSE and interpolated."""
+"""The room's light is cast for one pixel in COARSE x COARSE and interpolated: a bound of time."""
 LEVELS = {"dark": 0.004, "ambient": 0.25, "bright": 2.2}
-"""Room light on a white surface that faces the lamps, in units of the sensor's white."""
+"""Room light on a white surface that faces the lamps, in units of the sensor's white. Chosen by hand."""
 _LAMPS = np.array([0.25, 0.35, 0.90])
+"""Direction of the lamps, scanner frame, not of unit length. Chosen by hand."""
 
 
 class Backdrop(NamedTuple):
@@ -56,7 +57,7 @@ class CoarseRays:
 
 
 def coarse_rays(view: View) -> CoarseRays:
-    """The rays through the middles of blocks of pixels."""
+    """Returns the rays of `view` through the middles of blocks of pixels."""
     pixels = np.arange(HEIGHT * WIDTH).reshape(HEIGHT, WIDTH)[::COARSE, ::COARSE].ravel()
     origins, directions = view.at(pixels, np.full((1, 2), (COARSE - 1) / 2.0))
     return CoarseRays(origins, directions, view.weights[pixels])
@@ -65,7 +66,7 @@ def coarse_rays(view: View) -> CoarseRays:
 def lit_object(
     scene: Scene, x: float, straight: CoarseRays, mirrored: CoarseRays | None, texture: Texture, level: float
 ) -> tuple[Singles, Singles]:
-    """The object in the room's light, and its mirror image in the glass where the camera stands above that.
+    """The object in the room's light, with its mirror image in the glass for an upper camera.
 
     Returns
     -------
@@ -86,7 +87,7 @@ def lit_object(
 def _room_light(
     scene: Scene, x: float, origins: Floats, directions: Floats, texture: Texture
 ) -> tuple[NDArray[np.int64], Floats]:
-    """Which rays meet the object, and how bright it is there, apart from its colour."""
+    """Indices of the rays that meet the object, and its brightness there, apart from its colour."""
     origins = origins + np.array([x, 0.0, 0.0])
     hits = scene.cast(origins, directions)
     points = origins[hits.ray] + hits.distance[:, None] * directions[hits.ray]

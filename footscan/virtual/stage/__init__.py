@@ -1,1 +1,1 @@
-"""What the heads travel along: a foot, the reference object, a block."""
+"""Objects on the glass: a foot, the reference object, a block."""

@@ -29,34 +29,36 @@ from schemas.parameters.simulation import SimulationSettings
 Progress = Callable[[int, int], None]
 
 LEVELS_A_STOP = 4
-"""Power, exposure and gain are rendered in steps of a quarter of a stop, 19 %: the nearest stands for what was set."""
+"""Power, exposure and gain are rendered in steps of a quarter of a stop, 19 %: the nearest step is shown. Chosen by
+hand, for time."""
 FAINTEST = 2.0**-8
-"""Of power or exposure, what is less is none."""
+"""A power or exposure below this is taken as 0. Chosen by hand."""
 GRAIN_GREY = 3.0
 """Its standard deviation, grey levels; compression leaves about as much as a camera's own noise does."""
 INDICES_A_TASK = 10
+"""Pictures that a process renders at a time. Chosen by hand; no byte depends on it."""
 _RENDERERS_A_PROCESS = 2
-"""One takes 90 MB."""
+"""A bound of memory: a renderer takes 90 MB."""
 
 
-class Light(NamedTuple):
-    """What was set, as factors of what the simulation's settings say."""
+class StageLight(NamedTuple):
+    """The light that was set, as factors of the simulation's settings."""
 
     power: float = 1.0
     """Of the lasers; 0 is off."""
     exposure: float = 1.0
     gain: float = 1.0
 
-    def nearest_level(self) -> "Light":
-        """The light that is rendered for this one."""
-        return Light(*map(_nearest_level, self))
+    def nearest_level(self) -> "StageLight":
+        """Returns the rendered light nearest to this one."""
+        return StageLight(*map(_nearest_level, self))
 
 
 class Subject(NamedTuple):
-    """What stands on the glass."""
+    """The object on the glass."""
 
     mesh: Mesh | None
-    """mm, scanner frame; None where nothing stands there."""
+    """mm, scanner frame; None for an empty glass."""
     surface: Surface = MATT_GREY
 
 
@@ -85,14 +87,14 @@ class StagePictures:
         self.close()
 
     def close(self) -> None:
-        """Ends the processes; pictures that are there can still be had."""
+        """End the processes; rendered pictures stay readable."""
         with self._opening:
             if self._pool is not None:
                 self._pool.shutdown(cancel_futures=True)
                 self._pool = None
 
-    def picture(self, camera: int, index: int, light: Light) -> bytes:
-        """The JPEG picture, from the folder or rendered now (some tenths of a second)."""
+    def picture(self, camera: int, index: int, light: StageLight) -> bytes:
+        """Returns the JPEG picture, from the folder or rendered now (some tenths of a second)."""
         light, index = light.nearest_level(), self._seen(index)
         path = self._path(camera, index, light)
         try:
@@ -102,9 +104,9 @@ class StagePictures:
             return path.read_bytes()
 
     def prepare(
-        self, cameras: Iterable[int], indices: Iterable[int], light: Light, progress: Progress | None = None
+        self, cameras: Iterable[int], indices: Iterable[int], light: StageLight, progress: Progress | None = None
     ) -> int:
-        """Renders what is not there yet, and says how much that was; `progress` hears of pictures done and in all."""
+        """Render missing pictures and return their number; `progress` gets the number of pictures done and in total."""
         light = light.nearest_level()
         wanted = sorted({self._seen(index) for index in indices})
         tasks = []
@@ -122,13 +124,13 @@ class StagePictures:
                 done += len(part)
                 if progress is not None:
                     progress(done, total)
-        except BaseException:  # such as a pipe that nobody listens to any more: the rest is for nobody
+        except BaseException:  # such as a broken pipe: nobody needs the remaining pictures
             self.close()
             raise
         return total
 
     def with_grain(self, jpeg: bytes, number: int) -> bytes:
-        """The same picture with some noise more: what a camera sees twice is never the same to the byte."""
+        """Returns the picture with some more noise: two pictures of a camera never have the same bytes."""
         picture = simplejpeg.decode_jpeg(jpeg, colorspace="RGB")
         grain = np.random.default_rng([number, 7]).normal(0.0, GRAIN_GREY, picture.shape)
         return compress(np.clip(np.rint(picture + grain), 0, 255).astype(np.uint8), self._job.settings)
@@ -136,14 +138,14 @@ class StagePictures:
     def _seen(self, index: int) -> int:
         return 0 if self._job.subject.mesh is None else index  # an empty scanner looks the same everywhere
 
-    def _path(self, camera: int, index: int, light: Light) -> Path:
+    def _path(self, camera: int, index: int, light: StageLight) -> Path:
         level = "-".join(f"{factor:.3f}" for factor in light)
         return self._folder / level / f"cam{camera}" / f"{index}.jpg"
 
     def _processes(self) -> ProcessPoolExecutor:
         with self._opening:
             if self._pool is None:
-                # Spawned: a forked process has locks of threads that it has not.
+                # Spawned: a forked process inherits locks of threads that it does not have.
                 spawn = get_context("spawn")
                 self._pool = ProcessPoolExecutor(self._workers, spawn, _open_studio, (self._job,))
             return self._pool
@@ -157,7 +159,7 @@ class _Job(NamedTuple):
     grid_mm: float
 
     def digest(self) -> str:
-        """Of the job and of the modules that render."""
+        """Returns the digest of the job and of the modules that render."""
         mesh = self.subject.mesh
         content = sha256(canonical_json(self.settings.model_dump(mode="json")).encode())
         content.update(repr((self.grid_mm, self.subject.surface)).encode())
@@ -179,11 +181,11 @@ def _nearest_level(factor: float) -> float:
 
 
 _NOTHING = Mesh(np.array([[1e6, 0, 0], [1e6, 1, 0], [1e6, 0, 1]], np.float64), np.array([[0, 1, 2]], np.int64))
-"""A triangle a kilometre away: a scene wants one."""
+"""A triangle a kilometre away: a scene needs at least one."""
 
 
 class _Studio:
-    """What one process renders with."""
+    """The scene and the renderers of one process."""
 
     def __init__(self, job: _Job) -> None:
         self._job = job
@@ -199,7 +201,7 @@ class _Studio:
 
         self._renderer = renderer
 
-    def jpeg(self, camera: int, index: int, light: Light) -> bytes:
+    def jpeg(self, camera: int, index: int, light: StageLight) -> bytes:
         settings = self._job.settings
         random = np.random.default_rng([settings.seed, camera, index % 2**32, 4])  # as films have it
         seen = self._renderer(camera, light.power).light(self._scene, index * self._job.grid_mm, random)
@@ -216,15 +218,15 @@ def _open_studio(job: _Job) -> None:
 
 
 def _end_with_parent() -> None:
-    """A pool that is killed cannot end its processes: they would wait for work for ever."""
+    """End this process with its parent: a pool that is killed cannot end its processes, which would wait forever."""
     parent = parent_process()
     assert parent is not None, "runs in a process of a pool"
     parent.join()
     os._exit(1)
 
 
-def _render(camera: int, light: Light, indices: list[int], folder: Path) -> None:
-    """Writes pictures into `folder`, each under its name when it is whole."""
+def _render(camera: int, light: StageLight, indices: list[int], folder: Path) -> None:
+    """Write pictures into `folder`; each appears under its name when it is complete."""
     folder.mkdir(parents=True, exist_ok=True)
     for index in indices:
         partial = folder / f"{index}.{os.getpid()}.part"

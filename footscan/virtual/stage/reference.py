@@ -29,7 +29,7 @@ def standard_reference() -> ReferenceObject:
 
 
 def read_reference(path: Path) -> ReferenceObject:
-    """The reference object in the YAML file `path`; refused where a placement would put it into the glass."""
+    """The reference object in the YAML file `path`; refused if a placement puts it into the glass."""
     reference = read_yaml(path, ReferenceObject)
     lowest = min(z for _, z in reference.profile_mm)
     for number, (_, shift) in enumerate(reference.placements_mm):

@@ -23,20 +23,22 @@ from math import floor
 
 import numpy as np
 
-from footscan.virtual.stage.pictures import Light, StagePictures
+from footscan.virtual.stage.pictures import StageLight, StagePictures
 
 Positions = tuple[float, float, float]
 
 HEAD_OF_CAMERA = {1: 0, 2: 0, 3: 1, 4: 1, 5: 2, 6: 2, 7: 2, 8: 2}
 """Two cameras on each of the upper heads, four on the one below."""
 FRAMES_PER_SECOND = 200 / 11
+"""The default scan of the live scanner: 200 frames in 11 s."""
 JITTER_SECONDS = 0.01
-"""How far an exposure may be off the camera's clock, at most."""
+"""Largest difference of an exposure from the camera's clock. Chosen by hand."""
 GRAINS = 4
-"""So many pictures of one place differ."""
+"""Number of different pictures of one place: a bound of memory and time."""
 _LOOKS = 5
-"""A crossing is sought between so many looks at the position within the jitter."""
+"""Positions within the jitter between which a crossing is searched. Chosen by hand."""
 _HALVINGS = 14
+"""They leave 5 ms / 2^14, less than a microsecond, of the time of a crossing."""
 
 
 class Stage:
@@ -67,18 +69,18 @@ class Stage:
         self._shown: dict[int, tuple[object, int, list[bytes]]] = {}
 
     def put(self, pictures: StagePictures) -> None:
-        """Puts something else onto the glass; closing the pictures of what stood there is the caller's."""
+        """Exchange the object on the glass; the caller closes the earlier pictures."""
         self._pictures = pictures
 
     def close(self) -> None:
-        """Ends all `exposures`."""
+        """End all `exposures`."""
         self._closed.set()
 
     def picture(self, camera: int, seconds: float) -> bytes:
         """The JPEG picture that `camera` took at `seconds`; never the same bytes twice in a row."""
         pictures = self._pictures
         x = self._position_at(seconds)[HEAD_OF_CAMERA[camera]]
-        light = Light(self._power_at(seconds), *self._light_of(camera)).nearest_level()
+        light = StageLight(self._power_at(seconds), *self._light_of(camera)).nearest_level()
         sight = (pictures, round(x / pictures.grid_mm), light)
         before, times, grained = self._shown.get(camera, (None, 0, []))
         if sight != before:
@@ -136,6 +138,6 @@ class Stage:
 
 
 def indices_of_travel(start_mm: float, end_mm: float, grid_mm: float) -> range:
-    """The pictures that heads pass on their way, those about both ends too."""
+    """Returns the indices of the pictures that heads pass, with those around both ends."""
     low, high = sorted((start_mm, end_mm))
     return range(floor(low / grid_mm), floor(high / grid_mm) + 2)

@@ -1,4 +1,4 @@
-"""How a thing is put onto the virtual scanner's glass."""
+"""Places an object on the virtual scanner's glass."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +9,8 @@ from schemas.parameters.simulation import SimulationSettings
 Floats = NDArray[np.float64]
 
 BLOCK_TURN_DEG = 5.0
-"""How the block stands, as one would place it: stripes run in over its turned edges bit by bit, which tells where the
-heads are, and none runs over a face that is square to the travel."""
+"""Turn of the block about Z, chosen by hand. Stripes move gradually over its turned edges, which reveals the position
+of the heads; no face is square to the travel."""
 
 
 def stand_on_glass(vertices: Floats, middle_x_mm: float, turn_deg: float = 0.0) -> Floats:

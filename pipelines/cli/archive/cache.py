@@ -1,6 +1,5 @@
 """`footscan cache`: what lies in the store, what of it can go, and whether it is sound."""
 
-import socket
 import time
 from collections.abc import Collection, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -9,33 +8,30 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.cli.archive.leases import TakeOver, lease_in_words, lease_json, take_over_leases
 from pipelines.cli.archive.run import WORKFLOW, WorkflowFile
-from pipelines.cli.archive.why import json_time, local_time, plan_of_scan
+from pipelines.cli.archive.why import plan_of_scan
 from pipelines.cli.terminal.output import AsJson, message, print_json, print_line, print_table
 from schemas.base.errors import Fault, RefusedInput, one_line
 
 if TYPE_CHECKING:
     from pipelines.engine.audit import Difference
     from pipelines.engine.garbage_collection import Contents, Garbage
-    from pipelines.engine.store.lease import Lease
     from pipelines.engine.store.store import Store
 
-cache = typer.Typer(help="The store of all results: its size, what can go, whether it is sound.", no_args_is_help=True)
+cache = typer.Typer(help="Inspect, verify and clean the store of results.", no_args_is_help=True)
 
 HOUR_S = 3600.0
 
-Place = Annotated[str | None, typer.Option("--cache", help="The store: a folder or a URL, without a workflow.")]
+Place = Annotated[str | None, typer.Option("--cache", help="Result store (folder or URL), instead of a workflow.")]
 OfWorkflow = Annotated[Path | None, typer.Option("--workflow", help="The workflow; default: workflow.yaml.")]
-ScanName = Annotated[str, typer.Argument(help="A scan: its folder, or patient/scan.")]
-TakeOver = Annotated[
-    bool, typer.Option("--take-over", help="Remove the leases of runs elsewhere, or with a wrong clock, that are gone.")
-]
-OlderThan = Annotated[float, typer.Option(min=0, help="Hours below which nothing goes.")]
+ScanName = Annotated[str, typer.Argument(help="Folder of a scan, or patient/scan.")]
+OlderThan = Annotated[float, typer.Option(min=0, help="Smallest age in hours of what is deleted.")]
 
 
 @cache.command("stats")
 def stats(workflow: WorkflowFile = None, place: Place = None, as_json: AsJson = False) -> None:
-    """Say what lies in the store, by kind of step, and what gc would free."""
+    """Show the content of the store by kind of step, and what gc would free."""
     from pipelines.engine.garbage_collection import read_contents
     from pipelines.engine.store.pins import read_pins
 
@@ -63,12 +59,12 @@ def stats(workflow: WorkflowFile = None, place: Place = None, as_json: AsJson = 
 def gc(
     workflow: WorkflowFile = None,
     place: Place = None,
-    delete: Annotated[bool, typer.Option("--delete", help="Delete it; otherwise it is only listed.")] = False,
+    delete: Annotated[bool, typer.Option("--delete", help="Delete what is listed.")] = False,
     older_than: OlderThan = 24.0,
     take_over: TakeOver = False,
     as_json: AsJson = False,
 ) -> int:
-    """List, and with --delete delete, what no step's last action and no pin reaches, or a vanished scan's alone.
+    """List results that no last action of a step and no pin needs; with --delete, delete them.
 
     Nothing is deleted while a run is under way.
     """
@@ -95,8 +91,8 @@ def gc(
             "deleted": len(deleted),
             "deleted_bytes": _bytes(contents, deleted),
             "vanished": vanished,
-            "runs": [_run_json(one) for one in live],
-            "taken_over": [_run_json(one) for one in taken_over],
+            "runs": [lease_json(one) for one in live],
+            "taken_over": [lease_json(one) for one in taken_over],
         }
         print_json({"store": _place(store), **_garbage_json(contents, garbage), **facts})
     elif delete:
@@ -104,7 +100,7 @@ def gc(
     elif garbage.names:
         print_line("nothing was deleted: --delete does it")
     for one in live:
-        message(f"footscan: {told_lease(one)}; nothing is deleted while it is")
+        message(f"footscan: {lease_in_words(one)}; nothing is deleted while it is")
     return 1 if delete and live else 0
 
 
@@ -112,11 +108,13 @@ def gc(
 def verify(
     workflow: WorkflowFile = None,
     place: Place = None,
-    recompute: Annotated[str | None, typer.Option(help="Do a share of the actions again, such as 5%.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the choice of these actions.")] = 0,
+    recompute: Annotated[
+        str | None, typer.Option(help="Share of the actions to compute again and compare, for example 5%.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the sample.")] = 0,
     as_json: AsJson = False,
 ) -> int:
-    """Read everything in the store and hold it against its digests and seals; remove what is damaged."""
+    """Check every file of the store against its digest or seal, and remove damaged ones."""
     from pipelines.engine import audit
 
     share = None if recompute is None else _share(recompute)
@@ -152,11 +150,14 @@ def seal(
     workflow: WorkflowFile = None,
     place: Place = None,
     every: Annotated[
-        bool, typer.Option("--all", help="Also what was written without the seal since: only if you wrote all of it.")
+        bool,
+        typer.Option(
+            "--all", help="Also seal rows that were written without a seal since; only if all of them are yours."
+        ),
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Seal the rows of a store with a secret of yours, so that nobody else can make one.
+    """Seal the rows of a store with a secret of yours, so that nobody else can add valid ones.
 
     The first time, what lies in the store is sealed; from then on, a row without the seal counts as missing.
     """
@@ -175,7 +176,7 @@ def seal(
 
 @cache.command("pin")
 def pin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_json: AsJson = False) -> None:
-    """Keep the present results of a scan, whatever is computed of it later."""
+    """Protect the present results of a scan from gc."""
     from pipelines.engine.store import pins
 
     store, name = _store(workflow, place), _scan_name(scan)
@@ -188,7 +189,7 @@ def pin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_jso
 
 @cache.command("unpin")
 def unpin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_json: AsJson = False) -> None:
-    """Keep them no longer than others."""
+    """End the protection of the results of a scan."""
     from pipelines.engine.store import pins
 
     store, name = _store(workflow, place), _scan_name(scan)
@@ -200,7 +201,7 @@ def unpin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_j
 
 
 def open_place(place: Path | str, group: int | None = None) -> "Store":
-    """The store at a place, read anew at every turn; RefusedInput where there is none."""
+    """Open the store at a place without an index of what was verified; RefusedInput if there is none."""
     from pipelines.engine.files.places import LocalFiles
     from pipelines.engine.store.permissions import warn_if_others_can_write
     from pipelines.engine.store.store import open_store
@@ -253,7 +254,7 @@ def _garbage(
 
 
 def _delivered(results: Path, secret: bytes | None, without: Collection[str] = ()) -> set[str]:
-    """Digests of the files that lie in a folder of results, but for those of some scans."""
+    """Digests of the delivered files in a folder of results, except those of some scans."""
     from pipelines.archive.job import CACHE
     from pipelines.engine.files.file_digests import FileDigests
     from pipelines.scan import DELIVERED
@@ -287,7 +288,7 @@ def _share(text: str) -> float:
 
 
 def _recompute(workflow: Path, share: float, seed: int) -> "tuple[int, list[Difference], list[str]]":
-    """Do a sample of the actions of all scans of a workflow again: how many, what differed, what could not be done."""
+    """Repeat a sample of the actions of a workflow; returns their number, the differences and the failures."""
     from pipelines.archive.job import job_of_workflow, plan_job
     from pipelines.engine import audit
 
@@ -360,38 +361,3 @@ def _garbage_json(contents: "Contents", garbage: "Garbage") -> dict[str, Any]:
         "young_files": len(garbage.young),
         "young_bytes": _bytes(contents, garbage.young),
     }
-
-
-def _run_json(one: "Lease") -> dict[str, Any]:
-    from pipelines.engine.store.lease import is_ahead
-
-    started, heartbeat = json_time(one.started), json_time(one.heartbeat)
-    times = {"started": started, "heartbeat": heartbeat, "ahead": is_ahead(one)}
-    return {"host": one.host, "process": one.process, **times}
-
-
-def take_over_leases(store: "Store") -> "list[Lease]":
-    """Take over all leases but those of this machine's own runs, and say which they were."""
-    from pipelines.engine.store.lease import take_over
-
-    taken = take_over(store)
-    for one in taken:
-        message(f"footscan: taken over: {one.name} of {_holder(one)}")
-    return taken
-
-
-def told_lease(one: "Lease") -> str:
-    """Who holds a lease, since when, and what to do where it is no run's."""
-    from pipelines.engine.store.lease import is_ahead
-
-    if one.host is None:
-        return f"{one.name}: damaged, so a run may be under way ('footscan cache verify' removes it)"
-    if is_ahead(one):
-        when = f"is dated in the future, {local_time(one.heartbeat)}: the clock there is wrong, or the one here"
-        return f"{_holder(one)} {when} (if no run is under way there, --take-over removes {one.name})"
-    hint = "" if one.host == socket.gethostname() else " (if that host is gone, --take-over)"
-    return f"{_holder(one)} is running since {local_time(one.started)}{hint}"
-
-
-def _holder(one: "Lease") -> str:
-    return "an unknown process" if one.host is None else one_line(f"process {one.process} on {one.host}")

@@ -13,12 +13,12 @@ from schemas.base.errors import RefusedInput
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-config = typer.Typer(help="What a workflow says, and what is wrong with it.", no_args_is_help=True)
+config = typer.Typer(help="Check a workflow and show its parameters.", no_args_is_help=True)
 
 
 @config.command("show")
 def show(workflow: WorkflowFile = None, settings: Settings = None, as_json: AsJson = False) -> None:
-    """Every value in force, and where it comes from: a line of the file, --set, or the default."""
+    """Show every value in force and its origin: a line of the file, --set, or the default."""
     from pipelines.archive.workflow_file import read_workflow
     from schemas.base.json_files import read_text
     from schemas.base.overrides import overridden, parse_settings
@@ -43,7 +43,7 @@ def show(workflow: WorkflowFile = None, settings: Settings = None, as_json: AsJs
 
 @config.command("check")
 def check(workflow: WorkflowFile = None, as_json: AsJson = False) -> int:
-    """Every mistake in a workflow, with its line and column and what was expected."""
+    """Show every mistake in a workflow, with its line and column and what was expected."""
     from pipelines.archive.workflow_file import workflow_mistakes
 
     path = workflow or WORKFLOW
@@ -58,7 +58,7 @@ def check(workflow: WorkflowFile = None, as_json: AsJson = False) -> int:
 
 
 def _values(document: "BaseModel", above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Every value of a document, after the names that lead to it."""
+    """Every value of a document with its path of names."""
     from pydantic import BaseModel
 
     for name in type(document).model_fields:
@@ -70,7 +70,7 @@ def _values(document: "BaseModel", above: tuple[str, ...] = ()) -> Iterator[tupl
 
 
 def _origin(document: "BaseModel", names: tuple[str, ...], text: str, path: Path) -> str:
-    """The line of a value that the file holds; otherwise it is the default."""
+    """The line of a value in the file; None for a default."""
     from pydantic import BaseModel
 
     from schemas.base.yaml_text import place_in_yaml

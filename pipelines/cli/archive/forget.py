@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.archive.cache import TakeOver, take_over_leases, told_lease
+from pipelines.cli.archive.leases import TakeOver, lease_in_words, take_over_leases
 from pipelines.cli.archive.run import WORKFLOW
 from pipelines.cli.terminal.output import AsJson, message, print_json, print_line
 from schemas.base.errors import RefusedInput, one_line
@@ -23,17 +23,21 @@ OUT_OF_REACH = (
 
 
 def forget(
-    patient: Annotated[str, typer.Argument(help="Whom to forget: the pseudonym.")],
-    scan: Annotated[str | None, typer.Option("--scan", help="One scan of theirs alone.")] = None,
+    patient: Annotated[str, typer.Argument(help="Pseudonym of the patient to erase.")],
+    scan: Annotated[str | None, typer.Option("--scan", help="Erase this scan only.")] = None,
     workflow: Annotated[Path | None, typer.Option(help="The workflow; default: workflow.yaml.")] = None,
-    suite: Annotated[list[Path] | None, typer.Option(help="A suite that runs scans of theirs; repeatable.")] = None,
-    log: Annotated[list[Path] | None, typer.Option(help="A log that lies elsewhere; repeatable.")] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be erased, and erase nothing.")] = False,
+    suite: Annotated[
+        list[Path] | None, typer.Option(help="Regression suite that uses scans of the patient; may be repeated.")
+    ] = None,
+    log: Annotated[
+        list[Path] | None, typer.Option(help="Log file outside the workflow's folders; may be repeated.")
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask for confirmation.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="List what would be erased, without erasing it.")] = False,
     take_over: TakeOver = False,
     as_json: AsJson = False,
 ) -> int:
-    """Erase a patient, or one scan: films, frames, results, entries of tables, and what only they needed in the store.
+    """Erase a patient or one scan: films, frames, results, entries of tables, and the store's data that only they need.
 
     What was erased is searched for afterwards. It cannot be undone.
     """
@@ -63,7 +67,7 @@ def forget(
     elif is_done:
         print_line(f"{subject.name}: erased; neither the name nor a digest is found in archive, results and store")
     for one in live:
-        message(f"footscan: {told_lease(one)}; nothing is erased while it is")
+        message(f"footscan: {lease_in_words(one)}; nothing is erased while it is")
     for place in found.remains:
         message(one_line(f"footscan: {place}: still bears {subject.name}, or is a copy of theirs: erase it by hand"))
     if not as_json:

@@ -32,19 +32,19 @@ WORKFLOW = Path("workflow.yaml")
 WorkflowFile = Annotated[
     Path | None, typer.Argument(help="The workflow; default: workflow.yaml.", metavar="[WORKFLOW]")
 ]
-ScanFolder = Annotated[Path | None, typer.Option("--scan", help="One scan folder, without a workflow.")]
+ScanFolder = Annotated[Path | None, typer.Option("--scan", help="Folder of one scan, instead of a workflow.")]
 CalibrationFile = Annotated[
-    Path | None, typer.Option("--calibration", help="Calibration for --scan; default: the one that the scan names.")
+    Path | None, typer.Option("--calibration", help="Calibration for --scan; default: the one named in scan.yaml.")
 ]
-ResultsFolder = Annotated[Path | None, typer.Option("--out", help="Folder of the results, for --scan.")]
-JsonLog = Annotated[Path | None, typer.Option("--log-json", help="Write what happens here, a JSON object a line.")]
+ResultsFolder = Annotated[Path | None, typer.Option("--out", help="Folder for the results of --scan.")]
+JsonLog = Annotated[Path | None, typer.Option("--log-json", help="Log file to write, one JSON object per line.")]
 WatchArchive = Annotated[
-    bool, typer.Option("--watch", help="Stay, and run scans as they arrive in the archive; Ctrl-C ends it.")
+    bool, typer.Option("--watch", help="Keep running and process scans as they arrive in the archive, until Ctrl-C.")
 ]
 Settings = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="NAME=VALUE", help="A parameter, extraction.red_threshold=22; may stand several times."
+        "--set", metavar="NAME=VALUE", help="Parameter, for example extraction.red_threshold=22; may be repeated."
     ),
 ]
 POLL_S = 2.0
@@ -95,7 +95,7 @@ def _run(
     as_json: bool = False,
     folders: dict[str, Path] | None = None,
 ) -> "list[ScanEnd]":
-    """Run a job and tell what became of it; `folders` as in `plan_job`."""
+    """Run a job and print the result of each scan; `folders` as in `plan_job`."""
     from pipelines.archive.job import plan_job, run_job
     from pipelines.cli.terminal.progress import StepProgress
 
@@ -118,7 +118,7 @@ def _run(
 
 
 def _write_table(ends: "list[ScanEnd]", results: Path) -> int:
-    """Write the table of all results; where that cannot be, it is said, and the exit status is that of a fault."""
+    """Write the table of all results; a failure is printed and gives the exit status of a fault."""
     from pipelines.archive.table import write_results_table
 
     try:
@@ -130,7 +130,7 @@ def _write_table(ends: "list[ScanEnd]", results: Path) -> int:
 
 
 def _watch(job: "Job", pool: "Pool", log: TextIO | None) -> int:
-    """Run scans as they are complete, until interrupted."""
+    """Run scans as soon as they are complete, until interrupted."""
     from pipelines.archive.watch import Arrivals
 
     arrivals = Arrivals(job.archives)
@@ -163,7 +163,7 @@ def plan(
     settings: Settings = None,
     as_json: AsJson = False,
 ) -> int:
-    """Say what `run` would do, and why, without doing it."""
+    """Show what `run` would do, and why, without running it."""
     from pipelines.archive.job import plan_job
 
     planned = plan_job(job_of(workflow, scan, calibration, out, None, settings), reasons=True)
@@ -205,7 +205,7 @@ def job_of(
     *,
     may_be_empty: bool = False,
 ) -> "Job":
-    """The job that the options of a command describe; `may_be_empty`: an archive that has no scan yet."""
+    """The job described by the options of a command; `may_be_empty` accepts an archive without scans."""
     from pipelines.archive.job import job_of_scan, job_of_workflow
 
     if scan is None:
@@ -222,7 +222,7 @@ def job_of(
 
 
 def _tell(scan: str, problem: str) -> None:
-    """One line for a scan that failed; most problems name a file of the scan and so the scan itself."""
+    """One line for a failed scan; most problems name a file of the scan and thereby the scan."""
     message(f"footscan: {problem}" if scan in problem else f"footscan: {scan}: {problem}")
 
 

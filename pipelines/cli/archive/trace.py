@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from pipelines.engine.trace import Trace, TracedAction, TracedInput
 
 SHOWN_CHARACTERS = 100
-"""Of a value in the tree; all of it is in the JSON."""
+"""Characters shown of a value in the tree; the JSON has all."""
 
 
 def trace(
-    file: Annotated[Path, typer.Argument(help="A file of the results, such as foot.stl.")],
-    cache: Annotated[str | None, typer.Option(help="The store, if it does not lie above the file.")] = None,
+    file: Annotated[Path, typer.Argument(help="Delivered file, such as foot.stl.")],
+    cache: Annotated[str | None, typer.Option(help="Result store; default: the one above the file.")] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Say everything that a file of the results came from, down to films, calibration and versions."""
+    """Show the provenance of a delivered file, down to films, calibration and versions."""
     from pipelines.engine import trace as engine
 
     digest = _digest(file)
@@ -69,7 +69,7 @@ def _store(file: Path, cache: str | None) -> "Store":
 
 
 def _places(file: Path) -> Iterator[Path | str]:
-    """Where its store may lie: where the workflow.yaml above it has that, if these are its results, or above it."""
+    """Candidates for the store: that of a workflow.yaml above the file, or a folder above the file."""
     from pipelines.archive.job import CACHE, job_of_workflow
 
     folders = file.resolve().parents
@@ -126,7 +126,7 @@ def _print_tree(file: Path, digest: str, found: "Trace") -> None:
 
 
 def _grow(tree: "Tree", taken_as: str, key: str, found: "Trace", shown: set[str]) -> None:
-    """Add an action with all that it came from; one that has been shown is only named."""
+    """Add an action with its provenance; an action that has been shown is only named."""
     from rich.text import Text
 
     action = found.actions[key]
@@ -165,7 +165,7 @@ def _acceptance(accepted: "Acceptance") -> str:
 
 
 def _leaf(taken: "TracedInput") -> str:
-    """A film, or another thing that no step made."""
+    """The line of an input that no step made, such as a film."""
     from pipelines.engine.trace import parsed
 
     name = f"{taken.name}: {taken.digest[:12]}"

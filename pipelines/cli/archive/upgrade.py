@@ -13,20 +13,22 @@ if TYPE_CHECKING:
     from pipelines.archive.upgrade import Trial
 
 SHOWN_CHANGES = 4
-"""Of each step in the table; all are in the JSON."""
+"""Changes shown of each step in the table; the JSON has all."""
 
 
 def upgrade(
     workflow: WorkflowFile = None,
-    sample: Annotated[int, typer.Option(min=1, help="Actions of each kind of step that are computed again.")] = 5,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the choice of these actions.")] = 0,
+    sample: Annotated[int, typer.Option(min=1, help="Number of actions per kind of step that are computed again.")] = 5,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the sample.")] = 0,
     accept: Annotated[
         str | None,
-        typer.Option(metavar="REASON", help="Keep the old results of the steps whose sample agrees, for this reason."),
+        typer.Option(
+            metavar="REASON", help="Keep the old results of steps whose sample agrees, and record this reason."
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """After an upgrade: compute a sample again and say what differs; with --accept keep what agrees.
+    """After an upgrade: compute a sample again and show what differs; with --accept, keep the results that agree.
 
     A step is stale when its inputs and parameters are those of its last result, and only its code or the version of a
     library that it computes with is new. The exit status is 1 if a step of the sample differs or fails.

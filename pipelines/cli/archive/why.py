@@ -21,27 +21,27 @@ if TYPE_CHECKING:
     from pipelines.engine.store.store import Row, Store
 
 SHOWN_LINES = 40
-"""Of one change in a table; all are in the JSON."""
+"""Lines shown of one change in a table; the JSON has all."""
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """What is known of a step."""
+    """State of a step and the reason for it."""
 
     step: "Step"
     state: str
     """`hit`, `miss` or `waits`."""
     reason: str
     changes: "tuple[Change, ...]"
-    """Against its last action."""
+    """Changes since the last action of the step."""
     last: "Row | None"
-    """What its last action came to; of a hit, what it comes to now."""
+    """Row of the last action of the step; for a hit, of the present one."""
     made: float | None
-    """When, s since 1970."""
+    """Time of the row, s since 1970."""
 
 
 def why(
-    scan: Annotated[str, typer.Argument(help="A scan: its folder, or patient/scan.")],
+    scan: Annotated[str, typer.Argument(help="Folder of a scan, or patient/scan.")],
     step: Annotated[
         str | None, typer.Argument(help="A step, such as extract or extract-3; default: all steps that would run.")
     ] = None,
@@ -53,7 +53,7 @@ def why(
     settings: Settings = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say what changed since the last result of each step that would run, old and new side by side."""
+    """Show what changed since the last result of each step that would run, old and new side by side."""
     from pipelines.archive.job import plan_job
 
     planned = plan_job(with_settings(_job(scan, workflow, calibration, out), settings))
@@ -80,12 +80,12 @@ def plan_of_scan(found: "PlannedScan", planned: "PlannedJob") -> "Plan":
 
 
 def local_time(seconds: float | None) -> str:
-    """A time, s since 1970, for a person."""
+    """A time, s since 1970, as local text."""
     return "at an unknown time" if seconds is None else f"{datetime.fromtimestamp(seconds):%Y-%m-%d %H:%M:%S}"
 
 
 def json_time(seconds: float | None) -> str | None:
-    """The same for a program."""
+    """A time, s since 1970, in ISO 8601."""
     return None if seconds is None else datetime.fromtimestamp(seconds, UTC).isoformat(timespec="seconds")
 
 
@@ -104,7 +104,7 @@ def _job(scan: str, workflow: Path | None, calibration: Path | None, out: Path |
 
 
 def _folder(scan: str, job: "Job") -> Path:
-    """The folder of a scan that is named by its folder, or as `patient/scan`."""
+    """The folder of a scan that is given as a folder or as `patient/scan`."""
     from footscan.recordings.scans import read_scan
 
     named = Path(scan).resolve()
@@ -160,7 +160,7 @@ def _newest(every: Sequence[Explanation]) -> Explanation:
 
 
 def _show(chosen: Sequence[Explanation]) -> None:
-    """A table for all steps of which the same is to be said, such as those of the cameras."""
+    """Print one table for all steps with the same changes, such as those of the cameras."""
     alike: dict[tuple[str, tuple[object, ...]], list[Explanation]] = {}
     for one in chosen:
         alike.setdefault((one.reason, one.changes), []).append(one)
@@ -174,7 +174,7 @@ def _show(chosen: Sequence[Explanation]) -> None:
 
 
 def _rows(change: "Change") -> list[list[str]]:
-    """Old and new side by side; of texts, the lines that differ."""
+    """Rows with old and new side by side; of texts only the lines that differ."""
     from pipelines.engine.explain import side_by_side
 
     made_by = f" (result of {change.step})" if change.step else ""
@@ -204,7 +204,7 @@ def _is_digest(text: str) -> bool:
 
 
 def _came_to(one: Explanation) -> str:
-    """What the last action of a step came to, and when."""
+    """Result of the last action of a step, and its time."""
     if one.last is None:
         return "none"
     result = one.last.failure[1] if one.last.failure is not None else f"{one.last.digest}"[:12]

@@ -1,4 +1,4 @@
-"""Where the steps of a command run: its options `--threads`, `--workers` and `--cluster`."""
+"""Options that say where steps run: `--threads`, `--workers` and `--cluster`."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -16,34 +16,38 @@ if TYPE_CHECKING:
     from pipelines.engine.pool import Cluster, OnStepEnd, Pool, RunTask, Task
 
 Threads = Annotated[
-    int | None, typer.Option("--threads", min=1, help="Steps that run at once; default: as many as cores.")
+    int | None, typer.Option("--threads", min=1, help="Number of steps that run at once; default: number of cores.")
 ]
 Workers = Annotated[
-    int | None, typer.Option("--workers", min=1, help="Run the steps in so many processes of this machine instead.")
+    int | None,
+    typer.Option(
+        "--workers", min=1, help="Number of local processes that run the steps; default: threads of one process."
+    ),
 ]
 ClusterAddress = Annotated[
-    str | None, typer.Option("--cluster", metavar="ADDRESS", help="Run them on the workers of this Dask scheduler.")
+    str | None,
+    typer.Option("--cluster", metavar="ADDRESS", help="Run the steps on the workers of this Dask scheduler."),
 ]
-Dashboard = Annotated[
-    bool, typer.Option("--dashboard", help="Serve Dask's status page to this machine, with --workers.")
-]
+Dashboard = Annotated[bool, typer.Option("--dashboard", help="With --workers: serve Dask's dashboard on this machine.")]
 TlsCa = Annotated[
     Path | None, typer.Option("--tls-ca", help="Certificate of the authority, for --cluster tls://... (PEM).")
 ]
-TlsCert = Annotated[Path | None, typer.Option("--tls-cert", help="Own certificate, likewise.")]
-TlsKey = Annotated[Path | None, typer.Option("--tls-key", help="Its private key, without a password.")]
+TlsCert = Annotated[Path | None, typer.Option("--tls-cert", help="Client certificate, for --cluster tls://... (PEM).")]
+TlsKey = Annotated[
+    Path | None, typer.Option("--tls-key", help="Private key of the client certificate, without a password (PEM).")
+]
 
 
 @dataclass(frozen=True)
 class Placement:
-    """What these options say."""
+    """Values of these options."""
 
     threads: int | None
     workers: int | None
     cluster: str | None
     dashboard: bool = False
     tls: tuple[Path | None, Path | None, Path | None] = (None, None, None)
-    """Files of the authority's certificate, of the own one, and of its key."""
+    """Files of the authority's certificate, the client certificate and its key."""
 
     def check(self) -> None:
         """Refuse options that contradict each other, before anything is read."""
@@ -62,7 +66,7 @@ class Placement:
 
 @contextmanager
 def chosen_pool(threads: int, placement: Placement) -> "Iterator[Pool]":
-    """The pool of `--workers` or `--cluster`, otherwise so many threads."""
+    """The pool of `--workers` or `--cluster`; default: threads."""
     from pipelines.engine.pool import Threads as ThreadPool
 
     if placement.workers is None and placement.cluster is None:
@@ -73,7 +77,7 @@ def chosen_pool(threads: int, placement: Placement) -> "Iterator[Pool]":
 
 
 class _LazyCluster:
-    """A cluster that is opened when there is something to run, for it takes seconds to start."""
+    """A cluster that is opened on the first run, because it takes seconds to start."""
 
     def __init__(self, stack: ExitStack, workers: int, placement: Placement) -> None:
         self._stack, self._workers, self._placement = stack, workers, placement
@@ -81,7 +85,7 @@ class _LazyCluster:
 
     @property
     def count(self) -> int:
-        """Steps that run at once; of a scheduler that has not been asked yet, a guess."""
+        """Number of steps that run at once; a guess until the scheduler has answered."""
         return self._cluster.count if self._cluster else self._workers
 
     def run(self, tasks: "Mapping[str, Task]", run_task: "RunTask", on_step_end: "OnStepEnd") -> "dict[str, Outcome]":

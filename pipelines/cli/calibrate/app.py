@@ -10,7 +10,7 @@ import typer
 from pipelines.cli.calibrate import capture, chart, check, compare, latency, show
 from pipelines.cli.terminal.output import AsJson, print_json, print_text
 
-calibrate = typer.Typer(help="Learn each camera's map from pixels to millimetres.", no_args_is_help=True)
+calibrate = typer.Typer(help="Fit each camera's map from pixels to millimetres, and check it.", no_args_is_help=True)
 calibrate.command("chart")(chart.chart)
 calibrate.command("capture")(capture.capture)
 calibrate.command("models")(chart.models)
@@ -22,12 +22,12 @@ calibrate.command("latency")(latency.latency)
 
 def map_pixels(
     calibration: Annotated[Path, typer.Argument(help="Calibration file.")],
-    points: Annotated[Path, typer.Argument(help="CSV with columns i,j (others are passed over).")],
-    camera: Annotated[int, typer.Option(help="Whose pixels they are.")],
+    points: Annotated[Path, typer.Argument(help="CSV with columns i,j (other columns are ignored).")],
+    camera: Annotated[int, typer.Option(help="Number of the camera.")],
     out: Annotated[Path | None, typer.Option(help="CSV to write: y_mm,z_mm,supported.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Map pixels of one camera to Y and Z in millimetres."""
+    """Map pixels of one camera to Y and Z in mm."""
     from footscan.calibration.models.maps import is_supported, to_world
     from footscan.calibration.models.pixels import read_pixels
     from pipelines.engine.files.atomic import write_atomically

@@ -19,29 +19,29 @@ def capture(
     folder: Annotated[Path, typer.Argument(help="Folder with capture.yaml, the reference object and the frames.")],
     model: Annotated[
         Literal["auto", "polynomial", "homography", "homography-distortion", "homography-correction"],
-        typer.Option(help="auto: the one with the least error on edges held out."),
+        typer.Option(help="auto: smallest error on held-out edges."),
     ] = "auto",
     order: Annotated[
-        int | None, typer.Option(min=1, max=5, help="Order of the polynomial, instead of a choice.")
+        int | None, typer.Option(min=1, max=5, help="Order of the polynomial; default: chosen on held-out data.")
     ] = None,
     tolerance_mm: Annotated[
-        float, typer.Option(min=0.01, max=50, help="How far the object may stand from where it should.")
+        float, typer.Option(min=0.01, max=50, help="Largest distance in mm of the object from its nominal placement.")
     ] = 1.0,
-    out: Annotated[Path | None, typer.Option(help="Write the calibration here.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Calibration file to write.")] = None,
     chart: Annotated[
-        Path | None, typer.Option(help="Write the corners that were found here, as a chart of control points (CSV).")
+        Path | None, typer.Option(help="Chart of control points to write: the corners that were found (CSV).")
     ] = None,
     picture: Picture = None,
     cache: Annotated[
-        Path | None, typer.Option(help="Folder of a content store: what it holds of this capture is not made again.")
+        Path | None, typer.Option(help="Folder of a result store; results of this capture that it holds are reused.")
     ] = None,
     keep_going: Annotated[
         bool,
-        typer.Option("--keep-going", help="Go on with cameras that see the object from another side than their own."),
+        typer.Option("--keep-going", help="Continue when a camera sees the object from another side than its own."),
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Calibrate from the stripe over the reference object: nobody clicks."""
+    """Calibrate from films of the stripe over the reference object, without clicking points."""
     from pipelines.capture_job import calibrate_capture
     from pipelines.cli.calibrate.model_table import print_trials
     from pipelines.engine.pool import cores

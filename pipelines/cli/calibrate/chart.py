@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 ChartFile = Annotated[Path, typer.Argument(help="CSV: camera,point,x_mm,y_mm,z_mm,i,j (or x_cm, y_cm, z_cm).")]
 KeepGoing = Annotated[
-    bool, typer.Option("--keep-going", help="Go on with a chart that has certain mistakes; they are told all the same.")
+    bool,
+    typer.Option("--keep-going", help="Continue when points of the chart are suspicious; they are still reported."),
 ]
 
 
@@ -26,16 +27,16 @@ def chart(
     file: ChartFile,
     model: Annotated[
         Literal["auto", "quadratic", "polynomial", "homography", "homography-distortion", "homography-correction"],
-        typer.Option(help="auto: the one with the least error on held-out points; quadratic: that of the thesis."),
+        typer.Option(help="auto: smallest error on held-out points; quadratic: the model of the thesis."),
     ] = "auto",
     order: Annotated[
-        int | None, typer.Option(min=1, max=5, help="Order of the polynomial, instead of a choice.")
+        int | None, typer.Option(min=1, max=5, help="Order of the polynomial; default: chosen on held-out data.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Write the calibration here.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Calibration file to write.")] = None,
     keep_going: KeepGoing = False,
     as_json: AsJson = False,
 ) -> None:
-    """Calibrate from control points whose pixels are known."""
+    """Calibrate from a chart of control points with known pixels."""
     from footscan.calibration.chart.from_chart import calibrate_chart
     from pipelines.cli.calibrate.model_table import print_trials
     from pipelines.engine.files.digest import sha256
@@ -69,11 +70,11 @@ def chart(
 
 def models(
     file: ChartFile,
-    markdown: Annotated[bool, typer.Option("--markdown", help="Print the table in Markdown.")] = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print the table as Markdown.")] = False,
     keep_going: KeepGoing = False,
     as_json: AsJson = False,
 ) -> None:
-    """Compare all models on a chart, on its points and on points held out; nothing is written."""
+    """Compare all models on a chart, on fitted and on held-out points; writes nothing."""
     from footscan.calibration.chart.from_chart import compare_models
     from pipelines.cli.calibrate.model_table import markdown_of_models, print_models
 
@@ -94,7 +95,7 @@ def models(
 
 
 def _checked(file: Path, *, keep_going: bool) -> "tuple[dict[int, Chart], list[ChartWarning]]":
-    """The charts of a file, and what looks like a mistake in them; certain ones are refused."""
+    """The charts of a file and warnings about its points; refuses certain mistakes."""
     from footscan.calibration.chart.chart import read_chart
     from footscan.calibration.chart.checks import check_charts, refuse_mistakes
 
@@ -138,7 +139,7 @@ def _calibration_json(
 
 
 def _trials_json(chart: "Chart", trials: "list[ModelTrial]") -> list[dict[str, Any]]:
-    """The trials of one camera, the worst point by its name."""
+    """The trials of one camera as JSON, with the name of the worst point."""
     documents = [asdict(trial) for trial in trials if trial.camera == chart.camera]
     for document in documents:
         worst = document["worst_point"]

@@ -19,18 +19,18 @@ def check(
     calibration: Annotated[Path, typer.Argument(help="Calibration file.")],
     capture: Annotated[Path, typer.Argument(help="Folder with capture.yaml, filmed today.")],
     tolerance_mm: Annotated[
-        float, typer.Option(min=0.001, max=100, help="A camera that is off by more (rms) has drifted.")
+        float, typer.Option(min=0.001, max=100, help="RMS deviation in mm above which a camera has drifted.")
     ] = 0.2,
     placement_tolerance_mm: Annotated[
-        float, typer.Option(min=0.01, max=50, help="How far the object may stand from where it should.")
+        float, typer.Option(min=0.01, max=50, help="Largest distance in mm of the object from its nominal placement.")
     ] = 1.0,
     picture: Picture = None,
     cache: Annotated[
-        Path | None, typer.Option(help="Folder of a content store: what it holds of this capture is not made again.")
+        Path | None, typer.Option(help="Folder of a result store; results of this capture that it holds are reused.")
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Measure how far each camera has drifted since its calibration; the exit status is 1 unless all are steady."""
+    """Measure the drift of each camera since its calibration. The exit status is 1 if a camera has drifted."""
     from pipelines.capture_job import check_calibration
     from pipelines.engine.pool import cores
     from pipelines.recordings.captures import read_capture
@@ -68,7 +68,7 @@ def check(
 
 
 def _alike(shifts: list[tuple[float, float]]) -> tuple[float, float] | None:
-    """The shift that all cameras share, where what they do not share is less than half of it."""
+    """The shift common to all cameras, if the rest is less than half of it."""
     if len(shifts) < 2:
         return None
     y, z = (median(shift[axis] for shift in shifts) for axis in (0, 1))

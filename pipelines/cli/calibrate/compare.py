@@ -21,14 +21,16 @@ MEANING = (
 
 def compare(
     a: Annotated[Path, typer.Argument(help="Calibration file.", metavar="A")],
-    b: Annotated[Path, typer.Argument(help="Another of the same scanner.", metavar="B")],
+    b: Annotated[Path, typer.Argument(help="Another calibration of the same scanner.", metavar="B")],
     tolerance_mm: Annotated[
         float | None,
-        typer.Option(min=0, help="Exit with status 1 where a camera differs by more (rms) or cannot be compared."),
+        typer.Option(
+            min=0, help="RMS difference in mm above which the exit status is 1; also if a camera cannot be compared."
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """How two calibrations differ, camera by camera, in millimetres."""
+    """Compare two calibrations, camera by camera, in millimetres."""
     from footscan.calibration.checks.comparison import compare_calibrations, worst_beyond
     from schemas.calibration import read_calibration
 

@@ -1,4 +1,4 @@
-"""What the commands say of a calibration, and where it is written."""
+"""Output of the commands on a calibration, and writing of its file."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def write_calibration(calibration: "Calibration", out: Path | None) -> None:
-    """Writes the file, dated, where one was asked for."""
+    """Write the file with its date, if one was requested."""
     from pipelines.engine.files.atomic import write_atomically
 
     if out is not None:
@@ -20,7 +20,7 @@ def write_calibration(calibration: "Calibration", out: Path | None) -> None:
 
 
 def tell_calibration(calibration: "Calibration", out: Path | None) -> None:
-    """What became of it, after the tables."""
+    """Print whether and where the calibration was written."""
     if out is None:
         message("nothing was written; --out FILE writes the calibration")
     else:
@@ -29,7 +29,7 @@ def tell_calibration(calibration: "Calibration", out: Path | None) -> None:
 
 
 def print_pairs(pairs: "list[PairAgreement]") -> None:
-    """How far apart each two cameras place the edges that both see."""
+    """Print how far apart two cameras place the edges that both see."""
     rows = [
         [f"{pair.cameras[0]} and {pair.cameras[1]}", str(pair.places), f"{pair.rms_mm:.3f}", f"{pair.worst_mm:.3f}"]
         for pair in pairs

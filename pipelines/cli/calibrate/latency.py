@@ -18,17 +18,21 @@ from pipelines.cli.terminal.output import AsJson, message, print_json, print_tab
 
 def latency(
     rig: RigFile = None,
-    from_mm: Annotated[float | None, typer.Option(help="Begin of the passes; default: the rig's travel.")] = None,
-    to_mm: Annotated[float | None, typer.Option(help="Their end.")] = None,
-    power: Annotated[float, typer.Option(min=0.01, max=1, help="Of the lasers.")] = 1.0,
+    from_mm: Annotated[
+        float | None, typer.Option(help="Start of the passes, mm; default: that of the rig's travel.")
+    ] = None,
+    to_mm: Annotated[
+        float | None, typer.Option(help="End of the passes, mm; default: that of the rig's travel.")
+    ] = None,
+    power: Annotated[float, typer.Option(min=0.01, max=1, help="Power of the lasers, as a share of full power.")] = 1.0,
     exposure_ms: Annotated[
-        float, typer.Option(min=0.05, max=1000, help="Of all cameras; best what scans will have.")
+        float, typer.Option(min=0.05, max=1000, help="Exposure of all cameras, ms; preferably that of later scans.")
     ] = 10.0,
     virtual: Virtual = False,
     virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
     as_json: AsJson = False,
 ) -> int:
-    """Find the latency of each camera from passes forth and back over an object that stands askew on the glass."""
+    """Find the latency of each camera from passes forth and back over an object placed at an angle."""
     from pipelines.live.latencies import measure_latencies, rig_with
     from pipelines.live.light import light_by_hand
     from pipelines.live.rig_file import write_rig

@@ -1,4 +1,4 @@
-"""Tables of models that were tried: which there are, what they err by, which was chosen."""
+"""Tables of the calibration models that were tried: their errors, and which was chosen."""
 
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ MEANING = (
 
 
 def print_trials(trials: "Sequence[ModelTrial]") -> None:
-    """What each model achieved, camera by camera, or in one row a model where all cameras choose the same."""
+    """Print the errors of each model by camera, or one row per model if all cameras choose the same."""
     tried = [trial for trial in trials if trial.status != "refused"]
     chosen = {trial.camera: trial.model for trial in trials if trial.status == "chosen"}
     cameras = sorted({trial.camera for trial in trials})
@@ -36,7 +36,7 @@ def print_trials(trials: "Sequence[ModelTrial]") -> None:
 
 
 def print_models(trials: "Sequence[ModelTrial]") -> None:
-    """The errors of all models, a column a camera."""
+    """Print the errors of all models, one column per camera."""
     columns, rows = _matrix(trials, chosen="{}*")
     print_table("Own and held-out error of each camera, mm rms; *: chosen", columns, rows)
     print_line(MEANING)
@@ -44,7 +44,7 @@ def print_models(trials: "Sequence[ModelTrial]") -> None:
 
 
 def markdown_of_models(trials: "Sequence[ModelTrial]") -> str:
-    """The same in Markdown."""
+    """The same table as Markdown."""
     columns, rows = _matrix(trials, chosen="**{}**")
     lines = [columns, ["---", "---:", "---", *["---:"] * (len(columns) - 3)], *rows]
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
@@ -57,7 +57,7 @@ def _print_refused(trials: "Sequence[ModelTrial]") -> None:
 
 
 def _row(model: str, trials: "Sequence[ModelTrial]") -> list[str]:
-    """One row for a model, of one camera or of several that chose the same."""
+    """The row of a model, for one camera or for several that chose the same."""
     chosen = any(trial.status == "chosen" for trial in trials)
     remarks = list(dict.fromkeys(trial.remark for trial in trials if trial.remark))
     return [
@@ -73,7 +73,7 @@ def _row(model: str, trials: "Sequence[ModelTrial]") -> list[str]:
 
 
 def _matrix(trials: "Sequence[ModelTrial]", *, chosen: str) -> tuple[list[str], list[list[str]]]:
-    """Two rows a model, for its own and its held-out error, and a column a camera."""
+    """Two rows per model (fitted and held-out error), one column per camera."""
     cameras = sorted({trial.camera for trial in trials})
     rows = []
     for model in _models(trial for trial in trials if trial.status != "refused"):

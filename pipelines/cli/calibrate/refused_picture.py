@@ -1,4 +1,4 @@
-"""A refused capture is drawn, so that a person sees why."""
+"""Picture of a refused capture, which shows the reason."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 Picture = Annotated[
     Path | None,
-    typer.Option(help="Draw a refused capture here (PNG).", show_default="NAME-OF-FOLDER-refused.png"),
+    typer.Option(help="Picture of a refused capture to write (PNG).", show_default="NAME-OF-FOLDER-refused.png"),
 ]
 
 

@@ -16,7 +16,7 @@ def show(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Draw residuals and coverage of each camera, and tell what a calibration was made from."""
+    """Draw residuals and coverage of each camera, and print the sources of a calibration."""
     from footscan.calibration.models.maps import model_of
     from footscan.report.calibration.figure import calibration_figure
     from pipelines.engine.files.atomic import write_atomically

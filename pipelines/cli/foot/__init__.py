@@ -1,1 +1,1 @@
-"""Commands on a foot that was measured."""
+"""Commands on a measured foot."""

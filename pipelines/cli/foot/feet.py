@@ -1,4 +1,4 @@
-"""Feet on the command line: measures.json, the folder of a scan's results, or that of a patient's."""
+"""Feet on the command line: measures.json, the results folder of a scan, or that of a patient."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,12 +18,15 @@ PATIENT = "RESULTS/<patient> alone"
 MEASURES_FILE = "measures.json"
 
 TableFile = Annotated[
-    Path | None, typer.Option("--table", help="Table of sizes, widths and lasts: an edited copy of the one here.")
+    Path | None,
+    typer.Option(
+        "--table", help="Table of sizes, widths and lasts; default: the built-in one (see sizes --show-table)."
+    ),
 ]
 ForPeople = Annotated[
-    Literal["all", "men", "women", "children"], typer.Option("--for", help="Whose sizes are asked for.")
+    Literal["all", "men", "women", "children"], typer.Option("--for", help="Group of wearers whose sizes are listed.")
 ]
-AnyPatient = Annotated[bool, typer.Option("--any-patient", help="Take feet of two patients all the same.")]
+AnyPatient = Annotated[bool, typer.Option("--any-patient", help="Accept feet of two patients.")]
 
 
 def read_feet(places: Sequence[Path], any_patient: bool) -> "list[Foot]":
@@ -50,17 +53,17 @@ def read_feet(places: Sequence[Path], any_patient: bool) -> "list[Foot]":
 
 
 def is_patient(place: Path) -> bool:
-    """Whether this is the folder of a patient's results, RESULTS/<patient>, with a folder for each scan."""
+    """True for the results folder of a patient, RESULTS/<patient>, with one folder per scan."""
     return not _measures_file(place).exists() and bool(_scans(place))
 
 
 def read_patient(folder: Path) -> "list[Foot]":
-    """The feet of all scans of a patient, in the order of the scans' names."""
+    """The feet of all scans of a patient, sorted by scan name."""
     return [read_foot(scan) for scan in _scans(folder)]
 
 
 def read_latest_pair(folder: Path) -> "list[Foot]":
-    """A patient's left and right foot of the latest day that has both."""
+    """The left and right foot of a patient from the latest day with both."""
     from footscan.sizing.sittings import latest_pair
 
     feet = read_patient(folder)
@@ -70,10 +73,10 @@ def read_latest_pair(folder: Path) -> "list[Foot]":
 
 
 def tell_passed_over(folder: Path, feet: "Sequence[Foot]", taken: "Sequence[Foot]") -> None:
-    """Scans that were not taken although they are no older."""
-    from footscan.sizing.sittings import passed_over
+    """Print the scans that were not used although they are not older."""
+    from footscan.sizing.sittings import feet_left_out
 
-    if names := ", ".join(foot.scan or foot.source for foot in passed_over(feet, taken)):
+    if names := ", ".join(foot.scan or foot.source for foot in feet_left_out(feet, taken)):
         message(one_line(f"{folder}: not taken: {names}"))
 
 
@@ -111,5 +114,5 @@ def _scans(folder: Path) -> list[Path]:
 
 
 def chosen(people: Literal["all", "men", "women", "children"]) -> "People | None":
-    """None for all."""
+    """The group of wearers; None for all."""
     return None if people == "all" else people

@@ -22,9 +22,9 @@ def lasts(
             metavar="FOOT",
         ),
     ],
-    folder: Annotated[Path, typer.Option("--lasts", help="Folder of CSV files, a last a row; or one such file.")],
-    purpose: Annotated[str, typer.Option(help="What the shoe is for: everyday, dress, comfort.")] = "everyday",
-    most: Annotated[int, typer.Option(min=1, help="Lasts in the printed table; the JSON has all.")] = 10,
+    folder: Annotated[Path, typer.Option("--lasts", help="CSV file with one last per row, or a folder of such files.")],
+    purpose: Annotated[str, typer.Option(help="Purpose of the shoe: everyday, dress or comfort.")] = "everyday",
+    most: Annotated[int, typer.Option(min=1, help="Number of lasts to print; the JSON has all.")] = 10,
     any_patient: AnyPatient = False,
     table: TableFile = None,
     as_json: AsJson = False,
@@ -73,7 +73,7 @@ def _print(ranking: "Ranking", feet: str, most: int) -> None:
 
 
 def _heading(last: "RankedLast", side: str) -> list[str]:
-    """Of a pair, the last's name stands in the first of two rows only."""
+    """Rows of the table; of a pair only the first of two rows has the name of the last."""
     is_first = side == next(iter(last.feet))
     foot = f"{side}, mirrored" if last.feet[side].mirrored else side
     return [str(last.rank) if is_first else "", one_line(last.name) if is_first else "", foot]

@@ -16,34 +16,34 @@ if TYPE_CHECKING:
 
 
 DECIMALS = {"mm": 2, "mm2": 0, "mm3": 0, "deg": 1, "1": 3}
-"""That a measure is printed with, by its unit."""
+"""Decimals of a printed measure, by unit."""
 
 
 def measure(
     file: Annotated[Path, typer.Argument(help="Mesh of a foot, in any pose: STL, PLY or OBJ.")],
     side: Annotated[
-        Literal["right", "left", "unknown"], typer.Option(help="Which foot it is; told by its form where unknown.")
+        Literal["right", "left", "unknown"], typer.Option(help="Side of the foot; default: inferred from its shape.")
     ] = "unknown",
     axis: Annotated[
-        Literal["toe2", "ball_center", "brannock"], typer.Option(help="The axis that lengths run along.")
+        Literal["toe2", "ball_center", "brannock"], typer.Option(help="Foot axis along which lengths are measured.")
     ] = "toe2",
     unit: Annotated[
         Literal["mm", "cm", "m", "in"] | None,
-        typer.Option(help="Unit of the mesh; default: the one that fits the size of a foot."),
+        typer.Option(help="Unit of the mesh; default: inferred from the size of a foot."),
     ] = None,
     landmarks: Annotated[
-        Path | None, typer.Option(help="Landmarks that were set by hand (YAML), in the mesh's own frame, mm.")
+        Path | None, typer.Option(help="Landmarks set by hand (YAML), in mm in the frame of the mesh.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Write measures.json here.")] = None,
+    out: Annotated[Path | None, typer.Option(help="measures.json to write.")] = None,
     csv: Annotated[
-        Path | None, typer.Option(help="Write the values here as a row; to a file with such rows it is added.")
+        Path | None, typer.Option(help="CSV to write the values to; a row is appended to an existing table.")
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option(help="Draw the foot with landmarks, axis and girths here (PNG).")
+        Path | None, typer.Option(help="Picture to write: the foot with landmarks, axis and girths (PNG).")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure a foot's mesh, of this scanner or of any other."""
+    """Measure the mesh of a foot, from this scanner or another."""
     from footscan.measure.foot_landmarks import check_manual
     from footscan.measure.measures import measure_foot
     from footscan.measure.raw_mesh import take_in
@@ -104,7 +104,7 @@ def _with_row(table: Path, file: Path, measures: "Measures") -> str:
 
 
 def print_measures(measures: "Measures", known: dict[str, float]) -> None:
-    """A table of measures, beside the known values where there are any."""
+    """Print a table of measures, with the known values if there are any."""
     rows = []
     for name, measured in measures.measures.items():
         value = "-" if measured.value is None else f"{measured.value:.{DECIMALS[measured.unit]}f}"

@@ -37,7 +37,7 @@ def pair(
     table: TableFile = None,
     as_json: AsJson = False,
 ) -> None:
-    """Both feet of a person: how they differ, and the sizes for both; the longer and the wider one decide."""
+    """Compare both feet of a person, and print sizes for both; the longer and the wider foot decide."""
     from footscan.sizing.pairs import compare_pair
     from footscan.sizing.table import read_table
 
@@ -62,7 +62,7 @@ def change(
     table: TableFile = None,
     as_json: AsJson = False,
 ) -> None:
-    """One foot at two times: what has changed, and what may be chance."""
+    """Compare one foot at two times: which changes exceed the repeatability."""
     from footscan.sizing.change import change_over_time
     from footscan.sizing.table import read_table
 
@@ -83,7 +83,7 @@ def change(
 
 
 def _expect_patient(place: Path, missing: str) -> None:
-    """Refuses a single foot where two are compared."""
+    """Refuse a single foot, because two are compared."""
     if not place.exists():
         raise RefusedInput(place, f"no such file or folder, expected {FEET}; or {PATIENT}")
     if not is_patient(place):

@@ -19,11 +19,11 @@ def sizes(
     people: ForPeople = "all",
     table: TableFile = None,
     show_table: Annotated[
-        bool, typer.Option("--show-table", help="Print the table itself, to be edited and named by --table.")
+        bool, typer.Option("--show-table", help="Print the table of sizes, as a start for your own --table.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Shoe sizes and widths of a foot, unrounded beside rounded. For reference only."""
+    """Print shoe sizes and widths of a foot, unrounded and rounded. For reference only."""
     from footscan.sizing.identity import sighting
     from footscan.sizing.sizes import foot_sizes
     from footscan.sizing.table import TABLE, read_table
@@ -47,7 +47,7 @@ def sizes(
 
 
 def print_sizes(title: str, found: "Sizes") -> None:
-    """Tables of sizes and of widths; below them what is to be said of them."""
+    """Print the tables of sizes and widths, and notes below them."""
     measures = ", ".join(f"{name} {figure(value, '.1f')}" for name, value in found.measures_mm.items())
     print_table(
         f"{one_line(title)}; mm: {measures}",
@@ -86,7 +86,7 @@ def print_sizes(title: str, found: "Sizes") -> None:
 
 
 def print_notes(told: Iterable[tuple[str, str | None]]) -> None:
-    """A line for each note, with all that it is said of."""
+    """One line per note, with the entries that it applies to."""
     of: dict[str, list[str]] = {}
     for label, note in told:
         if note:

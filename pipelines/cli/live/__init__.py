@@ -1,1 +1,1 @@
-"""Commands that move the heads or film."""
+"""Commands that move the heads or record films."""

@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 LOOPBACK = "127.0.0.1"
 ASKED_TO_END = (None, signal.SIGINT, signal.SIGTERM)
-"""The ordinary ways to end a console; after others its exit status tells the signal."""
+"""Signals that end a console normally; after other signals the exit status is that of the signal."""
 EVERYWHERE = ("0.0.0.0", "::")
 
 
 def console(
     rig: RigFile = None,
-    out: Annotated[Path, typer.Option(help="The archive.")] = Path("archive"),
+    out: Annotated[Path, typer.Option(help="Folder of the archive.")] = Path("archive"),
     results: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
     calibration: Annotated[Path | None, typer.Option(help="Calibration file; default: the rig's.")] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0: any free port.")] = 8760,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0: any free one.")] = 8760,
     host: Annotated[
-        str, typer.Option(help="Address to listen on. Other than loopback, the page is opened with a token.")
+        str, typer.Option(help="Address to listen on; any other than loopback requires a token to open the page.")
     ] = LOOPBACK,
     token: Annotated[
         bool | None,
@@ -43,7 +43,7 @@ def console(
     virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
     grid_mm: GridMm = 0.5,
 ) -> None:
-    """Run the scanner from a web page; Ctrl-C ends it, with the lasers off."""
+    """Run the scanner from a web page. Ctrl-C ends it, with the lasers off."""
     from pipelines.console.console import Console
     from pipelines.console.guard import is_loopback
     from pipelines.console.server import listen, server_of
@@ -76,8 +76,8 @@ def console(
 def _opened(
     rig: Path | None, archive: Path, results: Path, calibration: Path | None, folder: Path, grid_mm: float | None
 ) -> "Iterator[Scanner]":
-    """The scanner of a rig; with a grid a virtual one, whose foot is put onto the glass as it is asked for."""
-    from pipelines.console.live_adapter import OverLive
+    """The scanner of a rig. With a grid it is a virtual one, whose foot is placed on request."""
+    from pipelines.console.live_adapter import LiveAdapter
     from pipelines.live.light import light_by_hand
     from pipelines.live.scanner import LiveScanner
     from pipelines.live.virtual.world import EXPOSURE_MS
@@ -90,4 +90,4 @@ def _opened(
         light = None if opened.world is None else light_by_hand(opened.rig, 1.0, EXPOSURE_MS)
         place_foot = None if opened.world is None else opened.world.put
         with LiveScanner(opened.rig) as scanner:
-            yield OverLive(scanner, archive, results, calibration, light, place_foot)
+            yield LiveAdapter(scanner, archive, results, calibration, light, place_foot)

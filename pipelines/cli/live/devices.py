@@ -12,7 +12,7 @@ def devices(
     virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
     as_json: AsJson = False,
 ) -> None:
-    """Say which serial ports and cameras are there, on which bus, and what the rig expects."""
+    """List serial ports and cameras with their buses, and what the rig expects."""
     from pipelines.live.devices import devices_json
 
     if rig is None and not virtual and not RIG.exists():

@@ -1,4 +1,4 @@
-"""What the commands of the live scanner share: which rig, or which virtual world instead of one."""
+"""Shared options of the live commands: the rig, or the virtual world in its place."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 RIG = Path("rig.yaml")
 
-RigFile = Annotated[Path | None, typer.Option("--rig", help="What the scanner consists of; default: rig.yaml.")]
+RigFile = Annotated[Path | None, typer.Option("--rig", help="Description of the scanner; default: rig.yaml.")]
 OF_VIRTUAL = "Virtual scanner"
-"""The group of options that a real scanner does not have."""
+"""Group of the options that only a virtual scanner has."""
 Virtual = Annotated[
-    bool, typer.Option("--virtual", rich_help_panel=OF_VIRTUAL, help="Use a virtual scanner, without any hardware.")
+    bool, typer.Option("--virtual", rich_help_panel=OF_VIRTUAL, help="Use a virtual scanner instead of hardware.")
 ]
 VirtualFolder = Annotated[
     Path,
-    typer.Option("--virtual-folder", rich_help_panel=OF_VIRTUAL, help="Folder of its rig, calibration and pictures."),
+    typer.Option("--virtual-folder", rich_help_panel=OF_VIRTUAL, help="Folder for its rig, calibration and pictures."),
 ]
 GridMm = Annotated[
     float,
@@ -40,12 +40,12 @@ VIRTUAL_FOLDER = Path("virtual")
 
 @dataclass(frozen=True)
 class OpenRig:
-    """A rig that can be used now."""
+    """A rig that is ready for use."""
 
     rig: "Rig"
     file: Path
     world: "WorldProcess | None" = None
-    """Of a virtual one."""
+    """World of a virtual rig."""
 
 
 @contextmanager
@@ -71,27 +71,27 @@ def opened_rig(rig: Path | None, folder: Path, world: "World | None", *, calibra
 
 
 def plain_world(virtual: bool, folder: Path, subject: Literal["block", "nothing"] = "nothing") -> "World | None":
-    """A world for commands that need no foot; None where none is wanted."""
+    """The virtual world of commands that need no foot; None for a real scanner."""
     from pipelines.live.virtual.world import World
 
     return World(pictures=str(folder / "pictures"), subject=subject) if virtual else None
 
 
 class StateTeller:
-    """Says a line for each thing that the scanner begins."""
+    """Print a line for each state of the scanner."""
 
     def __init__(self) -> None:
         self._told = ("", "")
 
     def __call__(self, state: "ScannerState") -> None:
-        """Hears of a state."""
+        """Print the line of a new state."""
         if (state.name, state.words) != self._told:
             self._told = (state.name, state.words)
             message(f"{state.name}: {state.words}" if state.words else state.name)
 
 
 class _Told:
-    """Says what is being prepared, now and then."""
+    """Print the progress of the preparation now and then."""
 
     def __init__(self) -> None:
         self._told = ("", -1)

@@ -30,57 +30,68 @@ if TYPE_CHECKING:
     from schemas.rig import Rig
 
 DARK_GRID_MM = 100.0
-"""Nothing of a virtual foot is looked at in the dark, unless for its colours."""
+"""Between rendered pictures with the lasers off; coarse, because only --texture uses them."""
 
 Speed = Annotated[float | None, typer.Option("--speed", min=0.1, help="Speed of the heads, mm/s; default: the rig's.")]
 
 
 def scan(
-    patient: Annotated[str, typer.Argument(help="Pseudonym.")],
-    side: Annotated[Literal["right", "left"], typer.Argument(help="Which foot stands on the glass.")],
+    patient: Annotated[str, typer.Argument(help="Pseudonym of the patient.")],
+    side: Annotated[Literal["right", "left"], typer.Argument(help="Side of the foot on the glass.")],
     rig: RigFile = None,
-    out: Annotated[Path, typer.Option(help="The archive.")] = Path("archive"),
+    out: Annotated[Path, typer.Option(help="Folder of the archive.")] = Path("archive"),
     results: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
     name: Annotated[str | None, typer.Option(help="Name of the scan; default: day and side.")] = None,
     calibration: Annotated[Path | None, typer.Option(help="Calibration file; default: the rig's.")] = None,
     speed: Speed = None,
-    from_mm: Annotated[float | None, typer.Option(help="X of the first frame; default: the rig's.")] = None,
-    to_mm: Annotated[float | None, typer.Option(help="X of the last frame; default: the rig's.")] = None,
+    from_mm: Annotated[float | None, typer.Option(help="X of the first frame, mm; default: the rig's.")] = None,
+    to_mm: Annotated[float | None, typer.Option(help="X of the last frame, mm; default: the rig's.")] = None,
     power: Annotated[
         float | None,
-        typer.Option(min=0.01, max=1, help="Power of the lasers; default: chosen by what the cameras see."),
+        typer.Option(
+            min=0.01, max=1, help="Power of the lasers, as a share of full power; default: set from a test picture."
+        ),
     ] = None,
     exposure_ms: Annotated[
-        float | None, typer.Option(min=0.05, max=1000, help="Exposure of all cameras; needs --power.")
+        float | None, typer.Option(min=0.05, max=1000, help="Exposure of all cameras, ms; requires --power.")
     ] = None,
     texture: Annotated[
-        bool, typer.Option("--texture", help="Film the way back in the dark, for the colours of the skin.")
+        bool, typer.Option("--texture", help="Film skin colours on the way back, with the lasers off.")
     ] = False,
     keep_partial: Annotated[
-        bool, typer.Option("--keep-partial", help="Keep a scan without the cameras whose films are not whole.")
+        bool,
+        typer.Option(
+            "--keep-partial",
+            help="Keep a scan even if the films of some cameras are incomplete; these cameras are left out.",
+        ),
     ] = False,
     measure: Annotated[bool, typer.Option("--measure/--no-measure", help="Reconstruct and measure at once.")] = True,
     virtual: Virtual = False,
     virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
     foot_seed: Annotated[
         int | None,
-        typer.Option(min=0, rich_help_panel=OF_VIRTUAL, help="Draw a foot of the population; default: the mean man's."),
+        typer.Option(
+            min=0,
+            rich_help_panel=OF_VIRTUAL,
+            help="Random seed of a foot drawn from the population; default: the mean male foot.",
+        ),
     ] = None,
     light: Annotated[
-        Literal["dark", "ambient", "bright"], typer.Option(rich_help_panel=OF_VIRTUAL, help="Light in its room.")
+        Literal["dark", "ambient", "bright"], typer.Option(rich_help_panel=OF_VIRTUAL, help="Light in the room.")
     ] = "ambient",
     ripple: Annotated[
         float,
         typer.Option(
-            min=0, max=0.5, rich_help_panel=OF_VIRTUAL, help="Share of its heads' speed that varies, once a second."
+            min=0, max=0.5, rich_help_panel=OF_VIRTUAL, help="Ripple of the heads' speed, as a share, at 1 Hz."
         ),
     ] = 0.0,
     pause: Annotated[
         float,
-        typer.Option(min=0, max=60, rich_help_panel=OF_VIRTUAL, help="How long its heads stop halfway, s."),
+        typer.Option(min=0, max=60, rich_help_panel=OF_VIRTUAL, help="Pause of the heads halfway, s."),
     ] = 0.0,
     jitter_ms: Annotated[
-        float, typer.Option(min=0, max=25, rich_help_panel=OF_VIRTUAL, help="Jitter of its cameras' exposures, ms.")
+        float,
+        typer.Option(min=0, max=25, rich_help_panel=OF_VIRTUAL, help="Jitter of the cameras' exposure times, ms."),
     ] = 10.0,
     grid_mm: GridMm = 0.5,
     as_json: AsJson = False,
@@ -129,28 +140,28 @@ def home(
     virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
     as_json: AsJson = False,
 ) -> None:
-    """Send the heads to their home switches, and align them."""
+    """Home the heads and align them."""
     with _homed(rig, virtual, virtual_folder) as one:
         _print_heads(one.heads.position_mm(), as_json)
 
 
 def jog(
     heads: Annotated[Literal["all", "1", "2", "3"], typer.Argument(help="Which.")],
-    mm: Annotated[float, typer.Argument(help="How far along X; behind -- where it is negative.")],
+    mm: Annotated[float, typer.Argument(help="Distance along X, mm; write -- before a negative one.")],
     rig: RigFile = None,
     speed: Speed = 20.0,
     virtual: Virtual = False,
     virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
     as_json: AsJson = False,
 ) -> None:
-    """Move the heads by hand, with the lasers off; heads that are not homed are homed first."""
+    """Move the heads, with the lasers off. Heads that are not homed are homed first."""
     with _homed(rig, virtual, virtual_folder) as one:
         _print_heads(one.jog(mm, speed or 20.0, None if heads == "all" else int(heads)), as_json)
 
 
 @contextmanager
 def _homed(rig: RigFile, virtual: bool, virtual_folder: Path) -> "Iterator[LiveScanner]":
-    """The scanner with its heads homed; states are told."""
+    """Connect to the scanner, home the heads and report each state."""
     from pipelines.live.scanner import LiveScanner
 
     with (
@@ -163,7 +174,7 @@ def _homed(rig: RigFile, virtual: bool, virtual_folder: Path) -> "Iterator[LiveS
 
 
 def _light(rig: "Rig", power: float | None, exposure_ms: float | None, virtual: bool) -> "ScanLight | None":
-    """The light that was given by hand; None where it is to be chosen."""
+    """The light set on the command line; None if it is to be chosen."""
     from pipelines.live.light import light_by_hand
     from pipelines.live.virtual.world import EXPOSURE_MS
 
@@ -241,7 +252,7 @@ def _print_heads(x_mm: tuple[float, float, float], as_json: bool) -> None:
 
 
 def _status(kind: str | None) -> int:
-    """Exit status of a command for one scan."""
+    """The exit status of a command on one scan."""
     match kind:
         case None:
             return 0

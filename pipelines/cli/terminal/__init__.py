@@ -1,1 +1,1 @@
-"""What the command prints, and how far a run is."""
+"""Output of the command, and the progress of a run."""

@@ -1,4 +1,4 @@
-"""What the command prints: tables for persons and JSON for programs on standard output, messages on standard error.
+"""Output of the command: tables or JSON on standard output, messages on standard error.
 
 Names of folders and all else that comes from outside is shown, never obeyed by the terminal: it cannot move the cursor,
 begin a line of its own or hide what stands before it. So nothing here is printed by `print` itself.
@@ -21,13 +21,13 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document in
 
 
 def message(text: str) -> None:
-    """A line for the person at the terminal; where that is gone, nobody can read it."""
+    """Print a line on standard error; ignored when the terminal is gone."""
     with suppress(OSError):
         print(printable(text), file=sys.stderr)
 
 
 def drop_unwritten() -> None:
-    """Keeps what a terminal or a pipe that is gone did not take from changing the exit status."""
+    """Discard output that a closed terminal or pipe did not take, so that it does not change the exit status."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
@@ -38,29 +38,29 @@ def drop_unwritten() -> None:
 
 
 def print_line(text: str) -> None:
-    """A line on standard output."""
+    """Print a line on standard output."""
     print(printable(text))
 
 
 def print_text(text: str) -> None:
-    """Lines on standard output, with their ends: a table in a format of its own, or a file as it is."""
+    """Print text with its line ends on standard output: a table in another format, or a file as it is."""
     print(printable(text, keep="\n\t"), end="")
 
 
 class LogFormatter(logging.Formatter):
-    """Log lines for the terminal."""
+    """Formatter of log lines for the terminal."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 (a name of logging's)
-        """The line, whatever names are in it."""
+        """The line, with unprintable characters of names escaped."""
         return printable(super().formatMessage(record))
 
     def formatException(self, ei: Any) -> str:  # noqa: N802 (as above)
-        """The lines of a traceback."""
+        """The lines of a traceback, escaped likewise."""
         return printable(super().formatException(ei), keep="\n")
 
 
 def keep_inputs(outputs: Iterable[Path | None], *inputs: Path) -> None:
-    """Refuses outputs that would overwrite an input, or each other.
+    """Refuse outputs that would overwrite an input or each other.
 
     Raises
     ------
@@ -84,12 +84,12 @@ def keep_inputs(outputs: Iterable[Path | None], *inputs: Path) -> None:
 
 
 def print_json(value: Any) -> None:
-    """One JSON document on standard output."""
+    """Print one JSON document on standard output."""
     print(json_text(value, indent=2))
 
 
 def json_text(value: Any, indent: int | None = None) -> str:
-    """A JSON document; what is not shown, such as a mark that turns the direction of writing, is escaped."""
+    """A JSON document, in which invisible characters, such as marks of the writing direction, are escaped."""
     text = json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False)
     if text.isprintable():
         return text
@@ -97,7 +97,7 @@ def json_text(value: Any, indent: int | None = None) -> str:
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table on standard output; columns whose every cell is a number stand to the right."""
+    """Print a table on standard output; columns of numbers are aligned to the right."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -115,7 +115,7 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
 
 
 def figure(value: float | None, form: str = ".3f") -> str:
-    """A cell of a table; a dash where the value is not known."""
+    """A cell of a table; a dash for an unknown value."""
     return "-" if value is None else format(value, form)
 
 

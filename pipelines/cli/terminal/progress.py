@@ -1,4 +1,4 @@
-"""A progress bar on standard error, fed by the events of a run."""
+"""A progress bar on standard error, driven by the events of a run."""
 
 import json
 import threading
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def frame_progress(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar of frames done and frames in all, for what is not a run of steps."""
+    """A progress bar of frames, for work that is not a run of steps."""
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(what)
@@ -40,9 +40,9 @@ class StepProgress:
 
     def __init__(self, to_run: int, scans: int = 0, log: TextIO | None = None) -> None:
         self.ran = 0
-        """Steps that ran, those left out that turned out to be known."""
+        """Steps that ran, without those whose result was found in the store."""
         self.seconds: dict[str, float] = {}
-        """Time taken by each kind of step, summed over cameras and scans."""
+        """Seconds taken by each kind of step, summed over cameras and scans."""
         self._scans, self._done, self._failed, self._known = scans, 0, 0, 0
         self._frames, self._start = 0, time.monotonic()
         self._log = log
@@ -69,7 +69,7 @@ class StepProgress:
         self._bar.stop()
 
     def on_step_end(self, end: StepEnd) -> None:
-        """Hears that a step has ended."""
+        """Count a step that has ended."""
         failure = end.outcome.problem if isinstance(end.outcome, Failure) else None
         with self._lock:
             self.ran += end.ran
@@ -82,7 +82,7 @@ class StepProgress:
             )  # fmt: skip
 
     def on_scan_end(self, end: "ScanEnd") -> None:
-        """Hears what became of a scan."""
+        """Count a scan that has ended."""
         with self._lock:
             self._done += end.problem is None
             self._failed += end.problem is not None
@@ -108,7 +108,7 @@ class StepProgress:
 
 
 def _frames(end: StepEnd) -> int:
-    """How many frames a step went through to find the stripe in them."""
+    """Number of frames in which a step searched the stripe."""
     if not end.ran or end.step.kind != "extract":
         return 0
     try:

@@ -1,1 +1,1 @@
-"""The pages of the console and what they show."""
+"""The pages of the console, and their content."""

@@ -1,4 +1,4 @@
-"""What to do about a scan that is not good: which camera, and why."""
+"""Advice on a scan of poor quality: the camera, the reason, and what to do."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -10,19 +10,19 @@ from schemas.quality import Quality
 from schemas.recording import RecordedCamera, Recording
 
 MOST_MEASURES = 4
-"""Named one by one; more have one reason."""
+"""Most measures that are named one by one; chosen by hand."""
 
 
 def advice(measures: Measures, quality: Quality, recording: Recording | None) -> list[str]:
-    """A line for each thing that a second try, or somebody with a screwdriver, may mend; the gravest first.
+    """List the problems that a second scan or a repair may solve, a line each, the gravest first.
 
-    `recording` tells how the scan was filmed; None of scans of which that is not known.
+    `recording` : how the scan was filmed; None if unknown
     """
     filmed = {} if recording is None else {camera.id: camera for camera in recording.cameras}
     return [
         *_finding(measures),
         *_cameras(quality, filmed),
-        *_places(filmed),
+        *_latencies(filmed),
         *_agreement(quality),
         *_surface(quality),
         *_not_taken(measures),
@@ -51,18 +51,18 @@ def _cameras(quality: Quality, filmed: dict[int, RecordedCamera]) -> Iterator[st
 
 
 def _reason(camera: RecordedCamera | None) -> str:
-    """Why most of its frames were lost."""
-    reasons = Counter(one.reason for one in camera.lost).most_common(1) if camera else []
+    """The most frequent reason of the lost frames of a camera."""
+    reasons = Counter(frame.reason for frame in camera.lost).most_common(1) if camera else []
     return "".join(f", {count} of them: {reason}" for reason, count in reasons)
 
 
-def _places(filmed: dict[int, RecordedCamera]) -> Iterator[str]:
-    unknown = [str(camera) for camera, one in sorted(filmed.items()) if one.latency is None]
+def _latencies(filmed: dict[int, RecordedCamera]) -> Iterator[str]:
+    unknown = [str(camera_id) for camera_id, camera in sorted(filmed.items()) if camera.latency is None]
     if unknown:
-        several = "s" if len(unknown) > 1 else ""
+        plural = "s" if len(unknown) > 1 else ""
         yield (
-            f"How late the pictures of camera{several} {', '.join(unknown)} come was never measured, so lengths along "
-            "the foot may be off: run 'footscan calibrate latency'."
+            f"The latency of camera{plural} {', '.join(unknown)} was never measured, so lengths along the foot may be "
+            "off: run 'footscan calibrate latency'."
         )
 
 
@@ -73,7 +73,7 @@ def _agreement(quality: Quality) -> Iterator[str]:
     suspect = max(apart, key=lambda camera: apart[camera])
     yield (
         f"Camera {suspect} sees the skin {number(apart[suspect], 2)} mm from where the others see it. If the foot "
-        "moved, scan again; if it stays so, the camera was knocked: check it with 'footscan calibrate check'."
+        "moved, scan again; if the error stays, the camera was moved: check it with 'footscan calibrate check'."
     )
 
 
@@ -82,16 +82,16 @@ def _surface(quality: Quality) -> Iterator[str]:
     if mesh.holes:
         yield f"The surface is open ({mesh.holes} holes). Scan again."
     elif mesh.filled_share is not None and mesh.filled_share > FILLED_SHARES[1]:
-        few = min(quality.cameras, key=lambda camera: camera.points, default=None)
-        least = "" if few is None else f" Camera {few.camera} gave the fewest points."
+        sparsest = min(quality.cameras, key=lambda camera: camera.points, default=None)
+        fewest = "" if sparsest is None else f" Camera {sparsest.camera} gave the fewest points."
         yield (
-            f"{number(100 * mesh.filled_share)} % of the surface was seen by no camera.{least} Is cloth, a strap or "
+            f"{number(100 * mesh.filled_share)} % of the surface was seen by no camera.{fewest} Is cloth, a strap or "
             "the other foot in the way? Then scan again."
         )
 
 
 def _not_taken(measures: Measures) -> Iterator[str]:
-    missing = {name: one.note for name, one in measures.measures.items() if one.status == "incomplete"}
+    missing = {name: m.note for name, m in measures.measures.items() if m.status == "incomplete"}
     if measures.finding is not None or not missing:
         return
     reasons = sorted({note for note in missing.values() if note})

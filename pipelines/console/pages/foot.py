@@ -1,4 +1,4 @@
-"""The page of a scanned foot: in 3D, with its measures, how good they are, and what to do where they are not."""
+"""The page of a scanned foot: 3D view, measures, quality, and advice."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,8 +8,8 @@ import numpy as np
 from footscan.mesh.formats.files import FARTHEST_MM, PARSERS
 from footscan.mesh.mesh import Mesh
 from footscan.report.filled import CUT, filled_colours, filled_key
-from footscan.report.markup import key, number, section, table, text, words
-from footscan.report.quality_lights import Level, Light, quality_lights, worst
+from footscan.report.markup import UNITS, key, number, section, table, text, words
+from footscan.report.quality_lights import Level, TrafficLight, quality_lights, worst
 from footscan.report.scan.foot_colours import CAMERAS
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
 from footscan.report.surface_views import upright
@@ -26,20 +26,19 @@ VERDICTS = {
     "good": "A good scan",
     "fair": "A fair scan",
     "poor": "A poor scan",
-    "unknown": "A scan that cannot be judged whole",
+    "unknown": "A scan that cannot be fully judged",
 }
-UNITS = {"mm": ("mm", 1), "mm2": ("mm²", 0), "mm3": ("mm³", 0), "deg": ("°", 1), "1": ("", 3)}
 FIRST = ("foot_length", "foot_breadth", "ball_girth", "instep_girth", "instep_height", "heel_breadth", "arch_index")
 FILES = {"report.html": "Whole report", "foot.stl": "Surface (STL)", "measures.json": "Measures (JSON)"}
 
 
 def foot_page(archive: Path, results: Path, patient: str, scan: str) -> str:
-    """The page of a scan's results; what the archive tells of how it was filmed goes into the advice.
+    """Return the page of the results of a scan; the recording in the archive is used for the advice.
 
     Raises
     ------
     RefusedInput
-        There are none, or they are not as expected.
+        The results are missing or damaged.
     """
     measures, quality = read_measures(results, patient, scan), read_quality(results, patient, scan)
     mesh = _mesh(results, patient, scan)
@@ -69,40 +68,40 @@ def _mesh(results: Path, patient: str, scan: str) -> Mesh:
     source = results / patient / scan / "foot.ply"
     try:
         mesh = PARSERS[".ply"](read_result(results, patient, scan, "foot.ply"))
-    except BeyondLimitError as error:  # a parser does not know whose bytes they are
+    except BeyondLimitError as error:  # the parser does not know the file
         raise BeyondLimitError(source, error.problem) from None
     except ValueError as error:
-        raise RefusedInput(source, f"is no proper PLY file: {error}") from None
+        raise RefusedInput(source, f"is not a valid PLY file: {error}") from None
     if not len(mesh.vertices) or not len(mesh.faces):
         raise RefusedInput(source, "expected a surface, found no faces")
     if not np.abs(mesh.vertices).max() <= FARTHEST_MM:
         raise RefusedInput(source, f"expected coordinates in mm, up to {FARTHEST_MM:.0f}")
     if not 0 <= int(mesh.faces.min()) <= int(mesh.faces.max()) < len(mesh.vertices):
-        raise RefusedInput(source, f"has faces of vertices that are not there, expected below {len(mesh.vertices)}")
+        raise RefusedInput(source, f"has faces with missing vertices, expected numbers below {len(mesh.vertices)}")
     return mesh
 
 
-def _verdict(level: Level, lights: Sequence[Light], lines: Sequence[str]) -> str:
+def _verdict(level: Level, lights: Sequence[TrafficLight], lines: Sequence[str]) -> str:
     rows = "".join(
         f'<li><span class="light {light.level}">{light.level}</span> <b>{text(light.name)}</b> {text(light.why)}</li>'
         for light in lights
     )
     listed = "".join(f"<li>{text(line)}</li>" for line in lines)
     todo = f'<h3>What to do</h3><ul class="todo">{listed}</ul>' if lines else ""
-    judged = f'<h2>{VERDICTS[level]}</h2><ul class="lights">{rows}</ul>'
-    return f'<section id="verdict" class="{level}">{judged}{todo}</section>'
+    summary = f'<h2>{VERDICTS[level]}</h2><ul class="lights">{rows}</ul>'
+    return f'<section id="verdict" class="{level}">{summary}{todo}</section>'
 
 
 def _next(side: str, patient: str, scan: str) -> str:
-    """What an operator does from here; `foot.js` makes it work."""
+    """The buttons for the next steps of the operator; `foot.js` handles them."""
     other = {"right": "left", "left": "right"}.get(side)
     one_more = (
         f'<button id="other" type="button" data-side="{other}">Scan the {other} foot now</button>' if other else ""
     )
     files = "".join(
         f'<a href="/results/{text(patient)}/{text(scan)}/{name}"'
-        f"{' target=_blank' if name.endswith('html') else ' download'}>{said}</a>"
-        for name, said in FILES.items()
+        f"{' target=_blank' if name.endswith('html') else ' download'}>{label}</a>"
+        for name, label in FILES.items()
     )
     return (
         f'<div class="row next"><a id="pair" class="button" hidden>Both feet</a>{one_more}'
@@ -113,16 +112,16 @@ def _next(side: str, patient: str, scan: str) -> str:
 
 def _colourings(mesh: Mesh, quality: Quality) -> list[Colouring]:
     plain = filled_colours(mesh.vertices, mesh.filled, None)
-    shown = [Colouring("Measured and filled", plain, filled_key(quality.mesh))]
+    colourings = [Colouring("Measured and filled", plain, filled_key(quality.mesh))]
     if mesh.colours is not None:
-        shown.insert(0, Colouring("Skin", mesh.colours))
+        colourings.insert(0, Colouring("Skin", mesh.colours))
     if mesh.camera is not None:
         palette = np.array([CUT, *CAMERAS], np.uint8)
-        places = np.where(mesh.camera == 0, 0, (mesh.camera.astype(int) - 1) % len(CAMERAS) + 1)
-        there = [camera for camera in np.unique(mesh.camera).tolist() if camera]
-        meaning = [(f"Camera {camera}", CAMERAS[(camera - 1) % len(CAMERAS)]) for camera in there]
-        shown.append(Colouring("Camera", palette[places], key([*meaning, ("Filled", CUT)])))
-    return shown
+        rows = np.where(mesh.camera == 0, 0, (mesh.camera.astype(int) - 1) % len(CAMERAS) + 1)
+        camera_ids = [camera for camera in np.unique(mesh.camera).tolist() if camera]
+        meaning = [(f"Camera {camera}", CAMERAS[(camera - 1) % len(CAMERAS)]) for camera in camera_ids]
+        colourings.append(Colouring("Camera", palette[rows], key([*meaning, ("Filled", CUT)])))
+    return colourings
 
 
 def _measures(measures: Measures, drawings: Mapping[str, Drawing]) -> str:
@@ -136,11 +135,10 @@ def _measures(measures: Measures, drawings: Mapping[str, Drawing]) -> str:
 def _row(name: str, measure: Measure, is_drawn: bool) -> list[str]:
     unit, decimals = UNITS[measure.unit]
     value = "–" if measure.value is None else number(measure.value, decimals)
-    said = text(words(name))
+    label = text(words(name))
     if is_drawn:
-        told = text(f"{words(name)} {value} {unit}: {measure.definition}")
-        said = (
-            f'<button type="button" data-shows="{text(name)}" data-told="{told}" aria-pressed="false">{said}</button>'
-        )
+        caption = text(f"{words(name)} {value} {unit}: {measure.definition}")
+        attributes = f'data-shows="{text(name)}" data-told="{caption}" aria-pressed="false"'
+        label = f'<button type="button" {attributes}>{label}</button>'
     note = f'<p class="note">{text(measure.note)}</p>' if measure.note and measure.status != "ok" else ""
-    return [said + note, value, unit, f'<span class="status {measure.status}">{measure.status}</span>']
+    return [label + note, value, unit, f'<span class="status {measure.status}">{measure.status}</span>']

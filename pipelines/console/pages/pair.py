@@ -1,8 +1,8 @@
-"""The page of both feet of a person: how they differ, and the sizes for both."""
+"""The page of both feet of a person: their differences, and the sizes for both."""
 
 from pathlib import Path
 
-from footscan.report.markup import number, section, table, text, words
+from footscan.report.markup import UNITS, number, section, table, text, words
 from footscan.sizing.pairs import compare_pair
 from footscan.sizing.table import read_table
 from pipelines.console.pages.results import read_measures
@@ -11,17 +11,14 @@ from schemas.feet import Foot
 from schemas.pairs import Pair, PairRow
 from schemas.sizes import Sizes
 
-DECIMALS = {"mm": 1, "mm2": 0, "mm3": 0, "deg": 1}
-UNITS = {"mm2": "mm²", "mm3": "mm³", "deg": "°", "1": ""}
-
 
 def pair_page(results: Path, patient: str, left: str, right: str) -> str:
-    """The page of two scans of a patient.
+    """Return the page of two scans of a patient.
 
     Raises
     ------
     RefusedInput
-        One has no results, or is of the other side.
+        A scan has no results, or is of the other side.
     """
     pair = compare_pair(_foot(results, patient, left), _foot(results, patient, right), read_table())
     links = "".join(
@@ -40,37 +37,36 @@ def pair_page(results: Path, patient: str, left: str, right: str) -> str:
 
 
 def _foot(results: Path, patient: str, scan: str) -> Foot:
-    told = read_measures(results, patient, scan).model_dump(mode="json")
-    return Foot.model_validate(told | {"patient": patient, "scan": scan, "source": f"{patient}/{scan}"})
+    document = read_measures(results, patient, scan).model_dump(mode="json")
+    return Foot.model_validate(document | {"patient": patient, "scan": scan, "source": f"{patient}/{scan}"})
 
 
 def _sizes(pair: Pair) -> list[str]:
     sides = ", ".join(f"{words(name).lower()}: {side}" for name, side in pair.decided_by.items() if side)
-    decided = [_note(f"Larger foot that decides: {sides}.")] if sides else []
+    decided = [_note(f"The larger foot decides ({sides}).")] if sides else []
     return [_size_table(pair.sizes), *decided, _note(f"{pair.sizes.caution[:1].upper()}{pair.sizes.caution[1:]}.")]
 
 
 def _size_table(sizes: Sizes) -> str:
     rows = [
-        [text(one.label), text(", ".join(one.people)), f"<b>{text(one.size or '–')}</b>", text(one.note or "")]
-        for one in sizes.sizes
+        [text(size.label), text(", ".join(size.people)), f"<b>{text(size.size or '–')}</b>", text(size.note or "")]
+        for size in sizes.sizes
     ]
     rows += [
-        [text(one.label), text(", ".join(one.people)), f"<b>{text(one.width or '–')}</b>", text(one.note or "")]
-        for one in sizes.widths
+        [text(width.label), text(", ".join(width.people)), f"<b>{text(width.width or '–')}</b>", text(width.note or "")]
+        for width in sizes.widths
     ]
     return table(["System", "For", "Size", ""], rows)
 
 
 def _row(row: PairRow) -> list[str]:
-    decimals = DECIMALS.get(row.unit, 3)
+    unit, decimals = UNITS.get(row.unit, (row.unit, 3))
     left, right, difference = (
         "–" if value is None else number(value, decimals) for value in (row.left, row.right, row.difference)
     )
     note = f'<p class="note">{text(row.note)}</p>' if row.note else ""
-    unit = UNITS.get(row.unit, row.unit)
     return [text(words(row.measure)) + note, left, right, difference, text(unit), text(row.larger or "–")]
 
 
-def _note(said: str) -> str:
-    return f'<p class="note">{text(said)}</p>'
+def _note(sentence: str) -> str:
+    return f'<p class="note">{text(sentence)}</p>'

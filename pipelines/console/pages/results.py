@@ -1,4 +1,4 @@
-"""What the server may read: files of a scan by their fixed names, and nothing that a link leads to."""
+"""Read access of the server: the files of a scan by their fixed names, without following links."""
 
 import logging
 import os
@@ -25,8 +25,9 @@ Parsed = TypeVar("Parsed", Measures, Quality, Recording)
 _Made = TypeVar("_Made")
 
 LARGEST_BYTES = 512 * 2**20
-"""Of a file that is given out; it is never in memory as a whole."""
-LONGEST_TELLING = 200
+"""Largest file that is sent; it is never in memory as a whole."""
+LONGEST_PROBLEM = 200
+"""Most characters of an unforeseen error that are shown."""
 KINDS = {
     ".html": "text/html; charset=utf-8",
     ".json": "application/json",
@@ -34,11 +35,11 @@ KINDS = {
     ".ply": "application/octet-stream",
 }
 BOUNDS = {".json": "json_bytes", ".ply": "mesh_bytes"}
-"""Of a file that a page is made of, by the end of its name."""
+"""Bound of the size of a file that is read as a whole, by suffix: names in `schemas.base.limits`."""
 
 
 def open_result(results: Path, patient: str, scan: str, name: str) -> BinaryIO:
-    """RESULTS/<patient>/<scan>/<name>, to be read and closed.
+    """Open RESULTS/<patient>/<scan>/<name> for reading; the caller closes it.
 
     Raises
     ------
@@ -46,7 +47,7 @@ def open_result(results: Path, patient: str, scan: str, name: str) -> BinaryIO:
         No such result.
     """
     if name not in DELIVERED:
-        raise RefusedInput(name[:80], "is no result of a scan")
+        raise RefusedInput(name[:80], "is not a result of a scan")
     file = _open_inside(results, patient, scan, name)
     if os.fstat(file.fileno()).st_size > LARGEST_BYTES:
         file.close()
@@ -55,14 +56,14 @@ def open_result(results: Path, patient: str, scan: str, name: str) -> BinaryIO:
 
 
 def read_result(results: Path, patient: str, scan: str, name: str) -> bytes:
-    """The content of a result that a page is made of; errors as in `open_result`, and BeyondLimitError."""
+    """Read a result as a whole; errors as in `open_result`, and BeyondLimitError."""
     if name not in DELIVERED:
-        raise RefusedInput(name[:80], "is no result of a scan")
+        raise RefusedInput(name[:80], "is not a result of a scan")
     return _read_inside(results, patient, scan, name)
 
 
 def version_of(results: Path, patient: str, scan: str, *names: str) -> tuple[int, ...]:
-    """What differs once one of the files has been written or swapped; errors as in `open_result`."""
+    """A fingerprint of files that changes if one is written or replaced; errors as in `open_result`."""
     version = []
     for name in names:
         with open_result(results, patient, scan, name) as file:
@@ -71,15 +72,15 @@ def version_of(results: Path, patient: str, scan: str, *names: str) -> tuple[int
     return tuple(version)
 
 
-def shown(source: Path, make: Callable[[], _Made]) -> _Made:
-    """What `make` makes of the results in the folder `source`.
+def guarded(source: Path, make: Callable[[], _Made]) -> _Made:
+    """Run `make` on the results in the folder `source`, and turn any exception into a RefusedInput.
 
-    Results may be changed by hand or by another program, also while they are read, and no schema foresees all of that.
+    Results may be changed by hand or by another program, even while they are read; no schema covers all such changes.
 
     Raises
     ------
     RefusedInput
-        They cannot be shown, whatever `make` stumbled over.
+        The results cannot be shown.
     """
     try:
         with np.errstate(over="raise", invalid="raise", divide="raise"):
@@ -88,24 +89,24 @@ def shown(source: Path, make: Callable[[], _Made]) -> _Made:
         raise
     except Exception as error:
         log.debug("results that cannot be shown", exc_info=True)
-        said = f"{type(error).__name__}: {error}"[:LONGEST_TELLING]
-        raise RefusedInput(source, f"cannot be shown ({said}), expected results as 'footscan run' has them") from None
+        problem = f"{type(error).__name__}: {error}"[:LONGEST_PROBLEM]
+        raise RefusedInput(source, f"cannot be shown ({problem}), expected results of 'footscan run'") from None
 
 
 def read_measures(results: Path, patient: str, scan: str) -> Measures:
-    """Its measures.json; errors as in `read_result`."""
+    """Read measures.json of a scan; errors as in `read_result`."""
     measures = _parsed(Measures, results, patient, scan, "measures.json")
     refuse_beyond("measures", len(measures.measures), results / patient / scan / "measures.json", field="measures")
     return measures
 
 
 def read_quality(results: Path, patient: str, scan: str) -> Quality:
-    """Its quality.json; errors as in `read_result`."""
+    """Read quality.json of a scan; errors as in `read_result`."""
     return _parsed(Quality, results, patient, scan, "quality.json")
 
 
 def read_recording(archive: Path, patient: str, scan: str) -> Recording | None:
-    """Its recording.json; None where there is none that can be read, as of scans that another program filmed."""
+    """Read recording.json of a scan; None if it is missing or invalid, as for scans of another program."""
     try:
         return _parsed(Recording, archive, patient, scan, "recording.json")
     except RefusedInput:
@@ -113,7 +114,7 @@ def read_recording(archive: Path, patient: str, scan: str) -> Recording | None:
 
 
 def _read_inside(root: Path, patient: str, scan: str, name: str) -> bytes:
-    """The content of ROOT/<patient>/<scan>/<name>; a file that grows meanwhile is not read further."""
+    """Read ROOT/<patient>/<scan>/<name>, no further than its bound even if it grows meanwhile."""
     source, bound = root / patient / scan / name, BOUNDS[Path(name).suffix]
     with _open_inside(root, patient, scan, name) as file:
         refuse_beyond(bound, os.fstat(file.fileno()).st_size, source)
@@ -126,10 +127,10 @@ def _read_inside(root: Path, patient: str, scan: str, name: str) -> bytes:
 
 
 def _open_inside(root: Path, patient: str, scan: str, name: str) -> BinaryIO:
-    """The regular file ROOT/<patient>/<scan>/<name>.
+    """Open the regular file ROOT/<patient>/<scan>/<name>.
 
-    Each step is opened from the one before it and none follows a symbolic link, so whatever the names are and whoever
-    changes the folders meanwhile, nothing outside is read.
+    Each folder is opened relative to its parent, and symbolic links are not followed: nothing outside of ROOT is read,
+    even if the folders change meanwhile.
     """
     steps = pseudonym(patient, "patient"), pseudonym(scan, "scan")
     source = root / patient / scan / name
@@ -140,10 +141,10 @@ def _open_inside(root: Path, patient: str, scan: str, name: str) -> BinaryIO:
             for step in steps:
                 folder = os.open(step, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=folder)
                 stack.callback(os.close, folder)
-            # Without O_NONBLOCK a named pipe would keep us waiting.
+            # Without O_NONBLOCK the call would block on a named pipe.
             descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=folder)
             if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-                os.close(descriptor)  # `os.fdopen` would leave that of a folder open
+                os.close(descriptor)  # `os.fdopen` would not close the descriptor of a folder
                 raise RefusedInput(source, "expected a file")
             return os.fdopen(descriptor, "rb")
         except OSError as error:
@@ -154,5 +155,5 @@ def _parsed(model: type[Parsed], root: Path, patient: str, scan: str, name: str)
     try:
         return model.model_validate_json(_read_inside(root, patient, scan, name))
     except ValidationError as error:
-        problem = f"is not as expected ({error.error_count()} mistakes)"
+        problem = f"does not match its schema ({error.error_count()} errors)"
         raise RefusedInput(root / patient / scan / name, problem) from None

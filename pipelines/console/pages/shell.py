@@ -1,4 +1,4 @@
-"""What all pages of the console share: the head with state and stop, and the scripts."""
+"""The shell of all pages of the console: the bar with state and Stop, and the scripts."""
 
 from collections.abc import Iterable
 
@@ -6,13 +6,13 @@ from footscan.report.markup import text
 
 
 def shell(*, title: str, parts: Iterable[str], scripts: Iterable[str] = ()) -> str:
-    """A page.
+    """Return a page with the shell around its parts.
 
     Parameters
     ----------
     title : any text
     parts : markup
-    scripts : names of files in `static`, beside the console's own
+    scripts : names of files in `static` in addition to link.js
     """
     loaded = "".join(f'<script src="/static/{name}" defer></script>\n' for name in ("link.js", *scripts))
     return _PAGE.format(title=text(title), parts="\n".join(parts), scripts=loaded)
@@ -38,7 +38,7 @@ _PAGE = """\
 </header>
 <main>
 <p id="told" role="alert" hidden></p>
-<p id="others" hidden><span>Another page is in charge of the scanner. This one looks on; “Stop” works here, too.</span>
+<p id="others" hidden><span>Another page is in charge. This page shows the state; “Stop” works here, too.</span>
 <button id="take-over" type="button">Take over</button></p>
 {parts}
 </main>

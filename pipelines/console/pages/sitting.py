@@ -1,10 +1,10 @@
-"""The page that a scan is made from."""
+"""The page from which a scan is made."""
 
 from pipelines.console.pages.shell import shell
 
 
 def sitting_page() -> str:
-    """The page; `sitting.js` fills it with what the server tells."""
+    """Return the page; `sitting.js` fills it with the state from the server."""
     return shell(title="footscan", parts=[_MAIN], scripts=["sitting.js"])
 
 

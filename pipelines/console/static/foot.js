@@ -1,4 +1,4 @@
-// What an operator does from a result: the other foot, a second try, both feet, the next person.
+// The next steps from a result: the other foot, a second try, both feet, the next person.
 "use strict";
 (() => {
   const {act, allow, element, hindrance, listen, press, say} = footscan;

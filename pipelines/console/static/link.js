@@ -1,15 +1,15 @@
-// The link between a page and the server: the state as it changes, orders, and the stop that is always there.
+// The link between a page and the server: the stream of states, orders, and Stop, which is always available.
 "use strict";
 const footscan = (() => {
   const NAMES = {disconnected: "Not connected", idle: "Ready", homing: "Homing", filming: "Filming", storing: "Storing",
     reconstructing: "Reconstructing", done: "Done", failed: "Failed", "door open": "Door open", alarm: "Alarm"};
   const LEVELS = {disconnected: "bad", idle: "ok", done: "ok", failed: "bad", alarm: "bad", "door open": "warning"};
   const PRESENT_MS = 150, STOP_SOON_MS = 60, STOP_LATE_MS = 1000;
-  const SWITCH = "The server does not answer. Where light is to end at once, use the scanner’s own switch.";
+  const SWITCH = "The server does not answer. To switch the lasers off at once, use the scanner’s own switch.";
   const listeners = [];
   let latest = null;
 
-  // The name by which the server knows this page; it lives as long as the tab does.
+  // The name of this page for the server; it lives as long as the tab.
   function pageName() {
     let name = sessionStorage.getItem("page");
     if (!name) {
@@ -21,7 +21,7 @@ const footscan = (() => {
 
   const page = pageName(), element = id => document.getElementById(id);
 
-  // Elements that are read aloud change only where there is something new to say.
+  // Elements that a screen reader announces change only if their text changes.
   function say(node, words) {
     if (node.textContent !== words) node.textContent = words;
   }
@@ -31,7 +31,7 @@ const footscan = (() => {
     element("told").hidden = !words;
   }
 
-  // While heads are moved by hand the server hears several times a second that this page is there, or it stops them.
+  // While heads are moved by hand, this page reports several times a second that it is there; else the server stops them.
   let present = null;
   function stayPresent(is) {
     if (is === (present !== null)) return;
@@ -42,7 +42,7 @@ const footscan = (() => {
       try {
         await fetch("/here", {method: "POST", headers: {"X-Footscan-Page": page}, priority: "high"});
       } catch {
-        // Who does not hear it stops the heads.
+        // Without the report the server stops the heads.
       }
       waits = false;
     };
@@ -50,7 +50,7 @@ const footscan = (() => {
     present = is ? setInterval(speak, PRESENT_MS) : null;
   }
 
-  // Gives an order; resolves to what is wrong, or to null.
+  // Gives an order; resolves to the problem, or to null.
   async function act(name, body = {}) {
     let problem = null;
     if (name === "jog") stayPresent(true);
@@ -90,7 +90,7 @@ const footscan = (() => {
     for (const listener of listeners) listener(seen);
   }
 
-  // Not read aloud: it changes every second.
+  // Not announced by a screen reader: it changes every second.
   function countOf(frames) {
     const counts = Object.values(frames);
     return `${counts.reduce((sum, count) => sum + count, 0).toLocaleString("en")} frames of ${counts.length} cameras`;
@@ -104,8 +104,8 @@ const footscan = (() => {
     element("count").textContent = "";
   }
 
-  // A browser has six connections for each port of a server, and other tabs and downloads may have taken them all: Stop
-  // goes to a port of its own first, and the usual way, too, where that is not answered soon.
+  // A browser opens six connections per port of a server, and other tabs and downloads may use them all: Stop first goes
+  // to a port of its own, and also the usual way if that is not answered soon.
   async function stopAside() {
     if (!latest || !latest.stop_port) return false;
     const answer = await fetch(`http://${location.hostname}:${latest.stop_port}/do/stop`,
@@ -138,7 +138,7 @@ const footscan = (() => {
     addEventListener("pagehide", () => events.close());
   }
 
-  // A page that is left, hidden or frozen shows nobody what the heads do, nor a button to stop them.
+  // A page that is left, hidden or frozen shows neither the heads nor a button to stop them.
   addEventListener("pagehide", () => stayPresent(false));
   document.addEventListener("freeze", () => stayPresent(false));
   document.addEventListener("visibilitychange", () => { if (document.hidden) stayPresent(false); });
@@ -154,24 +154,24 @@ const footscan = (() => {
 
   return {
     act, say, element,
-    // Calls `listener` with each state, and with the one that is known.
+    // Calls `listener` with the latest state, and with each new one.
     listen(listener) {
       listeners.push(listener);
       if (latest) listener(latest);
     },
-    // A button that stays where the focus is, but does nothing, while `why` is something.
+    // Disables a button while `why` is not empty; the button keeps the focus.
     allow(button, why) {
       button.setAttribute("aria-disabled", String(Boolean(why)));
       button.title = why || "";
     },
-    // Has `order` called by a click on a button that is allowed.
+    // Calls `order` on each click on a button that is not disabled.
     press(button, order) {
       button.addEventListener("click", event => {
         event.preventDefault();
         if (button.getAttribute("aria-disabled") !== "true") order();
       });
     },
-    // Why no order can be given; "" where one can.
+    // Why no order can be given now; "" if one can.
     hindrance(seen) {
       if (!seen.in_charge && seen.others) return "Another page is in charge.";
       if (seen.action !== null) return "The scanner is busy.";

@@ -1,10 +1,10 @@
-// The page that a scan is made from.
+// The page from which a scan is made.
 "use strict";
 (() => {
   const {act, allow, element, hindrance, listen, press, say} = footscan;
   const SIDES = {right: "Right foot", left: "Left foot"};
   const MARKS = {ok: "✓", warning: "!", bad: "✕", unknown: "?"};
-  const CLEAR_POINTS = 100;  // glints of the scanner itself give some
+  const CLEAR_POINTS = 100;  // glints of the scanner itself give some points
   const PSEUDONYM = /^[A-Za-z0-9_-]{1,64}$/;
   const patient = element("patient"), form = element("scan");
   let seen = null, before = null, pictured = "", listed = "", fed = "";
@@ -18,14 +18,14 @@
     return node;
   }
 
-  // Checked as typed: what is wrong is said at once, and what is missing only on the way to the start.
+  // Checked while typing: wrong letters are reported at once, a missing pseudonym only at the start.
   function patientProblem() {
     const name = patient.value;
     if (PSEUDONYM.test(name)) return "";
     const wrong = [...new Set([...name].filter(letter => !/[A-Za-z0-9_-]/.test(letter)))];
     if (wrong.length)
-      return `Only letters, digits, - and _ may be in it, no ${wrong.map(w => w === " " ? "space" : `“${w}”`).join(", ")}.`;
-    return name ? "At most 64 letters." : "";
+      return `Only letters, digits, - and _ are allowed, no ${wrong.map(w => w === " " ? "space" : `“${w}”`).join(", ")}.`;
+    return name ? "At most 64 characters." : "";
   }
 
   function checkPatient() {
@@ -41,7 +41,7 @@
     const why = hindrance(seen) || (seen.state.name === "disconnected" ? "Connect the scanner first." : "")
       || (seen.state.name === "door open" ? "Close the door first." : "")
       || (seen.state.name === "alarm" ? "Home the heads first." : "")
-      || (PSEUDONYM.test(patient.value) ? "" : patient.value ? "The pseudonym is not right yet." : "A pseudonym is missing.");
+      || (PSEUDONYM.test(patient.value) ? "" : patient.value ? "The pseudonym is not valid." : "A pseudonym is missing.");
     allow(element("start"), why);
     say(element("start-told"), why);
     say(element("start"), `Scan the ${chosenSide()} foot`);
@@ -111,13 +111,13 @@
     }
     for (const camera of cameras) {
       const figure = element(`camera-${camera}`);
-      const device = devices.find(one => one.name === `Camera ${camera}`);
+      const device = devices.find(part => part.name === `Camera ${camera}`);
       figure.dataset.level = device ? device.level : "unknown";
       if (state.name === "filming") say(figure.querySelector("span"), `${frames[camera] ?? 0} frames`);
     }
   }
 
-  // One picture after another, so that a slow line carries no more than it can; rarely while there is filming to do.
+  // One picture after another, so as not to overload a slow line; less often while the scanner films.
   async function lookOn() {
     for (let turn = 0; ; turn++) {
       const cameras = seen ? seen.cameras : [], filming = seen && seen.state.name === "filming";
@@ -129,7 +129,7 @@
   async function look(camera) {
     const figure = element(`camera-${camera}`);
     if (!figure) return;
-    const picture = figure.querySelector("img"), said = figure.querySelector("span");
+    const picture = figure.querySelector("img"), caption = figure.querySelector("span");
     try {
       const answer = await fetch(`/cameras/${camera}.jpg`), is = answer.status === 200;
       const old = picture.src;
@@ -141,14 +141,14 @@
       const points = Number(answer.headers.get("X-Stripe-Points") || 0);
       picture.alt = is ? `Camera ${camera} now, ${points < CLEAR_POINTS ? "no clear stripe in it" : "with the stripe found"}` : "";
       if (seen.state.name !== "filming")
-        say(said, is ? (points < CLEAR_POINTS ? "no clear stripe" : `stripe: ${points} points`) : "no picture");
+        say(caption, is ? (points < CLEAR_POINTS ? "no clear stripe" : `stripe: ${points} points`) : "no picture");
     } catch {
       picture.hidden = true;
       figure.querySelector(".dark").hidden = false;
     }
   }
 
-  // Of the page in charge, which saw the scan end.
+  // The page in charge opens the result when a scan has ended.
   function goToResult(now) {
     const ended = before && before.action === "scan" && now.action === null && !now.problem;
     const last = now.sitting.feet.at(-1);

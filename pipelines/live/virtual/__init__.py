@@ -1,1 +1,1 @@
-"""A virtual scanner in place of the real one."""
+"""A virtual scanner without hardware."""

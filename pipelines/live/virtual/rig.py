@@ -1,7 +1,7 @@
-"""A virtual scanner ready to scan: its world runs, and its rig says what a user's rig would say.
+"""A virtual scanner that is ready to scan: a running world, and a rig like that of a real scanner.
 
-What it is like stays in a folder, `rig.yaml` and its calibration, so that the second start is quick. Latencies are
-found as those of any scanner are: the rig never learns them from the world.
+Rig and calibration are kept in a folder, so that the second start is quick. Latencies are measured as for a real
+scanner: the rig never gets them from the world.
 """
 
 from collections.abc import Callable, Iterator
@@ -24,14 +24,14 @@ from schemas.parameters.simulation import SimulationSettings
 from schemas.rig import Rig, RigCamera
 
 TRIES = 3
-"""Of measuring latencies: nothing can be wrong with a virtual scanner but that its host was held up meanwhile."""
+"""Attempts to measure the latencies, which fail only if the host was too busy; chosen by hand."""
 OnProgress = Callable[[str, int, int], None]
-"""Hears what is being prepared, how much of it is there, and how much there is."""
+"""Called with the name of the preparation, the amount done and the total."""
 
 
 @dataclass(frozen=True)
 class VirtualRig:
-    """A virtual scanner that is ready."""
+    """A virtual scanner that is ready to scan."""
 
     rig: Rig
     file: Path
@@ -42,34 +42,34 @@ class VirtualRig:
 def virtual_rig(
     folder: Path, world: World, on_progress: OnProgress, *, calibrated: bool = True
 ) -> Iterator[VirtualRig]:
-    """The virtual scanner of `folder` in a world of its own, prepared as far as it is not yet.
+    """Run the virtual scanner of `folder` in a world of its own, and prepare what is missing in the folder.
 
     Parameters
     ----------
-    calibrated : whether its latencies are found where the rig does not have them.
+    calibrated : True to make a missing calibration, and to measure missing latencies
     """
 
     def pictures(done: int, total: int) -> None:
         on_progress("pictures", done, total)
 
     file = folder / "rig.yaml"
-    rig = _known_rig(file, world)
-    lacks = calibrated and any(camera.latency is None for camera in rig.cameras)
+    rig = _stored_rig(file, world)
+    lacks_latency = calibrated and any(camera.latency is None for camera in rig.cameras)
     calibration = folder / f"calibration-{world.scanner_seed}.json"
     if calibrated and not calibration.exists():
         on_progress("calibration", 0, 1)
         _calibrate(folder, calibration, world.scanner_seed)
-    with WorldProcess(world.model_copy(update={"subject": "block"}) if lacks else world, pictures) as process:
+    with WorldProcess(world.model_copy(update={"subject": "block"}) if lacks_latency else world, pictures) as process:
         rig = _plugged_in(rig, process, calibration if calibration.exists() else None)
         write_rig(file, rig)
-        if lacks:
+        if lacks_latency:
             rig = _with_latencies(rig, world, on_progress)
             write_rig(file, rig)
             process.put(world.subject, pictures)
         yield VirtualRig(rig, file, process)
 
 
-def _known_rig(file: Path, world: World) -> Rig:
+def _stored_rig(file: Path, world: World) -> Rig:
     scanner = f"virtual-{world.scanner_seed}"
     if file.exists() and (rig := read_rig(file)).scanner == scanner:
         return rig
@@ -78,7 +78,7 @@ def _known_rig(file: Path, world: World) -> Rig:
 
 
 def _plugged_in(rig: Rig, process: WorldProcess, calibration: Path | None) -> Rig:
-    """The rig with the addresses that the devices have today."""
+    """The rig with the present addresses of the devices."""
     cameras = [
         camera.model_copy(
             update={
@@ -106,7 +106,7 @@ def _with_latencies(rig: Rig, world: World, on_progress: OnProgress) -> Rig:
 
 
 def _calibrate(folder: Path, file: Path, scanner_seed: int) -> None:
-    """The scanner's calibration, from a capture of the reference object."""
+    """Calibrate the scanner from a capture of the reference object."""
     steps = filmed_calibration_steps(
         f"virtual-{scanner_seed}", folder / f"capture-{scanner_seed}", SimulationSettings(scanner_seed=scanner_seed)
     )

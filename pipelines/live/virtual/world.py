@@ -1,10 +1,10 @@
-"""The world without hardware: a board, eight cameras, and what stands on the glass.
+"""The virtual world: a board, eight cameras, and the subject on the glass.
 
     python -m pipelines.live.virtual.world '{"pictures": "...", "subject": "right"}'
 
-runs as a process of its own, as hardware does, and shares nothing with the scanner but a serial port and eight
-addresses. It says on standard output, a JSON document a line, how far its pictures are and then what it offers; orders
-come on standard input, a JSON document a line, and their end is its own.
+runs as a process of its own and, like hardware, shares only a serial port and eight addresses with the scanner. On
+standard output it writes the progress of its pictures and then its addresses, on standard input it reads orders, each a
+JSON document in one line. It ends when standard input ends.
 """
 
 import json
@@ -14,7 +14,6 @@ import time
 from collections.abc import Iterator, Mapping
 from math import ceil, floor
 from pathlib import Path
-from types import TracebackType
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -26,7 +25,7 @@ from footscan.virtual.board.rails import Gait
 from footscan.virtual.filming.streams import VirtualStreams
 from footscan.virtual.foot.foot import Foot, FootShape, make_foot, sample_shape
 from footscan.virtual.optics.scene import SKIN, Mesh
-from footscan.virtual.stage.pictures import Light, Progress, StagePictures, Subject
+from footscan.virtual.stage.pictures import Progress, StageLight, StagePictures, Subject
 from footscan.virtual.stage.reference_stage import NOTHING, block_subject
 from footscan.virtual.stage.stage import Positions, Stage, indices_of_travel
 from footscan.virtual.stage.standing import stand_in_the_middle
@@ -35,61 +34,65 @@ from schemas.parameters.simulation import Scale, Seed, SimulationSettings
 
 CAMERAS = range(1, 9)
 EXPOSURE_MS = 10.0
-"""What the stage's pictures are exposed for at light 1, see `VirtualStreams.settings`."""
+"""Exposure of the pictures of the stage at light 1, see `VirtualStreams.settings`."""
 MOST_GAIN = 16.0
-"""Of a camera's range, as a factor."""
+"""Largest gain of a camera, as a factor."""
 LATENCIES_S = (0.02, 0.06)
+"""Range from which the latencies of the cameras are drawn."""
 WATCHED_EVERY_S = 0.02
+"""Interval at which the middle of the travel is watched for."""
 MOVES_SECONDS = 0.1
+"""Heads move if their position differs from that so long before."""
 RAIL_MM = (-20.0, 412.0)
+"""Ends of the rails, X."""
 BLOCK_MM_PER_S = 90.0
-"""No faster do heads pass the block."""
+"""Largest speed at which heads pass the block."""
 EVEN_SECONDS = 0.3
-"""Heads move evenly, with light, for so long before a travel and behind it; before that they gain speed."""
+"""Time before and behind a travel in which heads move evenly, with light; before it they accelerate."""
 ACCELERATIONS = (120, 121, 122)
-"""The board's settings of them, mm/s^2."""
+"""Numbers of the board's settings of the accelerations, mm/s^2."""
 SLACK_MM = 2.0
-"""Heads are that far at most from where they were sent, or from one another."""
+"""Largest distance of a head from its target, and from the other heads."""
 BLOCK_REACH_MM = 86.0
-"""Before and behind the middle: the block is nowhere else, and heads need not be either."""
+"""Half of the travel over the block, from its middle: the block does not reach further."""
 
 SubjectName = Literal["right", "left", "block", "nothing"]
 
 
 class World(Document):
-    """What a virtual world is like."""
+    """Settings of a virtual world."""
 
     pictures: str
-    """Folder of its pictures, kept from one start to the next."""
+    """Folder of the pictures, kept from one start to the next."""
     subject: SubjectName = "nothing"
-    """What stands on the glass."""
+    """The subject on the glass."""
     foot_seed: Seed | None = None
-    """Of the population that the feet are drawn from; default: the mean man's."""
+    """Seed of the shape of the feet; default: the mean male foot."""
     light: Literal["dark", "ambient", "bright"] = "ambient"
     scanner_seed: Seed = 1
-    """Of mounting and lenses, and of the latencies of its cameras, which nobody is told."""
+    """Seed of mounting, lenses and latencies of the cameras; the latencies are not revealed."""
     start_mm: float = 0.0
     end_mm: float = 400.0
     mm_per_s: Annotated[float, Field(gt=0, le=200)] = 400.0 / 11.0
-    """How fast heads travel along a foot."""
+    """Speed of the heads along a foot."""
     grid_mm: Annotated[float, Field(gt=0, le=10)] = 0.5
-    """Of the places that there are pictures of with light."""
+    """Spacing of the positions with pictures with light."""
     dark_grid_mm: Annotated[float, Field(gt=0, le=400)] = 100.0
-    """Of those without: in the dark a head is shown at the nearest of these."""
+    """Spacing of the positions with pictures without light; in the dark a head is shown at the nearest one."""
     ripple: Annotated[float, Field(ge=0, le=0.5)] = 0.0
-    """Part of the speed that swings once a second."""
+    """Share of the speed that oscillates once a second."""
     pause_s: Annotated[float, Field(ge=0, le=60)] = 0.0
-    """How long the heads stand still in the middle of each travel with light."""
+    """Pause of the heads in the middle of each travel with light."""
     jitter_ms: Annotated[float, Field(ge=0, le=25)] = 10.0
-    """How far an exposure may be off the camera's clock, either way."""
+    """Largest deviation of an exposure from the clock of the camera, either way."""
     delivery_jitter_ms: Annotated[float, Field(ge=0, le=1000)] = 2.0
-    """How much later than usual a picture may be sent."""
+    """Largest additional delay of sending a picture."""
     brightness: Scale = 24.0
-    """Of the lasers at full power, see `SimulationSettings.laser_exposure`."""
+    """Brightness of the lasers at full power, see `SimulationSettings.laser_exposure`."""
 
 
 class VirtualWorld:
-    """A world that runs; a context manager."""
+    """A running virtual world; a context manager."""
 
     def __init__(self, world: World, progress: Progress | None = None) -> None:
         self._world = world
@@ -116,24 +119,22 @@ class VirtualWorld:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @property
     def offer(self) -> dict[str, Any]:
-        """What a user of the scanner would plug in: the serial port, and the address of each camera."""
+        """The connections of the scanner: the serial port, and the address of each camera."""
         return {"port": self.board.port, "cameras": {camera: self.streams.url(camera) for camera in CAMERAS}}
 
     def put(self, subject: SubjectName, progress: Progress | None = None) -> None:
-        """Puts something else onto the glass."""
+        """Put another subject onto the glass."""
         before, self._pictures = self._pictures, self._prepared(subject, progress)
         self.stage.put(self._pictures)
         before.close()
 
     def close(self) -> None:
-        """Ends all of it."""
+        """End board, cameras and stage."""
         self._ends.set()
         self._watch.join()
         self.streams.close()
@@ -143,16 +144,15 @@ class VirtualWorld:
 
     def _prepared(self, subject: SubjectName, progress: Progress | None) -> StagePictures:
         world = self._world
-        made = self._subject(subject)
-        pictures = StagePictures(made, self._settings, Path(world.pictures), world.grid_mm)
+        pictures = StagePictures(self._subject(subject), self._settings, Path(world.pictures), world.grid_mm)
         rail = range(floor(RAIL_MM[0] / world.dark_grid_mm), ceil(RAIL_MM[1] / world.dark_grid_mm) + 1)
         dark = {round(k * world.dark_grid_mm / world.grid_mm) for k in rail}
-        pictures.prepare(CAMERAS, dark, Light(0.0), progress)
-        pictures.prepare(CAMERAS, indices_of_travel(*self._lit_mm(subject), world.grid_mm), Light(), progress)
+        pictures.prepare(CAMERAS, dark, StageLight(0.0), progress)
+        pictures.prepare(CAMERAS, indices_of_travel(*self._lit_mm(subject), world.grid_mm), StageLight(), progress)
         return pictures
 
     def _lit_mm(self, subject: SubjectName) -> tuple[float, float]:
-        """Where heads come with light."""
+        """Range of X, mm, in which heads may have light."""
         start, end, speed = self._world.start_mm, self._world.end_mm, self._world.mm_per_s
         if subject == "block":
             start, end = block_range_mm(self._world)
@@ -161,7 +161,7 @@ class VirtualWorld:
         return max(start - run_up, RAIL_MM[0]), min(end + run_up, RAIL_MM[1])
 
     def _shown_at(self, seconds: float) -> Positions:
-        """Where the heads are shown: where they are, or in the dark near there."""
+        """X of the heads in the picture, mm: their position, in the dark rounded to `dark_grid_mm`."""
         x = self.board.position_at(seconds)
         if self.board.laser_at(seconds):
             return x
@@ -169,9 +169,9 @@ class VirtualWorld:
         return round(x[0] / dark) * dark, round(x[1] / dark) * dark, round(x[2] / dark) * dark
 
     def _power_at(self, seconds: float) -> float:
-        """The lasers' power; of heads that move the nearest that there are pictures of.
+        """Power of the lasers in the picture: full power for any light on moving heads.
 
-        While they gain and lose speed the board dims the lasers, and pictures of that would have to be made first.
+        While heads accelerate the board dims the lasers, but no pictures of dimmed light are prepared.
         """
         power = self.board.laser_at(seconds)
         moves = self.board.position_at(seconds) != self.board.position_at(seconds - MOVES_SECONDS)
@@ -188,7 +188,7 @@ class VirtualWorld:
         return Subject(Mesh(stand_in_the_middle(foot.vertices, travel), foot.faces.astype(np.int64)), SKIN)
 
     def _exposures(self, camera: int) -> Iterator[float]:
-        self._is_whole.wait()  # cameras have threads of their own before there are settings to ask them for
+        self._is_whole.wait()  # the threads of the cameras start before `self.streams` is set
         yield from self.stage.exposures(camera, jitter_seconds=self._world.jitter_ms / 1000)
 
     def _light_of(self, camera: int) -> tuple[float, float]:
@@ -196,7 +196,7 @@ class VirtualWorld:
         return settings["exposure"] / EXPOSURE_MS, 1.0 + (MOST_GAIN - 1.0) * settings["gain"]
 
     def _pause_in_the_middle(self) -> None:
-        """Holds the heads up once in each travel with light."""
+        """Pause the heads once in each travel with light."""
         middle_mm = (self._world.start_mm + self._world.end_mm) / 2
         before: float | None = None
         while self._world.pause_s and not self._ends.wait(WATCHED_EVERY_S):
@@ -208,20 +208,20 @@ class VirtualWorld:
 
 
 def block_range_mm(world: World) -> tuple[float, float]:
-    """Between which places the heads travel for the latencies: past all of the block."""
+    """Range of X, mm, of the travel for the latencies: past the whole block."""
     middle = (world.start_mm + world.end_mm) / 2
     return middle - BLOCK_REACH_MM, middle + BLOCK_REACH_MM
 
 
 def virtual_foot(world: World, side: Literal["right", "left"]) -> Foot:
-    """The foot that stands on the glass of a world, as it stands on a floor of its own."""
+    """The foot of a world, in its own frame on the floor."""
     seed = world.foot_seed
     shape = FootShape() if seed is None else sample_shape(np.random.default_rng(seed), "male")
     return make_foot(shape, side=side)
 
 
 def obey(world: VirtualWorld, order: Mapping[str, Any]) -> None:
-    """Carries out an order: `put` a subject, `pause` for seconds, `door` open or closed, `cable` in or out."""
+    """Carry out an order: `put` a subject, `pause` (s), `door` open or closed, `cable` in or out, `stick` a head."""
     for name, value in order.items():
         match name:
             case "put":
@@ -237,7 +237,7 @@ def obey(world: VirtualWorld, order: Mapping[str, Any]) -> None:
 
 
 def main() -> None:
-    """Runs a world until its standard input ends."""
+    """Run a world until standard input ends."""
     world = World.model_validate_json(sys.argv[1])
     with VirtualWorld(world, _tell_progress) as running:
         _tell({"ready": running.offer})

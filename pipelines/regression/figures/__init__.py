@@ -1,1 +1,1 @@
-"""The figures of a night: results, files, time and memory, and their verdicts."""
+"""Figures of a night: results, files, time and memory, and their verdicts."""

@@ -1,4 +1,4 @@
-"""The files that a scan delivers, read back: does another program get what was measured?"""
+"""Figures of the delivered files of a scan: each is read back and compared with its source."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,11 +13,11 @@ from pipelines.arrays import unpack
 from schemas.base.errors import RefusedInput
 
 MADE_OF = {"foot.stl": "surface", "foot.ply": "surface", "cloud.ply": "orient"}
-"""Delivered files, and the step whose result each shows."""
+"""Delivered files, and the kind of step that each is made from."""
 
 
 def shape_of(result: bytes) -> Shape:
-    """The mesh, or the cloud without faces, that a step came to."""
+    """The mesh in the result of a step, or its cloud, without faces."""
     arrays = unpack(result)
     if "faces" in arrays:
         return arrays["vertices"], arrays["faces"]
@@ -26,13 +26,14 @@ def shape_of(result: bytes) -> Shape:
 
 
 def delivered_figures(folder: Path, results: Mapping[str, bytes]) -> dict[str, float | None]:
-    """`files.NAME_off_mm`: the largest distance between the points of a file and those that it was made of, either way,
-    mm; None where it cannot be read.
+    """Compute `files.NAME_off_mm`: the largest distance between the points of a file and its source, in mm.
+
+    It is the larger one of both directions, and None if the file cannot be read.
 
     Parameters
     ----------
-    folder : with the delivered files
-    results : of the steps in `MADE_OF`, by kind
+    folder : folder of the delivered files
+    results : results of the steps in `MADE_OF`, by kind
     """
     trees = {kind: KDTree(shape_of(result)[0]) for kind, result in results.items()}
     return {f"files.{name}_off_mm": _off(folder / name, trees[kind]) for name, kind in MADE_OF.items() if kind in trees}

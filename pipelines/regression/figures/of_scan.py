@@ -1,4 +1,4 @@
-"""The figures of a scan's results, and what is better of each."""
+"""Figures of the results of a scan; for each figure, which values are better, and its tolerance."""
 
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
@@ -12,7 +12,7 @@ from schemas.quality import Quality
 from schemas.regression import Suite, Tolerance
 
 Goal = Literal["less", "more", "nearer", "same"]
-"""`nearer` to what is known of the foot; `same`: whatever differs from what was accepted is worse."""
+"""`nearer`: to the true value of the foot; `same`: any value that differs from the accepted one is worse."""
 
 GOALS: dict[str, Goal] = {
     "accuracy.within_1mm": "more",
@@ -34,10 +34,12 @@ GOALS: dict[str, Goal] = {
     "time.*": "less",
     "memory.*": "less",
 }
-"""The first that fits."""
+"""Goal of a figure: that of the first pattern that fits."""
 
 WRITING = Tolerance(absolute=12.0, relative=1.0)
-"""Of the time of steps that write many files: on a disk that others use, too, no computation tells how fast it is."""
+"""Tolerance of the time of steps that write many files: no reference computation tells the speed of a shared disk.
+
+Chosen by hand."""
 TOLERANCES: dict[str, Tolerance] = {
     "accuracy.within_1mm": Tolerance(absolute=0.002),
     "accuracy.*": Tolerance(absolute=0.003, relative=0.02),
@@ -59,16 +61,18 @@ TOLERANCES: dict[str, Tolerance] = {
     "memory.peak_mb": Tolerance(absolute=100.0, relative=0.25),
     "memory.*_mb": Tolerance(absolute=60.0, relative=0.5),
 }
-"""The first that fits; counts of points, cameras and steps come out alike to the last, so they have none."""
+"""Tolerance of a figure: that of the first pattern that fits; chosen by hand.
+
+Counts of points, cameras and steps are reproducible, so they have none."""
 
 
 def goal_of(figure: str) -> Goal:
-    """What is better of a figure."""
+    """Goal of a figure; default: `same`."""
     return next((goal for pattern, goal in GOALS.items() if fnmatchcase(figure, pattern)), "same")
 
 
 def tolerance_of(data_set: str, figure: str, suite: Suite) -> Tolerance:
-    """By how much a figure of a set may differ: as the suite says, or else the project."""
+    """Tolerance of a figure of a set: that of the suite, or by default of `TOLERANCES`."""
     for pattern, tolerance in reversed(suite.tolerances.items()):
         if fnmatchcase(f"{data_set}:{figure}", pattern) or fnmatchcase(figure, pattern):
             return tolerance
@@ -76,7 +80,7 @@ def tolerance_of(data_set: str, figure: str, suite: Suite) -> Tolerance:
 
 
 def result_figures(documents: Mapping[str, bytes]) -> dict[str, float | None]:
-    """The figures of what the steps `quality`, `measure` and, where there is one, `texture` came to."""
+    """Figures of the results of the steps `quality`, `measure` and, if present, `texture`."""
     quality = Quality.model_validate_json(documents["quality"])
     measures = Measures.model_validate_json(documents["measure"])
     figures: dict[str, float | None] = {}
@@ -105,12 +109,12 @@ def result_figures(documents: Mapping[str, bytes]) -> dict[str, float | None]:
 
 
 def measure_figure(measure: str, unit: str) -> str:
-    """The figure of a measure."""
+    """Name of the figure of a measure."""
     return f"measures.{measure}_{unit}"
 
 
 def rounded(figure: str, value: float | None) -> float | None:
-    """A figure as the baseline has it: as many decimals as say something of it."""
+    """Round a figure to the decimals that it has in the baseline."""
     return None if value is None else round(value, _decimals(figure))
 
 

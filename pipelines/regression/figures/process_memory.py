@@ -1,4 +1,4 @@
-"""How much memory this process holds, and held at most."""
+"""Memory of this process: held now, and peak."""
 
 import resource
 import sys
@@ -8,19 +8,19 @@ _STATUS, _RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 
 
 def held_mb() -> float:
-    """What it holds now, MB; its most so far where the system does not tell."""
+    """Memory held now, MB; the peak if the system does not report it."""
     return _of_status("VmRSS") or peak_mb()
 
 
 def peak_mb() -> float:
-    """The most that it held since `forget_peak`, MB."""
+    """Peak of the memory since `forget_peak`, MB."""
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1e-6 if sys.platform == "darwin" else 1.024e-3)
-    # The kernel's other figure, for it counts what the parent held before it started this program.
+    # VmHWM is preferred: ru_maxrss includes the memory of the parent before it started this program.
     return _of_status("VmHWM") or most
 
 
 def forget_peak() -> None:
-    """Begin anew to look for the most; where the system cannot, the most is that since the start."""
+    """Reset the peak; if the system cannot, it remains the peak since the start."""
     try:
         _RESET.write_text("5")  # man 5 proc
     except OSError:

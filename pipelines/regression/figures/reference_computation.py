@@ -1,8 +1,8 @@
-"""A fixed computation that tells how fast a machine is at the moment: times are told as multiples of it.
+"""A fixed computation that measures the present speed of a machine: times are given as multiples of it.
 
-It uses what the steps use, decoding, sorting and neighbours in space, but no line of the project: a step that becomes
-slower must not slow what it is measured by. Nor anything that some processors have instructions of their own for, which
-few steps gain from: NumPy's default sort takes a sixth of its time with AVX-512, the stable one all of it.
+It does what the steps do (decoding, sorting, neighbours in space), but uses no code of the project: a step that becomes
+slower must not slow its own unit. It also avoids operations with special instructions on some processors, from which
+few steps gain: with AVX-512 NumPy's default sort takes a sixth of its time, the stable sort all of it.
 """
 
 import time
@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 FRAMES = 4
+"""Frames that are decoded; chosen by hand so that the computation is short against a step."""
 
 
 def reference_seconds() -> float:
-    """Do it once; returns how long it took, about 0.03 s on one core."""
+    """Run the computation once and return its time, about 0.03 s on one core."""
     jpeg, points = _material()
     start = time.perf_counter()
     for _ in range(FRAMES):
@@ -29,7 +30,7 @@ def reference_seconds() -> float:
 
 @cache
 def _material() -> tuple[bytes, NDArray[np.float64]]:
-    """A frame and a cloud that are the same everywhere."""
+    """A frame and a cloud, (4000, 3), that are the same on every machine."""
     random = np.random.default_rng(0)
     j, i = np.mgrid[0:480, 0:640]
     stripe = 180 * np.exp(-0.5 * ((i - 320 - 60 * np.sin(j / 80)) / 4) ** 2)

@@ -1,8 +1,8 @@
-"""A scan run from its films with an empty cache of its own, in a process of its own: what it takes in time and memory.
+"""Time and memory of a scan that runs from its films with an empty cache, in a process of its own.
 
-Results may come from the cache of the suite, times may not: what is timed is always computed. Each step runs alone, and
-before and after it the reference computation, so that a machine that is busy, or slow, slows both. Of several passes
-the least counts: the first one also imports libraries and compiles, and what else runs on the machine only adds.
+Results may come from the cache of the suite, times may not: each timed step is computed. The steps run one at a time,
+and the reference computation runs before and after each, so that a busy or slow machine slows both. The least of
+several passes counts: the first pass also imports libraries and compiles, and other programs only add to a time.
 """
 
 import gc
@@ -30,22 +30,22 @@ from schemas.base.errors import Fault
 from schemas.scan import CameraFilm
 
 TEMPORARY = ".timed-"
-"""Begins the name of a folder that a pass has its cache and frames in."""
+"""Prefix of the folder with the cache and the frames of a pass."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-"""What tells libraries how many threads to use, read when they are loaded."""
+"""Environment variables that set the threads of libraries, read when the libraries are loaded."""
 
 
 @dataclass(frozen=True)
 class StepCost:
-    """What one run of a step took."""
+    """Time and memory of one run of a step."""
 
     kind: str
     ratio: float
-    """Its time as a multiple of the reference computation's."""
+    """Time in units of the reference computation."""
     needed_mb: float
-    """Memory at most, beyond what was held before."""
+    """Peak of the memory, beyond that held before the step."""
     kept_mb: float
-    """Memory held after it, beyond what was held before."""
+    """Memory held after the step, beyond that held before."""
 
 
 @dataclass(frozen=True)
@@ -53,16 +53,16 @@ class Pass:
     """One run of all steps, in their order."""
 
     steps: Mapping[str, StepCost]
-    """By name within the scan, `extract-3`."""
+    """Costs by name of the step within the scan, `extract-3`."""
     results: Mapping[str, str]
-    """Digests of results by the same name."""
+    """Digests of the results by the same name."""
     peak_mb: float
     held_mb: float
-    """At the end."""
+    """Memory held at the end."""
 
 
 def take_times(job: Job, passes: int) -> list[Pass]:
-    """Run the one scan of a job so many times, in a new process.
+    """Run the one scan of a job `passes` times in a new process.
 
     Raises
     ------
@@ -75,13 +75,15 @@ def take_times(job: Job, passes: int) -> list[Pass]:
         try:
             return process.submit(_passes, job, passes).result()
         except BrokenProcessPool:
-            raise Fault(f"{job.folders[0]}: the process that is timed has died; is there memory enough?") from None
+            raise Fault(f"{job.folders[0]}: the timed process has died; is there enough memory?") from None
 
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Processes that are started here keep their libraries to one thread: several that wait for each other, on cores
-    that others use, take many times as long as one."""
+    """Limit the libraries of processes that are started in the block to one thread.
+
+    Several threads that wait for each other on busy cores take many times as long as one.
+    """
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))
     try:
@@ -95,21 +97,21 @@ def _one_thread() -> Iterator[None]:
 
 
 def _passes(job: Job, passes: int) -> list[Pass]:
-    """The work of that process."""
+    """Run the passes, in the new process."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    reference_seconds()  # its material is made, its libraries are loaded
+    reference_seconds()  # makes its material and loads its libraries
     job.results.mkdir(parents=True, exist_ok=True)
-    for left in job.results.glob(f"{TEMPORARY}*"):  # by a night that was killed; there is but one at a time
-        shutil.rmtree(left, ignore_errors=True)
-    found = []
+    for remnant in job.results.glob(f"{TEMPORARY}*"):  # of a killed night; only one night runs at a time
+        shutil.rmtree(remnant, ignore_errors=True)
+    timed = []
     for _ in range(passes):
         with TemporaryDirectory(prefix=TEMPORARY, dir=job.results) as empty:
-            found.append(_one_pass(job, Path(empty)))
-    return found
+            timed.append(_one_pass(job, Path(empty)))
+    return timed
 
 
 def _end_with_parent() -> None:
-    """A process whose parent was killed would wait for work for ever."""
+    """Exit with the parent: a process whose parent was killed would wait for work forever."""
     parent = parent_process()
     if parent is not None:
         parent.join()
@@ -135,7 +137,7 @@ def _one_pass(job: Job, empty: Path) -> Pass:
 
 @dataclass(frozen=True)
 class _Elsewhere(RecordedScan):
-    """A scan whose frames are ingested into a folder of ours: those beside the films stay as they are."""
+    """A scan whose frames are ingested into the folder `frames`; those beside the films stay unchanged."""
 
     frames: Path = Path()
 
@@ -148,7 +150,7 @@ class _Elsewhere(RecordedScan):
 
 @dataclass
 class _Watch:
-    """Hears of each step that has ended, and measures the reference between it and the next."""
+    """Record the cost of each step that ends, and run the reference computation before the next step."""
 
     steps: dict[str, StepCost] = field(default_factory=dict)
     peak_mb: float = 0.0

@@ -1,4 +1,4 @@
-"""A night's figures beside the accepted ones."""
+"""Verdicts on the figures of a night, compared with the accepted ones."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,29 +7,29 @@ from pipelines.regression.report.result import JudgedFigure, Verdict
 from schemas.regression import NightEnded, Suite
 
 ROUNDING = 1e-9
-"""Differences of decimal numbers are no exact ones."""
+"""Bound of the rounding error of a difference of two figures."""
 
 
 def judge_figures(
     data_set: str,
     figures: Mapping[str, float | None],
     accepted: Mapping[str, float | None],
-    known: Mapping[str, float],
+    truths: Mapping[str, float],
     suite: Suite,
     history: Sequence[NightEnded] = (),
 ) -> list[JudgedFigure]:
-    """Each figure that there is, or that was accepted, in the order of their names.
+    """Judge each figure that exists or was accepted, in the order of `in_order`.
 
     Parameters
     ----------
-    known : true measures of the foot by name
+    truths : true measures of the foot, mm, by name
     history : earlier nights
     """
-    truths = {measure_figure(name, unit): value for name, value in known.items() for unit in _UNITS}
+    true_figures = {measure_figure(name, unit): value for name, value in truths.items() for unit in _UNITS}
     judged = []
     for name in sorted(figures.keys() | accepted.keys(), key=in_order):
         value, before = rounded(name, figures.get(name)), accepted.get(name)
-        goal, truth = goal_of(name), truths.get(name)
+        goal, truth = goal_of(name), true_figures.get(name)
         allowed = 0.0 if before is None else tolerance_of(data_set, name, suite).allows(before)
         nights = [night.sets.get(data_set, {}).get(name) for night in history]
         judged.append(
@@ -40,7 +40,7 @@ def judge_figures(
                 allowed=allowed,
                 better=goal,
                 truth=truth,
-                verdict=verdict(value, before, allowed, goal, truth, is_known=name in accepted),
+                verdict=verdict(value, before, allowed, goal, truth, in_baseline=name in accepted),
                 history=[*nights, value],
             )
         )
@@ -48,15 +48,15 @@ def judge_figures(
 
 
 def verdict(
-    value: float | None, accepted: float | None, allowed: float, goal: Goal, truth: float | None, *, is_known: bool
+    value: float | None, accepted: float | None, allowed: float, goal: Goal, truth: float | None, *, in_baseline: bool
 ) -> Verdict:
-    """What to think of one figure; `is_known` whether the baseline has it, be it as null."""
+    """Judge one figure; `in_baseline` is True if the baseline has it, even as null."""
     if value is None and accepted is None:
-        return "same" if is_known else "new"
+        return "same" if in_baseline else "new"
     if value is None:
         return "missing"
     if accepted is None:
-        return "better" if is_known else "new"  # what could not be told before can be told now
+        return "better" if in_baseline else "new"  # a figure that was unknown before is known now
     gain = accepted - value
     if abs(gain) <= allowed + ROUNDING:
         return "same"
@@ -70,7 +70,7 @@ def verdict(
 
 
 def in_order(figure: str) -> tuple[int, str]:
-    """For sorting: what matters most first."""
+    """Sort key of a figure: the most important groups come first."""
     group = figure.partition(".")[0]
     return (_GROUPS.index(group) if group in _GROUPS else len(_GROUPS)), figure
 

@@ -1,1 +1,1 @@
-"""What a night found, its page and its JUnit file."""
+"""The findings of a night: its page and its JUnit file."""

@@ -1,4 +1,4 @@
-"""The history of a figure as a line: last night at the right, around it what was accepted."""
+"""Plot the history of a figure: a line that ends in the last night, and a band around the accepted value."""
 
 from collections.abc import Callable, Sequence
 
@@ -6,18 +6,19 @@ from footscan.report.markup import text
 from pipelines.regression.report.result import JudgedFigure
 
 WIDTH, HEIGHT, MARGIN = 180.0, 36.0, 4.0
+"""Size and margin of the plot, in units of the drawing."""
 FEWEST = 8
-"""The line of a young history is short: nights stand at least as close as so many would."""
+"""Nights that the plot has room for at least, so that the line of a young history stays short."""
 COLOURS = {"better": "#17632f", "same": "#1f6f8b", "worse": "#b3261e", "missing": "#b3261e", "new": "#7a5200"}
 
 
 def history_line(figure: JudgedFigure) -> str:
-    """A small plot as SVG: a band of what is the same as accepted, a line from night to night, a dot for the last."""
-    known = [value for value in figure.history if value is not None]
+    """Draw a small plot as SVG: the band of the tolerance, a line from night to night, a dot for the last night."""
+    values = [value for value in figure.history if value is not None]
     band = [] if figure.accepted is None else [figure.accepted - figure.allowed, figure.accepted + figure.allowed]
-    if not known:
+    if not values:
         return ""
-    least, most = _range(known, band)
+    least, most = _range(values, band)
 
     def x(night: int) -> float:
         spacing = (WIDTH - 2 * MARGIN) / max(len(figure.history) - 1, FEWEST - 1)
@@ -35,22 +36,21 @@ def history_line(figure: JudgedFigure) -> str:
     colour = COLOURS[figure.verdict]
     if figure.history[-1] is not None:
         parts.append(f'<circle cx="{points[-1][0]:.1f}" cy="{points[-1][1]:.1f}" r="2.6" fill="{colour}"/>')
-    label = f"{figure.name} in {len(known)} nights, from {min(known):g} to {max(known):g}"
-    drawn = "".join(parts)
+    label = f"{figure.name} in {len(values)} nights, from {min(values):g} to {max(values):g}"
     return (
         f'<svg class="history" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{text(label)}">'
-        f"<title>{text(label)}</title>{drawn}</svg>"
+        f"<title>{text(label)}</title>{''.join(parts)}</svg>"
     )
 
 
-def _range(known: Sequence[float], band: Sequence[float]) -> tuple[float, float]:
-    """What the plot reaches over: all nights and the band; something around them where they are all one."""
-    least, most = min([*known, *band]), max([*known, *band])
+def _range(values: Sequence[float], band: Sequence[float]) -> tuple[float, float]:
+    """Range of the plot: all nights and the band, widened if they are all equal."""
+    least, most = min([*values, *band]), max([*values, *band])
     return (least, most) if most > least else (least - 1.0, most + 1.0)
 
 
 def _path(history: Sequence[float | None], x: Callable[[int], float], y: Callable[[float], float]) -> str:
-    """A line from night to night, broken where there is no figure; a lone night is a dot."""
+    """SVG path from night to night, broken at nights without the figure; a lone night is a dot."""
     path, is_open = [], False
     for night, value in enumerate(history):
         if value is not None:

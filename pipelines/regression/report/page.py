@@ -1,4 +1,4 @@
-"""The page of the morning: last night beside the accepted baseline."""
+"""The page of a night: its figures beside the accepted baseline."""
 
 from collections.abc import Iterable, Sequence
 
@@ -16,21 +16,21 @@ from pipelines.regression.report.result import (
 )
 
 NOTICE = "<!-- notice -->"
-"""Where a check puts what it has to say, on a line of its own."""
+"""Marks the line on which `with_notice` puts its notice."""
 _CLASS = {"better": "ok", "same": "quiet", "worse": "incomplete", "missing": "incomplete", "new": "uncertain"}
 _ARROWS = {"less": "less is better", "more": "more is better", "nearer": "nearer to what is known", "same": ""}
 
 
 def regress_page(night: NightResult) -> str:
-    """A self-contained HTML page."""
+    """Return the self-contained HTML page of a night."""
     parts = [
         f"<style>{_STYLE}</style>\n{NOTICE}",
         _tiles(night),
         *([_notes(night.notes)] if night.notes else []),
-        *(_set(one) for one in sorted(night.sets, key=_urgency)),
+        *(_set(judged_set) for judged_set in sorted(night.sets, key=_urgency)),
         _accepted(night),
     ]
-    good = not night.count("worse", "missing") and not any(one.problem for one in night.sets)
+    good = not night.count("worse", "missing") and not any(judged_set.problem for judged_set in night.sets)
     verdict = "all is the same or better" if good else "something is worse"
     return page(
         title=f"{night.suite}: {verdict}",
@@ -41,10 +41,10 @@ def regress_page(night: NightResult) -> str:
 
 
 def with_notice(markup: str, notice: str) -> str:
-    """A page of `regress_page` with a notice on top, in place of an earlier one; any text is safe."""
+    """Put a notice on top of a page of `regress_page`, in place of an earlier one; any text is safe."""
     lines = markup.splitlines(keepends=True)
-    said = f'{NOTICE}<p class="notice">{text(notice)}</p>\n'
-    return "".join(said if line.startswith(NOTICE) else line for line in lines)
+    banner = f'{NOTICE}<p class="notice">{text(notice)}</p>\n'
+    return "".join(banner if line.startswith(NOTICE) else line for line in lines)
 
 
 def _tiles(night: NightResult) -> str:
@@ -57,36 +57,37 @@ def _tiles(night: NightResult) -> str:
 
 
 def _notes(notes: Iterable[str]) -> str:
-    return section("To be known", "".join(f"<p>{text(note)}</p>" for note in notes))
+    return section("Notes", "".join(f"<p>{text(note)}</p>" for note in notes))
 
 
-def _urgency(one: JudgedSet) -> bool:
-    return not (one.problem or one.count("worse", "missing"))
+def _urgency(judged_set: JudgedSet) -> bool:
+    return not (judged_set.problem or judged_set.count("worse", "missing"))
 
 
-def _set(one: JudgedSet) -> str:
-    noted = [figure for figure in one.figures if figure.verdict != "same"]
+def _set(judged_set: JudgedSet) -> str:
+    noted = [figure for figure in judged_set.figures if figure.verdict != "same"]
     noted.sort(key=lambda figure: VERDICTS.index(figure.verdict))
-    parts = [f'<p class="problem">{text(one.problem)}</p>'] if one.problem else []
-    if one.first or one.otherwise:
-        parts.append(_first(one))
+    parts = [f'<p class="problem">{text(judged_set.problem)}</p>'] if judged_set.problem else []
+    if judged_set.first or judged_set.otherwise:
+        parts.append(_first(judged_set))
     if noted:
         parts.append(_figures(noted))
-    if one.pictures:
-        parts.append(_pictures(one))
-    elif one.note:
-        parts.append(f'<p class="note">{text(one.note)}</p>')
-    same = [figure for figure in one.figures if figure.verdict == "same"]
+    if judged_set.pictures:
+        parts.append(_pictures(judged_set))
+    elif judged_set.note:
+        parts.append(f'<p class="note">{text(judged_set.note)}</p>')
+    same = [figure for figure in judged_set.figures if figure.verdict == "same"]
     if same:
         what = f"{len(same)} figures that are the same" if noted else f"All {len(same)} figures are the same"
         parts.append(f"<details><summary>{what}</summary>{_figures(same)}</details>")
-    return section(one.name, *parts)
+    return section(judged_set.name, *parts)
 
 
-def _first(one: JudgedSet) -> str:
-    steps = "".join(_first_step(first) for first in one.first)
-    said = f"{one.otherwise} {'step has' if one.otherwise == 1 else 'steps have'} another result than the accepted one"
-    counted = f'<p class="note">{said}.</p>' if one.otherwise else ""
+def _first(judged_set: JudgedSet) -> str:
+    steps = "".join(_first_step(first) for first in judged_set.first)
+    counted = ""
+    if judged_set.otherwise:
+        counted = f'<p class="note">Steps whose result differs from the accepted one: {judged_set.otherwise}.</p>'
     return f"<h3>Where it begins</h3>{counted}<ul>{steps}</ul>" if steps else counted
 
 
@@ -127,36 +128,37 @@ def _value(value: float | None) -> str:
 
 
 def _difference(figure: JudgedFigure) -> str:
-    """How far it is from the accepted figure, and how far it may be."""
+    """Difference from the accepted figure, and its tolerance."""
     if figure.value is None or figure.accepted is None:
         return ""
     by = figure.value - figure.accepted
     sign = "+" if by > 0 else ""
-    said = f"may be {figure.allowed:g}; {_ARROWS[figure.better]}".removesuffix("; ")
+    title = f"may be {figure.allowed:g}; {_ARROWS[figure.better]}".removesuffix("; ")
     if figure.truth is not None:
-        said += f", {figure.truth:.6g}"
-    return f'<span title="{text(said)}">{sign}{_value(by)}<small>±{_value(figure.allowed)}</small></span>'
+        title += f", {figure.truth:.6g}"
+    return f'<span title="{text(title)}">{sign}{_value(by)}<small>±{_value(figure.allowed)}</small></span>'
 
 
 def _chip(verdict: Verdict) -> str:
     return f'<span class="status {_CLASS[verdict]}">{verdict}</span>'
 
 
-def _pictures(one: JudgedSet) -> str:
+def _pictures(judged_set: JudgedSet) -> str:
     figures = "".join(
         f'<figure><img src="{data_uri("image/png", png)}" alt="{text(caption)}">'
         f"<figcaption>{text(caption)}</figcaption></figure>"
-        for caption, png in one.pictures.items()
+        for caption, png in judged_set.pictures.items()
     )
-    return f'<h3>Beside the shape before</h3><div class="beside">{figures}</div>'
+    return f'<h3>Compared with the earlier shape</h3><div class="beside">{figures}</div>'
 
 
 def _accepted(night: NightResult) -> str:
     if not night.accepted:
-        said = "Nothing has been accepted yet: every figure is new. <code>footscan regress --accept REASON</code> does."
-        return section("Accepted", f"<p>{said}</p>")
+        hint = "Nothing has been accepted yet: every figure is new. Accept with"
+        return section("Accepted", f"<p>{hint} <code>footscan regress --accept REASON</code>.</p>")
     rows = [
-        [f"{one.date:%Y-%m-%d %H:%M}", text(one.by), text(one.software), text(one.reason)] for one in night.accepted
+        [f"{entry.date:%Y-%m-%d %H:%M}", text(entry.by), text(entry.software), text(entry.reason)]
+        for entry in night.accepted
     ]
     first, last = night.nights[0], night.nights[-1]
     shown = f"{len(night.nights)} nights are shown, from {first:%Y-%m-%d} to {last:%Y-%m-%d}."

@@ -1,4 +1,4 @@
-"""What a night came to beside the accepted baseline, as its page and its JUnit file show it."""
+"""The result of a night compared with the accepted baseline, as shown by its page and its JUnit file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -7,48 +7,48 @@ from typing import Literal
 
 Verdict = Literal["better", "same", "worse", "missing", "new"]
 VERDICTS: tuple[Verdict, ...] = ("worse", "missing", "new", "better", "same")
-"""What needs a look, first."""
+"""Verdicts in the order of the page: the most urgent first."""
 
 
 @dataclass(frozen=True)
 class JudgedFigure:
-    """A figure of last night beside the accepted one."""
+    """A figure of the last night beside the accepted one."""
 
     name: str
     """Such as `accuracy.mean_mm`."""
     value: float | None
     accepted: float | None
     allowed: float
-    """By how much it may differ."""
+    """Tolerance."""
     better: str
     """`less`, `more`, `nearer` or `same`."""
     truth: float | None
-    """What is known to be right, of what is better the nearer it is."""
+    """The true value, for a figure that is better the nearer it is to it."""
     verdict: Verdict
     history: Sequence[float | None] = ()
-    """Of each night shown, the last one last; None where there was none."""
+    """Value of each night shown, the last night last; None if a night lacks the figure."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """Something that a step takes, and that is not what it was."""
+    """A changed input of a step: code, parameter, library or data."""
 
     text: str
     """`code of footscan.cloud.fuse changed`"""
     lines: Sequence[tuple[str, str]] = ()
-    """Old and new side by side, those that differ with some around them."""
+    """Old and new lines side by side: those that differ, with their context."""
 
 
 @dataclass(frozen=True)
 class FirstStep:
-    """Where the difference begins."""
+    """A step at which the difference begins."""
 
     steps: Sequence[str]
     """Steps of one kind, such as those of several cameras: `extract-1`."""
     why: str
-    """`its result is another`, `is no more`, `takes longer`..."""
+    """`its result differs`, `no longer exists`, `takes longer`..."""
     changes: Sequence[Change] = ()
-    """What is not as it was in the last good night, or when the baseline was accepted; empty where it is not known."""
+    """Changes since the last good night or the baseline; empty if unknown."""
 
 
 @dataclass(frozen=True)
@@ -57,18 +57,18 @@ class JudgedSet:
 
     name: str
     problem: str | None
-    """Why it could not be run to its end."""
+    """Why the set could not be run to its end."""
     figures: Sequence[JudgedFigure]
     first: Sequence[FirstStep] = ()
     otherwise: int = 0
-    """Steps whose result is not the accepted one."""
+    """Number of steps whose result differs from the accepted one."""
     pictures: Mapping[str, bytes] = field(default_factory=dict)
-    """PNG by caption: how far the present shape lies from the accepted one, or from that of the last good night."""
+    """PNG by caption: distances of the present shape to the accepted one, or to that of the last good night."""
     note: str | None = None
-    """Why there are no pictures, where there should be some."""
+    """Why expected pictures are missing."""
 
     def count(self, *verdicts: Verdict) -> int:
-        """How many figures have one of these verdicts."""
+        """Count the figures with one of these verdicts."""
         return sum(figure.verdict in verdicts for figure in self.figures)
 
 
@@ -84,14 +84,14 @@ class Accepted:
 
 @dataclass(frozen=True)
 class NightResult:
-    """A night."""
+    """The result of a night."""
 
     suite: str
     time: datetime
     software: str
     sets: Sequence[JudgedSet]
     accepted: Sequence[Accepted]
-    """The last one first; empty where nothing was accepted yet."""
+    """The latest entry first; empty if nothing was accepted yet."""
     nights: Sequence[datetime]
     """Ends of the nights whose figures are shown, this one last."""
     notes: Sequence[str] = ()
@@ -99,5 +99,5 @@ class NightResult:
     host: str = ""
 
     def count(self, *verdicts: Verdict) -> int:
-        """How many figures of all sets have one of these verdicts."""
-        return sum(one.count(*verdicts) for one in self.sets)
+        """Count the figures of all sets with one of these verdicts."""
+        return sum(judged_set.count(*verdicts) for judged_set in self.sets)

@@ -1,1 +1,1 @@
-"""What a search for parameters found, and its page."""
+"""Results of a search for parameters, and their page."""

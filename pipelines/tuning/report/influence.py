@@ -1,4 +1,4 @@
-"""How much of what an objective varies by, over trials, goes with one parameter."""
+"""Influence of a parameter: its share of the variance of an objective over the trials."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,18 +8,23 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 CLASSES = 5
-"""A number's values are parted into so many of equal count."""
+"""Number of classes of equal count into which numeric values are divided; chosen by hand."""
 FEWEST = 8
-"""Trials below which nothing is said."""
+"""Least number of trials for a statement; chosen by hand."""
 
 
 def share_of_variance(parameter: Sequence[Any], values: Sequence[float]) -> float | None:
-    """The share, 0 to 1, of the variance of the values' ranks that lies between classes of the parameter.
+    """Share, 0 to 1, of the variance of the ranks of `values` that lies between classes of the parameter.
 
-    A number is parted into classes of equal count, so that an optimum in the midst of its range counts, too; ranks, for
-    a trial that failed must not outweigh all others. What classes explain by chance is taken off (epsilon squared:
-    Kelley, "An unbiased correlation ratio measure", PNAS 1935, doi:10.1073/pnas.21.9.554). None where too few trials,
-    or equal ones, tell nothing.
+    Numbers are divided into classes of equal count, so that an optimum in the middle of the range counts, too. Ranks
+    are used because a failed trial must not outweigh all others. The share that classes explain by chance is subtracted
+    (epsilon squared: Kelley, "An unbiased correlation ratio measure", PNAS 1935, doi:10.1073/pnas.21.9.554). None if
+    there are too few trials, or if they are all equal.
+
+    >>> share_of_variance([1, 1, 1, 1, 2, 2, 2, 2], [1.0, 1.0, 1.0, 1.0, 5.0, 5.0, 5.0, 5.0])
+    1.0
+    >>> share_of_variance([1, 2], [1.0, 5.0]) is None
+    True
     """
     count = len(values)
     ranks = rankdata(values)
@@ -36,7 +41,7 @@ def share_of_variance(parameter: Sequence[Any], values: Sequence[float]) -> floa
 
 
 def _classes(parameter: Sequence[Any]) -> NDArray[np.intp]:
-    """The number of the class of each value."""
+    """Number of the class of each value, (N,)."""
     numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in parameter)
     if numbers and len(set(parameter)) > CLASSES:
         return np.asarray((rankdata(parameter) - 1) * CLASSES // len(parameter), np.intp)

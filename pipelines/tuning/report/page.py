@@ -1,4 +1,4 @@
-"""The page of a search for parameters: what was found, and whether to believe it."""
+"""The page of a search for parameters: the winner, and how reliable its gain is."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -12,16 +12,17 @@ from pipelines.tuning.report.result import Gain, Goal, Trial, TuneResult
 from pipelines.tuning.report.stripe_change import COLOURS, change_figures
 
 DECIMALS = {"mm": 4, "%": 2, "s": 2}
+"""Decimals of a value, by its unit."""
 STATUS = {"real": "ok", "fails less": "ok", "real loss": "incomplete", "fails more": "incomplete"}
-"""How a verdict looks; any other is uncertain."""
+"""CSS class of a verdict; any other verdict is uncertain."""
 SHOWN = 60
-"""Trials in the table; of more, those on the front and the first."""
+"""Most trials in the table; beyond, only those on the front and the first ones are shown."""
 
 
 def tune_page(result: TuneResult) -> str:
-    """A self-contained HTML page, the same for the same result."""
+    """Return a self-contained HTML page; the same result gives the same page."""
     best = result.winner.number
-    what = f"Trial {best} of {len(result.trials) - 1} is best" if best else "The present parameters stay"
+    heading = f"Trial {best} of {len(result.trials) - 1} is best" if best else "The present parameters stay"
     parts = [
         section("Outcome", _tiles(result), *_verdicts(result), _notes(result)),
         section("Parameters", _parameters(result)),
@@ -33,11 +34,11 @@ def tune_page(result: TuneResult) -> str:
         else "",
         section("All trials", _trials(result)),
     ]
-    return page(title="footscan tune", kicker="Search for parameters", heading=text(what), parts=parts)
+    return page(title="footscan tune", kicker="Search for parameters", heading=text(heading), parts=parts)
 
 
 def sentences(result: TuneResult) -> list[str]:
-    """In words what the winner gains, by objective."""
+    """Describe the gain of the winner, a sentence per objective."""
     where = "on the held-out scans" if result.held_out else "on the scans that chose it"
     return [f"{gain.goal.name}, {where}: {_sentence(gain)}" for gain in result.held_out or result.gains]
 
@@ -50,20 +51,20 @@ def _verdicts(result: TuneResult) -> Iterator[str]:
 
 def _sentence(gain: Gain) -> str:
     before, after = gain.failed
-    told = ""
+    sentence = ""
     if before or after:
-        told = f"the present parameters fail on {before} of {len(gain.sets)} data sets, the winner on {after}. "
-        told += "On the others: " if gain.both else ""
+        sentence = f"the present parameters fail on {before} of {len(gain.sets)} data sets, the winner on {after}. "
+        sentence += "On the others: " if gain.both else ""
     if not gain.both:
-        return told.strip()
+        return sentence.strip()
     if not gain.mean:
-        return f"{told}no gain."
-    told += f"{'gain' if gain.mean > 0 else 'loss'} {_figure(abs(gain.mean), gain.goal)}"
+        return f"{sentence}no gain."
+    sentence += f"{'gain' if gain.mean > 0 else 'loss'} {_figure(abs(gain.mean), gain.goal)}"
     if gain.spread is None:
-        return f"{told}; a single data set does not tell whether that is real."
+        return f"{sentence}; a single data set does not show whether that is real."
     sets = f"better on {gain.improved} of {len(gain.both)} data sets"
     verdict = "real" if abs(gain.mean) > gain.spread else "no larger than the spread, it can be chance"
-    return f"{told}, {sets}, spread between them {_figure(gain.spread, gain.goal)}: {verdict}."
+    return f"{sentence}, {sets}, spread between them {_figure(gain.spread, gain.goal)}: {verdict}."
 
 
 def _figure(value: float, goal: Goal) -> str:
@@ -182,7 +183,7 @@ def _trials(result: TuneResult) -> str:
 
 
 def _failures(result: TuneResult) -> str:
-    """Why scans failed, each reason once."""
+    """The reasons why scans failed, each once."""
     reasons: dict[str, str] = {}
     for trial in result.trials:
         for scan, problem in trial.problems.items():
@@ -208,11 +209,11 @@ def _written(value: Any) -> str:
 
 
 _INFLUENCE_NOTE = (
-    '<p class="note">Share of what an objective varies by over the trials that goes with the parameter alone, by ranks '
-    "and less what chance explains; a dash where too few trials tell. A sampler that seeks the best does not try all "
-    "values alike, so this is a guide and no measurement.</p>"
+    '<p class="note">Share of the variance of an objective over the trials that the parameter alone explains, by ranks '
+    "and corrected for chance; a dash if there are too few trials. A sampler that seeks the best does not try all "
+    "values equally often, so this is a guide and no measurement.</p>"
 )
 _CHANGES_NOTE = (
-    '<p class="note">Frames of the first scans in which the points that are kept differ most, at most eight; points of '
-    "the winner lie over those of the present parameters.</p>"
+    '<p class="note">Frames of the first scans in which the kept points differ most, at most eight; points of the '
+    "winner lie over those of the present parameters.</p>"
 )

@@ -1,4 +1,4 @@
-"""Plots of trials as SVG: each a point, the present parameters and the winner marked."""
+"""Plots of trials as SVG: each trial is a point; the present parameters and the winner are marked."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -12,15 +12,15 @@ WIDTH, HEIGHT = 360, 240
 LEFT, RIGHT, TOP, BELOW = 52, 10, 8, 34
 """Margins, in units of the drawing."""
 LEAST_TICKS = 3.5
-"""So many of an axis's steps at least lie between its ends."""
+"""Least number of steps between the ends of an axis; chosen by hand."""
 PLAIN, FRONT, PRESENT, WINNER = "#a9b4bf", "#1f6f8b", "#d9822b", "#17632f"
 
 Axis = tuple[str, Sequence[float], Sequence[tuple[float, str]] | None]
-"""Label, value of each trial, and its ticks where they are not those of a number."""
+"""Label, value of each trial, and ticks; None: the ticks of a numeric axis."""
 
 
 def trade_off(first: Goal, second: Goal, trials: Sequence[Trial], winner: Trial) -> str:
-    """Two objectives of each trial against each other; those in which a scan failed are left out."""
+    """Plot two objectives of each trial against each other; trials in which a scan failed are left out."""
     shown = sound(trials)
     label = f"{first.name} and {second.name} of each trial"
     axes = [(_label(goal), [trial.values[goal.name] for trial in shown], None) for goal in (first, second)]
@@ -28,7 +28,7 @@ def trade_off(first: Goal, second: Goal, trials: Sequence[Trial], winner: Trial)
 
 
 def course(goal: Goal, trials: Sequence[Trial], winner: Trial) -> str:
-    """An objective from trial to trial; those in which a scan failed are left out."""
+    """Plot an objective from trial to trial; trials in which a scan failed are left out."""
     shown = sound(trials)
     values = [trial.values[goal.name] for trial in shown]
     return _scatter(
@@ -38,7 +38,7 @@ def course(goal: Goal, trials: Sequence[Trial], winner: Trial) -> str:
 
 
 def by_parameter(name: str, goal: Goal, trials: Sequence[Trial], winner: Trial) -> str:
-    """An objective over the values of one parameter; trials in which a scan failed are left out."""
+    """Plot an objective over the values of one parameter; trials in which a scan failed are left out."""
     shown = sound(trials)
     places, ticks = _places([trial.point[name] for trial in shown])
     values = [trial.values[goal.name] for trial in shown]
@@ -46,7 +46,7 @@ def by_parameter(name: str, goal: Goal, trials: Sequence[Trial], winner: Trial) 
 
 
 def sound(trials: Sequence[Trial]) -> list[Trial]:
-    """Those in which no scan failed; all, where there are none."""
+    """The trials in which no scan failed; all trials if there are none."""
     return [trial for trial in trials if not trial.problems] or list(trials)
 
 
@@ -55,7 +55,7 @@ def _label(goal: Goal) -> str:
 
 
 def _places(values: Sequence[Any]) -> tuple[list[float], list[tuple[float, str]] | None]:
-    """Where values stand along an axis: numbers by their size, others one after another."""
+    """Positions of values on an axis, and its ticks: numbers by their size, other values one after another."""
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return [float(value) for value in values], None
     names = sorted({str(value) for value in values})
@@ -72,10 +72,10 @@ def _scatter(label: str, across: Axis, up: Axis, trials: Sequence[Trial], winner
     def y(value: float) -> float:
         return HEIGHT - BELOW - (value - y_low) / (y_high - y_low) * (HEIGHT - TOP - BELOW)
 
-    drawn = sorted(zip(trials, across[1], up[1], strict=True), key=lambda one: _rank(one[0], winner))
+    drawn = sorted(zip(trials, across[1], up[1], strict=True), key=lambda row: _rank(row[0], winner))
     dots = "".join(
         f'<circle cx="{x(a):.1f}" cy="{y(b):.1f}" r="{3 + _rank(trial, winner) / 2}" fill="{_colour(trial, winner)}">'
-        f"<title>{text(_told(trial))}</title></circle>"
+        f"<title>{text(_caption(trial))}</title></circle>"
         for trial, a, b in drawn
     )
     marks = "".join(
@@ -96,7 +96,7 @@ def _scatter(label: str, across: Axis, up: Axis, trials: Sequence[Trial], winner
 
 
 def _rank(trial: Trial, winner: Trial) -> int:
-    """What is drawn above what."""
+    """Order of drawing; higher ranks are drawn above."""
     if trial.number == winner.number:
         return 3
     return 2 if trial.number == 0 else int(trial.on_front)
@@ -106,7 +106,7 @@ def _colour(trial: Trial, winner: Trial) -> str:
     return (PLAIN, FRONT, PRESENT, WINNER)[_rank(trial, winner)]
 
 
-def _told(trial: Trial) -> str:
+def _caption(trial: Trial) -> str:
     name = f"trial {trial.number}" if trial.number else "at present"
     values = [f"{key} {value:.4g}" for key, value in trial.values.items()]
     return "; ".join([name, *values, *(f"{key} {value}" for key, value in trial.point.items())])
@@ -119,7 +119,7 @@ def _ends(values: Sequence[float]) -> tuple[float, float]:
 
 
 def _ticks(low: float, high: float) -> list[tuple[float, str]]:
-    """Round numbers between two, and how they are written."""
+    """Round numbers between `low` and `high`, and their text."""
     power = 10.0 ** np.floor(np.log10(high - low))
     step = float(next(part * power for part in (2, 1, 0.5, 0.2) if (high - low) / (part * power) >= LEAST_TICKS))
     decimals = max(0, -int(np.floor(np.log10(step))))

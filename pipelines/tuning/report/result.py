@@ -1,4 +1,4 @@
-"""What a search for parameters came to, as its page and its tables show it."""
+"""The result of a search for parameters, as shown by its page and its tables."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from footscan.frames.image import Rgb
 
 @dataclass(frozen=True)
 class Goal:
-    """An objective, and what stands for it."""
+    """An objective, and its meaning with the present scans."""
 
     name: str
     unit: str
@@ -26,64 +26,64 @@ class Trial:
     """A set of parameters that was tried."""
 
     number: int
-    """From 1; 0 is what the workflow has at present."""
+    """Number from 1; 0 are the present parameters of the workflow."""
     point: Mapping[str, Any]
-    """The values of what is sought."""
+    """Values of the searched parameters."""
     values: Mapping[str, float]
-    """Mean over the data sets, by goal; the worst that there is counts for those that failed."""
+    """Mean over the data sets, by goal; a failure counts as the worst value."""
     of_sets: Mapping[str, Mapping[str, float | None]]
-    """By goal, the value of each data set (a scan, or a foot that was scanned more than once); None where it failed."""
+    """Value of each data set (a scan, or a foot that was scanned more than once), by goal; None for a failure."""
     problems: Mapping[str, str]
     """Why scans failed, by scan."""
     on_front: bool = False
-    """Whether no other is as good in all and better in something."""
+    """True if the trial is on the Pareto front."""
 
 
 @dataclass(frozen=True)
 class Gain:
-    """The winner beside the present parameters, by one goal."""
+    """Comparison of the winner with the present parameters, by one goal."""
 
     goal: Goal
     sets: Mapping[str, tuple[float | None, float | None]]
-    """Present and winner's value of each data set; None where that failed."""
+    """Values of each data set: present and winner; None for a failure."""
 
     @property
     def both(self) -> list[tuple[float, float]]:
-        """The values of the data sets on which neither failed."""
+        """Values of the data sets on which neither failed."""
         return [(a, b) for a, b in self.sets.values() if a is not None and b is not None]
 
     @property
     def failed(self) -> tuple[int, int]:
-        """On how many data sets the present parameters fail, and the winner."""
+        """Number of data sets on which the present parameters fail, and the winner."""
         present, winner = zip(*self.sets.values(), strict=True)
         return present.count(None), winner.count(None)
 
     @property
     def means(self) -> tuple[float | None, float | None]:
-        """Present and winner's value over the data sets on which neither failed, or else over those of each."""
+        """Mean values, present and winner, over the data sets on which neither failed (if none: each over its own)."""
         columns = zip(*(self.both or self.sets.values()), strict=True)
-        known = [[value for value in column if value is not None] for column in columns]
-        present, winner = (fmean(values) if values else None for values in known)
+        succeeded = [[value for value in column if value is not None] for column in columns]
+        present, winner = (fmean(values) if values else None for values in succeeded)
         return present, winner
 
     @property
     def mean(self) -> float | None:
-        """By how much the winner is better over those; negative where it is worse."""
+        """Mean gain of the winner over the data sets on which neither failed; negative for a loss."""
         return fmean(self._by) if self.both else None
 
     @property
     def spread(self) -> float | None:
-        """Standard deviation of that between the data sets; None of a single one."""
+        """Standard deviation of the gain between the data sets; None for a single data set."""
         return stdev(self._by) if len(self.both) > 1 else None
 
     @property
     def improved(self) -> int:
-        """On how many data sets the winner is better."""
+        """Number of data sets on which the winner is better."""
         return sum(better > 0 for better in self._by)
 
     @property
     def verdict(self) -> str:
-        """In a word whether to believe in it."""
+        """Verdict on the gain in a word or two."""
         before, after = self.failed
         if before != after:
             return "fails less" if after < before else "fails more"
@@ -103,31 +103,31 @@ class Gain:
 
 @dataclass(frozen=True)
 class FrameChange:
-    """A frame in which the winner finds other points than the present parameters."""
+    """A frame in which winner and present parameters keep different points."""
 
     scan: str
     camera: int
     frame: int
     image: Rgb
     present: NDArray[np.float64]
-    """(N, 2) columns and rows of the points that the present parameters keep, px."""
+    """(N, 2) columns and rows, px, of the points kept with the present parameters."""
     winner: NDArray[np.float64]
-    """(M, 2)"""
+    """(M, 2) columns and rows, px, of the points kept with the winner."""
 
 
 @dataclass(frozen=True)
 class TuneResult:
-    """What a search came to."""
+    """The result of a search."""
 
     goals: Sequence[Goal]
     sampler: str
     notes: Sequence[str]
-    """What a reader must know to judge it."""
+    """Notes that a reader needs to judge the result."""
     trials: Sequence[Trial]
-    """The present parameters first."""
+    """All trials; the first is that of the present parameters."""
     winner: Trial
     gains: Sequence[Gain]
-    """On the data sets that decided."""
+    """Gains on the data sets that decided."""
     held_out: Sequence[Gain]
-    """On those that did not; empty where none was held out."""
+    """Gains on the held-out data sets; empty if none was held out."""
     changes: Sequence[FrameChange]

@@ -1,4 +1,4 @@
-"""Where two sets of stripe points differ, and how that looks over the frame."""
+"""Differences of two sets of stripe points, by frame and drawn over the frame."""
 
 from collections.abc import Sequence
 
@@ -13,12 +13,12 @@ from footscan.stripe.points import StripePoints
 from pipelines.tuning.report.result import FrameChange
 
 FAR_PX = 10.0
-"""A point that has no other so near in the same frame differs by that much."""
+"""Largest difference of a point: that of a point without another one nearer than this; chosen by hand."""
 COLOURS = {"present": "#ff9f1c", "winner": "#2ee6ff"}
 
 
 def change_by_frame(a: StripePoints, b: StripePoints, count: int) -> NDArray[np.float64]:
-    """(count,) px: distances from each point to the nearest of the other set in its frame, added up frame by frame.
+    """Sum of the distances from each point to the nearest of the other set in its frame, px, by frame: (count,).
 
     Parameters
     ----------
@@ -38,12 +38,12 @@ def change_by_frame(a: StripePoints, b: StripePoints, count: int) -> NDArray[np.
 
 
 def change_figures(changes: Sequence[FrameChange]) -> str:
-    """Each frame cropped around its stripe, the points of both sets over it: as SVG."""
+    """Draw each frame, cropped around its stripe, with the points of both sets, as SVG."""
     return '<div class="frames">\n' + "\n".join(_figure(change) for change in changes) + "\n</div>"
 
 
 def _apart(points: StripePoints) -> NDArray[np.float64]:
-    """Places in which points of two frames are never near."""
+    """Positions (N, 3) in which points of different frames are never near each other."""
     return np.column_stack([points["frame"] * (2 * FAR_PX), points["i"], points["j"]])
 
 

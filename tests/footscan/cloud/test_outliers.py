@@ -14,7 +14,7 @@ Views = dict[int, View]
 
 
 WITH_ENDS = OutlierParameters(end_points=0)
-"""What other tests look at is told more easily where the ends of stripes stay."""
+"""Parameters that keep the ends of stripes, which simplifies the other tests."""
 
 
 def line(camera: int, frame: int, start: tuple[float, float], end: tuple[float, float], count: int = 40) -> np.ndarray:
@@ -119,7 +119,7 @@ def test_speckles_are_isolated(ellipsoid: Film, views: Views) -> None:
 
 
 def above(clean: np.ndarray, camera: int, by_mm: float) -> np.ndarray:
-    """What one camera sees of the top, in 16 frames, so much higher."""
+    """The top as one camera sees it, in 16 frames, raised by so much."""
     ghost = clean[(clean["camera"] == camera) & (clean["z"] > 42) & (abs(clean["frame"] - 30) < 8)].copy()
     ghost["z"] += by_mm
     ghost["source"] += 1_000_000

@@ -6,7 +6,7 @@ from footscan.stripe.points import STRIPE_DTYPE
 from schemas.calibration import CameraCalibration, PolynomialMap
 
 MIDDLE = 200
-"""Of 401 points, so far from the ends that these hardly count."""
+"""The middle of 401 points, far enough from the ends that these hardly count."""
 
 
 def camera(**more: object) -> CameraCalibration:

@@ -15,35 +15,35 @@ def sheet(z: float, half: float = 30.0, middle: float = 0.0) -> np.ndarray:
 
 
 def answers(parts: list[tuple[int, np.ndarray]], views: list[View | None]) -> list[np.ndarray]:
-    """What is said of the points of each part, (number of its camera, points)."""
+    """The answers for the points of each part, (number of its camera, points)."""
     xyz = np.concatenate([points for _, points in parts])
     camera = np.concatenate([np.full(len(points), number, np.uint8) for number, points in parts])
     voxels = voxelise(xyz, (2.0, 1.0, 1.0))
-    said = ask_others(xyz, camera, voxels.voxel, views, voxels, sight_of(xyz, camera, len(views), voxels))
-    return np.split(said, np.cumsum([len(points) for _, points in parts])[:-1])
+    answer = ask_others(xyz, camera, voxels.voxel, views, voxels, sight_of(xyz, camera, len(views), voxels))
+    return np.split(answer, np.cumsum([len(points) for _, points in parts])[:-1])
 
 
-def middle_of(said: np.ndarray, points: np.ndarray) -> np.ndarray:
+def middle_of(answer: np.ndarray, points: np.ndarray) -> np.ndarray:
     inner = (points[:, 0] > 30) & (points[:, 0] < 50) & (np.abs(points[:, 1] - points[:, 1].mean()) < 4)
-    return said[inner]
+    return answer[inner]
 
 
 def test_what_two_cameras_see_is_confirmed() -> None:
-    for said in answers([(0, sheet(0.0)), (1, sheet(0.5))], [LEFT, RIGHT]):
-        assert (said == CONFIRMED).all()
+    for answer in answers([(0, sheet(0.0)), (1, sheet(0.5))], [LEFT, RIGHT]):
+        assert (answer == CONFIRMED).all()
 
 
 @pytest.mark.parametrize("height", [6.0, 15.0])
 def test_what_floats_before_what_another_camera_sees_is_denied(height: float) -> None:
     floating = sheet(height, half=6.0)
-    _, said = answers([(1, sheet(0.0)), (0, floating)], [LEFT, RIGHT])
-    assert (middle_of(said, floating) == DENIED).all()
+    _, answer = answers([(1, sheet(0.0)), (0, floating)], [LEFT, RIGHT])
+    assert (middle_of(answer, floating) == DENIED).all()
 
 
 def test_what_lies_behind_what_others_see_is_denied() -> None:
     behind = sheet(-8.0, half=6.0)
-    _, said = answers([(1, sheet(0.0)), (0, behind)], [LEFT, RIGHT])
-    assert (middle_of(said, behind) == DENIED).all()
+    _, answer = answers([(1, sheet(0.0)), (0, behind)], [LEFT, RIGHT])
+    assert (middle_of(answer, behind) == DENIED).all()
 
 
 def test_what_is_hidden_from_the_other_camera_is_unknown() -> None:
@@ -51,25 +51,25 @@ def test_what_is_hidden_from_the_other_camera_is_unknown() -> None:
     x, z = np.meshgrid(np.arange(0.0, 81.0, 2.0), np.arange(0.0, 60.1, 0.4), indexing="ij")
     wall = np.column_stack([x.ravel(), np.full(x.size, -8.0), z.ravel()])
     ground = sheet(0.0, half=6.0, middle=2.0)
-    _, said = answers([(1, wall), (0, ground)], [LEFT, RIGHT])
-    assert (middle_of(said, ground) == UNKNOWN).all()
+    _, answer = answers([(1, wall), (0, ground)], [LEFT, RIGHT])
+    assert (middle_of(answer, ground) == UNKNOWN).all()
 
 
 def test_what_lies_outside_of_the_others_outline_is_unknown() -> None:
     narrow = View(RIGHT.centre, np.array([[-100.0, -100.0], [-20.0, -100.0], [-20.0, 100.0], [-100.0, 100.0]]))
     own = sheet(0.0, half=6.0)
-    _, said = answers([(1, sheet(0.0, 5.0, -40.0)), (0, own)], [LEFT, narrow])
-    assert (said == UNKNOWN).all()
+    _, answer = answers([(1, sheet(0.0, 5.0, -40.0)), (0, own)], [LEFT, narrow])
+    assert (answer == UNKNOWN).all()
 
 
 def test_a_camera_without_a_picture_of_the_plane_is_not_asked() -> None:
     own = sheet(0.0)
-    _, said = answers([(1, sheet(40.0)[:1]), (0, own)], [LEFT, RIGHT])
-    assert (middle_of(said, own) == UNKNOWN).all()
+    _, answer = answers([(1, sheet(40.0)[:1]), (0, own)], [LEFT, RIGHT])
+    assert (middle_of(answer, own) == UNKNOWN).all()
 
 
 @pytest.mark.parametrize("views", [[None, None], [LEFT, None], [None, RIGHT]])
 def test_cameras_of_unknown_place(views: list[View | None]) -> None:
     floating = sheet(9.0, half=6.0)
-    said = answers([(1, sheet(0.0)), (0, floating)], views)[1]
-    assert set(np.unique(said)) <= {UNKNOWN, DENIED}
+    answer = answers([(1, sheet(0.0)), (0, floating)], views)[1]
+    assert set(np.unique(answer)) <= {UNKNOWN, DENIED}

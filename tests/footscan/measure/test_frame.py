@@ -60,12 +60,12 @@ def test_the_form_tells_the_side(side: Side) -> None:
 
 def test_motion_and_mirroring_change_nothing() -> None:
     foot = known_foot("right")
-    known = framed(foot, POSES["upright"], "right")
+    upright = framed(foot, POSES["upright"], "right")
     for pose in POSES.values():
         mirrored = foot_frame(pose.apply(foot.vertices * [1, -1, 1]) - ABOVE_GLASS, foot.faces[:, ::-1], "left")
         for frame in (framed(foot, pose, "right"), mirrored):
-            np.testing.assert_allclose(frame.vertices, known.vertices, atol=0.003)
-            assert frame.length == pytest.approx(known.length, abs=0.003)
+            np.testing.assert_allclose(frame.vertices, upright.vertices, atol=0.003)
+            assert frame.length == pytest.approx(upright.length, abs=0.003)
 
 
 def test_the_glass_stays_the_floor() -> None:

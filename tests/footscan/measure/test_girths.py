@@ -6,7 +6,7 @@ from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame import FootFrame
 from footscan.measure.girths import girth, tape
 from footscan.measure.outline import Plane
-from footscan.measure.quantity import NotThere, Quantity
+from footscan.measure.quantity import NotMeasurable, Quantity
 
 ALONG = np.array([1.0, 0.0, 0.0])
 
@@ -48,33 +48,33 @@ def around(foot: FootSurface, direction: np.ndarray = ALONG) -> Quantity:
 
 
 def test_a_cylinder() -> None:
-    found = around(surface(prism(ellipse(40, 40))))
-    assert found.value == pytest.approx(2 * np.pi * 40, rel=1e-3)
-    assert found.surface_length == pytest.approx(2 * np.pi * 40, rel=1e-3)
+    measured = around(surface(prism(ellipse(40, 40))))
+    assert measured.value == pytest.approx(2 * np.pi * 40, rel=1e-3)
+    assert measured.surface_length == pytest.approx(2 * np.pi * 40, rel=1e-3)
 
 
 @pytest.mark.parametrize(("a", "b"), [(50.0, 30.0), (45.0, 20.0)])
 def test_an_ellipse_by_ramanujan(a: float, b: float) -> None:
     h = ((a - b) / (a + b)) ** 2
-    known = np.pi * (a + b) * (1 + 3 * h / (10 + np.sqrt(4 - 3 * h)))
-    assert around(surface(prism(ellipse(a, b)))).value == pytest.approx(known, rel=1e-3)
+    exact = np.pi * (a + b) * (1 + 3 * h / (10 + np.sqrt(4 - 3 * h)))
+    assert around(surface(prism(ellipse(a, b)))).value == pytest.approx(exact, rel=1e-3)
 
 
 def test_an_oblique_section() -> None:
     direction = np.array([np.cos(0.5), np.sin(0.5), 0.0])
     a, b = 40.0 / np.cos(0.5), 40.0
     h = ((a - b) / (a + b)) ** 2
-    known = np.pi * (a + b) * (1 + 3 * h / (10 + np.sqrt(4 - 3 * h)))
-    assert around(surface(prism(ellipse(40, 40), 100.0)), direction).value == pytest.approx(known, rel=1e-3)
+    exact = np.pi * (a + b) * (1 + 3 * h / (10 + np.sqrt(4 - 3 * h)))
+    assert around(surface(prism(ellipse(40, 40), 100.0)), direction).value == pytest.approx(exact, rel=1e-3)
 
 
 def test_a_d_with_a_notch() -> None:
     # Half a disc of radius 40 over a flat sole, in which a notch is 20 wide and 24 deep: two sides of 26 mm.
     arc = [(40 * np.cos(t), 40 * np.sin(t)) for t in np.linspace(0, np.pi, 126)]
     corners = [*arc, (-10.0, 0.0), (0.0, 24.0), (10.0, 0.0)]
-    found = around(surface(prism(polygon(corners) + np.array([0.0, -10.0]))))
-    assert found.value == pytest.approx(np.pi * 40 + 80, rel=1e-3)
-    assert found.surface_length == pytest.approx(np.pi * 40 + 60 + 2 * 26, rel=1e-3)
+    measured = around(surface(prism(polygon(corners) + np.array([0.0, -10.0]))))
+    assert measured.value == pytest.approx(np.pi * 40 + 80, rel=1e-3)
+    assert measured.surface_length == pytest.approx(np.pi * 40 + 60 + 2 * 26, rel=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -88,16 +88,16 @@ def test_noise_changes_little(noise: float, seed: int) -> None:
 
 def test_the_errors_of_the_vertices_make_that_of_the_girth() -> None:
     foots = [surface(prism(ellipse(40, 40)), 0.1, seed) for seed in range(40)]
-    found = [around(foot) for foot in foots]
-    told = np.mean(
-        [quantity.sd(np.full(len(foot.noise), 0.1)) or 0 for quantity, foot in zip(found, foots, strict=True)]
+    measured = [around(foot) for foot in foots]
+    predicted = np.mean(
+        [quantity.sd(np.full(len(foot.noise), 0.1)) or 0 for quantity, foot in zip(measured, foots, strict=True)]
     )
-    assert told == pytest.approx(np.std([quantity.value for quantity in found]), rel=0.5)
+    assert predicted == pytest.approx(np.std([quantity.value for quantity in measured]), rel=0.5)
 
 
 def test_a_cylinder_that_grows_by_1_has_a_girth_larger_by_2_pi() -> None:
-    found = around(surface(prism(ellipse(40, 40))))
-    assert found.gradient.sum() == pytest.approx(2 * np.pi, rel=1e-2)
+    measured = around(surface(prism(ellipse(40, 40))))
+    assert measured.gradient.sum() == pytest.approx(2 * np.pi, rel=1e-2)
 
 
 def test_a_girth_follows_its_station() -> None:
@@ -107,13 +107,13 @@ def test_a_girth_follows_its_station() -> None:
     foot = surface(trimesh.Trimesh(vertices, cone.faces, process=False))
     weights = np.zeros(len(vertices))
     weights[0] = 1.0
-    found = girth(
+    measured = girth(
         foot,
         lambda at: (Plane.across(np.array([at[0], 0, 0]), ALONG), np.array([at[0], 0, 0])),
         [Quantity(5.0, weights)],
     )
-    assert found.value == pytest.approx(2 * np.pi * 41, rel=1e-3)
-    assert found.gradient[0] == pytest.approx(2 * np.pi * 0.2, rel=1e-2)
+    assert measured.value == pytest.approx(2 * np.pi * 41, rel=1e-3)
+    assert measured.gradient[0] == pytest.approx(2 * np.pi * 0.2, rel=1e-2)
 
 
 @pytest.mark.parametrize(("width", "problem"), [(3.0, None), (12.0, "a gap of 1[0-4] mm")])
@@ -124,7 +124,7 @@ def test_narrow_gaps_are_closed_and_wide_ones_told(width: float, problem: str | 
     if problem is None:
         assert around(surface(mesh)).value == pytest.approx(2 * np.pi * 40, abs=0.1)
     else:
-        with pytest.raises(NotThere, match=problem):
+        with pytest.raises(NotMeasurable, match=problem):
             around(surface(mesh))
 
 
@@ -136,7 +136,7 @@ def test_the_loop_around_the_seed_is_taken() -> None:
 
 
 def test_short_loops_are_no_section_of_a_foot() -> None:
-    with pytest.raises(NotThere, match="no section"):
+    with pytest.raises(NotMeasurable, match="no section"):
         around(surface(prism(ellipse(9, 9, 60))))
 
 
@@ -144,8 +144,8 @@ def test_a_tape_touches_at_the_corners_of_the_hull() -> None:
     foot = surface(prism(polygon([(-30, -20), (30, -20), (30, 20), (0, 5), (-30, 20)])))
     plane = Plane.across(np.zeros(3), ALONG)
     outline = foot.outline(plane, np.zeros(3))
-    found = tape(outline)
-    assert found.length == pytest.approx(200.0, rel=1e-3)
-    reached = {tuple(corner) for corner in np.round(outline.points[found.corners]).tolist()}
+    measured = tape(outline)
+    assert measured.length == pytest.approx(200.0, rel=1e-3)
+    reached = {tuple(corner) for corner in np.round(outline.points[measured.corners]).tolist()}
     assert {(-30.0, -20.0), (30.0, -20.0), (30.0, 20.0), (-30.0, 20.0)} <= reached
     assert (0.0, 5.0) not in reached

@@ -48,29 +48,29 @@ def values(measures: dict[str, Measure]) -> dict[str, float]:
 
 def test_measures_equal_those_of_the_construction() -> None:
     measures = known_place()
-    for name, known in foot().measures.items():
+    for name, exact in foot().measures.items():
         tolerance = {"arch_index": 0.003}.get(name, 0.15 if "girth" in name else 0.06)
-        assert measures[name].value == pytest.approx(known, abs=tolerance), name
+        assert measures[name].value == pytest.approx(exact, abs=tolerance), name
         assert measures[name].status == "ok"
 
 
 def test_without_help_too() -> None:
-    for name, known in foot().measures.items():
+    for name, exact in foot().measures.items():
         tolerance = {"arch_index": 0.003}.get(name, 0.5 if "girth" in name else 0.3)
-        assert measured().measures[name].value == pytest.approx(known, abs=tolerance), name
+        assert measured().measures[name].value == pytest.approx(exact, abs=tolerance), name
 
 
 def test_what_follows_from_others() -> None:
-    found = values(known_place())
+    result = values(known_place())
     landmarks = foot().landmarks
     across = landmarks["metatarsale_tibiale"] - landmarks["metatarsale_fibulare"]
-    assert found["foot_breadth_diagonal"] == pytest.approx(np.hypot(across[0], across[1]), abs=1e-3)
-    assert found["ball_angle"] == pytest.approx(np.rad2deg(np.arctan2(across[1], across[0])), abs=0.01)
-    assert found["toe_length"] == pytest.approx(found["foot_length"] - found["ball_length"], abs=2e-3)
-    assert found["arch_height_index"] == pytest.approx(found["instep_height"] / found["ball_length"], abs=1e-4)
-    assert found["foot_breadth_max"] == pytest.approx(found["foot_breadth"], abs=0.1)
-    assert found["ball_height"] < found["instep_height"] < found["scan_height"]
-    assert found["instep_girth_min"] <= found["instep_girth"] + 3 if "instep_girth_min" in found else True
+    assert result["foot_breadth_diagonal"] == pytest.approx(np.hypot(across[0], across[1]), abs=1e-3)
+    assert result["ball_angle"] == pytest.approx(np.rad2deg(np.arctan2(across[1], across[0])), abs=0.01)
+    assert result["toe_length"] == pytest.approx(result["foot_length"] - result["ball_length"], abs=2e-3)
+    assert result["arch_height_index"] == pytest.approx(result["instep_height"] / result["ball_length"], abs=1e-4)
+    assert result["foot_breadth_max"] == pytest.approx(result["foot_breadth"], abs=0.1)
+    assert result["ball_height"] < result["instep_height"] < result["scan_height"]
+    assert result["instep_girth_min"] <= result["instep_girth"] + 3 if "instep_girth_min" in result else True
 
 
 def test_a_girth_is_never_longer_than_its_surface() -> None:
@@ -183,13 +183,13 @@ def test_a_landmark_that_is_missing_is_named() -> None:
 
 def test_a_landmark_set_by_hand_counts() -> None:
     point = foot().landmarks["metatarsale_tibiale"] - [5.0, 0.0, 0.0]
-    found = measure_foot(foot().vertices, foot().faces, "right", manual={"metatarsale_tibiale": point})
+    result = measure_foot(foot().vertices, foot().faces, "right", manual={"metatarsale_tibiale": point})
     before = measured().measures["ball_length"].value or 0.0
-    assert found.measures["ball_length"].value == pytest.approx(foot().measures["ball_length"] - 5.0, abs=0.05)
+    assert result.measures["ball_length"].value == pytest.approx(foot().measures["ball_length"] - 5.0, abs=0.05)
     assert before == pytest.approx(foot().measures["ball_length"], abs=0.3)
-    assert found.measures["ball_length"].uncertainty is None
-    assert found.landmarks["metatarsale_tibiale"].method == "manual"
-    assert found.landmarks["metatarsale_tibiale"].point == pytest.approx(point, abs=1e-3)
+    assert result.measures["ball_length"].uncertainty is None
+    assert result.landmarks["metatarsale_tibiale"].method == "manual"
+    assert result.landmarks["metatarsale_tibiale"].point == pytest.approx(point, abs=1e-3)
 
 
 def test_a_calibration_is_applied_and_told() -> None:
@@ -216,10 +216,10 @@ def test_a_real_foot() -> None:
         pytest.skip("FOOTSCAN_DATA is not set")
     vertices, faces = read_mesh(Path(data) / "find" / "template.obj")
     vertices = vertices * 1000 - np.array([0, 0, vertices[:, 2].min() * 1000])
-    found = values(measure_foot(vertices, faces, "left").measures)
+    result = values(measure_foot(vertices, faces, "left").measures)
     # Toes and heel are the model's ends along X, and its axis is turned by less than 5 degrees from there.
-    assert found["foot_length"] == pytest.approx(np.ptp(vertices[:, 0]), abs=2.0)
+    assert result["foot_length"] == pytest.approx(np.ptp(vertices[:, 0]), abs=2.0)
     # Ratios to the length within three standard deviations of ANSUR II.
-    assert found["ball_length"] / found["foot_length"] == pytest.approx(0.740, abs=0.045)
-    assert found["ball_girth"] / found["foot_length"] == pytest.approx(0.93, abs=0.126)
-    assert found["heel_breadth"] / found["foot_length"] == pytest.approx(0.27, abs=0.06)
+    assert result["ball_length"] / result["foot_length"] == pytest.approx(0.740, abs=0.045)
+    assert result["ball_girth"] / result["foot_length"] == pytest.approx(0.93, abs=0.126)
+    assert result["heel_breadth"] / result["foot_length"] == pytest.approx(0.27, abs=0.06)

@@ -5,7 +5,7 @@ from footscan.measure.foot_landmarks import Landmark
 from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame import FootFrame
 from footscan.measure.plantar import arch_index, chippaux_smirak, clarke_angle, footprint, staheli
-from footscan.measure.quantity import NotThere
+from footscan.measure.quantity import NotMeasurable
 
 Block = tuple[int, int, int, int]
 """X from, X to, Y from (lateral), Y to (medial), mm, in steps of STEP."""
@@ -70,7 +70,7 @@ def test_a_print_in_two_parts() -> None:
     foot = standing([HEEL, BALL])
     assert arch_index(foot).value == pytest.approx(0.0, abs=1e-9)
     assert chippaux_smirak(foot).value == 0.0
-    with pytest.raises(NotThere, match="two parts"):
+    with pytest.raises(NotMeasurable, match="two parts"):
         clarke_angle(foot)
 
 
@@ -98,7 +98,7 @@ def tube(corners: list[tuple[float, float]]) -> FootSurface:
 
 
 def test_an_open_sole_gives_no_print() -> None:
-    with pytest.raises(NotThere, match="gap at the sole"):
+    with pytest.raises(NotMeasurable, match="gap at the sole"):
         footprint(standing([HEEL, MIDFOOT, BALL], opened=20.0))
 
 
@@ -106,5 +106,5 @@ def test_a_foot_in_the_air() -> None:
     foot = standing([HEEL, MIDFOOT, BALL])
     raised = foot.mesh.vertices + np.array([0.0, 0.0, 30.0])
     frame = FootFrame(raised, foot.mesh.faces.astype(np.int32), raised, np.eye(4), "toe2", 250.0)
-    with pytest.raises(NotThere, match="does not reach the floor"):
+    with pytest.raises(NotMeasurable, match="does not reach the floor"):
         footprint(FootSurface(frame, foot.landmarks))

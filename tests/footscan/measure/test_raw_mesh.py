@@ -39,14 +39,14 @@ def test_what_may_be_inches_or_a_child_in_centimetres_must_be_stated() -> None:
         taken(foot.vertices * 12.3 / 262, foot.faces)
     mesh = taken(foot.vertices * 12.3 / 262, foot.faces, unit="cm")
     assert foot_frame(mesh.vertices, mesh.faces, "right").length == pytest.approx(123.0, abs=0.2)
-    assert "cm, given" in mesh.notes[0]
+    assert "cm, as stated" in mesh.notes[0]
 
 
 def test_a_surface_that_looks_inward_is_turned_over() -> None:
     foot = known_foot()
     mesh = taken(foot.vertices, foot.faces[:, ::-1])
     np.testing.assert_array_equal(mesh.faces, taken(foot.vertices, foot.faces).faces)
-    assert mesh.notes == ("the surface looked inward and was turned over",)
+    assert mesh.notes == ("the surface faced inward and was turned over",)
 
 
 def test_open_meshes_are_accepted() -> None:
@@ -120,9 +120,9 @@ def test_no_foot_is_a_finding(shape: Shape, problem: str) -> None:
         mesh = taken(*shape)
         foot_frame(mesh.vertices, mesh.faces, "unknown")
 
-    with pytest.raises(Finding, match=problem) as told:
+    with pytest.raises(Finding, match=problem) as caught:
         measured()
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_coordinates_that_are_no_numbers_are_a_finding() -> None:

@@ -15,9 +15,9 @@ def rough_sphere(noise: float) -> Roughness:
 
 @pytest.mark.parametrize("noise", [0.05, 0.1, 0.3])
 def test_noise_is_told(noise: float) -> None:
-    told = rough_sphere(noise).noise
-    assert np.median(told) == pytest.approx(noise, rel=0.1)
-    assert np.quantile(told, [0.01, 0.99]) == pytest.approx([noise, noise], rel=0.5)
+    estimate = rough_sphere(noise).noise
+    assert np.median(estimate) == pytest.approx(noise, rel=0.1)
+    assert np.quantile(estimate, [0.01, 0.99]) == pytest.approx([noise, noise], rel=0.5)
 
 
 def test_a_smooth_surface_has_none() -> None:
@@ -38,10 +38,10 @@ def test_a_sharp_edge_is_noise_only_to_its_neighbours() -> None:
     for _ in range(4):
         mesh = mesh.subdivide()  # edges of 2.5 mm
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-    told = roughness(vertices, vertex_normals(vertices, faces), faces).deviation
+    estimate = roughness(vertices, vertex_normals(vertices, faces), faces).deviation
     inner = np.sort(np.abs(vertices), axis=1)[:, 1] < 20 - 4 * 2.5
     assert np.count_nonzero(inner) > 100
-    np.testing.assert_allclose(told[inner], 0.0, atol=1e-6)
+    np.testing.assert_allclose(estimate[inner], 0.0, atol=1e-6)
 
 
 def test_a_mesh_too_small_to_tell() -> None:

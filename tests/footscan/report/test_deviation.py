@@ -69,7 +69,7 @@ def test_four_pictures_with_their_colours(faces: np.ndarray) -> None:
 
 
 def redder(picture: np.ndarray, row: int) -> bool:
-    """Whether a patch of the picture, 20 pixels wide, has more red than blue."""
+    """True if a patch of the picture, 20 pixels wide, has more red than blue."""
     column = picture.shape[1] // 2
     red, _, blue = picture[row - 10 : row + 10, column - 10 : column + 10].mean(axis=(0, 1))
     assert abs(red - blue) > 15

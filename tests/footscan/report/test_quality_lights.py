@@ -1,4 +1,4 @@
-"""Lights and lines that judge a scan, at and beyond their limits."""
+"""Lights and lines that judge a scan, at their limits and beyond."""
 
 import re
 from typing import Any

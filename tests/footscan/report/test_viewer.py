@@ -53,7 +53,7 @@ def test_drawings_and_landmarks_are_in_the_frame_of_the_points() -> None:
 
 
 def test_a_surface_in_shreds_stays_within_16_bits():
-    """30,000 triangles that are not joined cannot become fewer: those that have numbers are shown, whole."""
+    """30,000 separate triangles cannot be decimated: only triangles whose corners have 16-bit numbers are shown."""
     corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     places = np.arange(30_000)
     vertices = (corner + np.column_stack([places % 200 * 2, places // 200 * 2, places * 0])[:, None]).reshape(-1, 3)

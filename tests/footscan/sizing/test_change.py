@@ -83,7 +83,7 @@ def test_measures_that_cannot_be_compared(make_foot: MakeFoot, table: SizeTable)
     )
     change = change_over_time(earlier, later, table)
     length, waist, heel = (row(change, name) for name in ("foot_length", "waist_girth", "heel_girth"))
-    assert (length.difference, length.significant, length.note) == (10.0, None, "defined otherwise then and now")
+    assert (length.difference, length.significant, length.note) == (10.0, None, "the definition changed")
     assert (waist.difference, waist.significant, waist.note) == (None, None, "later: incomplete")
     assert (heel.difference, heel.note) == (None, "in cm and in mm")
-    assert "measured along other axes: toe2 and ball_center" in change.notes
+    assert "measured along different axes: toe2 and ball_center" in change.notes

@@ -56,7 +56,7 @@ def test_a_last_a_file_is_called_as_the_file(tmp_path: Path) -> None:
         ("left", "links", "row 2, column side: expected left, right or both, found 'links'"),
         ("330,20", "330", "row 2: expected 8 cells, found 7"),
         ("heel_girth_mm", "heel_grith_mm", "row 1: unknown column 'heel_grith_mm', did you mean 'heel_girth_mm'?"),
-        ("heel_girth_mm", "size", "row 1, column size: stands twice, expected each column once"),
+        ("heel_girth_mm", "size", "row 1, column size: is listed twice, expected each column once"),
         ("ball_girth_mm", "waist_girth_mm", "row 1: column ball_girth_mm is missing, expected it in the header"),
         ("Derby,41,F,left", ",,,left", "row 2: has no name, expected one in column last, or an article"),
     ],
@@ -70,7 +70,7 @@ def test_a_bad_cell_is_named_in_one_line(tmp_path: Path, old: str, new: str, sai
 
 @pytest.mark.parametrize(("cell", "said"), [(";", "';'"), ("\t", "tabs")])
 def test_cells_parted_otherwise_are_seen(tmp_path: Path, cell: str, said: str) -> None:
-    expected = f"row 1: cells are parted by {said}, expected ',' between them and a decimal point in numbers"
+    expected = f"row 1: cells are separated by {said}, expected ',' between them and a decimal point in numbers"
     with pytest.raises(RefusedInput, match=f"{expected}$"):
         read_lasts(lasts_in(tmp_path, TABLE.replace(",", cell)))
 
@@ -81,11 +81,11 @@ def test_a_last_that_stands_twice_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RefusedInput) as caught:
         read_lasts(tmp_path)
     twice, first = (f"{tmp_path / name}: row {row}" for name, row in (("b.csv", 2), ("a.csv", 3)))
-    assert str(caught.value) == f"{twice}: last 'Derby 41 F' stands in {first} already, expected once"
+    assert str(caught.value) == f"{twice}: last 'Derby 41 F' is listed in {first} already, expected once"
 
 
 def test_a_folder_without_lasts_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RefusedInput, match=r"no lasts here, expected CSV files with a last a row$"):
+    with pytest.raises(RefusedInput, match=r"no lasts here, expected CSV files with one last per row$"):
         read_lasts(tmp_path)
     with pytest.raises(RefusedInput, match="row 1: column length_mm is missing, expected it in the header"):
         read_lasts(lasts_in(tmp_path, "\n"))

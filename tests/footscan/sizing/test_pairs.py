@@ -103,10 +103,13 @@ def test_mixed_up_sides_are_refused(make_foot: MakeFoot, table: SizeTable, first
     assert str(caught.value) == said
 
 
-def test_an_unknown_side_is_taken_as_said(make_foot: MakeFoot, table: SizeTable) -> None:
+def test_an_unknown_side_is_assumed_as_stated(make_foot: MakeFoot, table: SizeTable) -> None:
     left = make_foot("unknown", source="a", patient="P1", foot_length=1.0, side_note="looks like a right foot")
     right = make_foot("right", patient="P1")
-    assert compare_pair(left, right, table).notes == ["a: side unknown, taken as said", "a: looks like a right foot"]
+    assert compare_pair(left, right, table).notes == [
+        "a: side unknown, assumed as stated",
+        "a: looks like a right foot",
+    ]
 
 
 def test_feet_of_two_people_are_refused(make_foot: MakeFoot, table: SizeTable) -> None:
@@ -116,4 +119,4 @@ def test_feet_of_two_people_are_refused(make_foot: MakeFoot, table: SizeTable) -
     assert compare_pair(left, right, table).notes == ["of two patients: P1 and P2"]
     unknown = make_foot("right")
     refuse_other_patient(left, unknown)
-    assert compare_pair(left, unknown, table).notes == ["patient not known of both, taken as one"]
+    assert compare_pair(left, unknown, table).notes == ["patient unknown for one or both, assumed to be the same"]

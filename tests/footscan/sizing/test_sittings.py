@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from footscan.sizing.sittings import latest_changes, latest_pair, passed_over
+from footscan.sizing.sittings import feet_left_out, latest_changes, latest_pair
 from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
 
@@ -24,13 +24,13 @@ def names(feet: tuple[Foot, Foot] | list[Foot]) -> list[str | None]:
 def test_the_latest_day_that_has_both_feet(make_foot: MakeFoot) -> None:
     feet = scans(make_foot, "2026-05-20-L", "2026-05-20-R", "2026-11-20-R", "2026-11-20-L", "2026-12-01-R", "first-R")
     assert names(latest_pair("P1", feet)) == ["2026-11-20-L", "2026-11-20-R"]
-    assert names(passed_over(feet, latest_pair("P1", feet))) == ["2026-12-01-R", "first-R"]
+    assert names(feet_left_out(feet, latest_pair("P1", feet))) == ["2026-12-01-R", "first-R"]
 
 
 def test_without_days_the_only_two_feet(make_foot: MakeFoot) -> None:
     feet = scans(make_foot, "foot-R", "foot-L")
     assert names(latest_pair("P1", feet)) == ["foot-L", "foot-R"]
-    assert passed_over(feet, feet) == []
+    assert feet_left_out(feet, feet) == []
 
 
 def test_a_scan_that_was_not_measured_does_not_count(make_foot: MakeFoot) -> None:

@@ -18,12 +18,12 @@ INCH = 25.4
 TABLE = read_table()
 
 
-def size(found: Sizes, system: str) -> FoundSize:
-    return next(one for one in found.sizes if one.system == system)
+def size(sizes: Sizes, system: str) -> FoundSize:
+    return next(entry for entry in sizes.sizes if entry.system == system)
 
 
-def width(found: Sizes, system: str) -> FoundWidth:
-    return next(one for one in found.widths if one.system == system)
+def width(sizes: Sizes, system: str) -> FoundWidth:
+    return next(entry for entry in sizes.widths if entry.system == system)
 
 
 @pytest.mark.parametrize(
@@ -62,10 +62,10 @@ def width(found: Sizes, system: str) -> FoundWidth:
 def test_a_length_in_every_system(
     make_foot: MakeFoot, table: SizeTable, length: float, system: str, unrounded: float, marked: str
 ) -> None:
-    found = size(foot_sizes(make_foot(foot_length=length), table), system)
-    assert found.unrounded == pytest.approx(unrounded, abs=0.0051)
-    assert found.size == marked
-    assert found.decided_by == "foot_length"
+    sizes = size(foot_sizes(make_foot(foot_length=length), table), system)
+    assert sizes.unrounded == pytest.approx(unrounded, abs=0.0051)
+    assert sizes.size == marked
+    assert sizes.decided_by == "foot_length"
 
 
 def test_brannocks_size_1_is_a_foot_of_7_inches_and_two_thirds(table: SizeTable) -> None:
@@ -88,13 +88,13 @@ def test_brannocks_size_1_is_a_foot_of_7_inches_and_two_thirds(table: SizeTable)
 def test_childrens_sizes_begin_again_after_thirteen_and_a_half(
     make_foot: MakeFoot, table: SizeTable, inches: float, uk: str, us: str
 ) -> None:
-    found = foot_sizes(make_foot(foot_length=inches * INCH), table, "children")
-    assert (size(found, "uk_children").size, size(found, "us_children").size) == (uk, us)
+    sizes = foot_sizes(make_foot(foot_length=inches * INCH), table, "children")
+    assert (size(sizes, "uk_children").size, size(sizes, "us_children").size) == (uk, us)
 
 
 def test_after_the_restart_a_childs_uk_size_is_an_adults(make_foot: MakeFoot, table: SizeTable) -> None:
-    found = foot_sizes(make_foot(foot_length=225.0), table)
-    child, adult = size(found, "uk_children"), size(found, "uk")
+    sizes = foot_sizes(make_foot(foot_length=225.0), table)
+    child, adult = size(sizes, "uk_children"), size(sizes, "uk")
     assert child.size == adult.size == "3.5"
     assert child.unrounded == pytest.approx(adult.unrounded)
 
@@ -148,12 +148,12 @@ def test_a_long_arch_decides_the_us_size(
     unrounded: float,
     marked: str,
 ) -> None:
-    found = foot_sizes(make_foot(foot_length=length, ball_length=ball), table)
-    us = size(found, "us_men")
+    sizes = foot_sizes(make_foot(foot_length=length, ball_length=ball), table)
+    us = size(sizes, "us_men")
     assert (us.decided_by, us.size) == (decided_by, marked)
     assert us.unrounded == pytest.approx(unrounded, abs=0.0051)
     assert ("the arch decides" in (us.note or "")) == (decided_by == "ball_length")
-    assert size(found, "eu").decided_by == "foot_length"
+    assert size(sizes, "eu").decided_by == "foot_length"
 
 
 def test_mondopoint_has_the_breadth_behind_a_slash(make_foot: MakeFoot, table: SizeTable) -> None:
@@ -237,8 +237,8 @@ def test_widths_by_girth(
 
 
 def test_the_unrounded_width_counts_steps_from_the_middle(make_foot: MakeFoot, table: SizeTable) -> None:
-    found = width(foot_sizes(make_foot(foot_length=250.0, ball_girth=250.5), table), "japan_men")
-    assert (found.middle, found.steps, found.width) == ("E", 1.25, "EE")
+    sizes = width(foot_sizes(make_foot(foot_length=250.0, ball_girth=250.5), table), "japan_men")
+    assert (sizes.middle, sizes.steps, sizes.width) == ("E", 1.25, "EE")
 
 
 def test_beyond_a_scale_there_is_no_size_and_a_reason(make_foot: MakeFoot, table: SizeTable) -> None:
@@ -256,38 +256,38 @@ def test_beyond_a_scale_there_is_no_size_and_a_reason(make_foot: MakeFoot, table
 
 def test_without_a_length_there_is_no_size_and_a_reason(make_foot: MakeFoot, table: SizeTable) -> None:
     gap = {"value": None, "status": "incomplete", "note": "the surface has a gap here"}
-    found = foot_sizes(make_foot(foot_length=gap, ball_girth=250.0), table)
-    assert {one.size for one in found.sizes} == {None}
-    assert {one.note for one in found.sizes} == {"foot_length is incomplete: the surface has a gap here"}
-    assert {one.width for one in found.widths} == {None}
+    sizes = foot_sizes(make_foot(foot_length=gap, ball_girth=250.0), table)
+    assert {entry.size for entry in sizes.sizes} == {None}
+    assert {entry.note for entry in sizes.sizes} == {"foot_length is incomplete: the surface has a gap here"}
+    assert {entry.width for entry in sizes.widths} == {None}
     no_foot = foot_sizes(make_foot(finding="it is a block"), table)
-    assert {one.note for one in no_foot.sizes} == {"nothing was measured: it is a block"}
+    assert {entry.note for entry in no_foot.sizes} == {"nothing was measured: it is a block"}
 
 
 @pytest.mark.parametrize("reading", [{"value": 26.5, "unit": "cm"}, {"value": 26.5}, {"value": -3.0}, {"value": 1e11}])
 def test_what_is_no_length_in_mm_gives_no_size(
     make_foot: MakeFoot, table: SizeTable, reading: dict[str, object]
 ) -> None:
-    found = foot_sizes(make_foot(foot_length=reading), table)
-    assert {one.size for one in found.sizes} == {None}
-    assert all("expected 60 to 500 mm" in (one.note or "") for one in found.sizes)
+    sizes = foot_sizes(make_foot(foot_length=reading), table)
+    assert {entry.size for entry in sizes.sizes} == {None}
+    assert all("expected 60 to 500 mm" in (entry.note or "") for entry in sizes.sizes)
 
 
 def test_a_misspelt_measure_is_told_of(make_foot: MakeFoot, table: SizeTable) -> None:
-    found = foot_sizes(make_foot(foot_lenght=270.0), table)
-    assert {one.note for one in found.sizes} == {"no foot_length was measured, but there is 'foot_lenght'"}
+    sizes = foot_sizes(make_foot(foot_lenght=270.0), table)
+    assert {entry.note for entry in sizes.sizes} == {"no foot_length was measured, but there is 'foot_lenght'"}
 
 
 def test_an_uncertain_measure_is_told_of(make_foot: MakeFoot, table: SizeTable) -> None:
     uncertain = {"value": 250.0, "status": "uncertain", "note": "12 % filled"}
-    found = foot_sizes(make_foot(foot_length=270.0, ball_girth=uncertain), table)
-    assert width(found, "japan_men").width == "D"
-    assert width(found, "japan_men").note == "ball_girth is uncertain: 12 % filled"
-    assert size(found, "eu").note is None
+    sizes = foot_sizes(make_foot(foot_length=270.0, ball_girth=uncertain), table)
+    assert width(sizes, "japan_men").width == "D"
+    assert width(sizes, "japan_men").note == "ball_girth is uncertain: 12 % filled"
+    assert size(sizes, "eu").note is None
 
 
 def test_only_the_sizes_of_those_who_are_asked_for(make_foot: MakeFoot, table: SizeTable) -> None:
-    found = foot_sizes(make_foot(foot_length=270.0), table, "women")
-    systems = {one.system for one in found.sizes} | {one.system for one in found.widths}
+    sizes = foot_sizes(make_foot(foot_length=270.0), table, "women")
+    systems = {entry.system for entry in sizes.sizes} | {entry.system for entry in sizes.widths}
     assert {"us_women", "us_women_iso", "japan_women", "eu", "us"} <= systems
     assert not {"us_men", "uk_children", "japan_men"} & systems

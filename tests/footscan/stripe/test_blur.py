@@ -1,4 +1,4 @@
-"""What is told from a film's stripe by its blur, in crossings written down one by one."""
+"""Pieces that are rejected by their blur, in crossings written down by hand."""
 
 import numpy as np
 import pytest
@@ -25,8 +25,8 @@ def kept(*pieces, frames=FRAMES, **parameters):
     stripe = crossings(20, 4.0, 0.04, 60.0)
     sizes = [20, *map(len, pieces)]
     piece = np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
-    given = PARAMETERS.model_copy(update=parameters)
-    parts = np.split(is_laser_light(np.concatenate([stripe, *pieces]), piece, frames, given), np.cumsum(sizes)[:-1])
+    changed = PARAMETERS.model_copy(update=parameters)
+    parts = np.split(is_laser_light(np.concatenate([stripe, *pieces]), piece, frames, changed), np.cumsum(sizes)[:-1])
     assert all(part.all() or not part.any() for part in parts)  # pieces are judged, not crossings
     assert parts[0].all()
     return [bool(part.all()) for part in parts[1:]]

@@ -158,6 +158,6 @@ def test_noise_moves_the_centre_in_proportion(method):
     slopes = np.gradient(gaussian(0.0))
     bound = 2.0 / np.sqrt(np.sum(slopes**2))
     noise = generator.normal(0, 2.0, (400, 41))
-    errors = [centre(gaussian(0.0) + one, method, base=4.0) - MIDDLE for one in noise]
+    errors = [centre(gaussian(0.0) + error, method, base=4.0) - MIDDLE for error in noise]
     assert bound * 0.9 < np.std(errors) < {"gravity": 1.3, "gaussian": 1.15, "ridge": 1.1, "fir": 1.2}[method] * bound
     assert abs(np.mean(errors)) < 0.005

@@ -1,4 +1,4 @@
-"""How points hang together, on points written down along made-up stripes."""
+"""Links between points, on points of made-up stripes."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What stands still and what comes once, in films written down point by point."""
+"""Static pieces and pieces of a single frame, in films written down point by point."""
 
 import numpy as np
 import pytest

@@ -39,7 +39,7 @@ def rms(errors):
 
 
 def lines_with_a_point(coordinates):
-    """How many columns (or rows) of the image have a point."""
+    """The number of columns (or rows) of the image that have a point."""
     return len(np.unique(np.rint(coordinates)))
 
 

@@ -1,4 +1,4 @@
-"""Which pieces are the stripe, on points written down as rows of a made-up stripe."""
+"""Selection of the pieces that are the stripe, on points of made-up stripes."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ def turned(profiles):
 
 def kept(*pieces, gap=5.0, **limits):
     """For each of the pieces whether it is kept; None where a part of it is."""
-    given = {
+    arguments = {
         "smallest_contrast": 32.0, "shortest": 12.0, "ghost_reach": 60.0, "ghost_strength": 0.05, "group_gap": 40.0,
         "smallest_group": 0.15,
     } | limits  # fmt: skip
@@ -33,7 +33,7 @@ def kept(*pieces, gap=5.0, **limits):
     for way in (lambda profiles: profiles, turned):
         profiles = way(np.concatenate(pieces))
         piece, count = pieces_of(profiles, gap, place(profiles, 480, 640))
-        keep = keep_stripe(profiles, piece, count, *given.values())
+        keep = keep_stripe(profiles, piece, count, *arguments.values())
         parts = np.split(keep, np.cumsum([len(part) for part in pieces])[:-1])
         results.append([bool(part.all()) if part.all() or not part.any() else None for part in parts])
     assert results[0] == results[1]

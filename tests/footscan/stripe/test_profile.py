@@ -14,14 +14,14 @@ RED = 2
 
 def measure(image, *ridge, background=None, **limits):
     """The profile of an image at the ridge (i, j, normal i, normal j), None where there is none."""
-    given = {
+    arguments = {
         "red_threshold": 5, "saturation": 250, "faintest": 5.0, "largest_width": 10.0, "centre_level": 0.25,
         "method": METHODS.index("gravity"),
     } | limits  # fmt: skip
     words = as_words(np.asarray(image, np.uint8))
     light = words if background is None else as_words(np.asarray(image - np.minimum(image, background), np.uint8))
     profiles = np.empty((1, COLUMNS))
-    found = measure_profiles(words, light, np.array([[*ridge, 7.0]]), Limits(**given), profiles)
+    found = measure_profiles(words, light, np.array([[*ridge, 7.0]]), Limits(**arguments), profiles)
     return profiles[0] if found else None
 
 

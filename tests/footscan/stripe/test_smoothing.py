@@ -47,7 +47,7 @@ def rms(values, axis=None):
 
 
 def of_a_parabola(reach):
-    """What the value in the middle of a parabola, fitted to 2 reach + 1 points a step apart, keeps of their noise."""
+    """The noise of a parabola's middle value, fitted to 2 reach + 1 points, relative to that of a point."""
     steps = np.arange(-reach, reach + 1.0)
     design = np.stack([steps**0, steps, steps**2], axis=1)
     return np.sqrt(np.linalg.inv(design.T @ design)[0, 0])
@@ -161,7 +161,7 @@ def test_beside_corners_and_steps_errors_stay_near_the_noise(shape, sigma):
     count = 121 if shape is corner else 120
     errors = [noise(count, sigma, seed) for seed in range(100)]
     t = shape(errors[0])[0]
-    after = np.array([one + smoothed(shape(one)[1], 10)[0] for one in errors])
+    after = np.array([error + smoothed(shape(error)[1], 10)[0] for error in errors])
     beside, far = (np.abs(t) >= 4) & (np.abs(t) < 24), (np.abs(t) >= 24) & (np.abs(t) < 100)
     assert rms(after[:, beside], axis=0).max() < 1.5 * sigma + 0.05
     assert rms(after[:, beside]) < 1.1 * sigma + 0.01

@@ -125,9 +125,9 @@ def test_foot_is_met() -> None:
 
 def test_same_bytes_again() -> None:
     cloud = sphere(400_000)
-    one, two = closed(*cloud), closed(*cloud)
-    assert one.vertices.tobytes() == two.vertices.tobytes()
-    assert one.faces.tobytes() == two.faces.tobytes()
+    first, second = closed(*cloud), closed(*cloud)
+    assert first.vertices.tobytes() == second.vertices.tobytes()
+    assert first.faces.tobytes() == second.faces.tobytes()
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 50])

@@ -60,26 +60,26 @@ def collapsed(mesh: Mesh, triangles: int) -> Mesh:
 
 @pytest.mark.parametrize("triangles", PRESETS)
 def test_the_virtual_foot_keeps_its_measures(foot: Mesh, smaller: dict[int, Mesh], triangles: int) -> None:
-    found = smaller[triangles]
-    assert len(found.faces) in (triangles, triangles - 1)
-    assert counts(found) == (0, 0, 1)
-    assert signed_volume(found) == pytest.approx(signed_volume(foot), rel=2e-4)
+    decimated = smaller[triangles]
+    assert len(decimated.faces) in (triangles, triangles - 1)
+    assert counts(decimated) == (0, 0, 1)
+    assert signed_volume(decimated) == pytest.approx(signed_volume(foot), rel=2e-4)
     # Ends as they were: what is outermost does not move, and nothing goes beyond.
     for end in (np.min, np.max):
-        np.testing.assert_allclose(end(found.vertices, axis=0), end(foot.vertices, axis=0), atol=0.01)
-    assert found.vertices[:, 2].min() == foot.vertices[:, 2].min()
-    changed = fidelity(foot, found)
+        np.testing.assert_allclose(end(decimated.vertices, axis=0), end(foot.vertices, axis=0), atol=0.01)
+    assert decimated.vertices[:, 2].min() == foot.vertices[:, 2].min()
+    changed = fidelity(foot, decimated)
     assert changed.kept  # 0.05 and 0.1 mm
     assert changed.surface_max < 0.15
     assert changed.surface_mean < 0.01
 
     # What is known of a vertex is that of the skin there.
-    nearby = found.vertices[~found.filled]
-    np.testing.assert_allclose(found.colours[~found.filled, 0], nearby[:, 0] / 2, atol=3)
-    assert set(found.colours[:, 2]) == {77}
-    assert np.abs(found.camera[~found.filled] - (1 + nearby[:, 0] / 40) + 0.5).max() < 0.7
-    assert np.all(found.vertices[found.filled, 2] > 105)
-    assert found.metadata == foot.metadata
+    nearby = decimated.vertices[~decimated.filled]
+    np.testing.assert_allclose(decimated.colours[~decimated.filled, 0], nearby[:, 0] / 2, atol=3)
+    assert set(decimated.colours[:, 2]) == {77}
+    assert np.abs(decimated.camera[~decimated.filled] - (1 + nearby[:, 0] / 40) + 0.5).max() < 0.7
+    assert np.all(decimated.vertices[decimated.filled, 2] > 105)
+    assert decimated.metadata == foot.metadata
 
 
 def test_every_run_gives_the_same_bytes(foot: Mesh, smaller: dict[int, Mesh]) -> None:
@@ -99,29 +99,29 @@ def test_a_foot_of_another_maker() -> None:
     for _ in range(3):
         vertices, faces = trimesh.remesh.subdivide(vertices, faces)
     template = Mesh(np.asarray(vertices) * scale, np.asarray(faces, np.int32))
-    found = decimate(template, 20_000)
-    assert len(found.faces) in (20_000, 19_999)
-    assert counts(found)[:2] == counts(Mesh(*read_mesh(Path(DATA or "") / "find" / "template.obj")))[:2]
-    assert fidelity(template, found).kept
+    decimated = decimate(template, 20_000)
+    assert len(decimated.faces) in (20_000, 19_999)
+    assert counts(decimated)[:2] == counts(Mesh(*read_mesh(Path(DATA or "") / "find" / "template.obj")))[:2]
+    assert fidelity(template, decimated).kept
 
 
 def test_a_cube_keeps_its_corners() -> None:
     cube = trimesh.creation.box((10.0, 20.0, 30.0))
     fine = cube.subdivide().subdivide().subdivide()
     assert len(fine.faces) == 12 * 4**3
-    found = collapsed(plain(fine), 60)
-    assert len(found.faces) == 60
+    decimated = collapsed(plain(fine), 60)
+    assert len(decimated.faces) == 60
     for corner in cube.vertices:
-        assert np.linalg.norm(found.vertices - corner, axis=1).min() < 1e-3
-    assert signed_volume(found) == pytest.approx(6000, rel=1e-5)
+        assert np.linalg.norm(decimated.vertices - corner, axis=1).min() < 1e-3
+    assert signed_volume(decimated) == pytest.approx(6000, rel=1e-5)
 
 
 def test_holes_through_a_body_stay() -> None:
     """A ring of as few triangles as can be is still one: V - E + F = 0."""
-    found = collapsed(plain(trimesh.creation.torus(30.0, 10.0)), 4)
-    assert counts(found) == (0, 0, 1)
-    assert len(found.vertices) - 3 * len(found.faces) // 2 + len(found.faces) == 0
-    assert 14 <= len(found.faces) < 40  # no ring has fewer than 14 (Möbius 1861)
+    decimated = collapsed(plain(trimesh.creation.torus(30.0, 10.0)), 4)
+    assert counts(decimated) == (0, 0, 1)
+    assert len(decimated.vertices) - 3 * len(decimated.faces) // 2 + len(decimated.faces) == 0
+    assert 14 <= len(decimated.faces) < 40  # no ring has fewer than 14 (Möbius 1861)
 
 
 def test_a_tetrahedron_and_a_triangle_are_the_end() -> None:
@@ -138,15 +138,15 @@ def test_open_rims_stay_where_they_are() -> None:
     vertices = np.column_stack([50 * np.cos(angle), 50 * np.sin(angle), along.ravel() * 3.0])
     a, b = (along * 96 + around)[:-1].ravel(), (along * 96 + (around + 1) % 96)[:-1].ravel()
     faces = np.concatenate([np.column_stack([a, b, b + 96]), np.column_stack([a, b + 96, a + 96])]).astype(np.int32)
-    found = collapsed(Mesh(vertices, faces), 400)
-    quality = mesh_quality(found.vertices, found.faces)
+    decimated = collapsed(Mesh(vertices, faces), 400)
+    quality = mesh_quality(decimated.vertices, decimated.faces)
     assert quality.triangles in (399, 400)
     assert (quality.holes, quality.non_manifold_edges, quality.components) == (2, 0, 1)
     for height in (0, 60):
-        rim = found.vertices[np.abs(found.vertices[:, 2] - height) < 0.01]
+        rim = decimated.vertices[np.abs(decimated.vertices[:, 2] - height) < 0.01]
         assert len(rim) > 20
-    assert np.sum((found.vertices[:, 2] < 0.01) | (found.vertices[:, 2] > 59.99)) == quality.open_edges
-    np.testing.assert_allclose(np.hypot(found.vertices[:, 0], found.vertices[:, 1]), 50, atol=0.2)
+    assert np.sum((decimated.vertices[:, 2] < 0.01) | (decimated.vertices[:, 2] > 59.99)) == quality.open_edges
+    np.testing.assert_allclose(np.hypot(decimated.vertices[:, 0], decimated.vertices[:, 1]), 50, atol=0.2)
 
 
 def test_outermost_vertices_stay_to_the_last_digit(foot: Mesh, smaller: dict[int, Mesh]) -> None:
@@ -163,8 +163,8 @@ def test_no_mesh_is_too_bad(seed: int, vertices: int, faces: int, triangles: int
     random = np.random.default_rng(seed)
     corners = np.array([random.permutation(vertices)[:3] for _ in range(faces)], np.int32)
     mesh = Mesh(random.integers(0, 3, (vertices, 3)).astype(np.float64), corners)
-    found = collapsed(mesh, triangles)
-    assert len(found.faces) <= len(mesh.faces)
-    assert np.all(np.isfinite(found.vertices))
-    assert found.faces.size == 0 or found.faces.max() < len(found.vertices)
-    assert all(len(set(face)) == 3 for face in found.faces.tolist())
+    decimated = collapsed(mesh, triangles)
+    assert len(decimated.faces) <= len(mesh.faces)
+    assert np.all(np.isfinite(decimated.vertices))
+    assert decimated.faces.size == 0 or decimated.faces.max() < len(decimated.vertices)
+    assert all(len(set(face)) == 3 for face in decimated.faces.tolist())

@@ -69,41 +69,41 @@ def test_a_mesh_to_a_cloud_and_the_other_way() -> None:
     vertices, faces = box(10.0)
     x, y = (grid.ravel() for grid in np.meshgrid(np.arange(-5, 5.1, 0.1), np.arange(-5, 0.01, 0.1)))
     cloud = np.column_stack([x, y, np.full(len(x), -5.0)]), NOTHING
-    found = compare(cloud, (vertices, faces), both=True)
-    assert found.max == pytest.approx(0, abs=1e-5)
-    assert found.completeness is not None
-    assert found.completeness.points == 200_000
+    comparison = compare(cloud, (vertices, faces), both=True)
+    assert comparison.max == pytest.approx(0, abs=1e-5)
+    assert comparison.completeness is not None
+    assert comparison.completeness.points == 200_000
     # Within 1 mm: half of the bottom and 1 mm of it beyond, 1 mm of one side, and that of two sides along half their
     # length, with a quarter of a circle at the end.
     area = 50 + 10 + 10 + 2 * (5 + np.pi / 4)
-    assert found.completeness.within_share == pytest.approx(area / 600, rel=0.01)
-    assert found.completeness.max == pytest.approx(np.hypot(10, 5), rel=0.01)
+    assert comparison.completeness.within_share == pytest.approx(area / 600, rel=0.01)
+    assert comparison.completeness.max == pytest.approx(np.hypot(10, 5), rel=0.01)
     back = compare((vertices, faces), cloud)
     assert back.model_dump(exclude={"unit", "transform", "histograms", "completeness"}) == {
-        **found.completeness.model_dump(exclude={"within_mm", "within_share"})
+        **comparison.completeness.model_dump(exclude={"within_mm", "within_share"})
     }
 
 
 def test_regions_are_parts_of_the_whole() -> None:
     foot = make_foot(resolution_mm=2.0)
     shifted = foot.vertices + np.array([0.0, 0, 0.2]), foot.faces
-    found = compare(shifted, (foot.vertices, foot.faces), both=True)
-    assert [region.region for region in found.regions] == ["sole", "heel", "midfoot", "ball", "toes", "ankle"]
-    counts = [region.points or 0 for region in found.regions]
-    assert sum(counts) == found.points == 200_000
-    means = [region.mean for region in found.regions]
-    assert np.average(means, weights=counts) == pytest.approx(found.mean)
-    assert max(region.max for region in found.regions) == found.max
+    comparison = compare(shifted, (foot.vertices, foot.faces), both=True)
+    assert [region.region for region in comparison.regions] == ["sole", "heel", "midfoot", "ball", "toes", "ankle"]
+    counts = [region.points or 0 for region in comparison.regions]
+    assert sum(counts) == comparison.points == 200_000
+    means = [region.mean for region in comparison.regions]
+    assert np.average(means, weights=counts) == pytest.approx(comparison.mean)
+    assert max(region.max for region in comparison.regions) == comparison.max
     # Lifted by 0.2 mm, a surface moves out by 0.2 mm times the rise of its normal.
     mesh = trimesh.Trimesh(foot.vertices, foot.faces, process=False)
     regions = foot_regions((foot.vertices, foot.faces))
     assert regions is not None
     region_of = regions.of(mesh.triangles_center)
-    for row, region in enumerate(found.regions):
+    for row, region in enumerate(comparison.regions):
         rise = np.average(mesh.face_normals[region_of == row, 2], weights=mesh.area_faces[region_of == row])
         assert region.signed_mean == pytest.approx(0.2 * rise, abs=0.01), region.region
-    assert found.completeness is not None
-    assert len(found.completeness.regions) == 6
+    assert comparison.completeness is not None
+    assert len(comparison.completeness.regions) == 6
     assert compare(box(10.0), box(9.0)).regions == []
 
 
@@ -174,9 +174,9 @@ def test_what_cannot_be_compared_is_refused_in_one_line(a: Shape, b: Shape, told
     ids=["one point", "doubled", "planar"],
 )
 def test_odd_clouds_have_their_distances(cloud: np.ndarray) -> None:
-    found = compare((cloud, NOTHING), box(10.0), classes=70)
-    assert (found.mean, found.std, found.p99, found.signed_mean) == pytest.approx((3, 0, 3, 3))
-    assert sum(found.histograms[0].counts) == len(cloud)
+    comparison = compare((cloud, NOTHING), box(10.0), classes=70)
+    assert (comparison.mean, comparison.std, comparison.p99, comparison.signed_mean) == pytest.approx((3, 0, 3, 3))
+    assert sum(comparison.histograms[0].counts) == len(cloud)
 
 
 @pytest.mark.parametrize("to_cloud", [False, True], ids=["to a mesh", "to a cloud"])

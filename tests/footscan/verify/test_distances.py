@@ -15,10 +15,10 @@ def box(size: float, centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Me
 
 def test_to_a_mesh_by_hand() -> None:
     points = np.array([[0.0, 0, 0], [0, 0, 7], [5, 5, 5], [8, 9, 5], [4, 0, 0]])
-    found = distances_to_mesh(points, box(10.0))
-    assert found.signed is not None
-    np.testing.assert_allclose(found.signed, [-5, 2, 0, 5, -1], atol=1e-6)
-    np.testing.assert_allclose(found.unsigned, [5, 2, 0, 5, 1], atol=1e-6)
+    distances = distances_to_mesh(points, box(10.0))
+    assert distances.signed is not None
+    np.testing.assert_allclose(distances.signed, [-5, 2, 0, 5, -1], atol=1e-6)
+    np.testing.assert_allclose(distances.unsigned, [5, 2, 0, 5, 1], atol=1e-6)
 
 
 def test_far_from_the_origin_nothing_is_lost() -> None:

@@ -22,13 +22,13 @@ def around(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def test_the_normals_of_a_cube_by_hand() -> None:
     cube = trimesh.creation.box(extents=(2, 2, 2))
-    found = sides((np.asarray(cube.vertices), np.asarray(cube.faces, np.int32)))
+    normals = sides((np.asarray(cube.vertices), np.asarray(cube.faces, np.int32)))
     # Three right angles meet at a corner, be they of one triangle or of two.
-    np.testing.assert_allclose(found.of_vertices, np.sign(found.vertices) * np.pi / 2, atol=1e-12)
-    middles = (found.vertices[found.faces[:, [1, 2, 0]]] + found.vertices[found.faces[:, [2, 0, 1]]]) / 2
+    np.testing.assert_allclose(normals.of_vertices, np.sign(normals.vertices) * np.pi / 2, atol=1e-12)
+    middles = (normals.vertices[normals.faces[:, [1, 2, 0]]] + normals.vertices[normals.faces[:, [2, 0, 1]]]) / 2
     # Of an edge: the two faces' normals; a diagonal's middle is that of a face of the cube.
     diagonal = np.sum(np.abs(middles) > 0.5, axis=2) == 1
-    np.testing.assert_allclose(found.of_edges, np.where(diagonal[..., None], 2, 1) * middles, atol=1e-12)
+    np.testing.assert_allclose(normals.of_edges, np.where(diagonal[..., None], 2, 1) * middles, atol=1e-12)
 
 
 @pytest.mark.parametrize("seen_from_inside", [False, True])

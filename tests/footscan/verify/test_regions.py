@@ -34,9 +34,9 @@ def test_landmarks_lie_in_their_regions(side: Side, turn: float) -> None:
     }
     places = np.array([scanned.landmarks[name] for name in expected])
     high = places + np.array([0, 0, 15.0])  # tips of toes and the ball's sides stand near the sole's limit
-    told = dict(zip(expected, (REGIONS[k] for k in regions.of(high)), strict=True))
-    del told["landing_point"]
-    assert told == {name: region for name, region in expected.items() if name != "landing_point"}
+    names = dict(zip(expected, (REGIONS[k] for k in regions.of(high)), strict=True))
+    del names["landing_point"]
+    assert names == {name: region for name, region in expected.items() if name != "landing_point"}
     assert REGIONS[regions.of(scanned.landmarks["landing_point"][None])[0]] == "sole"
 
 
@@ -48,9 +48,9 @@ def test_limits_are_shares_of_the_length() -> None:
     heights = np.array([[0.3, SOLE - 0.001], [0.3, SOLE], [0.3, ANKLE - 0.001], [0.3, ANKLE], [0.9, -1.0], [0.9, 2.0]])
     x, z = np.concatenate([shares, heights]).T * regions.length
     points = np.column_stack([x, np.zeros(len(x)), z, np.ones(len(x))]) @ np.linalg.inv(regions.transform).T
-    told = [REGIONS[k] for k in regions.of(points[:, :3])]
-    assert told[:7] == ["heel", "midfoot", "midfoot", "ball", "ball", "toes", "heel"]
-    assert told[7:] == ["sole", "midfoot", "midfoot", "ankle", "sole", "ankle"]
+    names = [REGIONS[k] for k in regions.of(points[:, :3])]
+    assert names[:7] == ["heel", "midfoot", "midfoot", "ball", "ball", "toes", "heel"]
+    assert names[7:] == ["sole", "midfoot", "midfoot", "ankle", "sole", "ankle"]
 
 
 @pytest.mark.parametrize(

@@ -89,9 +89,9 @@ def moved(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
 def end_of(of: Shape, onto: Shape, number: int, parameters: RegistrationParameters = QUICK) -> np.ndarray:
     """(V, 3) where the vertices come to lie from start `number`."""
     begun = moved(of[0], start(number))
-    found = register((begun, of[1]), onto, parameters)
-    assert found.verdict == "same shape"
-    return moved(begun, np.array(found.transform))
+    registration = register((begun, of[1]), onto, parameters)
+    assert registration.verdict == "same shape"
+    return moved(begun, np.array(registration.transform))
 
 
 def furthest(a: np.ndarray, b: np.ndarray) -> float:
@@ -116,26 +116,28 @@ def test_a_real_foot_model_from_random_starts_ends_where_it_was() -> None:
 
 
 def test_a_known_motion_is_undone() -> None:
-    known = start(5)
-    found = register((moved(tee()[0], known), tee()[1]), tee(), QUICK)
-    np.testing.assert_allclose(np.array(found.transform), np.linalg.inv(known), atol=1e-4)
-    assert (found.after.rms, found.after.inliers, found.after.overlap) == pytest.approx((0, 1, 1), abs=1e-4)
-    assert found.before.rms > 10
-    assert found.runner_up is not None
-    assert found.runner_up.rms > 1
-    assert 1 <= found.agreeing <= found.starts == 504
+    start_pose = start(5)
+    registration = register((moved(tee()[0], start_pose), tee()[1]), tee(), QUICK)
+    np.testing.assert_allclose(np.array(registration.transform), np.linalg.inv(start_pose), atol=1e-4)
+    assert (registration.after.rms, registration.after.inliers, registration.after.overlap) == pytest.approx(
+        (0, 1, 1), abs=1e-4
+    )
+    assert registration.before.rms > 10
+    assert registration.runner_up is not None
+    assert registration.runner_up.rms > 1
+    assert 1 <= registration.agreeing <= registration.starts == 504
 
 
 def test_either_may_be_a_cloud() -> None:
-    known = start(6)
+    start_pose = start(6)
     points = cloud(tee(), 4000)
-    onto_mesh = register((moved(points[0], known), NO_FACES), tee(), QUICK)
-    assert furthest(moved(moved(points[0], known), np.array(onto_mesh.transform)), points[0]) < 0.05
-    onto_cloud = register((moved(tee()[0], known), tee()[1]), points, QUICK)
-    assert furthest(moved(moved(tee()[0], known), np.array(onto_cloud.transform)), tee()[0]) < 0.05
-    for found in (onto_mesh, onto_cloud):
-        assert 0.05 < found.after.rms < 0.15  # the noise
-        assert np.linalg.det(np.array(found.transform)[:3, :3]) == pytest.approx(1)
+    onto_mesh = register((moved(points[0], start_pose), NO_FACES), tee(), QUICK)
+    assert furthest(moved(moved(points[0], start_pose), np.array(onto_mesh.transform)), points[0]) < 0.05
+    onto_cloud = register((moved(tee()[0], start_pose), tee()[1]), points, QUICK)
+    assert furthest(moved(moved(tee()[0], start_pose), np.array(onto_cloud.transform)), tee()[0]) < 0.05
+    for registration in (onto_mesh, onto_cloud):
+        assert 0.05 < registration.after.rms < 0.15  # the noise
+        assert np.linalg.det(np.array(registration.transform)[:3, :3]) == pytest.approx(1)
 
 
 def test_a_part_is_brought_onto_the_whole(foot: Shape, scan: Shape) -> None:
@@ -145,9 +147,9 @@ def test_a_part_is_brought_onto_the_whole(foot: Shape, scan: Shape) -> None:
 
 def test_a_left_foot_is_not_taken_for_a_right_one(foot: Shape) -> None:
     mirrored = foot[0] * [1, -1, 1], foot[1][:, ::-1]
-    found = register(mirrored, foot, QUICK)
-    assert found.verdict == "different shapes"
-    assert np.linalg.det(np.array(found.transform)[:3, :3]) == pytest.approx(1)
+    registration = register(mirrored, foot, QUICK)
+    assert registration.verdict == "different shapes"
+    assert np.linalg.det(np.array(registration.transform)[:3, :3]) == pytest.approx(1)
 
 
 def test_doubled_points_change_nothing_much() -> None:
@@ -188,16 +190,16 @@ GRID = np.stack(np.meshgrid(np.arange(20.0), np.arange(30.0), [0.0]), axis=-1).r
         (np.where(np.isnan(NOT_A_NUMBER), 1e300, NOT_A_NUMBER), "1 of 201 points are no numbers or beyond"),
         (GRID, "is flat, 0 mm thick"),
         (np.tile([[30.0, 40.0, 50.0]], (500, 1)), "is flat, 0 mm thick and 0 mm long"),
-        (np.tile(sample_surface(*tee(), 50), (10, 1)), "50 of 500 points lie apart, expected at least 100"),
+        (np.tile(sample_surface(*tee(), 50), (10, 1)), "50 of 500 points are distinct, expected at least 100"),
         (sample_surface(*tee(), 500) / 1000, "shapes of"),
     ],
     ids=["empty", "one point", "nan", "huge", "planar", "one place", "doubled", "metres"],
 )
 def test_what_cannot_be_registered_is_a_finding(points: np.ndarray, problem: str) -> None:
     for moving, fixed in (((points, NO_FACES), tee()), (tee(), (points, NO_FACES))):
-        with pytest.raises(Finding, match=problem) as found:
+        with pytest.raises(Finding, match=problem) as registration:
             register(moving, fixed)
-        assert "\n" not in str(found.value)
+        assert "\n" not in str(registration.value)
 
 
 def test_a_plane_and_triangles_without_area_are_findings() -> None:
@@ -209,8 +211,8 @@ def test_a_plane_and_triangles_without_area_are_findings() -> None:
 
 
 def test_is_a_document_that_can_be_read_back() -> None:
-    found = register((moved(tee()[0], start(9)), tee()[1]), tee(), QUICK)
-    assert Registration.model_validate_json(found.model_dump_json()) == found
+    registration = register((moved(tee()[0], start(9)), tee()[1]), tee(), QUICK)
+    assert Registration.model_validate_json(registration.model_dump_json()) == registration
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no way here to take processors away")

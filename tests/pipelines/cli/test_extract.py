@@ -139,7 +139,7 @@ def test_a_parameter_is_heeded(extract: Extract, frame: Path) -> None:
         (["red_threshold="], "--set: red_threshold: input should be a valid integer"),
         (["red_threshold"], "--set: expected NAME=VALUE, found 'red_threshold'"),
         (["=22"], "--set: expected NAME=VALUE, found '=22'"),
-        (["gap_px=2", "gap_px=3"], "--set: gap_px: stands twice, expected each parameter once"),
+        (["gap_px=2", "gap_px=3"], "--set: gap_px: is listed twice, expected each parameter once"),
         (["faintest_contrast=13"], "--set: faintest_contrast: expected at most smallest_contrast, 12, found 13"),
         (["smallest_contrast=5.5"], "--set: faintest_contrast: expected at most smallest_contrast, 5.5, found 6"),
     ],

@@ -178,8 +178,8 @@ def test_a_foot_in_a_bad_state_is_measured_all_the_same(run: Run, tmp_path: Path
     assert status == 0
     assert lines == [
         f"{file}: 1 small part apart from the foot left out",
-        f"{file}: {np.count_nonzero(turned)} triangles looked otherwise than those beside them and were turned over",
-        f"{file}: coordinates in cm, told by the length of 26.2, were multiplied by 10 to have mm",
+        f"{file}: {np.count_nonzero(turned)} triangles faced against their neighbours and were turned over",
+        f"{file}: coordinates in cm, inferred from the length of 26.2, were multiplied by 10 to obtain mm",
         f"{file}: toes and ball look like those of a right foot",
     ]
     assert json.loads(printed) == json.loads(out.read_bytes())

@@ -1,4 +1,4 @@
-"""A console over a scanner that is none, and a way to ask it as a page does."""
+"""A console over a stand-in of the scanner, and a client that acts as a page."""
 
 import sys
 import time
@@ -41,7 +41,7 @@ def console(scanner: StandIn, results: Path) -> Iterator[Console]:
 
 @pytest.fixture
 def until(console: Console) -> Until:
-    """Waits until what a page sees is as it should be."""
+    """Wait until the state that a page sees is as expected."""
 
     def wait(is_so: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         end = time.monotonic() + GENEROUS_SECONDS
@@ -55,7 +55,7 @@ def until(console: Console) -> Until:
 
 @pytest.fixture
 def web(console: Console) -> Iterator[TestClient]:
-    """As the page asks: of this server, with the page's name."""
+    """A client that sends the headers of a page of this server."""
     headers = {"origin": ADDRESS, "x-footscan-page": PAGE}
     app = application(console, "127.0.0.1", None)
     with TestClient(app, base_url=ADDRESS, headers=headers, follow_redirects=False) as client:

@@ -1,4 +1,4 @@
-"""A scanner that is none: it films in no time, and what goes wrong with it is what a test wants to."""
+"""A stand-in of the scanner: it films in no time, and fails as a test wants it to."""
 
 import json
 import threading
@@ -18,13 +18,13 @@ from schemas.base.errors import Fault, RefusedInput
 CAMERAS = tuple(range(1, 9))
 GENEROUS_SECONDS = 60.0
 Deliver = Callable[[Path, Side], None]
-"""Puts the results of a scan into a folder that is there."""
+"""Puts the results of a scan into an existing folder."""
 
 
 class StandIn:
     """A `Scanner` with three heads and eight cameras.
 
-    `pause` says in which activities it waits for `go` to be set; `step_seconds` is how long each of ten steps takes.
+    In the activities in `pause` it waits for `go` to be set; `step_seconds` is the time of each of ten steps.
     """
 
     def __init__(self, results: Path, deliver: "Deliver | None" = None, step_seconds: float = 0.0) -> None:
@@ -68,7 +68,7 @@ class StandIn:
             words = "not connected", "check its USB cable and its power, then connect"
             return Health([Device("Controller", "bad", *words)], CAMERAS)
         devices = [Device("Controller", "ok", "the heads stand" if self._homed else "ready; heads not homed")]
-        unknown = "warning", "where it stands is not known", "home the heads"
+        unknown = "warning", "position unknown", "home the heads"
         devices += [Device(f"Head {n}", *(("ok", "at X = -18.0 mm") if self._homed else unknown)) for n in (1, 2, 3)]
         for camera in CAMERAS:
             if camera == self.lost_camera:
@@ -191,7 +191,7 @@ def stripe_jpeg(lit: bool) -> bytes:
 
 
 def deliver_made_up(folder: Path, side: Side) -> None:
-    """Results as a scan has them, of an egg instead of a foot."""
+    """Write the results of a scan of an egg instead of a foot."""
     egg = trimesh.creation.icosphere(subdivisions=3)
     vertices = np.asarray(egg.vertices) * [130.0, 48.0, 40.0] + [200.0, 0.0, 40.0]
     mesh = Mesh(vertices, np.asarray(egg.faces, np.int32), camera=np.full(len(vertices), 3, np.uint8))

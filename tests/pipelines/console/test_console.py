@@ -1,4 +1,4 @@
-"""One operator, one thing at a time, and a stop that is always there."""
+"""The console: one operator, one action at a time, and a Stop that is always available."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -81,7 +81,7 @@ def test_a_second_page_looks_on_may_stop_and_may_take_over(
     for order in ("home", "connect", "shine", "resume", "new-person"):
         answer = web.post(f"/do/{order}", json={}, headers=second)
         assert answer.status_code == 409
-        assert "another one is in charge" in answer.json()["problem"]
+        assert "another page is in charge" in answer.json()["problem"]
     assert scanner.calls == ["connect"]
     assert web.post("/do/stop", json={}, headers=second).status_code == 204
     assert scanner.calls == ["connect", "stop"]

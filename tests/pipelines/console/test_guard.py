@@ -1,4 +1,4 @@
-"""What another site's page may ask for, and that whoever has charge hears of it; a token on loopback."""
+"""The guard: requests of other sites, the warning to the operator, and a token on loopback."""
 
 import pytest
 from conftest import ADDRESS, PAGE, Until
@@ -16,7 +16,7 @@ TOKEN = "t0ken-that-nobody-guesses"
 
 @pytest.fixture
 def stranger(console: Console) -> TestClient:
-    """A browser that another site's page has sent here."""
+    """A browser that sends requests for a page of another site."""
     return TestClient(application(console, "127.0.0.1", None), base_url=ADDRESS)
 
 
@@ -69,7 +69,7 @@ def test_what_a_stranger_is_called_is_text(stranger: TestClient, until: Until) -
 
 
 def test_a_token_is_wanted_on_loopback_where_it_is_asked_for(console: Console, scanner: StandIn) -> None:
-    """Another account of this computer has the address, and no token."""
+    """Another account of this computer has the address, but no token."""
     guarded = TestClient(application(console, "127.0.0.1", TOKEN), base_url=ADDRESS, follow_redirects=False)
     order = {"origin": ADDRESS, "x-footscan-page": PAGE}
     for path in ("/", "/static/link.js", "/cameras/1.jpg", "/results/P1/S1/foot.stl", "/?token=wrong"):

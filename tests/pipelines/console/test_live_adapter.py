@@ -1,11 +1,11 @@
-"""The live scanner in words: what is not there is named, with what to do."""
+"""The live scanner in words: missing devices are named with a remedy."""
 
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from pipelines.console.live_adapter import OverLive
+from pipelines.console.live_adapter import LiveAdapter
 from pipelines.console.scanner import Side
 from pipelines.live.scanner import STOPPED, LiveScanner
 from schemas.base.errors import FootscanError
@@ -20,8 +20,8 @@ RIG = {
 
 
 @pytest.fixture
-def over_nothing(tmp_path: Path) -> OverLive:
-    """Over a rig of which nothing is plugged in."""
+def over_nothing(tmp_path: Path) -> LiveAdapter:
+    """An adapter over a rig without any connected device."""
     rig = Rig.model_validate(
         {
             "format": "footscan.rig/1",
@@ -30,14 +30,14 @@ def over_nothing(tmp_path: Path) -> OverLive:
             "cameras": [{"id": camera, "device": f"http://127.0.0.1:9/{camera}"} for camera in (1, 5)],
         }
     )
-    return OverLive(LiveScanner(rig), tmp_path / "archive", tmp_path / "results", tmp_path / "calibration.json")
+    return LiveAdapter(LiveScanner(rig), tmp_path / "archive", tmp_path / "results", tmp_path / "calibration.json")
 
 
-def test_what_is_not_connected_is_told(over_nothing: OverLive) -> None:
+def test_what_is_not_connected_is_told(over_nothing: LiveAdapter) -> None:
     health = over_nothing.health()
     told = {device.name: (device.level, device.words) for device in health.devices}
     assert told["Controller"] == ("bad", "not connected")
-    assert told["Head 2"] == ("unknown", "not known")
+    assert told["Head 2"] == ("unknown", "position unknown")
     assert told["Camera 5"] == ("unknown", "not open")
     assert told["Passes"] == ("ok", "All 2 cameras in one pass: cameras 1, 5 on no USB bus of this computer.")
     assert told["Disk"][1].endswith("GB are free for scans")
@@ -47,12 +47,12 @@ def test_what_is_not_connected_is_told(over_nothing: OverLive) -> None:
     assert over_nothing.picture(1) is None
 
 
-def test_orders_to_nothing_are_faults_and_a_stop_is_none(over_nothing: OverLive, tmp_path: Path) -> None:
+def test_orders_to_nothing_are_faults_and_a_stop_is_none(over_nothing: LiveAdapter, tmp_path: Path) -> None:
     over_nothing.stop()
     for order in (over_nothing.connect, over_nothing.home, over_nothing.resume, over_nothing.shine):
         with pytest.raises(FootscanError):
             order()
-    with pytest.raises(FootscanError, match=r"^camera 1: latency: has none"):
+    with pytest.raises(FootscanError, match=r"^camera 1: latency: is missing"):
         over_nothing.film("P1", "right", keep_partial=False)
     assert not (tmp_path / "archive").exists()
     over_nothing.close()
@@ -69,7 +69,7 @@ def test_a_foot_that_is_put_onto_the_glass_is_told_and_can_be_stopped(tmp_path: 
         over.stop()
         assert side == "left"
 
-    over = OverLive(scanner, tmp_path / "archive", tmp_path / "results", place_foot=place)
+    over = LiveAdapter(scanner, tmp_path / "archive", tmp_path / "results", place_foot=place)
     with pytest.raises(FootscanError, match="stopped"):
         over.film("P1", "left", keep_partial=False)
     words = "a virtual left foot is put onto the glass"

@@ -1,8 +1,8 @@
-"""Which page is in charge."""
+"""The page in charge: entering, leaving, taking over."""
 
 import pytest
 
-from pipelines.console.operator_lock import GONE_SECONDS, Charge
+from pipelines.console.operator_lock import GONE_SECONDS, OperatorLock
 from schemas.base.errors import RefusedInput
 
 
@@ -15,7 +15,7 @@ class Clock:
 
 def test_the_first_page_is_in_charge_until_it_is_gone() -> None:
     clock = Clock()
-    charge = Charge(clock)
+    charge = OperatorLock(clock)
     assert charge.holder is None
     charge.enter("one")
     charge.enter("two")
@@ -23,7 +23,7 @@ def test_the_first_page_is_in_charge_until_it_is_gone() -> None:
     charge.leave("one")
     clock.now += GONE_SECONDS - 0.1
     assert charge.holder == "one", "it may only be loading another page"
-    with pytest.raises(RefusedInput, match="another one is in charge"):
+    with pytest.raises(RefusedInput, match="another page is in charge"):
         charge.need("two")
     clock.now += 0.2
     assert charge.holder is None
@@ -33,7 +33,7 @@ def test_the_first_page_is_in_charge_until_it_is_gone() -> None:
 
 def test_a_page_that_is_loaded_anew_stays_in_charge() -> None:
     clock = Clock()
-    charge = Charge(clock)
+    charge = OperatorLock(clock)
     charge.enter("one")
     charge.leave("one")
     clock.now += 1.0
@@ -44,7 +44,7 @@ def test_a_page_that_is_loaded_anew_stays_in_charge() -> None:
 
 def test_two_streams_of_one_page_count_as_one() -> None:
     clock = Clock()
-    charge = Charge(clock)
+    charge = OperatorLock(clock)
     charge.enter("one")
     charge.enter("one")
     charge.leave("one")
@@ -53,7 +53,7 @@ def test_two_streams_of_one_page_count_as_one() -> None:
 
 
 def test_taking_over() -> None:
-    charge = Charge(Clock())
+    charge = OperatorLock(Clock())
     charge.enter("one")
     charge.enter("two")
     charge.take("two")

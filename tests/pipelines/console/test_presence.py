@@ -1,4 +1,4 @@
-"""Whether the page that moves heads is there: who is heard, and what is done where nobody is."""
+"""Presence of the page that moves heads: its reports, and the stop without them."""
 
 import threading
 import time
@@ -16,7 +16,7 @@ PAGE, OTHER = "a" * 16, "b" * 16
 
 
 def moved(presence: Presence, speaks: str | None, seconds: float) -> tuple[float, str]:
-    """How long heads moved that stop when they are told to, and what was said of it; a page speaks meanwhile."""
+    """Move heads while a page reports its presence; returns the time of the move, and the message of its failure."""
     stopped, ended = threading.Event(), threading.Event()
 
     def speak() -> None:

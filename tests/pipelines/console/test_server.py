@@ -1,4 +1,4 @@
-"""What the server lets in, what it tells, and what it never gives away."""
+"""The server: admitted requests, answers, and files that it never sends."""
 
 import json
 import os
@@ -96,7 +96,7 @@ def test_another_site_links_to_pages_alone(web: TestClient, console: Console, pa
 
 
 def test_a_link_to_the_events_is_refused_whatever_the_browser_tells(web: TestClient, console: Console) -> None:
-    """Browsers say where a request is from on loopback and with TLS only."""
+    """Browsers send the origin of a request only on loopback and with TLS."""
     assert web.get("/events?page=cccccccccccccccc", headers={"accept": "text/html,*/*"}).status_code == 403
     assert not console.seen_by("c" * 16)["in_charge"]
 
@@ -272,7 +272,7 @@ def test_live_pictures_come_with_their_stripe(web: TestClient, scanner: StandIn)
 
 @pytest.fixture
 def guarded(console: Console) -> TestClient:
-    """On another address than loopback."""
+    """A server on an address other than loopback."""
     return TestClient(application(console, "0.0.0.0", TOKEN), base_url="http://10.0.0.7:8760", follow_redirects=False)
 
 

@@ -1,4 +1,4 @@
-"""Results that are swapped under a console that serves them: one clear line, no error, nothing left open."""
+"""Results that change while the console serves them: one clear line, no exception, no open file."""
 
 import json
 import os
@@ -41,7 +41,7 @@ def foot(results: Path) -> Path:
 
 def _socket(path: Path) -> None:
     before = Path.cwd()
-    os.chdir(path.parent)  # an address of a socket is short
+    os.chdir(path.parent)  # the path of a socket must be short
     with socket.socket(socket.AF_UNIX) as one:
         one.bind(path.name)
     os.chdir(before)
@@ -70,7 +70,7 @@ NO_FILES: dict[str, Callable[[Path], None]] = {
 
 @contextmanager
 def swapped(path: Path, make: Callable[[Path], None]) -> Iterator[None]:
-    """Something else stands in place of a file."""
+    """Replace a file by something else."""
     kept = path.with_name("kept")
     path.rename(kept)
     make(path)
@@ -81,7 +81,7 @@ def swapped(path: Path, make: Callable[[Path], None]) -> Iterator[None]:
 
 
 def descriptors() -> list[str]:
-    """What this process has open."""
+    """The open files of this process."""
     return sorted(file.name for file in Path("/proc/self/fd").iterdir())
 
 
@@ -195,7 +195,7 @@ def test_a_page_is_that_of_the_files_that_lie_there(web: TestClient, foot: Path)
 
 
 def test_a_download_that_becomes_shorter_is_cut_off(console: Console, foot: Path) -> None:
-    """The server, over a real connection: what is not whole does not look so, and is told to nobody else."""
+    """The server, over a real connection: an incomplete answer is recognisable, its error goes to no other client."""
     size = 64 * 2**20
     _sparse(size)(foot / "foot.stl")
     with listen("127.0.0.1", 0) as listening:
@@ -213,7 +213,7 @@ def test_a_download_that_becomes_shorter_is_cut_off(console: Console, foot: Path
 
 
 def _half_a_download(address: tuple[str, int], file: Path) -> tuple[int, int]:
-    """How much came of a file that was emptied as its first part had come, and how much was told to."""
+    """Bytes received of a file that was emptied after its first part, and its content-length."""
     with socket.create_connection(address, 30) as connection:
         connection.sendall(b"GET /results/P1/R/foot.stl HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
         begin = b""

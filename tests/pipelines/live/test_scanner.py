@@ -1,4 +1,4 @@
-"""The live scanner with a virtual board and two cameras that film a made-up foot: what it keeps, says and refuses."""
+"""The live scanner with a virtual board and two cameras that film a made-up foot: stored scans, states, refusals."""
 
 import datetime
 import threading
@@ -37,12 +37,12 @@ DAY = datetime.date(2026, 11, 20)
 RATE = 20.0
 LATENCY_S = 0.04
 STEP_MM = 10.0
-"""Between two pictures of the made-up foot."""
+"""Spacing of the pictures of the made-up foot."""
 
 
 @dataclass
 class Bench:
-    """A scanner, its world, and where its scans go."""
+    """A scanner, its world, and the folder of its scans."""
 
     scanner: LiveScanner
     board: Board
@@ -66,7 +66,7 @@ class Bench:
 
 @pytest.fixture
 def bench(pristine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    # A busy host times frames badly and says so: how well places must be known is not what is tested here.
+    # A busy host times frames badly and reports it; the accuracy of positions is not tested here.
     monkeypatch.setattr(storing, "LARGEST_SD_MM", 5.0)
     monkeypatch.setattr(frame_positions, "LARGEST_SD_MM", 5.0)
     with open_bench(pristine, tmp_path) as one:
@@ -150,7 +150,7 @@ def test_a_camera_that_fails_costs_the_scan_unless_it_is_to_be_kept(bench: Bench
     bench.scanner.home()
     cut = bench.streams._cameras[5]
     when_filming(bench, lambda: cut._cut(True))
-    with pytest.raises(Finding, match="the scan is not whole: camera 5"):
+    with pytest.raises(Finding, match="the scan is incomplete: camera 5"):
         bench.scanner.scan(bench.order())
     assert bench.scanner.state.name == "failed"
     bench.assert_dark_and_empty()
@@ -258,7 +258,7 @@ def test_a_disk_that_fills_up_ends_the_travel(bench: Bench, monkeypatch: pytest.
 def test_a_camera_without_a_latency_is_refused_before_anything_moves(bench: Bench) -> None:
     cameras = [camera.model_copy(update={"latency": None}) for camera in bench.scanner.rig.cameras]
     bench.scanner.rig = bench.scanner.rig.model_copy(update={"cameras": cameras})
-    with pytest.raises(RefusedInput, match="camera 1: latency: has none in the rig"):
+    with pytest.raises(RefusedInput, match="camera 1: latency: is missing in the rig"):
         bench.scanner.scan(bench.order())
     bench.assert_dark_and_empty()
 
@@ -274,7 +274,7 @@ def test_the_light_is_chosen_where_none_is_given(bench: Bench) -> None:
 
 
 def when_filming(bench: Bench, happens: object) -> None:
-    """Has something happen in the middle of the next travel with light."""
+    """Cause an event in the middle of the next travel with light."""
     assert callable(happens)
 
     def watch() -> None:

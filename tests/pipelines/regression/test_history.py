@@ -1,4 +1,4 @@
-"""The history of nights: whatever befalls one of them, no line of another is lost."""
+"""The history of nights: if a night fails, no line of another night is lost."""
 
 import subprocess
 import sys

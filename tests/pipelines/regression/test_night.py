@@ -1,4 +1,4 @@
-"""A night with the small archive: nothing has changed, something has, and what befalls a night."""
+"""A night with the small archive: without changes, with changes, and with failures."""
 
 import re
 import shutil
@@ -25,7 +25,7 @@ sets:
 
 
 def ignore(_: object) -> None:
-    """Nobody listens."""
+    """Ignore the end of a step."""
 
 
 def reason(text: str) -> Acceptance:
@@ -108,7 +108,7 @@ def test_the_first_step_and_what_changed_in_it(
 
 
 def test_a_baseline_of_another_kind_of_machine(root: Path) -> None:
-    """There every step came out otherwise, by rounding, and no figure did."""
+    """On the other machine every step differs by rounding, but no figure does."""
     accepted = root / "baseline.steps.yaml"
     accepted.write_text(re.sub(r'(key|result): "[0-9a-f]{64}"', rf'\1: "{"e" * 64}"', accepted.read_text()))
     (root / "nights/good.steps.yaml").write_text("damaged: [")
@@ -116,7 +116,7 @@ def test_a_baseline_of_another_kind_of_machine(root: Path) -> None:
     assert (first.status, only(first).otherwise) == (0, 16)
     assert [list(one.steps) for one in only(first).first] == [["ingest-1", "ingest-5"]]
     assert (night(root).status, only(night(root)).first) == (0, [])
-    for grid_steps in (1.25, 1.3):  # a bad night does not become the one to compare with
+    for grid_steps in (1.25, 1.3):  # a bad night does not become the last good one
         worse = night(root, with_parameters(f"{{surface: {{grid_steps: {grid_steps}}}}}"))
         [one] = only(worse).first
         assert list(one.steps) == ["surface"]
@@ -146,7 +146,7 @@ def test_a_camera_that_is_no_more(root: Path) -> None:
     document = root / "archive/P0001/S1/scan.yaml"
     document.write_text(document.read_text().replace("  - {id: 5, file: cam5.avi}\n", ""))
     one = only(night(root))
-    assert [(list(first.steps), first.why) for first in one.first] == [(["ingest-5"], "is no more")]
+    assert [(list(first.steps), first.why) for first in one.first] == [(["ingest-5"], "no longer exists")]
     assert figure(one, "points.camera-5").verdict == "missing"
 
 
@@ -192,7 +192,7 @@ def test_sets_come_and_go(root: Path) -> None:
     assert {one.name: one.count("new") > 0 for one in found.result.sets} == {"foot": False, "more": True}
     gone = night(root, SUITE.replace("foot:", "other:"))
     assert gone.status == 1
-    assert {one.name: one.problem for one in gone.result.sets} == {"other": None, "foot": "is no more in the suite"}
+    assert {one.name: one.problem for one in gone.result.sets} == {"other": None, "foot": "is no longer in the suite"}
 
 
 def test_a_night_at_a_time_and_one_that_was_killed(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,7 +27,7 @@ from schemas.regression import Suite
 
 STEPS = (capture_stripe, recognise, place, all_recognise, own_side, fit, calibrate)
 KINDS = {"film", "capture", "calibrate"}
-"""What is filmed, and the last step of a calibration."""
+"""Kinds of the steps that film, and of the last step of a calibration."""
 
 SUITE: dict[str, Any] = {
     "format": "footscan.suite/1",
@@ -44,7 +44,7 @@ SUITE: dict[str, Any] = {
 
 
 class Filming:
-    """Counts what would be filmed and calibrated, and leaves behind what the steps would."""
+    """Counts the steps that would film and calibrate, and writes their outputs in their place."""
 
     def __init__(self, patch: pytest.MonkeyPatch, out: Path) -> None:
         self.out = out
@@ -80,7 +80,7 @@ def filming(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Filming:
 def test_what_was_filmed_is_not_filmed_again(filming: Filming) -> None:
     prepared, ran = filming.prepare("ambient")
     assert sorted(ran) == ["calibrate", "capture", "film"]
-    assert prepared.known == {"foot_length": 262.0}
+    assert prepared.truths == {"foot_length": 262.0}
     assert prepared.job.folders == [filming.out / "films/virtual/ambient"]
     assert filming.prepare("ambient")[1] == []
     (prepared.job.folders[0] / "scan.yaml").unlink()  # which is written last: without it nothing was filmed

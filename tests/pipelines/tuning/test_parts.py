@@ -1,16 +1,19 @@
-"""The pieces of a search: its space, its samplers, its journal, its data, its winner."""
+"""The parts of a search: space, samplers, journal, data, winner."""
 
+import doctest
 import json
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
 
+from pipelines.tuning import pareto_front
 from pipelines.tuning.data import split
 from pipelines.tuning.journal import Journal
 from pipelines.tuning.objectives import GOALS, Judged, figures_of, goals_of, mean_of, values_of
 from pipelines.tuning.pareto_front import best_compromise, on_front
+from pipelines.tuning.report import influence
 from pipelines.tuning.report.result import Gain
 from pipelines.tuning.sampling import proposals_of
 from pipelines.tuning.space import Point, grid, present_point, with_point
@@ -20,6 +23,7 @@ from schemas.parameters.scan import ScanParameters
 from schemas.quality import CameraQuality, MeshQuality, Quality
 from schemas.tuning import TriedPoint, Tuning
 
+MODULES = [pareto_front, influence]
 SEARCH: dict[str, Any] = {
     "extraction.red_threshold": {"low": 8, "high": 60},
     "extraction.ridge_px": {"low": 0.5, "high": 4},
@@ -33,8 +37,13 @@ def tuning(**values: Any) -> Tuning:
     return Tuning.model_validate({"search": SEARCH, **values})
 
 
+@pytest.mark.parametrize("module", MODULES)
+def test_examples(module: ModuleType) -> None:
+    assert doctest.testmod(module).failed == 0
+
+
 def scans(*names: str, truth: str = "", side: str = "right") -> list[Any]:
-    """Names as `patient/scan`; those in `truth` have one."""
+    """Scans with the names `patient/scan`; those in `truth` name a truth."""
     return [
         SimpleNamespace(
             name=name,
@@ -258,7 +267,7 @@ def test_figures_of_a_scan_without_truth() -> None:
 def test_what_stands_in_for_a_truth_is_said() -> None:
     goals, notes = goals_of(["accuracy", "completeness"], scans("P1/a", "P2/a"))
     assert [goal.name for goal in goals] == ["disagreement", "completeness"]
-    assert "some camera saw" in goals[1].meaning
+    assert "a camera saw" in goals[1].meaning
     assert "No scan names a truth: agreement of the cameras stands in for accuracy" in notes[0]
     goals, notes = goals_of(["accuracy"], scans("P1/a", "P1/b"))
     assert [goal.name for goal in goals] == ["disagreement", "repeatability"]

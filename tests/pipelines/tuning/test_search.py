@@ -1,4 +1,4 @@
-"""A search over the small archive: what runs, what is known, what comes out."""
+"""A search over the small archive: steps that run, reused results, and the outcome."""
 
 import csv
 import re
@@ -32,12 +32,12 @@ CONE = trimesh.creation.cylinder(radius=36, height=190, sections=64)
 
 
 def count(ran: list[str], kind: str) -> int:
-    """How many steps of a kind ran."""
+    """Count the steps of a kind that ran."""
     return sum(re.fullmatch(rf"tune/.*/{kind}(-\d+)?", name) is not None for name in ran)
 
 
 class Bench:
-    """A workflow with a search, and what it runs."""
+    """A workflow with a search, and the steps that it runs."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -77,7 +77,7 @@ class Bench:
             film.write_bytes(data if spoil is None else data[:spoil])
 
     def name_truth(self, name: str) -> None:
-        """A cylinder about the travel, which is not quite what was filmed."""
+        """A cylinder about the travel, which differs slightly from the filmed object."""
         mesh = CONE.copy()
         mesh.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (0, 1, 0)))
         mesh.apply_translation((95, 0, 40))
@@ -88,7 +88,7 @@ class Bench:
 
 @pytest.fixture(scope="module")
 def searched(pristine: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Tuned, list[str]]:
-    """A home in which a grid was sought over one scan that names a truth; what came of it, and what ran."""
+    """A folder with a finished grid search over one scan that names a truth; its outcome, and the steps that ran."""
     root = tmp_path_factory.mktemp("searched") / "home"
     shutil.copytree(pristine, root)
     bench = Bench(root)
@@ -98,7 +98,7 @@ def searched(pristine: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[
 
 @pytest.fixture
 def bench(searched: tuple[Path, Tuned, list[str]], tmp_path: Path) -> Bench:
-    """The same, to go on with."""
+    """A copy of that folder, to continue in."""
     return Bench(Path(shutil.copytree(searched[0], tmp_path / "home")))
 
 
@@ -156,7 +156,7 @@ def test_one_more_data_set_runs_only_what_is_new(bench: Bench) -> None:
 
 
 class StopError(Exception):
-    """What interrupts."""
+    """The exception that interrupts a search."""
 
 
 def test_a_search_that_was_interrupted_goes_on_where_it_was(bench: Bench, tmp_path: Path) -> None:
@@ -203,7 +203,7 @@ def test_what_held_out_scans_do_not_tell_is_said(bench: Bench) -> None:
     scan.write_text(scan.read_text().replace("truth: truth.stl\n", ""))
     tuned = bench.seek("tune: {search: {outliers.shortest: [2]}, sampler: grid, held_out: P0002/*}\n").result
     assert tuned.held_out == []
-    assert "The held-out scans do not tell accuracy." in tuned.notes
+    assert "The held-out scans do not test accuracy." in tuned.notes
 
 
 def test_without_truth_the_cameras_stand_in(bench: Bench) -> None:

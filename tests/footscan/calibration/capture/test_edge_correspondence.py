@@ -69,9 +69,9 @@ def test_a_frame_names_an_edge_once_but_two_frames_may_share_it(pinhole: Any, ed
     lines, ends = seen(camera, edges, [2, 4, 2, 4], shifts)
     # parallel pairs: any three of the four lines still span the plane
     two = named_maps(facing_names(edges), lines, ends, np.array([0, 0, 1, 1]), shifts, edges)
-    one = named_maps(facing_names(edges), lines, ends, np.array([0, 0, 0, 0]), shifts, edges)
+    same_frame = named_maps(facing_names(edges), lines, ends, np.array([0, 0, 0, 0]), shifts, edges)
     assert true_ones(two, camera).any()
-    assert not true_ones(one, camera).any()
+    assert not true_ones(same_frame, camera).any()
 
 
 def test_what_no_camera_shows_is_no_view() -> None:

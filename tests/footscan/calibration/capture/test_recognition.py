@@ -75,7 +75,7 @@ def test_placements_outvote_the_mounting(pinhole: Any, edges: Edges) -> None:
 def test_a_symmetric_object_in_one_placement_needs_the_mounting(pinhole: Any, edges: Edges) -> None:
     camera = pinhole(target_mm=(10.0, 60.0))
     stripes = filmed(camera, PLACEMENTS[:1])
-    with pytest.raises(UnrecognisedError, match="say where the camera stands"):
+    with pytest.raises(UnrecognisedError, match="state where the camera stands"):
         recognise(stripes, edges, PLACEMENTS[:1], Mounting(0, 0, 0))
     mirrored = recognise(stripes, edges, PLACEMENTS[:1], Mounting(-1, -1, 1))
     expected = GRID * [-1, 1]  # the cross is its own mirror image, so the mirrored camera sees the same
@@ -124,10 +124,10 @@ def test_cameras_agree_on_where_the_object_stood(pinhole: Any, edges: Edges) -> 
     """Placed by hand, a fifth of a millimetre off: what each camera's map would bend to, all of them together tell."""
     off = np.array([(0.0, 0.0), (0.2, -0.1), (-0.15, 0.1)])
     cameras = {k: pinhole(bearing_deg=30.0 + 12 * k, roll_deg=20.0 * k, target_mm=(10.0, 60.0)) for k in range(3)}
-    said = poses_of(PLACEMENTS)
+    nominal = poses_of(PLACEMENTS)
     stripes = {k: filmed(camera, PLACEMENTS + off, seed=k) for k, camera in cameras.items()}
-    fits = {k: fit_to_edges(stripes[k], cameras[k].world, edges, said, LENS) for k in cameras}
-    poses, before, after = joined_poses(fits, edges, said)
+    fits = {k: fit_to_edges(stripes[k], cameras[k].world, edges, nominal, LENS) for k in cameras}
+    poses, before, after = joined_poses(fits, edges, nominal)
     assert after < 0.5 * before
     found = poses[:, :2] - PLACEMENTS
     assert found - found[0] == pytest.approx(off - off[0], abs=0.06)
@@ -138,10 +138,10 @@ def test_cameras_agree_on_where_the_object_stood(pinhole: Any, edges: Edges) -> 
 
 def test_exact_poses_are_kept(pinhole: Any, edges: Edges) -> None:
     cameras = {k: pinhole(bearing_deg=30.0 + 12 * k, target_mm=(10.0, 60.0)) for k in range(2)}
-    said = poses_of(PLACEMENTS)
+    nominal = poses_of(PLACEMENTS)
     fits = {
-        k: fit_to_edges(filmed(camera, PLACEMENTS, seed=k), camera.world, edges, said, LENS)
+        k: fit_to_edges(filmed(camera, PLACEMENTS, seed=k), camera.world, edges, nominal, LENS)
         for k, camera in cameras.items()
     }
-    assert np.array_equal(joined_poses(fits, edges, said)[0], said)
-    assert agreed_poses(fits, said) == pytest.approx(said, abs=0.03)
+    assert np.array_equal(joined_poses(fits, edges, nominal)[0], nominal)
+    assert agreed_poses(fits, nominal) == pytest.approx(nominal, abs=0.03)

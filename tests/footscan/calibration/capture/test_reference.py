@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from footscan.calibration.capture.reference import doubts_about, edges_of, nearest_edge
+from footscan.calibration.capture.reference import edges_of, nearest_edge, placement_doubts
 
 Floats = NDArray[np.float64]
 
@@ -111,6 +111,8 @@ def _distances(start: Floats, end: Floats, points: Floats) -> Floats:
 
 def test_an_object_in_the_glass_or_far_off_is_doubted() -> None:
     square = [[-50, 0], [50, 0], [50, 90], [-50, 90]]
-    assert doubts_about(square, [[0, 0], [40, 14]]) == []
-    assert doubts_about(square, [[0, 0], [0, -3]]) == ["placement 1 reaches down to Z = -3 mm, below the glass at 0"]
-    assert doubts_about(square, [[500, 0]]) == ["placement 0 reaches out to 550 mm, far from where feet stand"]
+    assert placement_doubts(square, [[0, 0], [40, 14]]) == []
+    assert placement_doubts(square, [[0, 0], [0, -3]]) == [
+        "placement 1 reaches down to Z = -3 mm, below the glass at 0"
+    ]
+    assert placement_doubts(square, [[500, 0]]) == ["placement 0 reaches out to 550 mm, far from where feet stand"]

@@ -46,7 +46,7 @@ def test_tolerates_order_spaces_mark_and_blank_lines(tmp_path: Path) -> None:
         ("camera,point,i,j\n1,A,0,0\n", "column x_mm: is missing, expected camera,point,x_cm"),
         ("camera,point,x_mm,y_cm,z_mm,i,j\n", "mixes cm and mm"),
         ("camera,point,x_mm,y_mm,z_mm,i,j,k\n", "line 1, column k: unknown column"),
-        ("camera,point,x_mm,y_mm,z_mm,i,i,j\n", "column i: stands twice"),
+        ("camera,point,x_mm,y_mm,z_mm,i,i,j\n", "column i: is listed twice"),
         ("camera;point;x_mm;y_mm;z_mm;i;j\n", "one column, expected camera,point"),
         (HEADER + "1,A,0,0,0,1,2\n1,B,0,zero,0,1,2\n", "line 3, column y_mm: expected a number"),
         (HEADER + "1,A,0,0,0,nan,2\n", "line 2, column i"),

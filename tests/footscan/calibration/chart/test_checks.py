@@ -54,21 +54,21 @@ def with_pixel(chart: Chart, point: int, column: int, value: float) -> Chart:
 
 
 def spoilt(charts: dict[int, Chart], camera: int, spoil: Spoil) -> list[ChartWarning]:
-    """What is told of a camera beyond what is told of it anyway."""
+    """The warnings for a camera beyond those for the unchanged charts."""
     before = {(warning.camera, warning.point, warning.kind) for warning in check_charts(charts)}
-    told = [
+    findings = [
         warning
         for warning in check_charts({**charts, camera: spoil(charts[camera])})
         if (warning.camera, warning.point, warning.kind) not in before
     ]
-    assert {warning.camera for warning in told} <= {camera}
-    return told
+    assert {warning.camera for warning in findings} <= {camera}
+    return findings
 
 
 def test_the_chart_of_the_thesis() -> None:
     warnings = check_charts(THESIS)
-    told = [(warning.camera, warning.point, warning.kind) for warning in warnings]
-    assert told == [(5, None, "residual"), (5, "P5", "border"), (8, "P1", "border")]
+    findings = [(warning.camera, warning.point, warning.kind) for warning in warnings]
+    assert findings == [(5, None, "residual"), (5, "P5", "border"), (8, "P1", "border")]
     assert "residual 4.9 px rms" in warnings[0].message
     assert "worst P3 by 9.0 px" in warnings[0].message
     assert "1.2 px is usual for the other cameras" in warnings[0].message
@@ -204,8 +204,8 @@ def test_the_border_counts_from_0_or_from_1() -> None:
     five = {1: THESIS[1], 2: THESIS[2], 3: THESIS[3]}
     for j, kind in ((480.0, "border"), (479.0, "border"), (483.0, "outside")):
         pixels = THESIS[1].pixels + np.array([0.0, j - 255.0])
-        told = check_charts({**five, 1: replace(THESIS[1], pixels=pixels)})
-        assert [(warning.kind, warning.point) for warning in told] == [(kind, "P5")]
+        warnings = check_charts({**five, 1: replace(THESIS[1], pixels=pixels)})
+        assert [(warning.kind, warning.point) for warning in warnings] == [(kind, "P5")]
     on_border = {1: replace(THESIS[1], pixels=THESIS[1].pixels + np.array([640.0 - 591.0, 0.0]))}
     assert [(warning.kind, warning.point) for warning in check_charts(on_border)] == [("border", "P5")]
 
@@ -248,10 +248,10 @@ def test_the_order_of_points_changes_nothing() -> None:
     chart = with_world(VIRTUAL[5], 8, 1, 3.0)
     order = np.random.default_rng(2).permutation(len(chart.points))
     shuffled = Chart(5, tuple(chart.points[k] for k in order), chart.world[order], "mm", chart.pixels[order])
-    told = [check_charts({**VIRTUAL, 5: one}) for one in (chart, shuffled)]
-    there, here = ([(warning.point, warning.kind) for warning in warnings] for warnings in told)
+    both = [check_charts({**VIRTUAL, 5: variant}) for variant in (chart, shuffled)]
+    there, here = ([(warning.point, warning.kind) for warning in warnings] for warnings in both)
     assert there == here != []
-    assert check_charts({**VIRTUAL, 5: chart}) == told[0]
+    assert check_charts({**VIRTUAL, 5: chart}) == both[0]
 
 
 def test_only_what_is_certain_is_refused() -> None:

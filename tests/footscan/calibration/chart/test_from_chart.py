@@ -229,7 +229,7 @@ def test_thesis_chart_as_the_thesis_has_it() -> None:
 
 
 def test_thesis_chart_by_models() -> None:
-    """Of the models that five points can judge, each camera gets one; the second order is not among them."""
+    """Each camera gets one of the models that five points can judge; the second order is not among them."""
     for chart in read_chart(DATA / "calibration_charts.csv").values():
         trials = {trial.model: trial for trial in compare_models(chart)}
         assert trials["polynomial 2"].status == "refused"

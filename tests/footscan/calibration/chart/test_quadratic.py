@@ -1,13 +1,11 @@
 """The thesis's own figures, read as data: its chart of eight cameras and the coefficients that it prints."""
 
 import csv
-import doctest
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from footscan.calibration.chart import quadratic
 from footscan.calibration.chart.chart import Chart, read_chart
 from footscan.calibration.chart.quadratic import fit_quadratic, r_squared
 from footscan.calibration.models.polynomial import design_matrix
@@ -17,10 +15,6 @@ TERMS = ["1", "i", "j", "i^2", "ij", "j^2"]
 CHARTS = read_chart(DATA / "calibration_charts.csv")
 with (DATA / "printed_coefficients.csv").open(newline="") as file:
     PRINTED = list(csv.DictReader(file))
-
-
-def test_examples() -> None:
-    assert doctest.testmod(quadratic).failed == 0
 
 
 def test_table_of_coefficients_is_whole() -> None:

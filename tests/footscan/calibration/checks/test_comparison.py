@@ -1,4 +1,4 @@
-"""How two calibrations differ, on maps whose differences are worked out by hand."""
+"""Comparison of two calibrations, on maps whose differences are worked out by hand."""
 
 from typing import Any
 
@@ -110,7 +110,7 @@ def test_models_by_the_names_of_the_tables(pinhole: Any, all_models: list[Homogr
 
 
 def test_only_the_shared_region_counts() -> None:
-    """Of columns 100 to 200 and 150 to 250, 51 are in both and 151 in either; there B minus A is 0.01 (i - 150)."""
+    """Columns 100 to 200 and 150 to 250 share 51 of 151 columns; there B minus A is 0.01 (i - 150)."""
     a, b = affine(*A_TENTH), affine([-1.5, 0.11, 0.0], [0.0, 0.0, 0.1])
     found = compared(calibrated(a), calibrated(b, (150, 100, 250, 200)))
     assert found.shared_fraction == pytest.approx(51 / 151)
@@ -136,8 +136,8 @@ def test_regions_without_a_whole_pixel() -> None:
 
 @pytest.mark.parametrize("unknown", ["A", "B"])
 def test_where_one_region_is_not_known_the_others_counts(unknown: str) -> None:
-    without, known = calibrated(affine(*A_TENTH), None), calibrated(affine([0.3, 0.1, 0.0], [0.0, 0.0, 0.1]))
-    found = compared(without, known) if unknown == "A" else compared(known, without)
+    without, with_region = calibrated(affine(*A_TENTH), None), calibrated(affine([0.3, 0.1, 0.0], [0.0, 0.0, 0.1]))
+    found = compared(without, with_region) if unknown == "A" else compared(with_region, without)
     assert (found.shared_fraction, found.pixels) == (None, 101 * 101)
     assert found.rms_mm == pytest.approx(0.3)
     assert found.remarks == (f"{unknown} does not say its region: compared over that of the other",)

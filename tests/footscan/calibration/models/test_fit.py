@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from footscan.calibration.models.fit import Fit, UndeterminedError, fit, predict
+from footscan.calibration.models.fit import ModelFit, UndeterminedError, fit, predict
 from footscan.calibration.models.homography import HomographyModel
 from footscan.calibration.models.maps import Model, prediction_covariance
 from footscan.calibration.models.observations import Observations, of_points
@@ -49,7 +49,7 @@ def image(count: int, seed: int = 1) -> np.ndarray:
     return np.random.default_rng(seed).uniform([0, 0], [639, 479], (count, 2))
 
 
-def covariance_at(found: Fit, pixels: np.ndarray) -> np.ndarray:
+def covariance_at(found: ModelFit, pixels: np.ndarray) -> np.ndarray:
     assert found.covariance is not None
     camera = CameraCalibration(
         camera=1,
@@ -154,15 +154,15 @@ def test_covariance_is_the_scatter_of_repeats(kind: str, robust: bool, pinhole: 
     exact = stripe(world, pixels, 3, per_block=len(pixels) // 60)
     if kind == "points":
         exact = of_points(pixels, world, np.arange(60))
-    seen, told = [], []
+    seen, predicted = [], []
     for _ in range(300):
         noise = generator.normal(0, 0.1, exact.independent)
         repeat = replace(exact, offsets=exact.offsets + noise[exact.block])
         found = fit(model, repeat, robust=robust)
         seen.append(model.world(found.parameters, PROBES))
-        told.append(covariance_at(found, PROBES))
+        predicted.append(covariance_at(found, PROBES))
     scatter = np.std(seen, axis=0)
-    expected = np.sqrt(np.diagonal(np.mean(told, axis=0), axis1=1, axis2=2))
+    expected = np.sqrt(np.diagonal(np.mean(predicted, axis=0), axis1=1, axis2=2))
     np.testing.assert_allclose(scatter / expected, 1.0, atol=0.15)
 
 

@@ -1,4 +1,4 @@
-"""What a calibrated camera says: there and back again, and how sure it is."""
+"""Maps of a calibrated camera: there and back again, and their uncertainty."""
 
 from typing import Any
 

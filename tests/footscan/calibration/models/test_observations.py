@@ -1,4 +1,4 @@
-"""What a map is fitted to: control points as two observations each, stripes as one."""
+"""Observations: two for a control point, one for a point of the stripe."""
 
 import numpy as np
 

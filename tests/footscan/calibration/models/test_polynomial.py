@@ -1,18 +1,11 @@
 """Polynomials of the pixel and their derivatives, against numbers worked out by hand and finite differences."""
 
-import doctest
-
 import numpy as np
 import pytest
 
-from footscan.calibration.models import polynomial
 from footscan.calibration.models.polynomial import PolynomialModel, derivatives, design_matrix, terms
 
 ORDERS = [1, 2, 3, 4, 5]
-
-
-def test_examples() -> None:
-    assert doctest.testmod(polynomial).failed == 0
 
 
 def test_terms_of_third_order() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from footscan.calibration.models.fit import Fit, fit, predict
+from footscan.calibration.models.fit import ModelFit, fit, predict
 from footscan.calibration.models.homography import HomographyModel
 from footscan.calibration.models.observations import Observations, of_points
 from footscan.calibration.models.polynomial import PolynomialModel
@@ -32,7 +32,7 @@ def clicked(world: np.ndarray, pixels: np.ndarray, noise_mm: float, seed: int = 
     return of_points(pixels, world + noise, np.arange(len(world)))
 
 
-def fares(observations: Observations, *, robust: bool = False) -> tuple[Fit | None, Mapping[str, ModelTrial]]:
+def fares(observations: Observations, *, robust: bool = False) -> tuple[ModelFit | None, Mapping[str, ModelTrial]]:
     found, trials = select(candidates(observations.pixels, IMAGE_PX), observations, 3, robust=robust)
     assert [trial.model for trial in trials] == NAMES
     return found, {trial.model: trial for trial in trials}
@@ -185,8 +185,8 @@ def test_many_groups_are_ten_folds(pinhole: Any) -> None:
 def test_nothing_can_be_held_out_of_one_group(pinhole: Any) -> None:
     pixels = image(20)
     observations = clicked(pinhole().world(pixels), pixels, 0.1)
-    one = replace(observations, group=np.zeros(40, np.intp))
-    found, trials = fares(one)
+    one_group = replace(observations, group=np.zeros(40, np.intp))
+    found, trials = fares(one_group)
     assert found is None
     assert {trial.held_out_rms_mm for trial in trials.values()} == {None}
     assert trials["homography"].rms_mm is not None

@@ -8,7 +8,7 @@ from footscan.cloud.points import make_points
 from schemas.parameters.fusion import FusionParameters
 
 SECTORS = {1: (-30, 110), 2: (-20, 120), 3: (70, 210), 4: (60, 200), 5: (200, 340), 6: (190, 330), 7: (230, 380)}
-"""What part of the foot each camera sees, in degrees from +Y towards +Z."""
+"""The part of the foot that each camera sees, in degrees from +Y towards +Z."""
 
 
 def foot(
@@ -45,7 +45,7 @@ def corrected(clouds: dict[int, np.ndarray], **parameters: object) -> tuple[Stri
 
 
 def errors(clouds: dict[int, np.ndarray], stripes: Stripes, result: Corrected) -> dict[int, float]:
-    """How far the points of each camera are off the skin they were on before they were spoiled, mm rms."""
+    """Distances of each camera's points from the skin on which they lay before they were moved, mm rms."""
     found = {}
     for k, camera in enumerate(stripes.cameras):
         mine = stripes.camera == k

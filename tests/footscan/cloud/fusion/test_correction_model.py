@@ -1,7 +1,7 @@
 import numpy as np
 
 from footscan.cloud.fusion.correction_model import STRETCHES, choose_terms, hold_the_middle
-from footscan.cloud.fusion.motion import MOST
+from footscan.cloud.fusion.motion import MOST_TERMS
 from footscan.cloud.fusion.pair_least_squares import Forms, sum_up
 
 CAMERAS = 4
@@ -13,7 +13,7 @@ def compared(truth: np.ndarray, noise: float = 0.02) -> Forms:
     random = np.random.default_rng(8)
     count = 4000
     pairs = np.array([random.permutation(CAMERAS)[:2] for _ in range(count)])
-    rows = random.uniform(-1, 1, (count, MOST))
+    rows = random.uniform(-1, 1, (count, MOST_TERMS))
     distances = np.sum(rows * (truth[pairs[:, 0]] - truth[pairs[:, 1]]), axis=1) + random.normal(0, noise, count)
     variances = np.full(count, noise**2)
     return sum_up(
@@ -23,7 +23,7 @@ def compared(truth: np.ndarray, noise: float = 0.02) -> Forms:
 
 def off(**terms: float) -> np.ndarray:
     """Coefficients by camera and term: c1t2 is the third of the second camera."""
-    truth = np.zeros((CAMERAS, MOST))
+    truth = np.zeros((CAMERAS, MOST_TERMS))
     for name, coefficient in terms.items():
         camera, term = name[1:].split("t")
         truth[int(camera), int(term)] = coefficient

@@ -27,7 +27,7 @@ def arch(shift: tuple[float, float] = (0.0, 0.0), moved: int = 3, frames: int = 
 
 
 def off_arch(cloud: np.ndarray) -> np.ndarray:
-    """How far from the arch the points are, mm, to first order."""
+    """Distances of the points from the arch, mm, to first order."""
     x, y, z = coordinates(cloud).T
     size = 1 + 0.0025 * x
     level = np.hypot(y / (30 * size), z / (40 * size))
@@ -51,10 +51,10 @@ def test_a_camera_that_stands_off_is_corrected_and_told() -> None:
     cloud, report = fuse(arch(shift=(0.15, -0.15)), PARAMETERS)
     assert [correction.kind for correction in report.corrections] == ["none", "none", "rigid", "none"]
     assert np.percentile(off_arch(cloud), 90) < 1.2 * np.percentile(off_arch(clean), 90)
-    told = {pair.cameras: pair for pair in report.pairs}
-    assert told[3, 4].before.rms_mm > 0.1
-    assert told[3, 4].after.rms_mm < 0.03
-    assert told[1, 2].before.rms_mm < 0.03
+    disagreement_of = {pair.cameras: pair for pair in report.pairs}
+    assert disagreement_of[3, 4].before.rms_mm > 0.1
+    assert disagreement_of[3, 4].after.rms_mm < 0.03
+    assert disagreement_of[1, 2].before.rms_mm < 0.03
     assert FusionReport.model_validate_json(json.dumps(report.model_dump(mode="json"))) == report
 
 
@@ -62,7 +62,7 @@ def test_a_camera_that_stands_far_off_is_named_and_outvoted() -> None:
     cloud, report = fuse(arch(shift=(0.0, 1.6), moved=2), PARAMETERS)
     assert [correction.kind for correction in report.corrections] == ["none"] * 4
     assert len(report.warnings) == 1
-    assert report.warnings[0].startswith("camera 2 stands 1.6")
+    assert report.warnings[0].startswith("camera 2 deviates from the others by 1.6")
     seen_by_others = np.degrees(np.arctan2(cloud["z"] / 40, cloud["y"] / 30)) > 0
     assert np.percentile(off_arch(cloud[seen_by_others]), 90) < 0.1
 

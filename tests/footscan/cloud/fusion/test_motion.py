@@ -1,6 +1,6 @@
 import numpy as np
 
-from footscan.cloud.fusion.motion import MOST, SCALE_MM, moved
+from footscan.cloud.fusion.motion import MOST_TERMS, SCALE_MM, moved
 
 CENTRE = np.array([1.0, 40.0])
 RANGES = np.array([[-30.0, 0.0], [31.0, 80.0]])
@@ -8,7 +8,7 @@ RANGES = np.array([[-30.0, 0.0], [31.0, 80.0]])
 
 def move(yz: tuple[float, float], **terms: float) -> list[float]:
     """One point by the coefficients of the terms t0 to t11."""
-    coefficients = np.zeros(MOST)
+    coefficients = np.zeros(MOST_TERMS)
     for name, coefficient in terms.items():
         coefficients[int(name[1:])] = coefficient
     return moved(np.array([yz]), coefficients, CENTRE, RANGES)[0].round(9).tolist()

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from footscan.cloud.fusion.motion import MOST
+from footscan.cloud.fusion.motion import MOST_TERMS
 from footscan.cloud.fusion.pair_least_squares import INDEPENDENT, PRIOR_MM, Forms, solve, squares, sum_up
 
 CAMERAS, STRETCHES = 3, 4
 RANDOM = np.random.default_rng(5)
 COUNT = 400
-ROWS = RANDOM.normal(size=(COUNT, MOST))
+ROWS = RANDOM.normal(size=(COUNT, MOST_TERMS))
 DISTANCES = RANDOM.normal(size=COUNT)
 WEIGHTS = RANDOM.uniform(1, 1000, COUNT)
 PAIRS = np.array([RANDOM.permutation(CAMERAS)[:2] for _ in range(COUNT)])
@@ -19,13 +19,13 @@ def forms() -> Forms:
 
 
 def left(coefficients: np.ndarray) -> np.ndarray:
-    """What the coefficients leave of each comparison."""
+    """The residual of each comparison under the coefficients."""
     apart = coefficients[PAIRS[:, 0]] - coefficients[PAIRS[:, 1]]
     return np.asarray(DISTANCES - np.sum(ROWS * apart, axis=1))
 
 
 def test_squares_are_those_of_all_comparisons() -> None:
-    coefficients = RANDOM.normal(size=(CAMERAS, MOST))
+    coefficients = RANDOM.normal(size=(CAMERAS, MOST_TERMS))
     found = squares(forms(), coefficients, np.ones(STRETCHES, np.bool_))
     weighted = WEIGHTS * left(coefficients) ** 2
     for n in range(STRETCHES):
@@ -39,8 +39,8 @@ def test_the_solution_is_that_of_least_squares() -> None:
     terms = np.array([3, 0, 12])
     stretches = np.array([True, False, True, True])
     found = solve(forms(), stretches, terms)
-    free = np.flatnonzero((np.arange(MOST) < terms[:, np.newaxis]).ravel())
-    design = np.zeros((COUNT, CAMERAS, MOST))
+    free = np.flatnonzero((np.arange(MOST_TERMS) < terms[:, np.newaxis]).ravel())
+    design = np.zeros((COUNT, CAMERAS, MOST_TERMS))
     design[np.arange(COUNT), PAIRS[:, 0]] += ROWS
     design[np.arange(COUNT), PAIRS[:, 1]] -= ROWS
     use = stretches[STRETCH]

@@ -14,8 +14,8 @@ def grid() -> np.ndarray:
 
 
 def test_a_term_of_each_power() -> None:
-    found = terms_at(np.array([[2.0, 3.0]]))[0]
-    assert found.tolist() == [1, 2, 3, 4, 6, 9, 8, 12, 18, 27, 16, 24, 36, 54, 81]
+    terms = terms_at(np.array([[2.0, 3.0]]))[0]
+    assert terms.tolist() == [1, 2, 3, 4, 6, 9, 8, 12, 18, 27, 16, 24, 36, 54, 81]
 
 
 def test_a_polynomial_is_found_again() -> None:

@@ -186,7 +186,7 @@ PLY = b"ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty flo
         ("a.stl", STL[:96] + struct.pack("<f", np.nan) + STL[100:], "no numbers"),
         ("a.obj", b"v 1 2\n", "2 coordinates"),
         ("a.obj", b"v 1 2 inf\n", "no numbers"),
-        ("a.obj", b"v 0 0 0\nf 1 2 3\n", "vertices that are not there"),
+        ("a.obj", b"v 0 0 0\nf 1 2 3\n", "vertices that do not exist"),
         ("a.obj", b"v 0 0 0\nf 1 1 99999999999999999999999\n", "too large"),
         ("a.obj", b"f x y z\n", "invalid literal"),
         ("a.obj", b"\xff\xd8\xff\xe0 a photograph", "no points"),
@@ -200,7 +200,7 @@ PLY = b"ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty flo
         ("a.ply", PLY % 0 + b"end_header\n", "no points"),
         ("a.ply", PLY % 1 + b"property quaternion q\nend_header\n0 0 0 0\n", "unknown header line"),
         ("a.ply", b"ply\nformat ascii 1.0\nproperty float x\nend_header\n", "unknown header line"),
-        ("a.ply", PLY % 0 + b"property float x\nend_header\n", "stands twice"),
+        ("a.ply", PLY % 0 + b"property float x\nend_header\n", "is listed twice"),
     ],
 )
 def test_broken_files_are_refused_in_one_line(tmp_path: Path, name: str, content: bytes, problem: str) -> None:

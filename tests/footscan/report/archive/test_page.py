@@ -1,4 +1,4 @@
-"""The page of an archive: its rows, in which order, and that names are data and pictures files beside it."""
+"""The page of an archive: order of its rows, escaped names, relative addresses of pictures."""
 
 import re
 from html.parser import HTMLParser
@@ -8,13 +8,13 @@ import pytest
 
 from footscan.report.archive.page import ScanRow, archive_page
 from footscan.report.archive.script import SCRIPT
-from footscan.report.quality_lights import Light
+from footscan.report.quality_lights import TrafficLight
 
 HOSTILE = "<script>alert('1')</script>\"&"
 
 
 class Rows(HTMLParser):
-    """Words of each row of the table; refuses a wrong end of a tag."""
+    """Words of each row of the table; fails at a wrong end tag."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
@@ -60,7 +60,7 @@ def test_both_feet_of_a_day_follow_each_other_the_left_one_first() -> None:
 
 
 def test_a_row_tells_length_size_lights_and_links() -> None:
-    lights = [Light("Frames", "good", "0 of 9 frames lost"), Light("Surface", "poor", "open")]
+    lights = [TrafficLight("Frames", "good", "0 of 9 frames lost"), TrafficLight("Surface", "poor", "open")]
     known: dict[str, Any] = {"length_mm": 261.94, "size": "41.5", "report": "P1/R/report.html", "picture": "f/x.png"}
     page = archive_page([row("P1", "R", lights=lights, **known)], "m")
     parsed = Rows(page)
@@ -91,7 +91,7 @@ def test_failures_are_counted_and_told_with_their_reasons() -> None:
 def test_names_and_reasons_are_data() -> None:
     hostile = ScanRow(
         HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, 1.0, HOSTILE,
-        [Light(HOSTILE, "good", HOSTILE)], HOSTILE, HOSTILE,
+        [TrafficLight(HOSTILE, "good", HOSTILE)], HOSTILE, HOSTILE,
     )  # fmt: skip
     page = archive_page([hostile], "m")
     assert Rows(page).tags.count("script") == 1

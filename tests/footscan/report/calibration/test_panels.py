@@ -1,4 +1,4 @@
-"""A calibration on a page: support, residuals and what is told of them."""
+"""Panels of a calibration: support, residuals and their legend."""
 
 import base64
 import io

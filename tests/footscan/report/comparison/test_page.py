@@ -39,7 +39,7 @@ def comparison() -> Comparison:
 
 
 class Words(HTMLParser):
-    """Words of a page, its headings apart; refuses a wrong end of a tag."""
+    """Words of a page, and separately its headings; fails at a wrong end tag."""
 
     def __init__(self, page: str) -> None:
         super().__init__()

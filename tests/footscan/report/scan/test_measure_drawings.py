@@ -51,7 +51,7 @@ def test_a_height_stands_in_the_section_of_its_girth() -> None:
 
 @pytest.mark.parametrize(("transform", "medial"), [(PLACED, 100), (MIRRORED, -100)])
 def test_spans_run_from_their_landmark_as_far_as_their_value(transform: list[list[float]], medial: float) -> None:
-    """A left foot is mirrored by its transform and shown as it is: there the medial side lies towards -Y."""
+    """A left foot is mirrored by its transform, but shown as it is: its medial side lies towards -Y."""
     drawings = measure_drawings(VERTICES, FACES, measures(transform))
     [length], [breadth] = drawings["foot_length"].lines, drawings["foot_breadth"].lines
     np.testing.assert_allclose(length, [[-10, 0, 20], [240, 0, 20]])

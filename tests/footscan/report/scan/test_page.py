@@ -8,7 +8,9 @@ import pytest
 from footscan.cloud.outliers import REASONS
 from footscan.cloud.points import make_points
 from footscan.report.sample_frames import FrameSample
-from footscan.report.scan.page import scan_page, upright
+from footscan.report.scan.foot_colours import FootSurface
+from footscan.report.scan.page import ScanPoints, ScanTitle, scan_page
+from footscan.report.surface_views import upright
 from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
 from schemas.fusion import CameraCorrection, Disagreement, FusionReport, PairDisagreement
 from schemas.measures import Measure, Measures
@@ -33,16 +35,19 @@ def scan():
     image = np.full((48, 64, 3), 30, np.uint8)
     point = np.array([20.0]), np.array([30.0])
     return {
-        "patient": "P0001",
-        "scan": "2026-11-20-R",
-        "side": "right",
-        "vertices": vertices,
-        "faces": np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
-        "filled": np.array([False, False, False, True]),
-        "cut_mm": None,
-        "points": make_points(np.vstack([vertices, [[0, 0, -9]]]), camera=np.array([1, 1, 2, 2, 2])),
-        "codes": np.array([0, 0, 0, 0, 1 + REASONS.index("glass")], np.uint8),
-        "cloud": make_points(vertices, camera=np.array([1, 1, 2, 2]), frame=np.array([0, 1, 1, 3])),
+        "title": ScanTitle("P0001", "2026-11-20-R", "right"),
+        "surface": FootSurface(
+            vertices=vertices,
+            faces=np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
+            filled=np.array([False, False, False, True]),
+            cut_mm=None,
+            truth_distance=None,
+        ),
+        "points": ScanPoints(
+            points=make_points(np.vstack([vertices, [[0, 0, -9]]]), camera=np.array([1, 1, 2, 2, 2])),
+            codes=np.array([0, 0, 0, 0, 1 + REASONS.index("glass")], np.uint8),
+            cloud=make_points(vertices, camera=np.array([1, 1, 2, 2]), frame=np.array([0, 1, 1, 3])),
+        ),
         "measures": Measures(
             side="right",
             axis="toe2",
@@ -109,7 +114,6 @@ def scan():
             ),
         ),
         "samples": [FrameSample(camera, 1, image, *point) for camera in (1, 2)],
-        "truth_distance": None,
         "provenance": {"extraction.method": "ridge", "footscan": "0.1.0"},
     }
 
@@ -166,7 +170,8 @@ def test_filled_parts_are_told_with_their_share(scan):
     assert "Filled, 12.5 %" in page
     assert "Flat cut of the leg, 25.0 %" in page
     unknown = scan["quality"].mesh.model_copy(update={"filled_share": None, "cut_share": None})
-    page = scan_page(**scan | {"filled": None, "quality": scan["quality"].model_copy(update={"mesh": unknown})})
+    quality = scan["quality"].model_copy(update={"mesh": unknown})
+    page = scan_page(**scan | {"surface": scan["surface"]._replace(filled=None), "quality": quality})
     assert "Measured," not in page
 
 
@@ -206,7 +211,8 @@ def test_the_comparison_stands_where_there_is_one(scan):
         mean=0.213, std=0.18, min=0, max=2.1, p50=0.17, p90=0.42, p95=0.61, p99=1.1, rms=0.28, signed_mean=-0.04
     )
     quality = scan["quality"].model_copy(update={"truth": truth})
-    page = scan_page(**scan | {"quality": quality, "truth_distance": np.array([0.1, -0.2, 0.3, np.nan])})
+    surface = scan["surface"]._replace(truth_distance=np.array([0.1, -0.2, 0.3, np.nan]))
+    page = scan_page(**scan | {"quality": quality, "surface": surface})
     facts = facts_of(page)
     assert facts["Mean"] == "0.213 mm"
     assert facts["95 %"] == "0.610 mm"
@@ -222,9 +228,7 @@ def test_what_comes_from_a_scan_is_no_markup(scan):
     page = scan_page(
         **scan
         | {
-            "patient": HOSTILE,
-            "scan": HOSTILE,
-            "side": HOSTILE,
+            "title": ScanTitle(HOSTILE, HOSTILE, HOSTILE),
             "measures": scan["measures"].model_copy(update={"measures": {HOSTILE: measure}}),
             "quality": scan["quality"].model_copy(update={"cameras": [camera]}),
             "provenance": {HOSTILE: HOSTILE},
@@ -243,7 +247,7 @@ def test_the_page_asks_for_nothing_from_elsewhere(scan):
 
 
 class Balance(HTMLParser):
-    """Tags that were opened and are still open; refuses a wrong end."""
+    """Stack of open tags; fails at a wrong end tag."""
 
     void = frozenset({"meta", "input", "img"})
 
@@ -272,7 +276,7 @@ def test_the_same_scan_gives_the_same_bytes_in_every_thread(scan):
 
 
 def test_a_left_foot_is_shown_as_it_is():
-    # Scanner and foot stand alike, but for 10 mm in X and the mirror that makes a right foot of a left one.
+    # The frames of scanner and foot differ by 10 mm in X and by the mirror that makes a right foot of a left one.
     mirrored = [[1, 0, 0, -10], [0, -1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
     assert upright(np.array([[30.0, 4.0, 5.0]]), mirrored).tolist() == [[20, 4, 5]]
     turned = [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 2], [0, 0, 0, 1]]

@@ -1,4 +1,4 @@
-"""Pictures of what the extraction found, read back as pixels and as the data of their axes."""
+"""Figures of an extraction, read back as pixels and as data of their axes."""
 
 import io
 from collections.abc import Iterator, Sequence
@@ -44,7 +44,7 @@ def read(png: bytes) -> NDArray[np.int16]:
 
 
 def stripe_in(picture: NDArray[np.int16]) -> tuple[NDArray[np.bool_], NDArray[np.int16]]:
-    """Where the smallest rectangle around all red is red, and its pixels."""
+    """Mask of red in the smallest rectangle around all red, and the pixels of that rectangle."""
     red = (picture[..., 0] > 100) & (picture[..., 1:].max(axis=2) < 40)
     rows, columns = np.nonzero(red.any(axis=1))[0], np.nonzero(red.any(axis=0))[0]
     box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
@@ -56,7 +56,7 @@ def test_points_lie_where_they_do_on_the_stripe(off: float) -> None:
     i = np.arange(COLUMNS)
     red, pixels = stripe_in(read(frame_figure(red_line(), points_at(i, line_at(i) + off))))
     drawn_px = red.shape[1] / COLUMNS
-    points = pixels[..., 1] > 60  # green there is in points alone
+    points = pixels[..., 1] > 60  # only points are green
     assert COLUMNS < points.sum() < red.sum() / 3  # both are seen
     rows, columns = np.nonzero(red | points)
     slope, start = np.polyfit(columns, rows, 1)
@@ -78,7 +78,7 @@ def test_a_score_has_its_colour() -> None:
 
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """The figures that are drawn from now on, as they are before they become pixels."""
+    """Collects the figures that are drawn, before they become pixels."""
     figures: list[Figure] = []
 
     def keep(figure: Figure) -> bytes:
@@ -158,7 +158,7 @@ def grey_of(number: int) -> int:
 
 
 def film(count: int, lost: tuple[int, ...] = ()) -> Iterator[NDArray[np.uint8] | None]:
-    """Frames of 20 x 10 px of one grey each, in one place of memory, as a film is decoded."""
+    """Frames of 20 x 10 px, each of one grey, all in the same buffer, as a film is decoded."""
     buffer = np.empty((10, 20, 3), np.uint8)
     for number in range(count):
         buffer[:] = grey_of(number)
@@ -225,7 +225,7 @@ def test_without_points_there_are_words_and_no_axes(drawn: list[Figure]) -> None
 
 @pytest.mark.parametrize("points", [points_at(np.arange(10), 5), points_at([], [])], ids=["stripe", "none"])
 def test_a_title_begins_with_whose_it_is(drawn: list[Figure], points: StripePoints) -> None:
-    about = "a$x$_\u8db3.png, gap_px=4.0"  # mathematics to matplotlib, and a letter that its font has not
+    about = "a$x$_\u8db3.png, gap_px=4.0"  # math text of matplotlib, and a letter that its font lacks
     frame_figure(np.zeros((300, 300, 3), np.uint8), points, about)
     film_figure(film(4), 4, points, about=about)
     for figure in drawn:

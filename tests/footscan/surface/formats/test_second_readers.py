@@ -47,20 +47,20 @@ def test_stl(ball: Mesh) -> None:
     content = mesh_bytes(ball, ".stl")
     # Two words are made one; the software would be letters 60 to 81 of 80.
     assert content[:80].rstrip(b"\0") == b'footscan unit=mm side=right patient=P0001 scan=2026_"R"_<&\\'
-    found = read(ball, "stl")
-    np.testing.assert_array_equal(single(found.vertices).reshape(-1, 3, 3), single(ball.vertices)[ball.faces])
+    result = read(ball, "stl")
+    np.testing.assert_array_equal(single(result.vertices).reshape(-1, 3, 3), single(ball.vertices)[ball.faces])
     assert trimesh.load(io.BytesIO(content), file_type="stl").is_watertight
-    outward = np.sum(found.face_normals * (found.triangles_center - [123.456, -7.0, 20.0]), axis=1)
+    outward = np.sum(result.face_normals * (result.triangles_center - [123.456, -7.0, 20.0]), axis=1)
     assert np.all(outward > 0)
 
 
 def test_ply(ball: Mesh) -> None:
-    found = read(ball, "ply")
-    np.testing.assert_array_equal(single(found.vertices), single(ball.vertices))
-    np.testing.assert_array_equal(found.faces, ball.faces)
-    np.testing.assert_array_equal(single(found.vertex_normals), single(ball.normals))
-    np.testing.assert_array_equal(found.visual.vertex_colors[:, :3], ball.colours)
-    of_vertices = found.metadata["_ply_raw"]["vertex"]["data"]
+    result = read(ball, "ply")
+    np.testing.assert_array_equal(single(result.vertices), single(ball.vertices))
+    np.testing.assert_array_equal(result.faces, ball.faces)
+    np.testing.assert_array_equal(single(result.vertex_normals), single(ball.normals))
+    np.testing.assert_array_equal(result.visual.vertex_colors[:, :3], ball.colours)
+    of_vertices = result.metadata["_ply_raw"]["vertex"]["data"]
     np.testing.assert_array_equal(of_vertices["camera"], ball.camera)
     np.testing.assert_array_equal(of_vertices["filled"], ball.filled)
     header = mesh_bytes(ball, ".ply").partition(b"end_header")[0].decode().splitlines()
@@ -74,11 +74,11 @@ def test_ply(ball: Mesh) -> None:
 
 
 def test_obj(ball: Mesh) -> None:
-    found = read(ball, "obj")
-    np.testing.assert_array_equal(single(found.vertices), single(ball.vertices))
-    np.testing.assert_array_equal(found.faces, ball.faces)
-    np.testing.assert_allclose(found.vertex_normals, ball.normals, atol=1e-6)
-    np.testing.assert_array_equal(found.visual.vertex_colors[:, :3], ball.colours)
+    result = read(ball, "obj")
+    np.testing.assert_array_equal(single(result.vertices), single(ball.vertices))
+    np.testing.assert_array_equal(result.faces, ball.faces)
+    np.testing.assert_allclose(result.vertex_normals, ball.normals, atol=1e-6)
+    np.testing.assert_array_equal(result.visual.vertex_colors[:, :3], ball.colours)
     assert mesh_bytes(ball, ".obj").startswith(b"# unit mm\n# patient P0001\n")
 
 
@@ -86,20 +86,20 @@ def test_glb(ball: Mesh) -> None:
     """Metres, Y up, and light in place of levels: half the light is level 188 of 255."""
     level = np.full((len(ball.vertices), 3), 188, np.uint8)
     content = io.BytesIO(mesh_bytes(replace(ball, colours=level), ".glb"))
-    (found,) = trimesh.load_scene(content, file_type="glb", process=False, skip_materials=True).geometry.values()
+    (result,) = trimesh.load_scene(content, file_type="glb", process=False, skip_materials=True).geometry.values()
     x, y, z = ball.vertices.T
-    np.testing.assert_array_equal(single(found.vertices), single(np.column_stack([x, z, -y]) / 1000))
-    np.testing.assert_array_equal(found.faces, ball.faces)
-    assert found.units == "meters"
-    assert found.volume > 0
+    np.testing.assert_array_equal(single(result.vertices), single(np.column_stack([x, z, -y]) / 1000))
+    np.testing.assert_array_equal(result.faces, ball.faces)
+    assert result.units == "meters"
+    assert result.volume > 0
     nx, ny, nz = ball.normals.T
-    np.testing.assert_allclose(found.vertex_normals, np.column_stack([nx, nz, -ny]), atol=1e-6)
+    np.testing.assert_allclose(result.vertex_normals, np.column_stack([nx, nz, -ny]), atol=1e-6)
     half = round(0.5029 * 255)  # ((188 / 255 + 0.055) / 1.055) ** 2.4
-    np.testing.assert_array_equal(found.visual.vertex_colors, [[half, half, half, 255]] * len(level))
-    np.testing.assert_array_equal(found.vertex_attributes["_CAMERA"].ravel(), ball.camera)
-    np.testing.assert_array_equal(found.vertex_attributes["_FILLED"].ravel(), ball.filled)
-    assert {key: found.metadata[key] for key in METADATA} == METADATA
-    assert found.metadata["unit"] == "m"
+    np.testing.assert_array_equal(result.visual.vertex_colors, [[half, half, half, 255]] * len(level))
+    np.testing.assert_array_equal(result.vertex_attributes["_CAMERA"].ravel(), ball.camera)
+    np.testing.assert_array_equal(result.vertex_attributes["_FILLED"].ravel(), ball.filled)
+    assert {key: result.metadata[key] for key in METADATA} == METADATA
+    assert result.metadata["unit"] == "m"
 
 
 def test_3mf(ball: Mesh) -> None:
@@ -111,11 +111,11 @@ def test_3mf(ball: Mesh) -> None:
     assert reader.GetWarningCount() == 0
     assert model.GetUnit() == lib3mf.ModelUnit.MilliMeter
     group = model.GetMetaDataGroup()
-    found = [group.GetMetaData(k) for k in range(group.GetMetaDataCount())]
-    told = {entry.GetName(): entry.GetValue() for entry in found}
-    assert told["Title"] == 'P0001 2026 "R" <&\\ right'
-    assert told["Application"] == "footscan 1.2"
-    assert {name: told[name] for name in METADATA} == METADATA
+    result = [group.GetMetaData(k) for k in range(group.GetMetaDataCount())]
+    entries = {entry.GetName(): entry.GetValue() for entry in result}
+    assert entries["Title"] == 'P0001 2026 "R" <&\\ right'
+    assert entries["Application"] == "footscan 1.2"
+    assert {name: entries[name] for name in METADATA} == METADATA
 
     meshes = model.GetMeshObjects()
     assert meshes.Count() == 1
@@ -134,10 +134,10 @@ def test_3mf(ball: Mesh) -> None:
 
 
 def test_3mf_a_second_time(ball: Mesh) -> None:
-    found = read(ball, "3mf")
-    np.testing.assert_array_equal(single(found.vertices), single(ball.vertices))
-    np.testing.assert_array_equal(found.faces, ball.faces)
-    assert found.units == "millimeter"
+    result = read(ball, "3mf")
+    np.testing.assert_array_equal(single(result.vertices), single(ball.vertices))
+    np.testing.assert_array_equal(result.faces, ball.faces)
+    assert result.units == "millimeter"
 
 
 def test_3mf_of_an_open_mesh_says_so(ball: Mesh) -> None:
@@ -153,10 +153,12 @@ def test_vrml(ball: Mesh, tmp_path: Path) -> None:
     path.write_bytes(mesh_bytes(ball, ".wrl"))
     meshes = pymeshlab.MeshSet()
     meshes.load_new_mesh(str(path))
-    found = meshes.current_mesh()
-    np.testing.assert_array_equal(single(found.vertex_matrix()), single(ball.vertices))
-    np.testing.assert_array_equal(found.face_matrix(), ball.faces)
-    np.testing.assert_allclose(found.vertex_color_matrix()[:, :3] * 255, ball.colours, atol=1.01)  # it cuts, not rounds
+    result = meshes.current_mesh()
+    np.testing.assert_array_equal(single(result.vertex_matrix()), single(ball.vertices))
+    np.testing.assert_array_equal(result.face_matrix(), ball.faces)
+    np.testing.assert_allclose(
+        result.vertex_color_matrix()[:, :3] * 255, ball.colours, atol=1.01
+    )  # it cuts, not rounds
     assert b'info [ "unit mm", "patient P0001", "scan 2026 \\"R\\" <&\\\\", "side right"' in path.read_bytes()
 
 
@@ -182,8 +184,8 @@ def test_the_same_mesh_gives_the_same_bytes(ball: Mesh, kind: str, monkeypatch: 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_words_that_would_break_a_file(ball: Mesh, kind: str, tmp_path: Path) -> None:
-    told = {"patient": 'a\n"]}></metadata>\x00\nend_header\nv 1 2 3\n--\x1b[0m'}
-    hostile = mesh_bytes(replace(ball, metadata=told), kind)
+    entries = {"patient": 'a\n"]}></metadata>\x00\nend_header\nv 1 2 3\n--\x1b[0m'}
+    hostile = mesh_bytes(replace(ball, metadata=entries), kind)
     assert hostile.count(b"\nv 1 2 3") == hostile.count(b"\nend_header\nv") == 0
     path = tmp_path / f"foot{kind}"
     path.write_bytes(hostile)

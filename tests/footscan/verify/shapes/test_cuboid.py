@@ -185,14 +185,14 @@ def test_a_block_that_leans_has_no_height_above_the_floor() -> None:
     fit = fit_cuboid(striped(turn=Rotation.from_euler("zy", [20, 5], degrees=True), faces=WITHOUT_BOTTOM))
     height = fit.dimensions[2]
     assert (height.value_mm, height.uncertainty_mm, height.ends) == (None, None, (None, "faces"))
-    assert height.note == "nothing tells where its bottom stands"
+    assert height.note == "the place of its bottom is unknown"
     assert values(fit)[:2] == pytest.approx([150, 100], abs=1e-6)
 
 
 def test_three_faces_suffice() -> None:
     fit = fit_cuboid(striped(turn=POSES["askew"], faces=((0, 1), (1, 1), (2, 1))))
     assert [found.name for found in fit.faces] == ["front", "left", "top"]
-    assert fit.dimensions[1].note == "nothing tells where its right stands"
+    assert fit.dimensions[1].note == "the place of its right is unknown"
     assert fit.dimensions[2].value_mm == pytest.approx(50, abs=1e-6)
 
 
@@ -263,6 +263,6 @@ def test_what_is_no_cuboid_is_told() -> None:
         (sample_surface(sphere.vertices, sphere.faces, 30_000), "cuboid"),
         (sample_surface(foot.vertices, foot.faces, 30_000), "cuboid"),
     ]:
-        with pytest.raises(Finding, match=problem) as told:
+        with pytest.raises(Finding, match=problem) as caught:
             fit_cuboid(points)
-        assert "\n" not in str(told.value)
+        assert "\n" not in str(caught.value)

@@ -117,9 +117,9 @@ def test_what_is_no_sphere_is_told() -> None:
         striped(30.0, (40, 0, 30)),  # of another size
         np.random.default_rng(1).uniform(0, 60, (5000, 3)),
     ):
-        with pytest.raises(Finding, match="no sphere of about 40 mm") as told:
+        with pytest.raises(Finding, match="no sphere of about 40 mm") as caught:
             fit_sphere(points, 40.0)
-        assert "\n" not in str(told.value)
+        assert "\n" not in str(caught.value)
     with pytest.raises(Finding, match="no numbers"):
         fit_sphere(np.full((200, 3), np.nan), 40.0)
 

@@ -17,7 +17,7 @@ from waiting import LONG_SECONDS, wait_until
 
 from footscan.virtual.board.board import Board
 from footscan.virtual.board.line import Harm
-from footscan.virtual.board.motion import Light, Motion, Move
+from footscan.virtual.board.motion import LaserPower, Motion, Move
 from footscan.virtual.board.rails import Gait, Mount, Rail
 
 pytestmark = pytest.mark.real_time  # the board answers on a terminal of the system
@@ -217,5 +217,5 @@ def straight_move(*, length: float, feed: float, acceleration: float) -> Motion:
     """Begun at time 0, with light that follows the speed."""
     motion = Motion([Rail(), Rail(), Rail()], (0.0, 0.0, 0.0), 0.0)
     target = (-length, 0.0, 0.0)
-    motion.add(Move(target, (-1.0, 0.0, 0.0), length, feed, math.inf, acceleration, Light(0.5, feed)))
+    motion.add(Move(target, (-1.0, 0.0, 0.0), length, feed, math.inf, acceleration, LaserPower(0.5, feed)))
     return motion

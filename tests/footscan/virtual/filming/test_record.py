@@ -8,8 +8,9 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
-from footscan.virtual.filming.record import record_scan
+from footscan.virtual.filming.record import ScanExtras, ScanName, record_scan
 from footscan.virtual.optics.scanner import standard_scanner
+from footscan.virtual.optics.scene import Mesh
 from schemas.base.errors import RefusedInput
 from schemas.base.yaml_files import read_yaml
 from schemas.parameters.simulation import SimulationSettings
@@ -17,19 +18,16 @@ from schemas.scan import Scan
 
 SETTINGS = SimulationSettings(start_mm=80.0, step_mm=60.0, frames=2)
 LOAF = trimesh.creation.box(bounds=[[10.0, -40.0, 0.0], [210.0, 40.0, 50.0]])
-VERTICES, FACES = np.asarray(LOAF.vertices), np.asarray(LOAF.faces)
+MESH = Mesh(np.asarray(LOAF.vertices), np.asarray(LOAF.faces))
 
 
 def record(folder: Path, settings: SimulationSettings = SETTINGS, workers: int = 1) -> dict[str, bytes]:
     record_scan(
-        VERTICES,
-        FACES,
+        MESH,
         folder,
-        patient="P0001",
-        scan="2026-11-20-R",
-        side="right",
-        settings=settings,
-        stripe_truth=True,
+        ScanName("P0001", "2026-11-20-R", "right"),
+        settings,
+        extras=ScanExtras(stripe_truth=True),
         workers=workers,
     )
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
@@ -67,14 +65,11 @@ def test_workers_do_not_change_bytes_but_seeds_do(folder: Path, tmp_path: Path) 
 
 def test_laser_off_is_a_second_exposure(folder: Path, tmp_path: Path) -> None:
     record_scan(
-        VERTICES,
-        FACES,
+        MESH,
         tmp_path,
-        patient="P0001",
-        scan="off",
-        side="right",
-        settings=SETTINGS,
-        laser_off=True,
+        ScanName("P0001", "off", "right"),
+        SETTINGS,
+        extras=ScanExtras(laser_off=True),
         workers=1,
     )
     cameras = read_yaml(tmp_path / "scan.yaml", Scan).cameras
@@ -117,5 +112,5 @@ def test_stripe_truth_lies_on_the_object(folder: Path) -> None:
 
 def test_refuses_a_patient_that_is_a_path(tmp_path: Path) -> None:
     with pytest.raises(RefusedInput, match="patient"):
-        record_scan(VERTICES, FACES, tmp_path / "x", patient="../x", scan="s", side="left", settings=SETTINGS)
+        record_scan(MESH, tmp_path / "x", ScanName("../x", "s", "left"), SETTINGS)
     assert not (tmp_path / "x").exists()

@@ -11,7 +11,7 @@ import simplejpeg
 
 from footscan.virtual.filming.renderers import Shot, Studio
 from footscan.virtual.optics.scene import MATT_GREY, Mesh
-from footscan.virtual.stage.pictures import Light, StagePictures, Subject
+from footscan.virtual.stage.pictures import StageLight, StagePictures, Subject
 from footscan.virtual.stage.reference_stage import NOTHING, block_subject, foot_subject, reference_subject
 from footscan.virtual.stage.stage import FRAMES_PER_SECOND, Stage, indices_of_travel
 from schemas.parameters.simulation import SimulationSettings
@@ -62,13 +62,13 @@ def test_pictures_are_those_of_a_film(block_pictures: StagePictures) -> None:
     block = block_subject(200.0)
     assert block.mesh is not None
     [filmed] = Studio([block.mesh], MATT_GREY, SETTINGS).shoot(2, [Shot(401, 200.5, 0)])
-    assert block_pictures.picture(2, 401, Light()) == filmed
+    assert block_pictures.picture(2, 401, StageLight()) == filmed
 
 
 def test_less_light_makes_a_darker_picture_and_no_laser_none_of_its_red(block_pictures: StagePictures) -> None:
     full, half, off = (
         simplejpeg.decode_jpeg(block_pictures.picture(2, 401, light), colorspace="RGB").astype(float)
-        for light in (Light(), Light(exposure=0.5), Light(power=0.0))
+        for light in (StageLight(), StageLight(exposure=0.5), StageLight(power=0.0))
     )
     assert half.mean() < 0.85 * full.mean()
     redness = [(picture[..., 0] - picture[..., 1:].max(axis=2)).max() for picture in (full, off)]
@@ -76,16 +76,16 @@ def test_less_light_makes_a_darker_picture_and_no_laser_none_of_its_red(block_pi
 
 
 def test_levels_are_a_quarter_of_a_stop_apart() -> None:
-    assert Light(0.001, 1.05, 2.0).nearest_level() == Light(0.0, 1.0, 2.0)
-    assert Light(0.5, 1.15, 1.0).nearest_level() == Light(0.5, pytest.approx(2**0.25), 1.0)
+    assert StageLight(0.001, 1.05, 2.0).nearest_level() == StageLight(0.0, 1.0, 2.0)
+    assert StageLight(0.5, 1.15, 1.0).nearest_level() == StageLight(0.5, pytest.approx(2**0.25), 1.0)
 
 
 def test_an_empty_scanner_looks_the_same_everywhere(empty: StagePictures) -> None:
     heard: list[tuple[int, int]] = []
-    assert empty.prepare([1], range(100), Light(), lambda done, total: heard.append((done, total))) == 1
+    assert empty.prepare([1], range(100), StageLight(), lambda done, total: heard.append((done, total))) == 1
     assert heard == [(1, 1)]
-    assert empty.picture(1, 3, Light()) == empty.picture(1, 77, Light())
-    assert empty.prepare([1], range(100), Light()) == 0
+    assert empty.picture(1, 3, StageLight()) == empty.picture(1, 77, StageLight())
+    assert empty.prepare([1], range(100), StageLight()) == 0
 
 
 def test_another_subject_has_other_pictures(tmp_path: Path) -> None:
@@ -146,14 +146,14 @@ def test_each_camera_goes_by_its_own_head_and_light(block_pictures: StagePicture
     stage = Stage(
         block_pictures, lambda _: (200.5, 0.0, 0.0), power_at=lambda _: 0.98, light_of=lambda camera: (2 / camera, 1.0)
     )
-    assert stage.picture(2, 0.0) == block_pictures.picture(2, 401, Light())
+    assert stage.picture(2, 0.0) == block_pictures.picture(2, 401, StageLight())
 
 
 def test_what_stands_on_the_glass_can_be_exchanged(block_pictures: StagePictures, empty: StagePictures) -> None:
     stage = Stage(block_pictures, lambda _: (200.5, 0.0, 0.0))
     before = stage.picture(2, 0.0)
     stage.put(empty)
-    assert stage.picture(2, 0.1) == empty.picture(2, 0, Light()) != before
+    assert stage.picture(2, 0.1) == empty.picture(2, 0, StageLight()) != before
 
 
 def test_closing_ends_exposures_that_are_waited_for(block_pictures: StagePictures) -> None:

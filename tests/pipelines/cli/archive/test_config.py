@@ -64,7 +64,7 @@ MISTAKES = [
 ]
 NO_YAML = [
     ("workers: 2", "\tworkers: 2", "line 4, column 1"),
-    ("workers: 2", "workers: 2\nworkers: 3", "line 5, column 1: 'workers' stands twice"),
+    ("workers: 2", "workers: 2\nworkers: 3", "line 5, column 1: 'workers' is listed twice"),
     ("z_mm: [-1, 100]", "z_mm: [-1, 100", "line 12, column 10"),
     ("ridge_px: 2.5", "ridge_px: *same", "line 9, column 15: alias 'same'"),
 ]

@@ -1,4 +1,4 @@
-"""What is told of a scan that is not good: which camera, and why."""
+"""Advice on a scan of poor quality: camera and reason."""
 
 from typing import Any
 
@@ -55,7 +55,7 @@ def test_lost_frames_are_told_with_the_reason_of_most() -> None:
 
 def test_a_latency_that_was_never_measured_is_told() -> None:
     [line] = told(measures_of("right"), quality_of(), recorded(0, None, []))
-    assert line.startswith("How late the pictures of camera 3 come was never measured")
+    assert line.startswith("The latency of camera 3 was never measured")
 
 
 def test_of_cameras_that_disagree_the_farthest_is_suspected() -> None:

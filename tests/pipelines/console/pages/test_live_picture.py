@@ -1,4 +1,4 @@
-"""The stripe that is found, drawn where it is."""
+"""The extracted stripe, drawn at its position."""
 
 import numpy as np
 import pytest

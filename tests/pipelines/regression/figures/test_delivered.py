@@ -1,4 +1,4 @@
-"""What is told of delivered files."""
+"""Figures of delivered files."""
 
 from pathlib import Path
 

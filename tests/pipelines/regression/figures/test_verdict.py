@@ -1,4 +1,4 @@
-"""Figures beside the accepted ones, and the file of the accepted ones."""
+"""Verdicts on figures, and the file of the accepted figures."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -37,12 +37,12 @@ SET = {"sets": {"foot": {"virtual": {"side": "right"}}}, "format": "footscan.sui
     ],
 )
 def test_verdicts(value: float, accepted: float, allowed: float, goal: str, truth: float | None, expected: str) -> None:
-    assert verdict(value, accepted, allowed, goal, truth, is_known=True) == expected  # type: ignore[arg-type]
+    assert verdict(value, accepted, allowed, goal, truth, in_baseline=True) == expected  # type: ignore[arg-type]
 
 
 def test_what_the_baseline_does_not_have_is_new() -> None:
-    assert verdict(1.0, None, 0.0, "less", None, is_known=False) == "new"
-    assert verdict(None, None, 0.0, "less", None, is_known=False) == "new"
+    assert verdict(1.0, None, 0.0, "less", None, in_baseline=False) == "new"
+    assert verdict(None, None, 0.0, "less", None, in_baseline=False) == "new"
 
 
 def test_every_kind_of_figure_has_its_goal() -> None:

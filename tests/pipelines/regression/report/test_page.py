@@ -1,4 +1,4 @@
-"""The page of the morning: what it says, how its lines run, and that names are data in it."""
+"""The page of a night: its text, its history lines, and escaped names."""
 
 import re
 import xml.etree.ElementTree as ET
@@ -49,18 +49,14 @@ BAD = JudgedSet(
     "bad",
     None,
     [figure("accuracy.mean_mm", 0.41, "worse", history=[0.2]), figure("points.cloud", None, "missing")],
-    [
-        FirstStep(
-            ["extract-1", "extract-2"], "its result is another", [Change("code of a changed", [("x = 1", "x = 2")])]
-        )
-    ],
+    [FirstStep(["extract-1", "extract-2"], "its result differs", [Change("code of a changed", [("x = 1", "x = 2")])])],
     otherwise=7,
     pictures={"surface: distance to the accepted one": PNG},
 )
 
 
 class Text(HTMLParser):
-    """What a person reads, and the elements in which it stands."""
+    """The words of a page, and the elements that hold them."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
@@ -82,8 +78,8 @@ def test_what_needs_a_look_comes_first() -> None:
     assert "<title>nightly: something is worse</title>" in page
     assert page.index("<h2>bad</h2>") < page.index("<h2>good</h2>")
     text = " ".join(Text(page).words)
-    assert "7 steps have another result than the accepted one." in text
-    assert "extract-1, extract-2 : its result is another" in text
+    assert "Steps whose result differs from the accepted one: 7." in text
+    assert "extract-1, extract-2 : its result differs" in text
     assert "All 1 figures are the same" in text
     assert "as filmed" in text
     assert "<title>nightly: all is the same or better</title>" in regress_page(night(GOOD))

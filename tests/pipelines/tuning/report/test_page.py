@@ -1,4 +1,4 @@
-"""The page of a search: whole, without a network, and with names as data."""
+"""The page of a search: well formed, self-contained, with escaped names."""
 
 import re
 from html.parser import HTMLParser
@@ -46,7 +46,7 @@ def result() -> TuneResult:
 
 
 class Elements(HTMLParser):
-    """Elements and words of a page; refuses a wrong end of a tag."""
+    """Elements and words of a page; fails at a wrong end tag."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
@@ -102,7 +102,7 @@ def test_sentences_tell_whether_a_gain_is_real(result: TuneResult) -> None:
 def test_without_held_out_scans_that_is_said(result: TuneResult) -> None:
     plain = TuneResult(**{**vars(result), "held_out": [], "changes": []})
     assert sentences(plain) == [
-        "accuracy, on the scans that chose it: gain 0.0100 mm; a single data set does not tell whether that is real.",
+        "accuracy, on the scans that chose it: gain 0.0100 mm; a single data set does not show whether that is real.",
         "completeness, on the scans that chose it: no gain.",
     ]
     words = Elements(tune_page(plain)).words
