@@ -1,4 +1,4 @@
-"""The results of an archive as a table."""
+"""Read the results of an archive as a table; `pipelines.archive.table` writes it."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

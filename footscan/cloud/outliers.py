@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.clutter import is_island, is_static
-from footscan.cloud.plate import is_plate
+from footscan.cloud.glass import is_plate
 from footscan.cloud.support import END, ISOLATED, UNCONFIRMED, judge_segments
 from footscan.cloud.views import View
 from schemas.parameters.outliers import OutlierParameters

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
-from footscan.stripe.limits import FIR, GAUSSIAN, GRAVITY, RIDGE, Limits
+from footscan.stripe.loop_parameters import FIR, GAUSSIAN, GRAVITY, RIDGE, LoopParameters
 
 SCALE = 0.5
 """Standard deviation of the smoothing of `ridge`, in widths of the stripe: 1.18 times that of a Gaussian profile, so
@@ -49,7 +49,7 @@ def centre_of(
     right: float,
     base: float,
     contrast: float,
-    limits: Limits,
+    limits: LoopParameters,
 ) -> float:
     """Find the centre of a profile.
 
@@ -68,10 +68,10 @@ def centre_of(
     Examples
     --------
     >>> from schemas.parameters.extraction import ExtractionParameters
-    >>> from footscan.stripe.limits import limits_of
+    >>> from footscan.stripe.loop_parameters import loop_parameters_of
     >>> samples = np.array([0.0, 0.0, 10.0, 20.0, 10.0, 0.0, 0.0])
     >>> clipped = np.zeros(7, np.bool_)
-    >>> limits = limits_of(ExtractionParameters(centre_method="gravity"))
+    >>> limits = loop_parameters_of(ExtractionParameters(centre_method="gravity"))
     >>> print(round(centre_of(samples, clipped, 0, 6, 2.0, 4.0, 0.0, 20.0, limits), 6))
     3.0
     """

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from footscan.compiled import compiled
 from footscan.stripe.chain import in_order, is_sharpest, neighbours, pieces_of, place
-from footscan.stripe.limits import Limits, limits_of
+from footscan.stripe.loop_parameters import LoopParameters, loop_parameters_of
 from footscan.stripe.pieces import keep_stripe
 from footscan.stripe.points import STRIPE_DTYPE, StripePoints
 from footscan.stripe.profile import COLUMNS, CONTRAST, REDNESS, SATURATION, SYMMETRY, WIDTH, measure_profiles
@@ -89,7 +89,7 @@ def find_stripe(
             background is not None,
             _memory(rows, columns),
             gaussian(0.5 * parameters.ridge_px),
-            limits_of(parameters),
+            loop_parameters_of(parameters),
             (
                 SIGNAL_SCALE * parameters.smallest_contrast,
                 float(parameters.shortest_piece_px),
@@ -172,7 +172,7 @@ def _find_points(
     has_background: bool,
     memory: Memory,
     kernel: NDArray[np.float32],
-    limits: Limits,
+    limits: LoopParameters,
     piece_limits: tuple[float, float, float, float, float, float],
     gap: float,
     smoothing_widths: float,

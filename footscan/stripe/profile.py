@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from footscan.compiled import compiled
 from footscan.stripe.centre import centre_of
-from footscan.stripe.limits import Limits
+from footscan.stripe.loop_parameters import LoopParameters
 from footscan.stripe.redness import SIGNAL_SCALE, WHITE_SCALE, light_of, lights_of, red_of, redness_of
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SHARPNESS, I, J
 
@@ -89,7 +89,7 @@ def measure_profiles(
     words: NDArray[np.uint32],
     light: NDArray[np.uint32],
     ridges: NDArray[np.float64],
-    limits: Limits,
+    limits: LoopParameters,
     profiles: NDArray[np.float64],
 ) -> int:
     """Measure the profiles across the ridges, and keep those that stand out from both their sides.
@@ -151,7 +151,7 @@ def _steps_inside(at: int, lines: int, beside: float, pixels: int, slope: float,
 
 
 @compiled
-def _walk(light: NDArray[np.uint32], way: Way, limits: Limits, memory: Samples) -> tuple[int, int, float, bool]:
+def _walk(light: NDArray[np.uint32], way: Way, limits: LoopParameters, memory: Samples) -> tuple[int, int, float, bool]:
     """Sample the profile from the ridge to both feet, into `memory`; returns the fields of `Feet`.
 
     Without a stripe first and last are equal. The laser's light lies above the higher foot, even beside an edge.
@@ -213,7 +213,7 @@ def _measure(
     memory: Samples,
     feet: Feet,
     step: float,
-    limits: Limits,
+    limits: LoopParameters,
     profiles: NDArray[np.float64],
     n: int,
 ) -> float:
@@ -274,7 +274,7 @@ def _white_centre(
     left: float,
     right: float,
     is_even: bool,
-    limits: Limits,
+    limits: LoopParameters,
 ) -> float:
     """Centre of the white core of a stripe whose red is saturated from `left` to `right`; NaN if there is no core.
 
@@ -339,7 +339,7 @@ def _saturation(
     last: int,
     left: float,
     right: float,
-    limits: Limits,
+    limits: LoopParameters,
 ) -> float:
     """The part of the stripe's width in which red is saturated; marks the saturated samples in `clipped`."""
     saturated = inside = 0
@@ -361,7 +361,7 @@ def _redness(
     last: int,
     left: float,
     right: float,
-    limits: Limits,
+    limits: LoopParameters,
 ) -> tuple[int, bool]:
     """By how much the reddest pixel of the stripe exceeds the redder foot; and True if its light may be a laser's.
 

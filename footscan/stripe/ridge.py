@@ -1,5 +1,7 @@
 """The ridge of the stripe: where the smoothed signal is highest across the stripe, and the normal there.
 
+The red threshold is applied here, to blocks of the image, and in `footscan.stripe.profile`, to the flanks of a profile.
+
 C. Steger, "An unbiased detector of curvilinear structures", IEEE TPAMI 20(2), 1998, doi:10.1109/34.659930. The Hessian
 gives the normal; the profile along the normal gives the centre (`footscan.stripe.profile`).
 """
@@ -11,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
-from footscan.stripe.limits import Limits
+from footscan.stripe.loop_parameters import LoopParameters
 from footscan.stripe.redness import SATURATED, SIGNAL_SCALE, SUMMED
 
 SIDE = 16
@@ -61,7 +63,7 @@ def find_ridges(
     excess: NDArray[np.uint16],
     signal: NDArray[np.uint16],
     kernel: NDArray[np.float32],
-    limits: Limits,
+    limits: LoopParameters,
     ridges: NDArray[np.float64],
 ) -> int:
     """Find the ridge crossings of a frame.

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from footscan.mesh.mesh import Mesh, with_normals
 from footscan.mesh.topology import directed_edges, vertex_normals
 from footscan.surface.ankle import cut_flat, opening_height
-from footscan.surface.indicator import indicator, level_surface
 from footscan.surface.patch import fair
+from footscan.surface.poisson import indicator, level_surface
 from footscan.surface.projection import Projection, project
 from footscan.surface.travel_ends import drawn_to_tips, travel_ends
 from schemas.base.errors import Finding

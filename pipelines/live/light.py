@@ -10,7 +10,7 @@ from footscan.capture.board.heads import Heads
 from footscan.capture.cameras.deck import CameraDeck
 from footscan.capture.cameras.stream import CapturedFrame
 from footscan.capture.cameras.video_controls import ControlValues, FixedControl, controls_of
-from footscan.capture.laser_light import LightLimits, choose_light
+from footscan.capture.light_choice import LightLimits, choose_light
 from footscan.frames.image import Rgb, decode_image
 from schemas.base.errors import Fault
 from schemas.rig import Rig

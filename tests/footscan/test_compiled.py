@@ -33,7 +33,7 @@ import importlib, sys, threading
 sys.setswitchinterval(1e-6)
 ROOMS = {
     "footscan.stripe.centre", "footscan.stripe.ridge", "footscan.mesh.voxels", "footscan.cloud.normals",
-    "footscan.measure.hull", "footscan.measure.outline", "footscan.surface.indicator", "footscan.surface.texture",
+    "footscan.measure.hull", "footscan.measure.outline", "footscan.surface.poisson", "footscan.surface.texture",
     "footscan.virtual.optics.scene", "footscan.virtual.optics.texture", "footscan.calibration.models.fit",
     "footscan.report.render",
 }

@@ -6,7 +6,7 @@ from importlib import import_module
 import pytest
 
 MODULES = [
-    *("clutter", "colour", "mapping", "normals", "outliers", "planes", "plate", "points", "segments", "uncertainty"),
+    *("clutter", "colour", "mapping", "normals", "outliers", "planes", "glass", "points", "segments", "uncertainty"),
     *("views", "fusion.agreement", "fusion.fuse", "fusion.motion", "fusion.stripes"),
 ]
 

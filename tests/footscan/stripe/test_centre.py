@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from footscan.stripe.centre import centre_of
-from footscan.stripe.limits import METHODS, Limits
+from footscan.stripe.loop_parameters import METHODS, LoopParameters
 
 MIDDLE = 20
 X = np.arange(2 * MIDDLE + 1.0)
@@ -25,7 +25,7 @@ def centre(samples, method, level=0.5, clipped=None, first=0, last=2 * MIDDLE, b
     a, b = above[0], above[-1]
     left = a - (samples[a] - half) / (samples[a] - samples[a - 1])
     right = b + (samples[b] - half) / (samples[b] - samples[b + 1])
-    limits = Limits(18, 250, 4.0, 40.0, level, METHODS.index(method))
+    limits = LoopParameters(18, 250, 4.0, 40.0, level, METHODS.index(method))
     clipped = np.zeros(len(samples), np.bool_) if clipped is None else clipped
     return centre_of(samples, clipped, first, last, left, right, base, contrast, limits)
 

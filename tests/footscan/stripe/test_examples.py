@@ -7,7 +7,7 @@ import pytest
 
 
 @pytest.mark.parametrize(
-    "module", ["centre", "chain", "clutter", "extract", "film", "limits", "redness", "ridge", "smoothing"]
+    "module", ["centre", "chain", "clutter", "extract", "film", "loop_parameters", "redness", "ridge", "smoothing"]
 )
 def test_examples(module: str) -> None:
     results = doctest.testmod(import_module(f"footscan.stripe.{module}"))

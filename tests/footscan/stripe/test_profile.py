@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from footscan.stripe.limits import METHODS, Limits
+from footscan.stripe.loop_parameters import METHODS, LoopParameters
 from footscan.stripe.profile import COLUMNS, CONTRAST, REDNESS, SATURATION, SYMMETRY, WIDTH, measure_profiles
 from footscan.stripe.redness import as_words
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SHARPNESS, I, J
@@ -21,7 +21,7 @@ def measure(image, *ridge, background=None, **limits):
     words = as_words(np.asarray(image, np.uint8))
     light = words if background is None else as_words(np.asarray(image - np.minimum(image, background), np.uint8))
     profiles = np.empty((1, COLUMNS))
-    found = measure_profiles(words, light, np.array([[*ridge, 7.0]]), Limits(**arguments), profiles)
+    found = measure_profiles(words, light, np.array([[*ridge, 7.0]]), LoopParameters(**arguments), profiles)
     return profiles[0] if found else None
 
 

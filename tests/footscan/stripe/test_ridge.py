@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from footscan.stripe.limits import Limits
+from footscan.stripe.loop_parameters import LoopParameters
 from footscan.stripe.redness import as_words, halve
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, RADIUS, SHARPNESS, TAPS, I, J, find_ridges, gaussian
 
-LIMITS = Limits(red_threshold=18, saturation=245, faintest=4.0, largest_width=40.0, centre_level=0.5, method=1)
+LIMITS = LoopParameters(red_threshold=18, saturation=245, faintest=4.0, largest_width=40.0, centre_level=0.5, method=1)
 SHAPE = ROWS, COLUMNS = 140, 180
 MIDDLE_I, MIDDLE_J = 90.2, 70.3
 ALONG_J, ALONG_I = np.mgrid[0:ROWS, 0:COLUMNS].astype(float)

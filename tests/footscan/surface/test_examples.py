@@ -10,7 +10,7 @@ MODULES = [
     "ball_pivoting",
     "collapse",
     "holes",
-    "indicator",
+    "poisson",
     "patch",
     "projection",
     "quality",

@@ -10,7 +10,7 @@ THRESHOLD_MEDIAN, GRAVITY, GAUSSIAN, RIDGE, FIR = range(len(METHODS))
 """Their numbers."""
 
 
-class Limits(NamedTuple):
+class LoopParameters(NamedTuple):
     """Values of `ExtractionParameters` that pixels and profiles are compared with, in grey levels and px."""
 
     red_threshold: int
@@ -21,14 +21,14 @@ class Limits(NamedTuple):
     method: int
 
 
-def limits_of(parameters: ExtractionParameters) -> Limits:
+def loop_parameters_of(parameters: ExtractionParameters) -> LoopParameters:
     """Select the limits from `parameters`.
 
-    >>> limits = limits_of(ExtractionParameters(centre_method="gaussian"))
+    >>> limits = loop_parameters_of(ExtractionParameters(centre_method="gaussian"))
     >>> limits.method == GAUSSIAN
     True
     """
-    return Limits(
+    return LoopParameters(
         parameters.red_threshold,
         parameters.saturation,
         parameters.faintest_contrast,

@@ -1,6 +1,6 @@
 import numpy as np
 
-from footscan.cloud.plate import is_plate
+from footscan.cloud.glass import is_plate
 from footscan.cloud.points import make_points
 from footscan.cloud.views import View
 

@@ -9,7 +9,7 @@ import pytest
 import simplejpeg
 from numpy.typing import NDArray
 
-from footscan.capture.laser_light import LightLimits, StripeSeen, choose_light, stripe_seen
+from footscan.capture.light_choice import LightLimits, StripeSeen, choose_light, stripe_seen
 from footscan.virtual.filming.render import CameraRenderer
 from footscan.virtual.optics.scanner import standard_scanner
 from footscan.virtual.optics.scene import SKIN, Scene
