@@ -255,3 +255,13 @@ def test_ends_that_another_camera_sees_within_its_stripe_are_dropped(views: View
 def test_ends_that_nobody_else_sees_stay(views: Views) -> None:
     alone = np.concatenate([line(1, frame, (-20.0, 40.0), (20.0, 40.0), 81) for frame in range(20)])
     assert len(remove_outliers(alone, views, OutlierParameters())[0]) == len(alone)
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_points_outside_the_control_volume_and_no_others_are_outside(ellipsoid: Film, views: Views, axis: str) -> None:
+    clean, _ = ellipsoid()
+    low, high = float(clean[axis].min()), float(clean[axis].max())
+    for bounds in ((low, high), (low + 3.0, high - 3.0)):
+        _, removed = remove_outliers(clean, views, OutlierParameters(**{f"{axis}_mm": bounds}))
+        outside = (clean[axis] < bounds[0]) | (clean[axis] > bounds[1])
+        assert np.array_equal(removed.codes == 1 + REASONS.index("volume"), outside)

@@ -1,19 +1,16 @@
 """The parts of a search: space, samplers, journal, data, winner."""
 
-import doctest
 import json
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from pipelines.tuning import pareto_front
 from pipelines.tuning.data import split
 from pipelines.tuning.journal import Journal
 from pipelines.tuning.objectives import GOALS, Judged, figures_of, goals_of, mean_of, values_of
 from pipelines.tuning.pareto_front import best_compromise, on_front
-from pipelines.tuning.report import influence
 from pipelines.tuning.report.result import Gain
 from pipelines.tuning.sampling import proposals_of
 from pipelines.tuning.space import Point, grid, present_point, with_point
@@ -23,7 +20,6 @@ from schemas.parameters.scan import ScanParameters
 from schemas.quality import CameraQuality, MeshQuality, Quality
 from schemas.tuning import TriedPoint, Tuning
 
-MODULES = [pareto_front, influence]
 SEARCH: dict[str, Any] = {
     "extraction.red_threshold": {"low": 8, "high": 60},
     "extraction.ridge_px": {"low": 0.5, "high": 4},
@@ -35,11 +31,6 @@ SEARCH: dict[str, Any] = {
 
 def tuning(**values: Any) -> Tuning:
     return Tuning.model_validate({"search": SEARCH, **values})
-
-
-@pytest.mark.parametrize("module", MODULES)
-def test_examples(module: ModuleType) -> None:
-    assert doctest.testmod(module).failed == 0
 
 
 def scans(*names: str, truth: str = "", side: str = "right") -> list[Any]:
