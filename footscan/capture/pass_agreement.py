@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.interpolate import BSpline
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.ndimage import uniform_filter1d
 
 from footscan.capture.head_motion import HeadMotion
@@ -19,6 +20,8 @@ from footscan.robust import MAD_TO_SD
 
 Floats = NDArray[np.float64]
 
+DEGREE = 3
+"""Of the splines. No two of their basis functions overlap that are farther apart: the normal equations are banded."""
 FRAMES_A_KNOT = 3.0
 """Mean number of frames between two knots of a curve. Chosen by hand."""
 CLUSTER_S = 0.5
@@ -146,19 +149,23 @@ def agree(seen: Seen, unknown: Floats, scale: Floats, weights: Floats | None = N
     x, changes = seen.places(unknown)
     weights = np.ones(len(x)) if weights is None else weights
     low, high = float(x.min()), float(x.max())
-    knots = np.concatenate([[low] * 3, np.linspace(low, high, max(int(len(x) / FRAMES_A_KNOT), 4)), [high] * 3])
-    basis = BSpline.design_matrix(x, knots, 3).toarray()
-    factor = cho_factor(basis.T @ (weights[:, None] * basis) + RIDGE * np.eye(basis.shape[1]))
+    knots = np.pad(np.linspace(low, high, max(int(len(x) / FRAMES_A_KNOT), 4)), DEGREE, mode="edge")
+    basis = BSpline.design_matrix(x, knots, DEGREE)
+    normal = basis.T @ sparse.diags_array(weights) @ basis
+    bands = np.stack([np.pad(normal.diagonal(k), (0, k)) for k in range(DEGREE + 1)])
+    bands[0] += RIDGE
+    factor = (cholesky_banded(bands, lower=True), True)
 
     def fitted(values: Floats) -> Floats:
-        return np.asarray(cho_solve(factor, basis.T @ (weights[:, None] * values)))
+        return np.asarray(cho_solve_banded(factor, np.asarray(basis.T @ (weights[:, None] * values))))
 
     figures = seen.figures / scale
     curves = fitted(figures)
-    slopes = np.asarray(BSpline(knots, curves, 3).derivative()(x))
+    slopes = np.asarray(BSpline(knots, curves, DEGREE).derivative()(x))
     ahead = (slopes[:, :, None] * changes[:, None, :]).reshape(len(x), -1)
     jacobian = (ahead - basis @ fitted(ahead)).reshape(*slopes.shape, 3)
     residuals = figures - basis @ curves
-    leverage = weights * np.einsum("kn,nk->n", cho_solve(factor, basis.T), basis)
+    rows = basis.T.toarray()
+    leverage = weights * np.einsum("kn,kn->n", cho_solve_banded(factor, rows), rows)
     held_out = residuals / np.maximum(1.0 - leverage, LEAST_FREEDOM)[:, None]
     return Agreement(seen, unknown, x, weights, residuals, held_out, slopes, jacobian)
