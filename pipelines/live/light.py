@@ -10,7 +10,6 @@ from footscan.capture.board.heads import Heads
 from footscan.capture.cameras.deck import CameraDeck
 from footscan.capture.cameras.stream import CapturedFrame
 from footscan.capture.cameras.video_controls import ControlValues, FixedControl, controls_of
-from footscan.capture.light_choice import LightLimits, choose_light
 from footscan.frames.image import Rgb, decode_image
 from schemas.base.errors import Fault
 from schemas.rig import Rig
@@ -74,6 +73,8 @@ def measured_light(rig: Rig, deck: CameraDeck, heads: Heads, check: Callable[[],
     Fault
         A device failed.
     """
+    from footscan.capture.light_choice import LightLimits, choose_light
+
     length = rig.travel.length_mm
     places = [rig.travel.start_mm + length * (k + 1) / (TEST_PLACES + 1) for k in range(TEST_PLACES)]
 

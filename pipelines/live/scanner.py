@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from footscan.capture.board.heads import HEADS, SLACK_MM, Heads
 from footscan.capture.board.position_log import Triple
@@ -16,16 +16,18 @@ from footscan.capture.cameras.deck import CameraDeck
 from footscan.capture.cameras.stream import CapturedFrame
 from footscan.capture.cameras.usb_bus import Pass
 from footscan.capture.passes import FilmedPass, PassPlan, film_name, film_pass
-from footscan.capture.recording import ScanRecording
 from pipelines.live.devices import heads_of, passes_of, sources_of, timing_of
 from pipelines.live.light import ScanLight, fix_light, measured_light
-from pipelines.live.measuring import Measured, measure_scan
 from pipelines.live.observer import looking_on
 from pipelines.live.recording_document import ScanStory
 from pipelines.live.state import Activity, OnState, ScannerState, StateBoard, with_board
-from pipelines.live.storing import FilmedScan, ScanName, store_scan
 from schemas.base.errors import Fault, FootscanError, RefusedInput
 from schemas.rig import Rig
+
+if TYPE_CHECKING:  # heads that are only moved do not wait for Zarr, Dask and the reconstruction
+    from footscan.capture.recording import ScanRecording
+    from pipelines.live.measuring import Measured
+    from pipelines.live.storing import FilmedScan, ScanName
 
 FRAME_BYTES = 40_000
 """Expected size of a frame, for the check of the free space before a scan."""
@@ -46,7 +48,7 @@ STOPPED = "stopped; nothing of this scan is kept"
 class ScanOrder:
     """Order of a scan: its name, its folders and its options."""
 
-    name: ScanName
+    name: "ScanName"
     archive: Path
     results: Path | None = None
     """Folder of the results; None: the scan is stored, but not measured."""
@@ -64,8 +66,8 @@ class ScanOrder:
 class LiveResult:
     """The outcome of a scan."""
 
-    stored: FilmedScan
-    measured: Measured | None
+    stored: "FilmedScan"
+    measured: "Measured | None"
 
 
 class LiveScanner:
@@ -188,6 +190,8 @@ class LiveScanner:
             stored = self.film(order)
             measured = None
             if order.results is not None and calibration is not None:
+                from pipelines.live.measuring import measure_scan
+
                 self._board.tell("reconstructing", progress=0.0)
                 measured = measure_scan(stored.place, calibration, order.results, self._board.progress)
             if measured is not None and measured.problem is not None:
@@ -196,8 +200,11 @@ class LiveScanner:
                 self._board.tell("done", str(stored.place))
             return LiveResult(stored, measured)
 
-    def film(self, order: ScanOrder) -> FilmedScan:
+    def film(self, order: ScanOrder) -> "FilmedScan":
         """Film and store a foot: the part of `scan` that needs the devices; the caller has reserved the scanner."""
+        from footscan.capture.recording import ScanRecording
+        from pipelines.live.storing import store_scan
+
         for camera in self.rig.cameras:
             timing_of(camera)
         with self._stop_reported():
@@ -233,7 +240,7 @@ class LiveScanner:
         planned: Pass,
         plan: PassPlan,
         light: ScanLight,
-        recording: ScanRecording,
+        recording: "ScanRecording",
         words: str = "",
         story: ScanStory | None = None,
     ) -> FilmedPass:
@@ -377,7 +384,7 @@ class LiveScanner:
         return round(len(self.rig.cameras) * seconds * self.rig.frames_per_second * FRAME_BYTES)
 
     @contextmanager
-    def _watched(self, plan: PassPlan, recording: ScanRecording) -> Iterator[None]:
+    def _watched(self, plan: PassPlan, recording: "ScanRecording") -> Iterator[None]:
         """Report the progress of the heads, and end the pass if the disk fails."""
         heads = self.heads
 

@@ -72,9 +72,11 @@ def opened_rig(rig: Path | None, folder: Path, world: "World | None", *, calibra
 
 def plain_world(virtual: bool, folder: Path, subject: Literal["block", "nothing"] = "nothing") -> "World | None":
     """The virtual world of commands that need no foot; None for a real scanner."""
+    if not virtual:
+        return None
     from pipelines.live.virtual.world import World
 
-    return World(pictures=str(folder / "pictures"), subject=subject) if virtual else None
+    return World(pictures=str(folder / "pictures"), subject=subject)
 
 
 class StateTeller:

@@ -99,7 +99,6 @@ def scan(
     """Scan a foot: home, film, store, reconstruct and measure."""
     from pipelines.live.scanner import LiveScanner, ScanOrder
     from pipelines.live.storing import ScanName, next_scan_name
-    from pipelines.live.virtual.world import World
     from schemas.base.model import pseudonym
 
     pseudonym(patient, "PATIENT")
@@ -107,6 +106,8 @@ def scan(
         pseudonym(name, "--name")
     world = None
     if virtual:
+        from pipelines.live.virtual.world import World
+
         world = World(
             pictures=str(virtual_folder / "pictures"), subject=side, foot_seed=foot_seed, light=light, ripple=ripple,
             pause_s=pause, jitter_ms=jitter_ms, grid_mm=grid_mm, start_mm=0.0 if from_mm is None else from_mm,
@@ -176,11 +177,13 @@ def _homed(rig: RigFile, virtual: bool, virtual_folder: Path) -> "Iterator[LiveS
 def _light(rig: "Rig", power: float | None, exposure_ms: float | None, virtual: bool) -> "ScanLight | None":
     """The light set on the command line; None if it is to be chosen."""
     from pipelines.live.light import light_by_hand
-    from pipelines.live.virtual.world import EXPOSURE_MS
 
     if power is None and exposure_ms is None:
-        # Pictures of a virtual scanner are made beforehand, and for one light.
-        return light_by_hand(rig, 1.0, EXPOSURE_MS) if virtual else None
+        if not virtual:
+            return None
+        from pipelines.live.virtual.world import EXPOSURE_MS
+
+        return light_by_hand(rig, 1.0, EXPOSURE_MS)  # its pictures are made beforehand, and for one light
     if power is None or exposure_ms is None:
         raise RefusedInput("--power, --exposure-ms", "go together, expected both or none")
     return light_by_hand(rig, power, exposure_ms)
