@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pipelines.engine.actions.code import CodeIdentity, code_identity
+from pipelines.engine.actions.code import CodeIdentity, code_identity, code_text
 from pipelines.engine.actions.key import PreImage
 from pipelines.engine.actions.step import Output, Step, Value
 from pipelines.engine.store.store import Store, plain_hex
@@ -118,10 +118,9 @@ def _code_changes(step: Step, old: PreImage, store: Store) -> Iterator[Change]:
     if was is None:
         yield Change("code", step.module, None, None)
         return
-    texts = dict(zip(now.modules, now.texts, strict=True))
-    for name, before, _ in _changed(was.modules, now.modules):
+    for name, before, after in _changed(was.modules, now.modules):
         text = None if before is None else store.get(before)
-        new = texts.get(name)
+        new = None if after is None else code_text(name)
         yield Change("code", name, _text(text), _text(new))
     for name, before, after in _changed(was.libraries, now.libraries):
         yield Change("library", name, before, after)

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from functools import partial
 from weakref import WeakValueDictionary
 
-from pipelines.engine.actions.code import CodeIdentity, code_identity
+from pipelines.engine.actions.code import CodeIdentity, code_identity, code_text
 from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Failure, Input, Outcome, Output, SourceFile, Step, Success, Value
 from pipelines.engine.files.digest import file_state
@@ -188,10 +188,10 @@ def _keep_code(identity: CodeIdentity, store: Store) -> None:
     """Put the texts of a step's code into the store, where they are missing or damaged; looked at once in a process."""
     if (store.files, identity.digest) in _KEPT and store.has(identity.digest):
         return
-    if any(store.get(digest) is None for digest in (*identity.modules.values(), identity.digest)):
-        for text in identity.texts:
-            store.put(text)
-        store.put(identity.document)
+    for module, digest in identity.modules.items():
+        if store.get(digest) is None:
+            store.put(code_text(module))
+    store.put(identity.document)
     _KEPT.add((store.files, identity.digest))
 
 

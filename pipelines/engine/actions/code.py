@@ -19,7 +19,7 @@ from typing import Any
 
 from pipelines.engine.actions.libraries import versions_that_count
 from pipelines.engine.files.atomic import write_atomically
-from pipelines.engine.files.digest import file_state, is_settled, sha256
+from pipelines.engine.files.digest import FileState, file_state, is_settled, sha256
 from pipelines.engine.files.seal import BROKEN, sealed, unsealed
 from schemas.base.errors import Fault
 from schemas.base.model import canonical_json
@@ -52,12 +52,6 @@ class CodeIdentity:
         """SHA-256 of the document."""
         return sha256(self.document)
 
-    @property
-    def texts(self) -> list[bytes]:
-        """The modules' syntax trees, as Python writes them down: what their digests are those of."""
-        with _parsing():
-            return [_text(name).encode() for name in self.modules]
-
 
 def code_identity(module: str) -> CodeIdentity:
     """The identity of the module of this name and of everything in this project that it reaches by import."""
@@ -68,6 +62,12 @@ def code_identity(module: str) -> CodeIdentity:
         identity = _KNOWN[module] = _identity(module)
         _remember()
     return identity
+
+
+def code_text(module: str) -> bytes:
+    """The syntax tree of a project module without docstrings, as Python writes it down: its digest is that of this."""
+    with _parsing():
+        return _text(module, file_state(_file(module))).encode()
 
 
 _KNOWN: dict[str, CodeIdentity] = {}
@@ -117,7 +117,7 @@ def _source(name: str) -> _Source:
     known = _remembered().get(name)
     if known is not None and known[0] == list(state):
         return _Source(known[1], frozenset(known[2]))
-    source = _Source(sha256(_text(name).encode()), frozenset(_imports(_tree(name))))
+    source = _Source(sha256(_text(name, state).encode()), frozenset(_imports(_tree(name))))
     if name.split(".", maxsplit=1)[0] in OWN and is_settled(state):
         _remembered()[name] = [list(state), source.digest, sorted(source.imports)]
         _CHANGED.add(name)
@@ -143,8 +143,9 @@ def _remember() -> None:
             write_atomically(MEMORY, sealed({"modules": _remembered()}))
 
 
-def _text(name: str) -> str:
-    """The syntax tree of a module without docstrings, as Python writes it down."""
+@cache
+def _text(name: str, _: FileState) -> str:
+    """The syntax tree of a module without docstrings, as Python writes it down, in a state of its file."""
     tree = _tree(name)
     for node in ast.walk(tree):
         _drop_docstring(node)
