@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from bench_scan import FRAMES, STEP_MM
 from chromium import launched
 from shared_folders import MadeOnce
 
@@ -67,7 +68,7 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture(scope="session")
 def recorded(films: MadeOnce, made_once: MadeOnce) -> Path:
-    """A bench as it is before its first run: 72 frames, 4 mm apart, of the right foot. To be read only."""
+    """A bench as it is before its first run: `FRAMES` of the right foot. To be read only."""
     filmed = films("bench", _film)
     return made_once("recorded", lambda bench: _calibrate(filmed, bench))
 
@@ -78,8 +79,8 @@ def laser_off_films(recorded: Path, films: MadeOnce) -> Path:
 
     def film(folder: Path) -> None:
         vertices, faces = read_mesh(recorded / "archive/P0001/small/truth.stl")
-        settings = SimulationSettings(frames=72, step_mm=4.0, laser_exposure=0.0)
-        shots = [Shot(72 + frame, 4.0 * frame, 0) for frame in range(72)]
+        settings = SimulationSettings(frames=FRAMES, step_mm=STEP_MM, laser_exposure=0.0)
+        shots = [Shot(FRAMES + frame, STEP_MM * frame, 0) for frame in range(FRAMES)]
         folder.mkdir()
         for _, part in shoot([Mesh(vertices, faces)], SKIN, [1], shots, settings, workers=1):
             for picture in part:
@@ -98,7 +99,7 @@ def _film(bench: Path) -> None:
     scan = bench / "archive" / "P0001" / "small"
     for arguments in (
         ("simulate", "capture", "--out", bench / "capture"),
-        ("simulate", "scan", "--foot", "right", "--out", scan, "--frames", "72", "--step-mm", "4"),
+        ("simulate", "scan", "--foot", "right", "--out", scan, "--frames", FRAMES, "--step-mm", STEP_MM),
     ):
         done = _command(*arguments, timeout=FILMING_SECONDS)
         assert done.returncode == 0, done.stderr

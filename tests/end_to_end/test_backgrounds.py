@@ -6,6 +6,7 @@ from pathlib import Path
 from subprocess import CompletedProcess
 
 import pytest
+from bench_scan import FRAMES
 
 from footscan.virtual.filming.film import write_film
 
@@ -33,10 +34,12 @@ def test_scan_with_a_background(footscan: Footscan, mistake: Mistake, bench: Pat
     assert mistake(done) == f"{scan / 'off/cam1.avi'}: no such film"
 
     (scan / "off").mkdir()
-    write_film(scan / "off/cam1.avi", laser_off[:71], 640, 480, 18)
+    write_film(scan / "off/cam1.avi", laser_off[:-1], 640, 480, 18)
     done = footscan("run", bench / "workflow.yaml", "--json")
     assert done.returncode == 1
-    expected = f"{scan / 'off/cam1.avi'}: frames: expected one frame or 72, as many as the film has, found 71"
+    expected = (
+        f"{scan / 'off/cam1.avi'}: frames: expected one frame or {FRAMES}, as many as the film has, found {FRAMES - 1}"
+    )
     assert mistake(done).startswith(expected)
 
     write_film(scan / "off/cam1.avi", laser_off, 640, 480, 18)

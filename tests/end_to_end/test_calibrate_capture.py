@@ -41,14 +41,30 @@ def capture(filmed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
 
 @pytest.fixture(scope="module")
 def calibrated(command: Footscan, filmed: Path, made_once: MadeOnce) -> Path:
-    """The calibration from `filmed`."""
+    """The calibration from `filmed`, in a folder with the store of its results."""
 
     def calibrate(folder: Path) -> None:
         folder.mkdir()
-        done = command("calibrate", "capture", filmed, "--out", folder / "calibration.json")
+        out = ("--out", folder / "calibration.json")
+        done = command("calibrate", "capture", filmed, *out, "--cache", folder / "store")
         assert done.returncode == 0, done.stderr
 
     return made_once("calibrated-capture", calibrate) / "calibration.json"
+
+
+@pytest.fixture(scope="module")
+def store(calibrated: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results that these tests share: a film that none of them changed is not extracted and recognised again."""
+    return Path(shutil.copytree(calibrated.parent / "store", tmp_path_factory.mktemp("cache") / "store"))
+
+
+@pytest.fixture
+def footscan(footscan: Footscan, store: Path) -> Footscan:
+    def run(*arguments: object) -> CompletedProcess[str]:
+        uses_store = arguments[:2] in {("calibrate", "capture"), ("calibrate", "check")}
+        return footscan(*arguments, *(("--cache", store) if uses_store else ()))
+
+    return run
 
 
 def test_every_map_is_near_the_truth(footscan: Footscan, capture: Path, tmp_path: Path) -> None:
@@ -179,13 +195,15 @@ def test_drift_is_measured_camera_by_camera(
 
 
 def test_drift_of_another_scanner_is_what_its_true_maps_say(
-    footscan: Footscan, calibrated: Path, recorded: Path
+    footscan: Footscan, calibrated: Path, recorded: Path, tmp_path: Path
 ) -> None:
-    done = footscan("calibrate", "check", calibrated, recorded / "capture", "--json")
+    another = Path(shutil.copytree(recorded / "capture", tmp_path / "another"))
+    keep(another, 1, 4, 5, 8)
+    done = footscan("calibrate", "check", calibrated, another, "--json")
     assert done.returncode == 1
     scanner, calibration = standard_scanner(1), read_calibration(calibrated)
     told = {camera["camera"]: camera for camera in json.loads(done.stdout)["cameras"]}
-    for camera in calibration.cameras:
+    for camera in (camera for camera in calibration.cameras if camera.camera in {1, 4, 5, 8}):
         pixels = scanner.camera(camera.camera).project_plane(GRID[:, 0], GRID[:, 1])
         inside = is_supported(camera, pixels)
         true = np.mean(to_world(camera, pixels[inside]) - GRID[inside], axis=0)

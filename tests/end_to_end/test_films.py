@@ -13,6 +13,7 @@ import av
 import numpy as np
 import pytest
 import zarr
+from bench_scan import FRAMES
 
 Footscan = Callable[..., CompletedProcess[str]]
 Mistake = Callable[[CompletedProcess[str]], str]
@@ -26,7 +27,7 @@ def test_ingest_keeps_the_cameras_bytes(footscan: Footscan, fresh: Path) -> None
     assert done.stderr == ""
     ends = json.loads(done.stdout)
     assert [(end["scan"], end["camera"], end["frames"], end["lost"]) for end in ends] == [
-        ("P0001/small", camera, 72, 0) for camera in range(1, 9)
+        ("P0001/small", camera, FRAMES, 0) for camera in range(1, 9)
     ]
     films = sum(file.stat().st_size for file in scan.glob("*.avi"))
     store = sum(file.stat().st_size for file in (scan / "frames.zarr").rglob("*") if file.is_file())
@@ -35,10 +36,10 @@ def test_ingest_keeps_the_cameras_bytes(footscan: Footscan, fresh: Path) -> None
     assert store <= 1.05 * films
     with av.open(scan / "cam3.avi") as film:
         packets = [bytes(packet) for packet in film.demux(video=0) if packet.size]
-    assert [(scan / f"frames.zarr/cam3/{k}.0.0.0").read_bytes() for k in range(72)] == packets
+    assert [(scan / f"frames.zarr/cam3/{k}.0.0.0").read_bytes() for k in range(FRAMES)] == packets
     group = zarr.open_group(str(scan / "frames.zarr"), mode="r")
     assert sorted(group.array_keys()) == [f"cam{camera}" for camera in range(1, 9)]
-    assert group["cam3"].shape == (72, 480, 640, 3)
+    assert group["cam3"].shape == (FRAMES, 480, 640, 3)
     assert np.asarray(group["cam3"][40]).max() == 255  # a laser's core
 
 
@@ -80,7 +81,7 @@ def test_extract_a_film_a_folder_and_a_picture(footscan: Footscan, measured: Pat
     film = measured / "archive/P0001/small/cam1.avi"
     pictures = tmp_path / "pictures"
     pictures.mkdir()
-    for number in range(72):
+    for number in range(FRAMES):
         shutil.copy(film.parent / f"frames.zarr/cam1/{number}.0.0.0", pictures / f"{number:03}.jpg")
     for source, name in ((film, "film.csv"), (pictures, "folder.csv")):
         done = footscan("extract", source, "--out", tmp_path / name)
@@ -88,7 +89,7 @@ def test_extract_a_film_a_folder_and_a_picture(footscan: Footscan, measured: Pat
     assert (tmp_path / "film.csv").read_bytes() == (tmp_path / "folder.csv").read_bytes()
     rows = rows_of(tmp_path / "film.csv")
     assert all(re.fullmatch(r"\d+\.\d{3}", row[name]) for row in rows for name in COLUMNS[1:])
-    assert {int(row["frame"]) for row in rows} <= set(range(72))
+    assert {int(row["frame"]) for row in rows} <= set(range(FRAMES))
     of_the_run = json.loads((measured / "results/P0001/small/quality.json").read_bytes())["cameras"][0]
     assert len(rows) == of_the_run["points"]
 

@@ -11,11 +11,11 @@ import numpy as np
 import open3d as o3d
 import pytest
 import trimesh
+from bench_scan import STEP_MM
 
 from footscan.virtual.foot.foot import make_foot
 
 Footscan = Callable[..., CompletedProcess[str]]
-STEP_MM = 4.0
 FIGURES = {"mean", "std", "min", "max", "p50", "p90", "p95", "p99", "rms", "signed_mean"}
 
 

@@ -8,6 +8,7 @@ from subprocess import CompletedProcess
 import numpy as np
 import pytest
 import simplejpeg
+from bench_scan import FRAMES, STEP_MM
 
 from footscan.virtual.filming.film import write_film
 
@@ -42,7 +43,7 @@ def refuse(footscan: Footscan, mistake: Mistake, bench: Path, scan: Path, result
 
 def grey_film(path: Path, width: int, height: int) -> None:
     picture = simplejpeg.encode_jpeg(np.full((height, width, 3), 40, np.uint8), 85, "RGB", "420")
-    write_film(path, [picture] * 72, width, height, 25)
+    write_film(path, [picture] * FRAMES, width, height, 25)
 
 
 @pytest.mark.parametrize("kept", ["half", "all but 100 bytes", "nothing"])
@@ -104,10 +105,10 @@ def test_the_films_that_are_well_are_not_read_again(footscan: Footscan, bench: P
         ("side: right", "side: [right", "line 5, column 7: expected ',' or ']'"),
         ("side: right", "side: &a [*a, *a]", "line 4, column 11: alias 'a'"),
         ("scan/1", "scan/9", "format: "),
-        ("step_mm: 4.0", "step_mm: 0", "travel.step_mm: "),
-        ("step_mm: 4.0", "step_mm: .nan", "travel.step_mm: "),
-        ("step_mm: 4.0", "step_mm: four", "travel.step_mm: "),
-        ("travel: {start_mm: 0.0, step_mm: 4.0}\n", "", "camera 1 has no travel"),
+        (f"step_mm: {STEP_MM}", "step_mm: 0", "travel.step_mm: "),
+        (f"step_mm: {STEP_MM}", "step_mm: .nan", "travel.step_mm: "),
+        (f"step_mm: {STEP_MM}", "step_mm: four", "travel.step_mm: "),
+        (f"travel: {{start_mm: 0.0, step_mm: {STEP_MM}}}\n", "", "camera 1 has no travel"),
         ("id: 2,", "id: 1,", "camera 1 is listed twice"),
         ("id: 2,", "id: -2,", "cameras.1.id: "),
         ("file: cam3.avi", "file: /etc/passwd", "cameras.2.file: expected a path relative to this file"),
@@ -149,7 +150,10 @@ def test_no_scan_at_all(footscan: Footscan, mistake: Mistake, bench: Path) -> No
 @pytest.mark.parametrize(
     ("rows", "told"),
     [
-        ("frame,x_mm\n" + "".join(f"{k},{4 * k}\n" for k in range(70)), "expected a position for each of 72 frames"),
+        (
+            "frame,x_mm\n" + "".join(f"{k},{STEP_MM * k}\n" for k in range(FRAMES - 2)),
+            f"expected a position for each of {FRAMES} frames",
+        ),
         ("frame,x_mm\n0,0\n0,1\n", "line 3: frame 0 stands twice"),
         ("frame,x_mm\n0,nan\n", "line 2: expected a frame number"),
         ("number,x\n0,0\n", "expected the columns frame,x_mm"),

@@ -11,6 +11,7 @@ import av
 import numpy as np
 import pytest
 import simplejpeg
+from bench_scan import FRAMES, STEP_MM
 
 from footscan.virtual.filming.film import write_film
 
@@ -49,7 +50,7 @@ def test_a_folder_of_pictures_is_a_film(footscan: Footscan, bench: Path, results
     (scan / "cam5").mkdir()
     with av.open(scan / "cam5.avi") as film:
         packets = [bytes(packet) for packet in film.demux(video=0) if packet.size]
-    assert len(packets) == 72
+    assert len(packets) == FRAMES
     for number, packet in enumerate(packets):
         (scan / "cam5" / f"{number:04}.jpg").write_bytes(packet)
     edit(scan, "file: cam5.avi", "file: cam5/")
@@ -62,11 +63,11 @@ def test_positions_and_own_travel_stand_for_the_travel(footscan: Footscan, bench
     before = results(bench)
     scan = bench / "archive/P0001/small"
     edit(scan, "file: cam3.avi", "file: cam3.avi, positions: cam3.csv")
-    edit(scan, "file: cam2.avi", "file: cam2.avi, travel: {start_mm: 0.0, step_mm: 4.0}")
-    edit(scan, "travel: {start_mm: 0.0, step_mm: 4.0}\ntruth", "truth")
+    edit(scan, "file: cam2.avi", f"file: cam2.avi, travel: {{start_mm: 0.0, step_mm: {STEP_MM}}}")
+    edit(scan, f"travel: {{start_mm: 0.0, step_mm: {STEP_MM}}}\ntruth", "truth")
     for camera in (1, 4, 5, 6, 7, 8):
         edit(scan, f"file: cam{camera}.avi", f"file: cam{camera}.avi, travel: {{start_mm: 0, step_mm: 4}}")
-    rows = "".join(f"{frame},{4 * frame}\n" for frame in reversed(range(72)))
+    rows = "".join(f"{frame},{STEP_MM * frame}\n" for frame in reversed(range(FRAMES)))
     (scan / "cam3.csv").write_text("frame,x_mm\n" + rows)
     assert run(footscan, bench)["ran"] == 1  # camera 3 is mapped again, to the same points
     assert results(bench) == before
