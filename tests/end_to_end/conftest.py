@@ -13,19 +13,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bench_scan import FRAMES, STEP_MM
+from bench_scan import film_bench, laser_off_of
 from chromium import launched
 from shared_folders import MadeOnce
 
-from footscan.mesh.formats.files import read_mesh
-from footscan.virtual.filming.renderers import Shot, shoot
-from footscan.virtual.optics.scene import SKIN, Mesh
 from pipelines.cli.main import run_command
-from schemas.parameters.simulation import SimulationSettings
 
 Footscan = Callable[..., subprocess.CompletedProcess[str]]
-FILMING_SECONDS = 1200
-"""Longer than a scan is filmed on a machine that has other work to do."""
 FOOTSCAN = Path(sys.executable).with_name("footscan")
 WORKFLOW = """\
 format: footscan.workflow/1
@@ -69,7 +63,7 @@ def browser() -> Iterator[Any]:
 @pytest.fixture(scope="session")
 def recorded(films: MadeOnce, made_once: MadeOnce) -> Path:
     """A bench as it is before its first run: `FRAMES` of the right foot. To be read only."""
-    filmed = films("bench", _film)
+    filmed = films("bench", film_bench)
     return made_once("recorded", lambda bench: _calibrate(filmed, bench))
 
 
@@ -77,32 +71,13 @@ def recorded(films: MadeOnce, made_once: MadeOnce) -> Path:
 def laser_off_films(recorded: Path, films: MadeOnce) -> Path:
     """The pictures of camera 1 of the bench's scan, taken again with the laser off: a JPEG file each."""
 
-    def film(folder: Path) -> None:
-        vertices, faces = read_mesh(recorded / "archive/P0001/small/truth.stl")
-        settings = SimulationSettings(frames=FRAMES, step_mm=STEP_MM, laser_exposure=0.0)
-        shots = [Shot(FRAMES + frame, STEP_MM * frame, 0) for frame in range(FRAMES)]
-        folder.mkdir()
-        for _, part in shoot([Mesh(vertices, faces)], SKIN, [1], shots, settings, workers=1):
-            for picture in part:
-                (folder / f"{len(list(folder.iterdir())):02d}.jpg").write_bytes(picture)
-
-    return films("laser-off", film)
+    return films("laser-off", laser_off_of(recorded / "archive/P0001/small/truth.stl"))
 
 
 @pytest.fixture(scope="session")
 def measured(recorded: Path, made_once: MadeOnce) -> Path:
     """A bench after its first run. To be read only."""
     return made_once("measured", lambda bench: _measure(recorded, bench))
-
-
-def _film(bench: Path) -> None:
-    scan = bench / "archive" / "P0001" / "small"
-    for arguments in (
-        ("simulate", "capture", "--out", bench / "capture"),
-        ("simulate", "scan", "--foot", "right", "--out", scan, "--frames", FRAMES, "--step-mm", STEP_MM),
-    ):
-        done = _command(*arguments, timeout=FILMING_SECONDS)
-        assert done.returncode == 0, done.stderr
 
 
 def _calibrate(filmed: Path, bench: Path) -> None:

@@ -8,6 +8,7 @@ from subprocess import CompletedProcess
 import numpy as np
 import pytest
 import trimesh
+from bench_scan import FRAMES, STEP_MM
 
 from footscan.cloud.outliers import KEPT
 from footscan.cloud.points import POINT_DTYPE, make_points
@@ -219,9 +220,16 @@ def test_odd_files_are_compared_or_refused(footscan: Footscan, mistake: Mistake,
             assert file.name in mistake(done)
 
 
-@pytest.mark.parametrize("zeroed", [("alpha_y",), ("alpha_y", "alpha_z")])
+@pytest.mark.parametrize(
+    ("zeroed", "said"),
+    [
+        (("alpha_y",), "points do not surround a solid"),
+        (("alpha_y", "alpha_z"), f"{FRAMES} points in planes {STEP_MM:g} mm apart, expected a cloud to mesh"),
+    ],
+    ids=["plane", "line"],
+)
 def test_a_scan_that_is_mapped_to_a_plane_or_a_line_is_a_finding(
-    footscan: Footscan, mistake: Mistake, bench: Path, zeroed: tuple[str, ...]
+    footscan: Footscan, mistake: Mistake, bench: Path, zeroed: tuple[str, ...], said: str
 ) -> None:
     calibration = json.loads((bench / "calibration.json").read_bytes())
     flat = {"model": "polynomial", "order": 1, "centre_px": [320, 240], "scale_px": 400}
@@ -234,7 +242,7 @@ def test_a_scan_that_is_mapped_to_a_plane_or_a_line_is_a_finding(
     assert (done.returncode, done.stdout) == (1, "")
     line = mistake(done)
     assert "P0001/small" in line
-    assert "points do not surround a solid" in line
+    assert said in line
 
 
 def test_a_scan_of_one_camera_that_sees_one_side_is_a_finding(

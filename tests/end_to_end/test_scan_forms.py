@@ -66,7 +66,7 @@ def test_positions_and_own_travel_stand_for_the_travel(footscan: Footscan, bench
     edit(scan, "file: cam2.avi", f"file: cam2.avi, travel: {{start_mm: 0.0, step_mm: {STEP_MM}}}")
     edit(scan, f"travel: {{start_mm: 0.0, step_mm: {STEP_MM}}}\ntruth", "truth")
     for camera in (1, 4, 5, 6, 7, 8):
-        edit(scan, f"file: cam{camera}.avi", f"file: cam{camera}.avi, travel: {{start_mm: 0, step_mm: 4}}")
+        edit(scan, f"file: cam{camera}.avi", f"file: cam{camera}.avi, travel: {{start_mm: 0, step_mm: {STEP_MM}}}")
     rows = "".join(f"{frame},{STEP_MM * frame}\n" for frame in reversed(range(FRAMES)))
     (scan / "cam3.csv").write_text("frame,x_mm\n" + rows)
     assert run(footscan, bench)["ran"] == 1  # camera 3 is mapped again, to the same points
@@ -74,7 +74,7 @@ def test_positions_and_own_travel_stand_for_the_travel(footscan: Footscan, bench
 
 
 def test_another_travel_moves_the_points(footscan: Footscan, bench: Path) -> None:
-    edit(bench / "archive/P0001/small", "travel: {start_mm: 0.0, step_mm: 4.0}", "travel: {start_mm: 10, step_mm: 4}")
+    edit(bench / "archive/P0001/small", "start_mm: 0.0", "start_mm: 10")
     before = json.loads((bench / "results/P0001/small/measures.json").read_bytes())
     run(footscan, bench)
     after = json.loads((bench / "results/P0001/small/measures.json").read_bytes())
