@@ -5,10 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 from subprocess import CompletedProcess
 
+import bench_scan
 import numpy as np
 import pytest
 import trimesh
-from bench_scan import FRAMES, STEP_MM
 
 from footscan.cloud.outliers import KEPT
 from footscan.cloud.points import POINT_DTYPE, make_points
@@ -224,7 +224,10 @@ def test_odd_files_are_compared_or_refused(footscan: Footscan, mistake: Mistake,
     ("zeroed", "said"),
     [
         (("alpha_y",), "points do not surround a solid"),
-        (("alpha_y", "alpha_z"), f"{FRAMES} points in planes {STEP_MM:g} mm apart, expected a cloud to mesh"),
+        (
+            ("alpha_y", "alpha_z"),
+            f"{bench_scan.FRAMES} points in planes {bench_scan.STEP_MM:g} mm apart, expected a cloud to mesh",
+        ),
     ],
     ids=["plane", "line"],
 )
