@@ -2,10 +2,10 @@
 export PYTHON
 BIN := .venv/bin
 
-.PHONY: help setup demo test lint format clean
+.PHONY: help setup demo test test-slow lint format clean
 
 help:     ## this list
-	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  make \1	\2/p' $(MAKEFILE_LIST)
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1	\2/p' $(MAKEFILE_LIST)
 
 setup:    ## system libraries, .venv, pinned packages; starts at once when they are there
 	@scripts/setup.sh
@@ -13,10 +13,15 @@ setup:    ## system libraries, .venv, pinned packages; starts at once when they 
 demo: setup   ## films, calibrates, scans and measures a foot; the result is in demo/
 	@$(BIN)/footscan demo
 
-test: lint    ## lint, then every test, in the end those that keep time; pages in Debian's Chromium; films are kept in .pytest_cache
+test: lint    ## lint, then the tests, in the end those that keep time; pages in Debian's Chromium; films are kept in .pytest_cache
 	@scripts/browser.sh
-	$(BIN)/pytest -n 2 --dist worksteal -m "not real_time"
-	$(BIN)/pytest -n 2 --dist worksteal -m real_time --reruns 2 -r fER
+	$(BIN)/pytest -n 2 --dist worksteal -m "not real_time and not slow"
+	$(BIN)/pytest -n 4 --dist worksteal -m "real_time and not slow" --reruns 2 -r fER
+
+test-slow: lint  ## the tests that repeat whole runs or draw many samples
+	@scripts/browser.sh
+	$(BIN)/pytest -n 2 --dist worksteal -m "slow and not real_time"
+	$(BIN)/pytest -n 4 --dist worksteal -m "slow and real_time" --reruns 2 -r fER
 
 lint: setup   ## style, layout and types
 	$(BIN)/ruff check

@@ -88,6 +88,7 @@ def test_what_is_the_same_everywhere_is_free(source: str) -> None:
     assert not list(unportable(source))
 
 
+@pytest.mark.slow
 def test_frames_and_stripes_are_those_of_an_older_processor() -> None:
     here, there = (
         subprocess.run(

@@ -105,6 +105,7 @@ def test_compression_costs_and_the_best_hardly_any(bound: Any) -> None:
     assert uncompressed < bound.centre_bound(2.5, 0.6, 0.1, 0.12)
 
 
+@pytest.mark.slow
 def test_estimates_reach_the_bound_in_correlated_speckle(bound: Any) -> None:
     """One column of a red sensor."""
     webcam = bound.Webcam(mosaic=False, jpeg_quality=None)
@@ -133,6 +134,7 @@ def test_estimates_reach_the_bound_in_correlated_speckle(bound: Any) -> None:
     assert expected * (1 - 3 * SPREAD_ERROR) <= spread <= 1.15 * expected
 
 
+@pytest.mark.slow
 def test_estimates_reach_the_bound_where_white_cuts_the_stripe(bound: Any) -> None:
     """One column of a red sensor with speckle that is independent from pixel to pixel."""
     webcam = bound.Webcam(grain_px=0.0, mosaic=False, jpeg_quality=None)

@@ -181,6 +181,7 @@ def test_ctrl_c_ends_processes_and_all_that_they_say(footscan: Footscan, bench: 
     assert json.loads(done.stdout)["ran"] <= STEPS - len(events(log, "step"))
 
 
+@pytest.mark.slow
 def test_processes_give_the_bytes_of_threads(command: Footscan, footscan: Footscan, bench: Path) -> None:
     workflow = bench / "workflow.yaml"
     done = command("run", workflow, "--workers", 2)

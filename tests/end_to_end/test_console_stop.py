@@ -27,7 +27,7 @@ Hold = Callable[[int], list[socket.socket]]
 
 @pytest.fixture
 def scanner(tmp_path: Path) -> Iterator[Scanner]:
-    yield from scanners(tmp_path, (-30.0, -30.0, -30.0))
+    yield from scanners(tmp_path, (-6.0, -6.0, -6.0))
 
 
 @pytest.fixture
@@ -59,9 +59,12 @@ HELD: dict[str, tuple[int, Callable[[int, int], bytes]]] = {
     "downloads": (200, lambda _k, _port: get("/results/P7/S1/foot.ply")),
     "event streams": (200, lambda k, _port: get(f"/events?page={k:016d}")),
 }
+QUICK = {"nothing", "half bodies", "downloads", "event streams"}
 
 
-@pytest.mark.parametrize("held", HELD)
+@pytest.mark.parametrize(
+    "held", [held if held in QUICK else pytest.param(held, marks=pytest.mark.slow) for held in HELD]
+)
 @pytest.mark.usefixtures("many_files")
 def test_stop_is_behind_nothing(scanner: Scanner, held: str) -> None:
     folder = scanner.folder / "results" / "P7" / "S1"

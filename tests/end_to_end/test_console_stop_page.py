@@ -18,7 +18,7 @@ TABS = 6
 
 @pytest.fixture
 def scanner(tmp_path: Path) -> Iterator[Scanner]:
-    yield from scanners(tmp_path, (-30.0, -30.0, -30.0))
+    yield from scanners(tmp_path, (-6.0, -6.0, -6.0))
 
 
 @pytest.fixture

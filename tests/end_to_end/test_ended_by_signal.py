@@ -16,23 +16,31 @@ from waiting import LONG_SECONDS
 
 pytestmark = pytest.mark.real_time  # a process is to stop within 0.3 s of a signal
 
-MOTION_SECONDS = {"jog": 6.0, "scan": 13.0}
-"""Longer than the motion of a command that is left alone: 380 mm of a jog take 4 s, 400 mm of a scan 11 s."""
+MOTION_SECONDS = {"jog": 6.0, "scan": 6.5}
+"""Longer than the motion of a command that is left alone: 380 mm of a jog take 4 s, 200 mm of a scan 5.5 s."""
+AS_FAR: dict[str, tuple[str, ...]] = {"jog": (), "scan": ("--to-mm", "200")}
 ENDS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129, signal.SIGQUIT: 131}
 
 
 @pytest.fixture
 def scanner(tmp_path: Path) -> Iterator[Scanner]:
-    yield from scanners(tmp_path, (-30.0, -30.0, -30.0))
+    yield from scanners(tmp_path, (-6.0, -6.0, -6.0))
 
 
 @pytest.fixture
 def far(tmp_path: Path) -> Iterator[Scanner]:
-    yield from scanners(tmp_path, (-250.0, -250.0, -250.0))
+    yield from scanners(tmp_path, (-200.0, -200.0, -200.0))
 
 
-@pytest.mark.parametrize("number", ENDS, ids=lambda number: number.name)
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [
+        pytest.param(name, number, id=f"{name}-{number.name}", marks=() if is_quick else pytest.mark.slow)
+        for name in COMMANDS
+        for number in ENDS
+        for is_quick in [name == "jog" or number == signal.SIGTERM]
+    ],
+)
 def test_heads_and_lasers_stop_within_a_moment(name: str, number: int, request: pytest.FixtureRequest) -> None:
     scanner: Scanner = request.getfixturevalue("far" if name == "home" else "scanner")
     process = scanner.started(name)
@@ -119,9 +127,9 @@ def test_output_that_nobody_reads_leaves_nothing_moving(scanner: Scanner) -> Non
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-@pytest.mark.parametrize("name", ["jog", "scan"])
+@pytest.mark.parametrize("name", ["jog", pytest.param("scan", marks=pytest.mark.slow)])
 def test_a_command_that_is_killed_or_halted_ends_with_its_motion(scanner: Scanner, name: str, number: int) -> None:
-    process = scanner.started(name)
+    process = scanner.started(name, AS_FAR[name])
     signalled = time.monotonic()
     process.send_signal(number)
     time.sleep(MOTION_SECONDS[name] + 1.0)

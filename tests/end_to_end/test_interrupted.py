@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from subprocess import CompletedProcess
 
+import pytest
+
 Footscan = Callable[..., CompletedProcess[str]]
 Results = Callable[[Path], dict[str, bytes]]
 
@@ -17,6 +19,7 @@ def steps_done(bench: Path) -> int:
     return sum(1 for _ in (bench / "results/.footscan/actions").rglob("[!.]*.json"))
 
 
+@pytest.mark.slow
 def test_two_runs_from_nothing_give_the_same_bytes(
     command: Footscan, fresh: Path, measured: Path, results: Results
 ) -> None:

@@ -19,7 +19,7 @@ FAR_MM = 300.0
 
 @pytest.fixture
 def scanner(tmp_path: Path) -> Iterator[Scanner]:
-    yield from scanners(tmp_path, (-30.0, -30.0, -30.0))
+    yield from scanners(tmp_path, (-6.0, -6.0, -6.0))
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def hang(page: Any) -> None:
     page.evaluate("() => { setTimeout(() => { const end = Date.now() + 4000; while (Date.now() < end); }, 0); }")
 
 
-@pytest.mark.parametrize("go", [close, cut_off, leave, hang])
+@pytest.mark.parametrize("go", [close, *(pytest.param(way, marks=pytest.mark.slow) for way in (cut_off, leave, hang))])
 def test_heads_stop_when_the_page_is_gone(go: Callable[[Any], None], scanner: Scanner, page: Any) -> None:
     begin = scanner.board.position_at(time.monotonic())[0]
     page.locator(f'[data-jog="{FAR_MM:g}"]').click()

@@ -46,6 +46,7 @@ def test_devices_of_a_rig_are_told(footscan: Footscan, folder: Path) -> None:
     assert [each["cameras"] for each in rig["passes"]] == [list(CAMERAS)]
 
 
+@pytest.mark.slow
 def test_a_scan_is_filmed_and_stored(
     footscan: Footscan, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[2]
 DRAWS = 6
 
 
+@pytest.mark.slow
 def test_nothing_is_worse_than_accepted_and_no_last_digit_counts(
     footscan: Callable[..., subprocess.CompletedProcess[str]], tmp_path: Path
 ) -> None:

@@ -54,9 +54,9 @@ class Scanner:
         self.running.append(subprocess.Popen(line, cwd=self.folder, text=True, **options))
         return self.running[-1]
 
-    def started(self, name: str) -> "subprocess.Popen[str]":
-        """A command in the midst of what it does."""
-        process = self.start(name)
+    def started(self, name: str, more: tuple[str, ...] = ()) -> "subprocess.Popen[str]":
+        """A command, with `more` options, in the midst of what it does."""
+        process = self.start(name, more)
         if name == "console":
             self.address = str(process.stdout.readline()).strip() if process.stdout else ""
             order(self.address, "connect", when_idle=True)

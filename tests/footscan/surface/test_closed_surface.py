@@ -106,6 +106,7 @@ def test_open_leg_is_cut_flat() -> None:
     assert share == pytest.approx(35**2 / (2 * 35**2 + 2 * 35 * cut), rel=0.03)
 
 
+@pytest.mark.slow
 def test_foot_is_met() -> None:
     foot = make_foot(resolution_mm=0.5)
     corners = foot.vertices[foot.faces]

@@ -98,6 +98,7 @@ def furthest(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.linalg.norm(a - b, axis=1).max())
 
 
+@pytest.mark.slow
 def test_a_foot_from_random_starts_ends_at_one_pose(foot: Shape, scan: Shape) -> None:
     ends = [end_of(scan, foot, number) for number in range(FIRST, FIRST + FEET)]
     assert max(furthest(end, ends[0]) for end in ends) < SAME_MM
@@ -215,6 +216,7 @@ def test_is_a_document_that_can_be_read_back() -> None:
     assert Registration.model_validate_json(registration.model_dump_json()) == registration
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no way here to take processors away")
 def test_the_same_bytes_with_one_processor(tmp_path: Path) -> None:
     points = moved(cloud(tee(), 4000)[0], start(2))

@@ -27,6 +27,7 @@ def results(archive: Any) -> tuple[ScanEnd, set[str]]:
     return end, ran
 
 
+@pytest.mark.slow
 def test_a_capture_in_the_workflow_gives_what_its_calibration_gives(archive: Any, capture: Path) -> None:
     use(archive, f"{{capture: {capture}}}")
     count, reasons = archive.plan()

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel
@@ -184,6 +185,7 @@ def _with_step(draw: st.DrawFn, world: World, edited: Callable[[Drawn], Drawn]) 
     return replace(world, steps=tuple(steps))
 
 
+@pytest.mark.slow
 @settings(
     max_examples=30 if ASKED is None else int(ASKED),
     derandomize=ASKED is None,

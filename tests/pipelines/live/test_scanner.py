@@ -175,7 +175,9 @@ def test_stopping_leaves_nothing_and_the_next_scan_works(bench: Bench) -> None:
     assert bench.scanner.scan(bench.order()).stored.left_out == {}
 
 
-@pytest.mark.parametrize("doing", ["homing", "filming: looking at the light", "filming 0 %"])
+@pytest.mark.parametrize(
+    "doing", ["homing", pytest.param("filming: looking at the light", marks=pytest.mark.slow), "filming 0 %"]
+)
 def test_a_stop_ends_a_scan_while_nothing_is_filmed_yet(bench: Bench, doing: str) -> None:
     if doing != "homing":
         bench.scanner.home()
@@ -263,6 +265,7 @@ def test_a_camera_without_a_latency_is_refused_before_anything_moves(bench: Benc
     bench.assert_dark_and_empty()
 
 
+@pytest.mark.slow
 def test_the_light_is_chosen_where_none_is_given(bench: Bench) -> None:
     result = bench.scanner.scan(bench.order(light=None))
     recording = read_json(result.stored.place / "recording.json", Recording)

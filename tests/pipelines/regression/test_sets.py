@@ -108,6 +108,7 @@ def test_what_cannot_be_filmed_is_a_fault(filming: Filming, monkeypatch: pytest.
         filming.prepare("ambient")
 
 
+@pytest.mark.slow
 def test_the_film_step_tells_what_was_filmed(tmp_path: Path) -> None:
     settings = SimulationSettings(frames=1, start_mm=150.0)
     result = json.loads(film.run({}, VirtualScan(side="left", settings=settings), {"folder": tmp_path / "one"}))

@@ -91,7 +91,7 @@ def board() -> Iterator[Board]:
 def begun(board: Board, program: str, seconds: float = 0.0) -> "subprocess.Popen[str]":
     """Another program, in the middle of a travel with light."""
     code = BEGIN + PROGRAMS[program]
-    line = [sys.executable, "-c", code, board.port, str(time.monotonic() + 15.0), str(seconds)]
+    line = [sys.executable, "-c", code, board.port, str(time.monotonic() + 10.0), str(seconds)]
     process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
     wait_until(lambda: board.laser_at(time.monotonic()) > 0.4)
     time.sleep(0.2)

@@ -55,6 +55,7 @@ def test_scan_follows_the_format(folder: Path) -> None:
     assert truth.volume == pytest.approx(200 * 80 * 50, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_workers_do_not_change_bytes_but_seeds_do(folder: Path, tmp_path: Path) -> None:
     alone = {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
     assert record(tmp_path / "shared", workers=2) == alone
