@@ -173,7 +173,7 @@ class _Job(NamedTuple):
 def _modules_that_render() -> Iterator[Path]:
     virtual = Path(__file__).parents[1]
     yield from sorted((virtual / "optics").glob("*.py"))
-    yield from (virtual / "filming/render.py", virtual / "room/room.py", Path(__file__))
+    yield from (virtual / "filming/render.py", virtual / "room/room.py", virtual / "portable.py", Path(__file__))
 
 
 def _nearest_level(factor: float) -> float:
