@@ -22,7 +22,7 @@ def release(monkeypatch: pytest.MonkeyPatch) -> Iterator[Release]:
 
     def forget() -> None:
         libraries._version.cache_clear()
-        code._KNOWN.clear()
+        code._IDENTITIES.clear()
 
     def released(distribution: str) -> None:
         def version(name: str) -> str:

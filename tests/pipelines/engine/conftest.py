@@ -47,7 +47,7 @@ class MadeUpPackage:
         for name in [name for name in sys.modules if name.split(".")[0] == self.name]:
             del sys.modules[name]
         importlib.invalidate_caches()
-        code._KNOWN.clear()
+        code._IDENTITIES.clear()
         code._source.cache_clear()
 
     def step_module(self, name: str, source: str = JOIN) -> str:

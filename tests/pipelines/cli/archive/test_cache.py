@@ -230,7 +230,7 @@ def test_verify_does_actions_again(done: Any, cache: Command, monkeypatch: pytes
         ),
         (["verify", "--cache", "CACHE", "--recompute", "5%"], "--recompute: needs the workflow"),
         (["pin", "P0001/S2", "--cache", "CACHE"], "P0001/S2: has no results in"),
-        (["unpin", "P0001/S1", "--cache", "CACHE"], "P0001/S1: is not pinned, expected one of: none is"),
+        (["unpin", "P0001/S1", "--cache", "CACHE"], "P0001/S1: is not pinned, expected a pinned scan: there is none"),
         (["pin", "../S1", "--cache", "CACHE"], "scan: expected 1 to 64 letters"),
         (["stats", "--cache", "nosuch://x"], "expected a place that fsspec reaches"),
     ],

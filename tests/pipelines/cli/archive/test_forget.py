@@ -158,7 +158,7 @@ def test_what_was_cut_off_is_finished(
             footscan("forget", "P0002", "--workflow", two.workflow, "--yes")
     assert cut_off(open_store(two.root / "results/.footscan")) == ["P0002"]
     assert footscan("run", two.workflow)[0] == 0
-    assert "P0002: its erasure was cut off" in caplog.text
+    assert "P0002: its erasure was interrupted" in caplog.text
     assert forget(two, footscan)["erased"]
     assert traces(two.root, "P0002") == []
     assert two.run()[1] == set()

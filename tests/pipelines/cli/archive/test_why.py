@@ -99,13 +99,13 @@ def test_code(done: Any, why: Why, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(code, "_text", lambda name: original(name).replace("def fuse(", "def fuse_all("))
     monkeypatch.setattr(code, "_remembered", dict)
     monkeypatch.setattr(code, "_remember", lambda: None)
-    for known in (code._KNOWN.clear, code._source.cache_clear):
+    for known in (code._IDENTITIES.clear, code._source.cache_clear):
         known()
     try:
         found = explained(why("P0001/S1", "fuse", "--workflow", done.workflow, "--json"))
         printed = why("P0001/S1", "fuse", "--workflow", done.workflow)[1]
     finally:
-        for known in (code._KNOWN.clear, code._source.cache_clear):
+        for known in (code._IDENTITIES.clear, code._source.cache_clear):
             known()
     [change] = found["fuse"]["changes"]
     assert change["what"] == "code"

@@ -15,7 +15,7 @@ from pipelines.engine.files import secret as secret_file
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.seal import seal_of, sealed, unsealed
 from pipelines.engine.store.store import Row, Store, blob_name, open_store, row_name
-from pipelines.engine.store.verified_index import Known
+from pipelines.engine.store.verified_index import VerifiedRow
 from schemas.base.errors import RefusedInput
 
 IMAGE = {"step": "made_up", "inputs": {}}
@@ -106,7 +106,7 @@ def test_what_a_machine_remembers_is_no_way_in(tmp_path: Path) -> None:
     assert plain.verified is not None
     plain.verified.secret = None
     state, blob = (store.files.state(name) for name in (row_name(key), blob_name(sha256(b"poison"))))
-    plain.verified.put(key, Known(str(state), sha256(b"poison"), None, None, blob))
+    plain.verified.put(key, VerifiedRow(str(state), sha256(b"poison"), None, None, blob))
     plain.verified.close()
     assert plain.lookup(key) is not None
     assert opened(tmp_path).lookup(key) is None

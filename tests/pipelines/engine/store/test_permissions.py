@@ -43,7 +43,7 @@ def test_others_can_write(store: Store, told: pytest.LogCaptureFixture, mode: in
     path = made(store, mode, folder)
     warn_if_others_can_write(store)
     warn_if_others_can_write(store)
-    expected = "other users can write to it, and so exchange results; expected 'chmod -R go-w'"
+    expected = "other users can write to it and so exchange results, expected 'chmod -R go-w'"
     assert told.messages == [f"{path}: {expected}"]
 
 
@@ -63,4 +63,4 @@ def test_another_owner(store: Store, told: pytest.LogCaptureFixture, monkeypatch
     path = made(store, 0o755)
     monkeypatch.setattr(os, "geteuid", lambda: path.stat().st_uid + 1)
     warn_if_others_can_write(store)
-    assert told.messages == [f"{path}: belongs to another user, who can exchange results; expected a store of your own"]
+    assert told.messages == [f"{path}: belongs to another user, who can exchange results, expected your own store"]

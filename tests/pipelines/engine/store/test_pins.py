@@ -27,7 +27,7 @@ def test_pinned_until_unpinned(store: Store) -> None:
         assert read_pins(store)[scan] == {step: one.key for step, one in latest.items() if one is not None}
     unpin("P/S-2", store)
     assert set(read_pins(store)) == {"P/S", "demo", "P-S/2"}
-    with pytest.raises(RefusedInput, match=r"P/S-2: is not pinned, expected one of: demo, P/S, P-S/2"):
+    with pytest.raises(RefusedInput, match=r"P/S-2: is not pinned, expected a pinned scan: demo, P/S, P-S/2"):
         unpin("P/S-2", store)
 
 

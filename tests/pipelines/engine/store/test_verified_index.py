@@ -17,7 +17,7 @@ import pytest
 from pipelines.engine.actions.key import key_of
 from pipelines.engine.store import verified_index as memory_module
 from pipelines.engine.store.store import Row, Store, blob_name, open_store, row_name
-from pipelines.engine.store.verified_index import Known, VerifiedIndex
+from pipelines.engine.store.verified_index import VerifiedIndex, VerifiedRow
 
 FLIPS = 150 if (asked := os.environ.get("FOOTSCAN_FUZZ")) is None else 20 * int(asked)
 IMAGES = [{"step": "clean", "code": "d" * 64, "parameters": None, "inputs": {"n": ["value", c * 64]}} for c in "abcdef"]
@@ -235,11 +235,11 @@ def test_busy_with_another_run(file: Path, truth: Truth, monkeypatch: pytest.Mon
 
 def test_threads_use_it_at_once(file: Path) -> None:
     memory = VerifiedIndex(file)
-    wrong: list[Known] = []
+    wrong: list[VerifiedRow] = []
 
     def use(thread: int) -> None:
         for number in range(50):
-            key, known = f"{thread} {number}", Known("row", f"{thread} {number}", None, None, "blob")
+            key, known = f"{thread} {number}", VerifiedRow("row", f"{thread} {number}", None, None, "blob")
             memory.put(key, known)
             if number % 10 == 0:
                 memory.save()
@@ -255,7 +255,7 @@ def test_threads_use_it_at_once(file: Path) -> None:
     memory.close()
     assert wrong == []
     again = VerifiedIndex(file)
-    assert again.get("3 49") == Known("row", "3 49", None, None, "blob")
+    assert again.get("3 49") == VerifiedRow("row", "3 49", None, None, "blob")
     assert again.get("4 0") is None
     again.close()
 
@@ -263,15 +263,15 @@ def test_threads_use_it_at_once(file: Path) -> None:
 USE = """
 import sys
 from pathlib import Path
-from pipelines.engine.store.verified_index import Known, VerifiedIndex
+from pipelines.engine.store.verified_index import VerifiedRow, VerifiedIndex
 
 memory, name = VerifiedIndex(Path(sys.argv[1])), sys.argv[2]
 for number in range(60):
     for key in ("both", f"{name} {number}"):
-        memory.put(key, Known("row", key, None, None, "blob"))
+        memory.put(key, VerifiedRow("row", key, None, None, "blob"))
     memory.save()
     for key in ("both", f"{name} {number}"):
-        assert memory.get(key) == Known("row", key, None, None, "blob")
+        assert memory.get(key) == VerifiedRow("row", key, None, None, "blob")
 memory.close()
 """
 
@@ -281,7 +281,7 @@ def test_processes_use_it_at_once(file: Path) -> None:
     assert [user.wait() for user in users] == [0, 0]
     memory = VerifiedIndex(file)
     for key in ("both", *(f"{name} {number}" for name in ("one", "two") for number in range(60))):
-        assert memory.get(key) == Known("row", key, None, None, "blob")
+        assert memory.get(key) == VerifiedRow("row", key, None, None, "blob")
     memory.close()
 
 
