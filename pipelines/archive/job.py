@@ -17,7 +17,7 @@ from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.places import open_files
 from pipelines.engine.plan import Plan
 from pipelines.engine.pool import OnStepEnd, Pool, cores
-from pipelines.engine.store.erasure_notes import cut_off
+from pipelines.engine.store.erasure_notes import interrupted_erasures
 from pipelines.engine.store.permissions import warn_if_others_can_write
 from pipelines.engine.workspace import Workspace
 from pipelines.recordings.calibration_choice import CalibrationPlace, calibration_places, choose_calibration
@@ -251,7 +251,7 @@ def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator
     waiting = iter(planned.scans)
     share_written(planned)
     warn_if_others_can_write(planned.workspace.store, planned.job.group)
-    for name in cut_off(planned.workspace.store):
+    for name in interrupted_erasures(planned.workspace.store):
         log.warning("%s: its erasure was interrupted, run 'footscan forget' for it again", name)
     # A job that runs no steps needs no lease: it uses only the results that it has looked up.
     held = planned.workspace.lease() if planned.to_run else nullcontext()
@@ -350,7 +350,7 @@ def _calibration(scan: RecordedScan, planned: PlannedJob) -> CalibrationFile | C
     if place.is_capture:
         if path not in planned.captures:
             planned.captures[path] = recorded_inputs(read_capture(path), planned.workspace.digests)
-        return CaptureOfScan.drawn(scan.name, planned.captures[path])
+        return CaptureOfScan.from_capture(scan.name, planned.captures[path])
     if path not in planned.calibrations:
         text = read_text(path, "json_bytes")
         digest = sha256(text.encode())

@@ -12,7 +12,7 @@ from pathlib import Path
 from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.files.digest import sha256
-from pipelines.engine.files.seal import BROKEN, sealed, unsealed
+from pipelines.engine.files.seal import UNSEALING_ERRORS, sealed, unsealed
 from pipelines.engine.files.secret import make_secret
 from pipelines.engine.plan import Plan, without_places
 from pipelines.engine.run import content_of
@@ -219,7 +219,7 @@ def _read(name: str, store: Store) -> bytes | None:
 def _is_sealed(data: bytes, secret: bytes | None = None) -> bool:
     try:
         unsealed(data, secret)
-    except BROKEN:
+    except UNSEALING_ERRORS:
         return False
     return True
 

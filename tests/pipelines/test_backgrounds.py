@@ -1,4 +1,4 @@
-"""Backgrounds: what the laser-off frames of a camera change, and what they leave alone."""
+"""Backgrounds: the effects of a camera's laser-off frames."""
 
 import json
 import shutil
@@ -187,14 +187,14 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("name", "how", "told"), REFUSED, ids=[f"{name} {how}" for name, how, _ in REFUSED])
-def test_refused_background_is_one_line(done: Any, name: str, how: str, told: str) -> None:
+@pytest.mark.parametrize(("name", "how", "expected"), REFUSED, ids=[f"{name} {how}" for name, how, _ in REFUSED])
+def test_refused_background_is_one_line(done: Any, name: str, how: str, expected: str) -> None:
     path = name_background(done, name)
     spoil(path, how)
     for again in (False, True):
         [end], ran = done.run()
         problem, _, _ = str(end.problem).partition(" (/")
-        assert problem.startswith(f"{path}: {told}")
+        assert problem.startswith(f"{path}: {expected}")
         assert problem.isprintable()
         assert (end.kind, end.folder) == ("refused", None)
         assert ran == (set() if again or how in {"missing", "empty folder"} else {"background-5"})
@@ -202,7 +202,7 @@ def test_refused_background_is_one_line(done: Any, name: str, how: str, told: st
     one, five = ingest_scans([done.scan])
     assert one.problem is None
     assert five.problem is not None
-    assert five.problem.startswith(f"{path}: {told}")
+    assert five.problem.startswith(f"{path}: {expected}")
 
 
 def test_background_is_a_path_as_others_are(archive: Any) -> None:

@@ -1,4 +1,4 @@
-"""The steps of a calibration from a capture: one by one, cached by camera, refused in one line."""
+"""The steps of a calibration from a capture: cached for each camera, refused in one line."""
 
 import json
 import shutil
@@ -40,7 +40,7 @@ def steps_of(capture: Path, cache: Path) -> list[Step]:
 
 
 def run(capture: Path, cache: Path) -> Calibrated:
-    """What each step came to, and which ran."""
+    """The result of each step, and the names of the steps that ran."""
     store = open_store(cache)
     ends: list[StepEnd] = []
     plan = make_plan(steps_of(capture, cache), store)

@@ -1,4 +1,4 @@
-"""The scan's graph: what a change makes run again, and what it leaves alone."""
+"""The graph of a scan: the steps that run again after a change."""
 
 import os
 import re

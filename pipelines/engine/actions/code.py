@@ -20,7 +20,7 @@ from typing import Any
 from pipelines.engine.actions.libraries import versions_that_count
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import file_state, is_settled, sha256
-from pipelines.engine.files.seal import BROKEN, sealed, unsealed
+from pipelines.engine.files.seal import UNSEALING_ERRORS, sealed, unsealed
 from schemas.base.errors import Fault
 from schemas.base.model import canonical_json
 
@@ -130,7 +130,7 @@ def _remembered() -> dict[str, list[Any]]:
     """Read state, digest and imports of each module from `MEMORY`; an entry is valid while the state is the same."""
     try:
         return dict(unsealed(MEMORY.read_bytes())["modules"])
-    except (OSError, *BROKEN):
+    except (OSError, *UNSEALING_ERRORS):
         return {}
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import FileState, file_state, is_settled, state_of_open
-from pipelines.engine.files.seal import BROKEN, sealed, unsealed
+from pipelines.engine.files.seal import UNSEALING_ERRORS, sealed, unsealed
 from schemas.base.errors import Fault, RefusedInput
 
 log = logging.getLogger("footscan.store")
@@ -32,7 +32,7 @@ class FileDigests:
             return cls(memory, secret, {path: (FileState(*state), str(digest)) for path, state, digest in rows})
         except FileNotFoundError:
             return cls(memory, secret)
-        except (OSError, *BROKEN):
+        except (OSError, *UNSEALING_ERRORS):
             log.warning("%s: damaged, will be made again", memory)
             return cls(memory, secret)
 

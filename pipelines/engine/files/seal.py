@@ -7,7 +7,7 @@ from typing import Any
 from pipelines.engine.files.digest import sha256
 from schemas.base.model import canonical_json
 
-BROKEN = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
+UNSEALING_ERRORS = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 """Errors that `unsealed`, and code that reads its result, may raise."""
 
 
@@ -27,7 +27,7 @@ def unsealed(data: bytes, secret: bytes | None = None) -> dict[str, Any]:
 
     Raises
     ------
-    One of `BROKEN`
+    One of `UNSEALING_ERRORS`
         `data` is not a sealed object, or its seal is broken.
     UnsealedError
         A `secret` is given, and the object does not bear its seal.

@@ -11,7 +11,7 @@ def note_name(subject: str) -> str:
     return f"{FOLDER}/{subject}.json"
 
 
-def cut_off(store: Store) -> list[str]:
+def interrupted_erasures(store: Store) -> list[str]:
     """Return the subjects whose erasure has begun but not ended."""
     names = (name for name, _ in store.files.sizes(FOLDER))
     return [name.removeprefix(f"{FOLDER}/").removesuffix(".json") for name in names if name.endswith(".json")]

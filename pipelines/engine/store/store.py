@@ -15,7 +15,7 @@ from typing import Any
 from pipelines.engine.actions.key import PreImage, key_of
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.places import Files, open_files
-from pipelines.engine.files.seal import BROKEN, UnsealedError, sealed, unsealed
+from pipelines.engine.files.seal import UNSEALING_ERRORS, UnsealedError, sealed, unsealed
 from pipelines.engine.files.secret import secret_of
 from pipelines.engine.store.verified_index import VerifiedIndex, VerifiedRow
 from schemas.base.errors import Fault
@@ -187,7 +187,7 @@ class Store:
             unsealed(self.files.read(row_name(key)), self.secret)
         except UnsealedError:
             return True
-        except (OSError, *BROKEN):
+        except (OSError, *UNSEALING_ERRORS):
             pass
         return False
 
@@ -204,7 +204,7 @@ class Store:
         except UnsealedError as error:
             log.warning("%s: %s, will be made again", self.files.path(name), error)
             return None
-        except (OSError, *BROKEN):
+        except (OSError, *UNSEALING_ERRORS):
             log.warning("%s: damaged, will be made again", self.files.path(name))
             return None
 

@@ -1,4 +1,4 @@
-"""Ingesting scans by hand."""
+"""Ingest of scans by a command."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What processes of this machine listen on."""
+"""The ports on which processes of a run listen."""
 
 import urllib.error
 import urllib.request

@@ -1,4 +1,4 @@
-"""Only misses run; what fails by its input is remembered, what fails by the machine is not."""
+"""Only misses run; failures of the input are cached, faults of the machine are not."""
 
 import logging
 from collections.abc import Callable
@@ -30,7 +30,7 @@ def raising(error: str) -> str:
 
 @pytest.fixture
 def diamond(package: Any) -> Callable[..., list[Step]]:
-    """left(a) and right(b), joined by both."""
+    """left(a), right(b), and both(left, right)."""
     module = package.step_module("join")
 
     def draw(a: bytes = b"a", b: bytes = b"b", left: Any = None, right: Any = None) -> list[Step]:

@@ -1,4 +1,4 @@
-"""Results of an earlier version of the code stay where a person accepts them, and are told apart from later on."""
+"""Results of an earlier version of the code can be accepted, and are marked as such."""
 
 from collections.abc import Callable
 from typing import Any
@@ -44,7 +44,7 @@ def test_steps_whose_code_alone_is_new_are_stale_and_what_follows_is_known(
     run_steps(*chain())
     assert stale_actions(chain(), store) == {}
     steps = chain(SAME_FIRST)
-    [stale] = stale_actions(steps, store).values()  # the second took what the first came to, and is known
+    [stale] = stale_actions(steps, store).values()  # the input of the second step is unchanged: it is a hit
     assert (stale.action.step.kind, versions(stale, store)) == ("first", [f"code of {steps[0].module} changed"])
     assert repeat(stale.action, store) is None
 
@@ -65,12 +65,12 @@ def test_what_is_accepted_is_a_hit_and_trace_tells(chain: Chain, store: Store, r
     assert verify(store).damaged == []
     result = outcomes["second"]
     assert isinstance(result, Success)
-    found = trace(result.digest, read_actions(store), store, "P/S")
-    assert found is not None
-    by_step = {action.step: action.accepted for action in found.actions.values()}
+    origin = trace(result.digest, read_actions(store), store, "P/S")
+    assert origin is not None
+    by_step = {action.step: action.accepted for action in origin.actions.values()}
     assert by_step == {"P/S/first": acceptance(stale.upgrade.old), "P/S/second": None}
     run_steps(*chain())
-    assert stale_actions(chain(), store) == {}  # the old rows stand as they were
+    assert stale_actions(chain(), store) == {}  # the old rows are unchanged
 
 
 def test_what_follows_from_a_refused_step_is_not_known(chain: Chain, store: Store, run_steps: Any) -> None:

@@ -1,4 +1,4 @@
-"""Rows that only who has the secret can make."""
+"""Seals of rows, which only the owner of the secret can make."""
 
 import json
 import logging
@@ -23,7 +23,7 @@ IMAGE = {"step": "made_up", "inputs": {}}
 
 @pytest.fixture(autouse=True)
 def configuration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Of a user of the test's own."""
+    """A configuration folder for this test."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     monkeypatch.delenv(secret_file.VARIABLE, raising=False)
     return tmp_path / "config"
@@ -34,7 +34,7 @@ def opened(tmp_path: Path) -> Store:
 
 
 def poison(tmp_path: Path, result: bytes, image: object = IMAGE) -> str:
-    """What somebody does who can write to the store and has read this program, but has no secret."""
+    """Forge a row with write access to the store, but without the secret."""
     digest, key = sha256(result), key_of(image)
     for name, data in (
         (blob_name(digest), result),
@@ -98,7 +98,7 @@ def test_the_seal_of_another_row_and_of_another_secret(tmp_path: Path) -> None:
 
 
 def test_what_a_machine_remembers_is_no_way_in(tmp_path: Path) -> None:
-    """The memory lies beside the store, and a row that it knows is not read."""
+    """A forged entry of the index is not used, although the rows that it lists are not read."""
     store = opened(tmp_path)
     seal_store(store)
     key = poison(tmp_path, b"poison")
@@ -162,7 +162,7 @@ def test_the_commands(done: object, capsys: pytest.CaptureFixture[str]) -> None:
     actions = Path(done.root) / "results/.footscan/actions"  # type: ignore[attr-defined]
     rows = {path: unsealed(path.read_bytes()) for path in sorted(actions.rglob("*.json"))}
     [(path, value)] = [(path, value) for path, value in rows.items() if '"measure"' in json.dumps(value["image"])][:1]
-    path.write_bytes(sealed(value))  # as anybody can
+    path.write_bytes(sealed(value))  # no secret is needed for that
     assert run_command(["plan", workflow, "--json"]) == 0
     reasons = [miss["reason"] for miss in json.loads(capsys.readouterr().out)["misses"]]
     assert "its row bears no seal of the store's owner" in reasons

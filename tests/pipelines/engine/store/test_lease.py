@@ -1,4 +1,4 @@
-"""Runs under way are known to all who use the store."""
+"""Leases announce runs under way to all users of the store."""
 
 import json
 import logging

@@ -1,4 +1,4 @@
-"""Scans whose results are kept."""
+"""Pins keep the results of scans."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""The store trusts nothing that it reads."""
+"""The store checks everything that it reads."""
 
 import json
 import logging
@@ -36,7 +36,7 @@ def sealed(value: dict[str, Any]) -> bytes:
 
 
 def result(store: Store, key: str = key_of(IMAGE)) -> str | None:
-    """Digest of what an action came to, as far as the store knows it."""
+    """Recorded result of an action, by its digest."""
     known = store.lookup(key)
     return None if known is None else known.digest
 
