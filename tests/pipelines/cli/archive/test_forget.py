@@ -10,7 +10,7 @@ import pytest
 
 from pipelines.cli.main import run_command
 from pipelines.engine.files.places import LocalFiles
-from pipelines.engine.store.erasure_notes import cut_off
+from pipelines.engine.store.erasure_notes import interrupted_erasures
 from pipelines.engine.store.lease import lease
 from pipelines.engine.store.store import open_store
 
@@ -156,7 +156,7 @@ def test_what_was_cut_off_is_finished(
         patch.setattr(LocalFiles, "remove", fail)
         with pytest.raises(Killed):
             footscan("forget", "P0002", "--workflow", two.workflow, "--yes")
-    assert cut_off(open_store(two.root / "results/.footscan")) == ["P0002"]
+    assert interrupted_erasures(open_store(two.root / "results/.footscan")) == ["P0002"]
     assert footscan("run", two.workflow)[0] == 0
     assert "P0002: its erasure was interrupted" in caplog.text
     assert forget(two, footscan)["erased"]
