@@ -1,4 +1,4 @@
-"""An archive under a new version of a library: a sample is computed again, and its results are kept where it agrees."""
+"""Upgrade of an archive to new versions of libraries or code: a sample is computed again, and accepted if it agrees."""
 
 import random
 from collections.abc import Collection, Iterator, Sequence

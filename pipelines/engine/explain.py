@@ -67,6 +67,11 @@ def side_by_side(change: Change) -> list[tuple[str, str]]:
     """Pairs of old and new lines of a change: the lines that differ, with one line of context before and after.
 
     `BETWEEN` marks omitted lines. A line that only one side has is paired with an empty line.
+
+    Examples
+    --------
+    >>> side_by_side(Change("code", "module", "a = 1\\nb = 2", "a = 1\\nb = 3\\nc = 4"))
+    [('a = 1', 'a = 1'), ('b = 2', 'b = 3'), ('', 'c = 4')]
     """
     old, new = (change.old or "").splitlines(), (change.new or "").splitlines()
     pairs: list[tuple[str, str]] = []

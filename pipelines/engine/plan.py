@@ -88,7 +88,13 @@ def cached_outcome(step: Step, row: VerifiedRow | None) -> Outcome | None:
 
 
 def without_places(problem: str, places: Mapping[str, Path]) -> str:
-    """`problem` with each path replaced by its name: an equal film in another folder then fails with the same text."""
+    """`problem` with each path replaced by its name: an equal film in another folder then fails with the same text.
+
+    Examples
+    --------
+    >>> without_places("/scans/cam1.avi: no frames", {"film": Path("/scans/cam1.avi")})
+    '\\x00film\\x00: no frames'
+    """
     for name, path in places.items():
         problem = problem.replace(str(path), f"\0{name}\0")
     return problem

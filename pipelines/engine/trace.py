@@ -94,7 +94,16 @@ def read_actions(store: Store) -> Actions:
 
 
 def row_key(name: str) -> str | None:
-    """The key in the file name of a row; None for another file."""
+    """The key in the file name of a row; None for another file.
+
+    Examples
+    --------
+    >>> key = 64 * "a"
+    >>> row_key(f"actions/aa/{key}.json") == key
+    True
+    >>> row_key(f"blobs/aa/{key}") is None
+    True
+    """
     path = PurePosixPath(name)
     is_row = path.suffix == ".json" and _is_hex(path.stem) and path.parts[:2] == ("actions", path.stem[:2])
     return path.stem if is_row and len(path.parts) == 3 else None

@@ -117,6 +117,8 @@ def test_each_camera_of_a_capture_that_is_to_be_filmed_has_its_own_stripe(tmp_pa
     keys = set()
     for step in steps:
         if step.kind == "stripe":  # all take the same listing of films
-            digests = {name: "0" * 64 if isinstance(one, Output) else one.digest for name, one in step.inputs.items()}
+            digests = {
+                name: "0" * 64 if isinstance(source, Output) else source.digest for name, source in step.inputs.items()
+            }
             keys.add(key_of(image_text(step, digests)))
     assert len(keys) == 8

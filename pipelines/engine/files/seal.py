@@ -16,7 +16,16 @@ class UnsealedError(ValueError):
 
 
 def sealed(value: dict[str, Any], secret: bytes | None = None) -> bytes:
-    """An object as canonical JSON, with its digest as `seal` and, given a `secret`, its HMAC as `owner_seal`."""
+    """An object as canonical JSON, with its digest as `seal` and, given a `secret`, its HMAC as `owner_seal`.
+
+    Examples
+    --------
+    >>> unsealed(sealed({"key": 1}))
+    {'key': 1}
+    >>> unsealed(sealed({"key": 1}).replace(b"1", b"2", 1))
+    Traceback (most recent call last):
+    ValueError: broken seal
+    """
     if secret is not None:
         value = {**value, "owner_seal": seal_of(value, secret)}
     return canonical_json({**value, "seal": sha256(canonical_json(value).encode())}).encode()

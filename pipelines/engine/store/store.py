@@ -222,7 +222,13 @@ def _reopened(files: Files) -> Store:
 
 
 def blob_name(digest: str) -> str:
-    """Return the file name of a blob."""
+    """Return the file name of a blob; ValueError if `digest` is not a SHA-256 digest.
+
+    Examples
+    --------
+    >>> blob_name(64 * "a")[:12]
+    'blobs/aa/aaa'
+    """
     return f"blobs/{plain_hex(digest)[:2]}/{digest}"
 
 

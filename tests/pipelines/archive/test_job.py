@@ -71,7 +71,7 @@ def test_no_later_job_overwrites_the_scan_of_an_earlier_one(done: Any) -> None:
 
     def refused(folder: Path) -> list[str]:
         planned = plan_job(replace(done.job(), folders=[folder]), folders=folders)
-        return [str(one.error) for one in planned.refused]
+        return [str(refusal.error) for refusal in planned.refused]
 
     assert refused(done.scan) == refused(done.scan) == []
     twin = add_scan(done, "S0", "scan: S0", "scan: S1")
@@ -187,9 +187,9 @@ def test_own_calibration_of_a_scan_comes_before_the_workflows(
 
 
 def test_calibration_without_a_camera_is_refused(done: Any, calibration: Callable[..., Calibration]) -> None:
-    one = calibration()
+    complete = calibration()
     path = done.root / "calibration.json"
-    path.write_text(one.model_copy(update={"cameras": [one.camera(1)]}).model_dump_json())
+    path.write_text(complete.model_copy(update={"cameras": [complete.camera(1)]}).model_dump_json())
     [scan], _ = done.run()
     assert scan.problem == f"{path}: cameras: has no camera 5, expected one of 1"
 

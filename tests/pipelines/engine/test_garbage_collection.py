@@ -88,7 +88,7 @@ def test_code_goes_with_the_last_action_that_it_was_of(
     package.forget()
     run_steps(*steps)
     shares = read_contents(store).shares(garbage(store).names)
-    assert {kind: (one.actions, one.results) for kind, one in shares.items()} == {CODE: (0, 2), "second": (1, 0)}
+    assert {kind: (share.actions, share.results) for kind, share in shares.items()} == {CODE: (0, 2), "second": (1, 0)}
     delete(garbage(store), store)
     package.write("second", (package.folder / "second.py").read_text() + "\nX = 2\n")
     package.forget()
@@ -191,25 +191,25 @@ def test_shares_by_kind(chain: Chain, store: Store, run_steps: Any) -> None:
     outcomes, _ = run_steps(*chain(2))
     contents = read_contents(store)
     shares = contents.shares(contents.sizes)
-    assert {kind: (one.actions, one.results) for kind, one in shares.items()} == {
+    assert {kind: (share.actions, share.results) for kind, share in shares.items()} == {
         CODE: (0, 4), VALUES: (0, 1), "first": (1, 1), "second": (1, 1), "(other)": (0, 0),
     }  # fmt: skip  # the film is equal to the result of first; code: two documents and two modules
     row = contents.sizes[
         next(row_name(key) for key, row in contents.actions.rows.items() if row.image["step"] == "second")
     ]
     assert shares["second"].bytes == row + len(b"film+remark*2")
-    assert sum(one.bytes for one in shares.values()) == sum(size for _, size in store.files.sizes(""))
+    assert sum(share.bytes for share in shares.values()) == sum(size for _, size in store.files.sizes(""))
     assert store.has(outcomes["first"].digest)
 
 
 def test_when_a_file_was_written(store: Store) -> None:
-    for one in (store, open_store("memory://collect-test")):
+    for opened in (store, open_store("memory://collect-test")):
         before = time.time() - 1
-        digest = one.put(b"x")
-        written = one.files.written(blob_name(digest))
+        digest = opened.put(b"x")
+        written = opened.files.written(blob_name(digest))
         assert written is not None
         assert before <= written <= time.time() + 1
-        assert one.files.written(blob_name("0" * 64)) is None
+        assert opened.files.written(blob_name("0" * 64)) is None
 
 
 def test_a_store_elsewhere(chain: Chain, run_steps: Any, store: Store) -> None:

@@ -31,12 +31,12 @@ def umask() -> Iterator[None]:
 def group() -> grp.struct_group:
     """A group that new files do not have by default."""
     mine = {os.getegid()}
-    known = [one for one in grp.getgrall() if one.gr_gid not in mine]
+    groups = [group for group in grp.getgrall() if group.gr_gid not in mine]
     if os.geteuid() != 0:
-        known = [one for one in known if one.gr_gid in os.getgroups()]
-    if not known:
+        groups = [group for group in groups if group.gr_gid in os.getgroups()]
+    if not groups:
         pytest.skip("this user is in one group only")
-    return known[0]
+    return groups[0]
 
 
 def mode(path: Path) -> int:

@@ -56,8 +56,8 @@ def truth(tmp_path: Path, file: Path) -> Truth:
 
 def lookups(store: Store) -> dict[str, tuple[str | None, str | None, str | None] | None]:
     """Outcome of each action according to the store."""
-    known = {key: store.lookup(key) for key in KEYS}
-    return {key: one and (one.digest, one.kind, one.problem) for key, one in known.items()}
+    rows = {key: store.lookup(key) for key in KEYS}
+    return {key: row and (row.digest, row.kind, row.problem) for key, row in rows.items()}
 
 
 def close(store: Store) -> None:
