@@ -1,4 +1,4 @@
-"""Arrays as bytes and back: the same bytes for the same arrays, and nothing in them that could run."""
+"""Arrays as bytes and back. Equal arrays give equal bytes, and the bytes cannot hold code."""
 
 import io
 import zipfile
@@ -13,14 +13,20 @@ Array = NDArray[np.generic]
 
 
 def pack(**arrays: Array) -> bytes:
-    """Named arrays as an uncompressed NPZ archive (whose entries bear a fixed date)."""
+    """Pack named arrays into an uncompressed NPZ archive, whose entries have a fixed date.
+
+    Examples
+    --------
+    >>> unpack(pack(x=np.array([1, 2], np.int32)))
+    {'x': array([1, 2], dtype=int32)}
+    """
     out = io.BytesIO()
     np.savez(out, allow_pickle=False, **{name: np.ascontiguousarray(array) for name, array in arrays.items()})
     return out.getvalue()
 
 
 def unpack(data: bytes) -> dict[str, NDArray[Any]]:
-    """The arrays of `pack`."""
+    """Restore the arrays of `pack`; DamagedError if `data` is not such an archive."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}

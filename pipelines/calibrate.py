@@ -30,8 +30,8 @@ class CaptureInputs:
     paths: Mapping[int, Path]
     """The film of each camera."""
     films: Mapping[int, Mapping[str, Input]]
-    """Inputs of each camera's stripe: its `film`; or, as `film`, the step that lists the digests of all films, and the
-    name of its `file`."""
+    """Inputs of each camera's stripe step: its `film`. For a capture yet to be filmed, `film` is the step that lists
+    the digests of all films, and `file` the name of the camera's film."""
     names: list[str]
     """All files within the capture's folder: capture.yaml, the reference object, the films."""
     digests: Input
@@ -39,7 +39,7 @@ class CaptureInputs:
 
 
 def recorded_inputs(capture: RecordedCapture, digests: FileDigests) -> CaptureInputs:
-    """The inputs of the steps from a recorded capture.
+    """Make the inputs of the steps from a recorded capture.
 
     Raises
     ------
@@ -56,13 +56,13 @@ def recorded_inputs(capture: RecordedCapture, digests: FileDigests) -> CaptureIn
             problem = f"has the same film as camera {other}, expected its own"
             raise RefusedInput(capture.file, problem, field=f"camera {camera}")
         films[camera] = {"film": source_files(path, digests)}
-    named = {file.relative_to(capture.folder).as_posix(): digests.of(file)[0] for file in capture.files}
-    listed = Value(canonical_json(named).encode())
-    return CaptureInputs(capture.file, capture.document, capture.reference, paths, films, list(named), listed)
+    digests_by_name = {file.relative_to(capture.folder).as_posix(): digests.of(file)[0] for file in capture.files}
+    listed = Value(canonical_json(digests_by_name).encode())
+    return CaptureInputs(capture.file, capture.document, capture.reference, paths, films, list(digests_by_name), listed)
 
 
 def camera_steps(name: str, capture: CaptureInputs, parameters: CaptureCalibrationParameters) -> list[Step]:
-    """The steps of each camera of a capture, and the step that places the object from the views of all cameras.
+    """Build the steps of each camera of a capture, and the step that finds the object's poses from all views.
 
     `name` is the name of the graph's scan; the kinds are `stripe`, `recognise` and `place`.
     """
@@ -73,16 +73,16 @@ def camera_steps(name: str, capture: CaptureInputs, parameters: CaptureCalibrati
         stripe = _step(
             name, "stripe", "capture_stripe", parameters.extraction, capture.films[camera.id], camera.id, places=film
         )
-        seen: dict[str, Input] = {
+        views: dict[str, Input] = {
             "stripe": Output(stripe.name), "reference": _reference(capture), "camera": _camera(camera)
         }  # fmt: skip
-        steps += [stripe, _step(name, "recognise", "recognise", None, seen, camera.id)]
-    told = {"reference": _reference(capture), **_seen(name, capture)}
-    return [*steps, _step(name, "place", "place", parameters.placement, told, places=document)]
+        steps += [stripe, _step(name, "recognise", "recognise", None, views, camera.id)]
+    inputs = {"reference": _reference(capture), **_views(name, capture)}
+    return [*steps, _step(name, "place", "place", parameters.placement, inputs, places=document)]
 
 
 def fit_steps(name: str, capture: CaptureInputs, parameters: CaptureCalibrationParameters, poses: str) -> list[Step]:
-    """The calibration of each camera by itself, with the object in the poses from the step of kind `poses`."""
+    """Build the steps that calibrate each camera alone, with the poses of the object from the step of kind `poses`."""
     return [
         _step(
             name, "fit", "fit", parameters.fit,
@@ -99,28 +99,28 @@ def fit_steps(name: str, capture: CaptureInputs, parameters: CaptureCalibrationP
 def calibration_steps(
     name: str, capture: CaptureInputs, parameters: CaptureCalibrationParameters, *, keep_going: bool = False
 ) -> list[Step]:
-    """The steps from a capture's films to its calibration, the result of the last one, of kind `calibrate`.
+    """Build the steps from a capture's films to its calibration, the result of the last step, of kind `calibrate`.
 
-    With `keep_going` cameras that see the object from another side than they stand on are calibrated all the same.
+    With `keep_going`, cameras that see the object from another side than they stand on are calibrated as well.
     """
     steps = camera_steps(name, capture, parameters)
     document = {"capture": capture.file}
-    seen = _seen(name, capture)
+    views = _views(name, capture)
     poses = "place"
     for kind in ("all-recognise", *(() if keep_going else ("own-side",))):
-        told = {"poses": Output(f"{name}/{poses}"), **seen}
-        steps.append(_step(name, kind, kind.replace("-", "_"), None, told, places=document))
+        inputs = {"poses": Output(f"{name}/{poses}"), **views}
+        steps.append(_step(name, kind, kind.replace("-", "_"), None, inputs, places=document))
         poses = kind
     steps += fit_steps(name, capture, parameters, poses)
     about = {"files": capture.names, "reference": Path(capture.document.reference).name, "software": SOFTWARE}
-    known: dict[str, Input] = {
+    last_inputs: dict[str, Input] = {
         **{f"fit-{camera.id}": Output(f"{name}/fit-{camera.id}") for camera in capture.document.cameras},
-        **seen,
+        **views,
         "reference": _reference(capture),
         "digests": capture.digests,
         "about": Value(canonical_json(about).encode()),
     }
-    return [*steps, _step(name, "calibrate", "calibrate", None, known)]
+    return [*steps, _step(name, "calibrate", "calibrate", None, last_inputs)]
 
 
 @dataclass
@@ -134,30 +134,30 @@ class CaptureOfScan:
     """Steps from the capture's films to the parts of the calibration that the scan takes."""
 
     @classmethod
-    def drawn(cls, name: str, capture: CaptureInputs) -> "CaptureOfScan":
-        """The calibration of the scan `name`; each part that a scan takes adds a step to `steps`."""
+    def from_capture(cls, name: str, capture: CaptureInputs) -> "CaptureOfScan":
+        """Build the calibration of the scan `name`; each part that a scan takes adds a step to `steps`."""
         return cls(name, capture, calibration_steps(name, capture, CaptureCalibrationParameters()))
 
     @property
     def source(self) -> Output:
         """Name and digest of the calibration."""
-        named = {"name": Value(canonical_json(self.capture.file.parent.name).encode())}
-        return self._taken("calibration-source", "calibration_source", named)
+        name = {"name": Value(canonical_json(self.capture.file.parent.name).encode())}
+        return self._part("calibration-source", "calibration_source", name)
 
     def camera(self, camera: int) -> Output:
         """The map of one camera; RefusedInput if the capture lacks the camera."""
         if camera not in self.capture.paths:
-            known = ", ".join(map(str, self.capture.paths))
-            raise RefusedInput(self.capture.file, f"has no camera {camera}, expected one of {known}", field="cameras")
-        return self._taken("camera-map", "camera_map", {"camera": Value(canonical_json(camera).encode())}, camera)
+            problem = f"has no camera {camera}, expected one of {', '.join(map(str, self.capture.paths))}"
+            raise RefusedInput(self.capture.file, problem, field="cameras")
+        return self._part("camera-map", "camera_map", {"camera": Value(canonical_json(camera).encode())}, camera)
 
     def cameras(self, ids: frozenset[int]) -> Output:
-        """The calibration with the maps of these cameras alone."""
-        return self._taken("camera-maps", "camera_maps", {"cameras": Value(canonical_json(sorted(ids)).encode())})
+        """The calibration with the maps of these cameras only."""
+        return self._part("camera-maps", "camera_maps", {"cameras": Value(canonical_json(sorted(ids)).encode())})
 
-    def _taken(self, kind: str, module: str, told: Mapping[str, Input], camera: int | None = None) -> Output:
+    def _part(self, kind: str, module: str, selection: Mapping[str, Input], camera: int | None = None) -> Output:
         calibration = {"calibration": Output(f"{self.name}/calibrate")}
-        step = _step(self.name, kind, module, None, {**calibration, **told}, camera)
+        step = _step(self.name, kind, module, None, {**calibration, **selection}, camera)
         self.steps.append(step)
         return Output(step.name)
 
@@ -175,12 +175,12 @@ def _step(
     return Step(name, kind, f"{STEPS}.{module}", parameters, inputs, camera, places or {})
 
 
-def _seen(name: str, capture: CaptureInputs) -> dict[str, Input]:
-    seen: dict[str, Input] = {}
+def _views(name: str, capture: CaptureInputs) -> dict[str, Input]:
+    views: dict[str, Input] = {}
     for camera in capture.document.cameras:
-        seen[f"stripe-{camera.id}"] = Output(f"{name}/stripe-{camera.id}")
-        seen[f"recognised-{camera.id}"] = Output(f"{name}/recognise-{camera.id}")
-    return seen
+        views[f"stripe-{camera.id}"] = Output(f"{name}/stripe-{camera.id}")
+        views[f"recognised-{camera.id}"] = Output(f"{name}/recognise-{camera.id}")
+    return views
 
 
 def _reference(capture: CaptureInputs) -> Value:

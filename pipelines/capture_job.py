@@ -1,4 +1,4 @@
-"""One capture as a job: a calibration from it, or how far the scanner has drifted since its last one."""
+"""One capture as a job: a new calibration, or the drift of the scanner since its last calibration."""
 
 import importlib
 import json
@@ -46,8 +46,8 @@ class CaptureCalibration:
     x_mm: float
     """X of all corners: the position of the laser plane."""
     departures_mm: Floats
-    """(K, 2) distances in Y and Z, mm, of the object from its K nominal placements, as the cameras agree; zeros where a
-    correction does not help."""
+    """(K, 2) offsets in Y and Z, mm, of the object from its K nominal placements, as all cameras see it; zeros if a
+    correction does not improve the fit."""
 
 
 def calibrate_capture(
@@ -58,24 +58,24 @@ def calibrate_capture(
     *,
     keep_going: bool = False,
 ) -> CaptureCalibration:
-    """The calibration of all cameras of a capture, by `workers` threads; results in `cache` are not computed again.
+    """Calibrate all cameras of a capture with `workers` threads; results in `cache` are not computed again.
 
-    With `keep_going` cameras that see the object from another side than they stand on are calibrated all the same.
+    With `keep_going`, cameras that see the object from another side than they stand on are calibrated as well.
 
     Raises
     ------
     RefusedInput
-        Two cameras have the same film; as `RefusedCapture`: the object is not recognised, or was wrongly placed.
+        Two cameras have the same film. A `RefusedCapture`: the object is not recognised, or was wrongly placed.
     Fault
         A step could not be run to its end.
     """
     with _job(capture, workers, cache) as job:
         steps = calibration_steps(job.name, job.inputs, parameters, keep_going=keep_going)
-        made = job.run(steps)
-        fits = [json.loads(_fit(job, made, camera)["document"].tobytes()) for camera in sorted(job.cameras)]
-        poses = unpack(made[f"{job.name}/place"])["poses"]
+        results = job.run(steps)
+        fits = [json.loads(_fit(job, results, camera)["document"].tobytes()) for camera in sorted(job.cameras)]
+        poses = unpack(results[f"{job.name}/place"])["poses"]
         return CaptureCalibration(
-            Calibration.model_validate_json(made[f"{job.name}/calibrate"]),
+            Calibration.model_validate_json(results[f"{job.name}/calibrate"]),
             [ModelTrial(**trial) for fit in fits for trial in fit["trials"]],
             [FoundCorner(**corner) for fit in fits for corner in fit["corners"]],
             capture.document.x_mm,
@@ -91,33 +91,33 @@ def check_calibration(
     workers: int,
     cache: Path | None = None,
 ) -> list[Drift]:
-    """The drift of each camera of a scanner since its calibration, by a capture of today.
+    """Measure the drift of each camera of a scanner since its calibration, with a present capture.
 
-    A camera that does not recognise the object, or is in the capture or the calibration alone, is part of the result.
+    A camera that does not recognise the object, or is only in the capture or only in the calibration, is reported too.
 
     Raises
     ------
     RefusedInput
-        As `RefusedCapture`: the object was wrongly placed, or no camera recognises it.
+        A `RefusedCapture`: the object was wrongly placed, or no camera recognises it.
     Fault
         A step could not be run to its end.
     """
     with _job(capture, workers, cache) as job:
         steps = camera_steps(job.name, job.inputs, parameters)
-        made = job.run([*steps, *fit_steps(job.name, job.inputs, parameters, "place")])
+        results = job.run([*steps, *fit_steps(job.name, job.inputs, parameters, "place")])
         drifts = []
-        for known in sorted(calibration.cameras, key=lambda camera: camera.camera):
-            if known.camera in job.cameras:
-                drifts.append(_drift(job, made, known, tolerance_mm))
+        for camera in sorted(calibration.cameras, key=lambda calibrated: calibrated.camera):
+            if camera.camera in job.cameras:
+                drifts.append(_drift(job, results, camera, tolerance_mm))
             else:
-                drifts.append(Drift(known.camera, "not in the capture"))
-        known_ids = {known.camera for known in calibration.cameras}
-        unknown = sorted(set(job.cameras) - known_ids)
-        return drifts + [Drift(camera, "not in the calibration") for camera in unknown]
+                drifts.append(Drift(camera.camera, "not in the capture"))
+        calibrated_ids = {camera.camera for camera in calibration.cameras}
+        uncalibrated_ids = sorted(set(job.cameras) - calibrated_ids)
+        return drifts + [Drift(number, "not in the calibration") for number in uncalibrated_ids]
 
 
 def picture_of(capture: RecordedCapture, refused: RefusedCapture) -> bytes:
-    """A PNG of the evidence for which a capture was refused."""
+    """Draw the evidence for which a capture was refused, as PNG."""
     films = {camera.id: capture.film(camera) for camera in capture.document.cameras}
     shown = [
         (evidence, next(islice(pixel_frames(open_film(films[evidence.camera])), evidence.frame, None), None))
@@ -137,11 +137,11 @@ class _Job:
 
     @property
     def cameras(self) -> list[int]:
-        """The numbers of the cameras."""
+        """Numbers of the cameras."""
         return list(self.inputs.paths)
 
     def run(self, steps: Sequence[Step]) -> dict[str, bytes]:
-        """The result of every step by its name; raises the error of a step that failed."""
+        """Run steps and return their results by name; raises the error of a failed step."""
         with self.workspace.lease():
             outcomes = self.workspace.run(steps, Threads(self.workers), lambda _: None)
             for step in steps:
@@ -159,37 +159,37 @@ class _Job:
 
 @contextmanager
 def _job(capture: RecordedCapture, workers: int, cache: Path | None) -> Iterator[_Job]:
-    """The job of a capture; without a `cache` its store lasts as long as the job."""
-    with TemporaryDirectory(prefix="footscan-") as passing, Workspace(cache or Path(passing)) as workspace:
+    """The job of a capture; without a `cache` the store is temporary."""
+    with TemporaryDirectory(prefix="footscan-") as temporary, Workspace(cache or Path(temporary)) as workspace:
         inputs = recorded_inputs(capture, workspace.digests)
         yield _Job(f"capture/{capture.folder.name}", inputs, workspace, workers)
 
 
 def _raise(failure: Failure, steps: Mapping[str, Step], outcomes: Mapping[str, Outcome], store: Store) -> None:
-    """Raise the error of a failed step. The step itself repeats a refusal, with the evidence that no store keeps."""
+    """Raise the error of a failed step. A refused step runs again, since the store does not keep the evidence."""
     if failure.kind == "refused":
         step = steps[failure.cause]
-        content = {}
+        contents = {}
         for name, source in step.inputs.items():
-            before = outcomes[source.step] if isinstance(source, Output) else None
-            assert not isinstance(before, Failure), "a cause has all its inputs"
-            digest = "" if before is None else before.digest
-            content[name] = content_of(step, source, digest, store)
-        importlib.import_module(step.module).run(content, step.parameters, step.places)
+            outcome = outcomes[source.step] if isinstance(source, Output) else None
+            assert not isinstance(outcome, Failure), "a cause has all its inputs"
+            digest = "" if outcome is None else outcome.digest
+            contents[name] = content_of(step, source, digest, store)
+        importlib.import_module(step.module).run(contents, step.parameters, step.places)
     raise Fault(failure.problem)
 
 
-def _fit(job: _Job, made: Mapping[str, bytes], camera: int) -> Mapping[str, NDArray[Any]]:
-    return unpack(made[f"{job.name}/fit-{camera}"])
+def _fit(job: _Job, results: Mapping[str, bytes], camera: int) -> Mapping[str, NDArray[Any]]:
+    return unpack(results[f"{job.name}/fit-{camera}"])
 
 
-def _drift(job: _Job, made: Mapping[str, bytes], known: CameraCalibration, tolerance_mm: float) -> Drift:
-    camera = known.camera
-    stripe, found = (unpack(made[f"{job.name}/{kind}-{camera}"]) for kind in ("stripe", "recognise"))
-    recognised = seen_by(camera, stripe, found)[1]
+def _drift(job: _Job, results: Mapping[str, bytes], calibrated: CameraCalibration, tolerance_mm: float) -> Drift:
+    camera = calibrated.camera
+    stripe, recognised_edges = (unpack(results[f"{job.name}/{kind}-{camera}"]) for kind in ("stripe", "recognise"))
+    recognised = seen_by(camera, stripe, recognised_edges)[1]
     if not isinstance(recognised, Recognised):
         return Drift(camera, "not recognised", remark=recognised)
-    fit = _fit(job, made, camera)
+    fit = _fit(job, results, camera)
     today = CameraCalibration.model_validate(json.loads(fit["document"].tobytes())["calibration"])
-    drift = drift_of(known, CalibratedView(today, [], points_of(fit), []), tolerance_mm)
+    drift = drift_of(calibrated, CalibratedView(today, [], points_of(fit), []), tolerance_mm)
     return replace(drift, remark=recognised.contradiction or drift.remark)

@@ -36,7 +36,7 @@ class DemoResult:
 
 
 def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
-    """Film a parametric foot and the reference object, calibrate, and run the scan; finished parts are kept.
+    """Film a parametric foot and the reference object, calibrate, and reconstruct the scan; finished parts are kept.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The difference of two results of a step, in words."""
+"""The difference of two results of a step in words."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,7 +14,7 @@ SHOWN = 3
 
 
 def difference_in_words(old: bytes, new: bytes) -> str:
-    """The arrays, or the fields of a document, that differ, with the largest difference of numbers.
+    """Describe the arrays or document fields in which two results differ, with the largest difference of numbers.
 
     Examples
     --------
@@ -37,19 +37,19 @@ def _of_arrays(old: bytes, new: bytes) -> Iterator[str]:
         if name not in before or name not in after:
             yield f"{name} {'is missing' if name in before else 'is new'}"
             continue
-        was, now = before[name], after[name]
-        if was.shape != now.shape or was.dtype != now.dtype:
-            yield f"{name} {was.dtype}{list(was.shape)} -> {now.dtype}{list(now.shape)}"
+        a, b = before[name], after[name]
+        if a.shape != b.shape or a.dtype != b.dtype:
+            yield f"{name} {a.dtype}{list(a.shape)} -> {b.dtype}{list(b.shape)}"
             continue
-        differs = was != now
-        if was.dtype.kind == "f":
-            differs &= ~(np.isnan(was) & np.isnan(now))
+        differs = a != b
+        if a.dtype.kind == "f":
+            differs &= ~(np.isnan(a) & np.isnan(b))
         if differs.any():
-            yield f"{name}: {int(differs.sum())} of {was.size} values{_at_most(was[differs], now[differs])}"
+            yield f"{name}: {int(differs.sum())} of {a.size} values{_at_most(a[differs], b[differs])}"
 
 
 def _fields(arrays: dict[str, np.ndarray[Any, Any]]) -> dict[str, np.ndarray[Any, Any]]:
-    """Arrays by their names, those of a structured array by its name and the field's."""
+    """Arrays by name; a field of a structured array has the name `array.field`."""
     plain: dict[str, np.ndarray[Any, Any]] = {}
     for name, array in arrays.items():
         fields = array.dtype.names
@@ -57,10 +57,10 @@ def _fields(arrays: dict[str, np.ndarray[Any, Any]]) -> dict[str, np.ndarray[Any
     return plain
 
 
-def _at_most(was: np.ndarray[Any, Any], now: np.ndarray[Any, Any]) -> str:
-    if was.dtype.kind not in "fiu":
+def _at_most(a: np.ndarray[Any, Any], b: np.ndarray[Any, Any]) -> str:
+    if a.dtype.kind not in "fiu":
         return ""
-    distance = np.abs(was.astype(np.float64) - now.astype(np.float64))
+    distance = np.abs(a.astype(np.float64) - b.astype(np.float64))
     return f" by at most {float(np.max(distance)):.3g}"
 
 
@@ -74,7 +74,7 @@ def _of_documents(old: bytes, new: bytes) -> Iterator[str]:
 
 
 def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    """Values of a document that are no objects and no lists, by their dotted names."""
+    """Scalar values of a document, by their dotted names."""
     if not isinstance(value, dict | list):
         yield name, value
         return

@@ -31,7 +31,7 @@ DELIVERED = {
     "quality.json": "quality",
     "report.html": "report",
 }
-"""The files of a scan's results, and the step that makes each."""
+"""The files of a scan's results, and the kind of step that makes each."""
 
 
 class ScanCalibration(Protocol):
@@ -45,7 +45,7 @@ class ScanCalibration(Protocol):
         """The map of one camera; RefusedInput if there is none."""
 
     def cameras(self, ids: frozenset[int]) -> Input:
-        """The calibration with the maps of these cameras alone."""
+        """The calibration with the maps of these cameras only."""
 
 
 @dataclass(frozen=True)
@@ -55,33 +55,33 @@ class CalibrationFile:
     path: Path
     content: Calibration
     digest: str
-    _drawn: dict[object, Value] = field(default_factory=dict, compare=False, repr=False)
-    """Parts that scans take, cached: they are the same for many scans, and slow to serialise."""
+    _parts: dict[object, Value] = field(default_factory=dict, compare=False, repr=False)
+    """Cached parts that scans take: many scans take the same ones, and they are slow to serialise."""
 
     @property
     def source(self) -> Value:
         """Name and digest of the calibration."""
-        return self._once("source", lambda: Source(name=self.path.name, sha256=self.digest))
+        return self._cached("source", lambda: Source(name=self.path.name, sha256=self.digest))
 
     def camera(self, camera: int) -> Value:
         """The map of one camera; RefusedInput if there is none."""
-        return self._once(camera, lambda: self.content.camera(camera, self.path))
+        return self._cached(camera, lambda: self.content.camera(camera, self.path))
 
     def cameras(self, ids: frozenset[int]) -> Value:
-        """The calibration with the maps of these cameras alone."""
+        """The calibration with the maps of these cameras only."""
         maps = [camera for camera in self.content.cameras if camera.camera in ids]
-        return self._once(ids, lambda: self.content.model_copy(update={"cameras": maps}))
+        return self._cached(ids, lambda: self.content.model_copy(update={"cameras": maps}))
 
-    def _once(self, part: object, draw: Callable[[], Document]) -> Value:
-        if part not in self._drawn:
-            self._drawn[part] = _document(draw(), self.path)
-        return self._drawn[part]
+    def _cached(self, part: object, make: Callable[[], Document]) -> Value:
+        if part not in self._parts:
+            self._parts[part] = _document(make(), self.path)
+        return self._parts[part]
 
 
 def scan_steps(
     scan: RecordedScan, calibration: ScanCalibration, parameters: ScanParameters, digests: FileDigests
 ) -> list[Step]:
-    """The steps from a scan's films to its results, each after those whose results it takes.
+    """Build the steps from a scan's films to its results, in topological order.
 
     Raises
     ------
@@ -101,11 +101,11 @@ def scan_steps(
     colours = {f"colours-{camera.id}": camera.colours for camera in cameras if camera.colours is not None}
     maps = calibration.cameras(frozenset(camera.id for camera in scan.document.cameras))
     foot = FootParameters(side=scan.document.side)
-    seen: dict[str, Input] = {**points, "calibration": maps}
-    cleaned = add(Step(scan.name, "clean", f"{STEPS}.clean", parameters.outliers, seen))
+    mapped: dict[str, Input] = {**points, "calibration": maps}
+    cleaned = add(Step(scan.name, "clean", f"{STEPS}.clean", parameters.outliers, mapped))
     fused = add(Step(scan.name, "fuse", f"{STEPS}.fuse", parameters.fusion, {"clean": cleaned}))
-    merged: dict[str, Input] = {"fused": fused, "calibration": maps}
-    oriented = add(Step(scan.name, "orient", f"{STEPS}.orient", parameters.normals, merged))
+    fused_inputs: dict[str, Input] = {"fused": fused, "calibration": maps}
+    oriented = add(Step(scan.name, "orient", f"{STEPS}.orient", parameters.normals, fused_inputs))
     mesh = add(Step(scan.name, "surface", f"{STEPS}.surface", parameters.surface, {"oriented": oriented}))
     measures = add(Step(scan.name, "measure", f"{STEPS}.measure", foot, {"surface": mesh}))
     verified: dict[str, Output] = {}
@@ -113,19 +113,19 @@ def scan_steps(
         pair: dict[str, Input] = {"surface": mesh, "truth": source_files(truth, digests)}
         verified = {"verified": add(Step(scan.name, "verify", f"{STEPS}.verify", None, pair, places={"truth": truth}))}
     of_cameras = {**manifests, **stripes, **verified}
-    judged: dict[str, Input] = {
+    quality_inputs: dict[str, Input] = {
         "clean": cleaned, "fused": fused, "surface": mesh, "calibration": calibration.source, **of_cameras
     }  # fmt: skip
-    qualities = add(Step(scan.name, "quality", f"{STEPS}.quality", None, judged))
+    quality = add(Step(scan.name, "quality", f"{STEPS}.quality", None, quality_inputs))
     add(Step(scan.name, "cloud.ply", f"{STEPS}.cloud_ply", None, {"oriented": oriented}))
     add(Step(scan.name, "foot.stl", f"{STEPS}.foot_stl", foot, {"surface": mesh}))
-    known: dict[str, Input] = {"surface": mesh, "name": _name(scan)}
+    ply_inputs: dict[str, Input] = {"surface": mesh, "name": _name(scan)}
     if colours:
-        seen_light: dict[str, Input] = {"surface": mesh, "calibration": maps, **points, **colours}
-        known["texture"] = add(Step(scan.name, "texture", f"{STEPS}.texture", None, seen_light))
-    add(Step(scan.name, "foot.ply", f"{STEPS}.foot_ply", foot, known))
-    shown: dict[str, Input] = {
-        "clean": cleaned, "oriented": oriented, "surface": mesh, "measures": measures, "quality": qualities,
+        texture_inputs: dict[str, Input] = {"surface": mesh, "calibration": maps, **points, **colours}
+        ply_inputs["texture"] = add(Step(scan.name, "texture", f"{STEPS}.texture", None, texture_inputs))
+    add(Step(scan.name, "foot.ply", f"{STEPS}.foot_ply", foot, ply_inputs))
+    report_inputs: dict[str, Input] = {
+        "clean": cleaned, "oriented": oriented, "surface": mesh, "measures": measures, "quality": quality,
         "calibration": maps, "about": _about(scan, parameters), **points, **of_cameras,
     }  # fmt: skip
     add(
@@ -134,7 +134,7 @@ def scan_steps(
             "report",
             f"{STEPS}.report",
             foot,
-            shown,
+            report_inputs,
             places={f"array-{camera.id}": camera.array for camera in cameras},
         )
     )
@@ -170,11 +170,11 @@ def _camera_steps(
             places={"film": film, "array": array}, writes=array / "zarr.json",
         )
     )  # fmt: skip
-    filmed: dict[str, Input] = {"manifest": manifest}
+    manifests: dict[str, Input] = {"manifest": manifest}
     places = {"array": array}
     if (background := scan.background(camera)) is not None:
         places["background"] = laser_off = scan.background_array(camera)
-        filmed["background"] = add(
+        manifests["background"] = add(
             Step(
                 scan.name, "background", f"{STEPS}.ingest_background", None,
                 {"manifest": manifest, "background": source_files(background, digests)}, camera.id,
@@ -182,7 +182,7 @@ def _camera_steps(
             )
         )  # fmt: skip
     stripe = add(
-        Step(scan.name, "extract", f"{STEPS}.extract", parameters.extraction, filmed, camera.id, places=places)
+        Step(scan.name, "extract", f"{STEPS}.extract", parameters.extraction, manifests, camera.id, places=places)
     )
     inputs: dict[str, Input] = {
         "stripe": stripe, "manifest": manifest, "calibration": calibration.camera(camera.id), **_travel(scan, camera)
@@ -190,14 +190,14 @@ def _camera_steps(
     points = add(Step(scan.name, "map", f"{STEPS}.map_points", parameters.mapping, inputs, camera.id))
     colours = None
     if background is not None:
-        lit: dict[str, Input] = {"stripe": stripe, "background": filmed["background"]}
-        skin = {"background": places["background"]}
-        colours = add(Step(scan.name, "colour", f"{STEPS}.colour", None, lit, camera.id, places=skin))
+        colour_inputs: dict[str, Input] = {"stripe": stripe, "background": manifests["background"]}
+        arrays = {"background": places["background"]}
+        colours = add(Step(scan.name, "colour", f"{STEPS}.colour", None, colour_inputs, camera.id, places=arrays))
     return _Camera(camera.id, array, manifest, stripe, points, colours)
 
 
 def source_files(path: Path, digests: FileDigests) -> SourceFile:
-    """A film, or another file of the archive, as input of a step."""
+    """Make the input of a step from a film or another file of the archive; RefusedInput if it cannot be read."""
     files = film_files(path)
     states = {file: digests.of(file) for file in files}
     if files == [path]:
@@ -213,7 +213,7 @@ def _travel(scan: RecordedScan, camera: CameraFilm) -> dict[str, Value]:
         x_mm = [None if math.isnan(x) else x for x in read_positions(positions).tolist()]
         return {"positions": Value(canonical_json({"file": positions.name, "x_mm": x_mm}).encode(), positions)}
     travel = camera.travel or scan.document.travel
-    assert travel is not None, "scan.yaml was checked for it"
+    assert travel is not None, "the format of scan.yaml requires it"
     return {"travel": _document(travel, scan.file)}
 
 

@@ -1,4 +1,4 @@
-"""The calibration of the virtual scanner, which every virtual recording needs."""
+"""The steps that calibrate the virtual scanner from a simulated capture."""
 
 from pathlib import Path
 
@@ -11,9 +11,10 @@ from schemas.parameters.simulation import SimulationSettings
 
 
 def filmed_calibration_steps(name: str, capture: Path, settings: SimulationSettings) -> list[Step]:
-    """The steps of `name` that film the reference object into the folder `capture` and calibrate from it.
+    """Build the steps that film the reference object into the folder `capture` and calibrate from it.
 
-    The first is of kind `capture`, the last of kind `calibrate`."""
+    `name` is the name of the graph's scan. The first step is of kind `capture`, the last of kind `calibrate`.
+    """
     film_capture = Step(
         name, "capture", f"{STEPS}.simulate_capture", settings,
         places={"folder": capture}, writes=capture / CAPTURE_FILE,

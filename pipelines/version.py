@@ -3,3 +3,4 @@
 from importlib.metadata import version
 
 SOFTWARE = f"footscan {version('footscan')}"
+"""Program name and version, e.g. `footscan 1.0`."""

@@ -22,7 +22,19 @@ DIAGONAL_MM = (20.0, 600.0)
 def virtual_object(
     mesh: Path | None, foot: Literal["right", "left"] | None, side: Side
 ) -> tuple[Vertices, Faces, Side]:
-    """Vertices (mm), faces and side of a mesh file, of the parametric foot, or else of the block."""
+    """Load a mesh file, or make the parametric foot, or else the block.
+
+    Returns
+    -------
+    vertices : (N, 3) float64, mm
+    faces : (M, 3) int64
+    side : `right`, `left` or `unknown`
+
+    Raises
+    ------
+    RefusedInput
+        The mesh cannot be read, or its size is not that of a foot.
+    """
     if mesh is not None:
         vertices, faces = read_mesh(mesh)
         diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
@@ -32,7 +44,7 @@ def virtual_object(
             raise RefusedInput(mesh, problem, field="unit")
         return vertices, faces.astype(np.int64), side
     if foot is not None:
-        made = make_foot(side=foot)
-        return made.vertices, made.faces.astype(np.int64), foot
+        parametric_foot = make_foot(side=foot)
+        return parametric_foot.vertices, parametric_foot.faces.astype(np.int64), foot
     vertices, faces = make_block()
     return vertices, faces.astype(np.int64), "unknown"

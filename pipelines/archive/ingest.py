@@ -1,4 +1,4 @@
-"""Ingesting scans by hand: films into Zarr, camera by camera."""
+"""Ingest of scans by a command: films into Zarr, camera by camera."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,34 +13,36 @@ from schemas.base.errors import FootscanError, RefusedInput
 
 @dataclass(frozen=True)
 class CameraIngest:
-    """What became of one camera's film and background; of a whole scan where that could not be read."""
+    """Result of the ingest of one camera's film and background, or of a scan that cannot be read."""
 
     scan: str
     camera: int | None
+    """Camera number; None for a whole scan."""
     frames: int = 0
     lost: int = 0
-    """Frames that the film has a place for, but no picture."""
+    """Number of frames that the film counts but has no image of."""
     film_bytes: int = 0
-    """Of the film and its background, as `store_bytes`."""
+    """Size of the film and its background."""
     store_bytes: int = 0
+    """Size of their Zarr arrays."""
     problem: str | None = None
     exit_status: int = 0
-    """Of a command for this camera alone, see `schemas.base.errors`."""
+    """Exit status that a command for this camera alone would have, see `schemas.base.errors`."""
 
     def to_json(self) -> dict[str, Any]:
-        """Its fields."""
+        """Return the fields by name."""
         return dict(vars(self))
 
 
 def ingest_scans(folders: Sequence[Path]) -> list[CameraIngest]:
-    """Ingest the films of scan folders, and of all scans in archives; what fails costs its own camera."""
+    """Ingest the films of scan folders, and of all scans in archives; a failure affects its own camera only."""
     ends: list[CameraIngest] = []
     for folder in folders:
-        found = len(ends)
+        count_before = len(ends)
         is_scan = (folder / SCAN_FILE).exists() or not folder.is_dir()
         for scan_folder in [folder] if is_scan else scan_folders(folder):
             ends += _ingest_scan(scan_folder, None if is_scan else folder)
-        if len(ends) == found:
+        if len(ends) == count_before:
             problem = str(RefusedInput(folder, "holds no scan, expected folders with a scan.yaml"))
             ends.append(CameraIngest(str(folder), None, problem=problem, exit_status=RefusedInput.exit_status))
     return ends

@@ -1,4 +1,4 @@
-"""An archive of scans: planned as a whole, run as a whole; one scan's failure is its own."""
+"""Jobs: archives of scans, planned and run as a whole. A failed scan does not stop the others."""
 
 import logging
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,7 +17,7 @@ from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.places import open_files
 from pipelines.engine.plan import Plan
 from pipelines.engine.pool import OnStepEnd, Pool, cores
-from pipelines.engine.store.erasure_notes import cut_off
+from pipelines.engine.store.erasure_notes import interrupted_erasures
 from pipelines.engine.store.permissions import warn_if_others_can_write
 from pipelines.engine.workspace import Workspace
 from pipelines.recordings.calibration_choice import CalibrationPlace, calibration_places, choose_calibration
@@ -32,38 +32,40 @@ from schemas.parameters.scan import ScanParameters
 from schemas.scan import Scan
 
 CACHE = ".footscan"
+"""Name of the store in the results folder, unless the workflow names another place."""
 WINDOW = 8
-"""Scans for each worker whose steps are handed over at once: an archive's memory does not grow with its scans."""
+"""Scans per worker whose steps are submitted at once: a bound of memory, which must not grow with the archive."""
 
 log = logging.getLogger("footscan.archive")
 
 
 @dataclass(frozen=True)
 class Job:
-    """Which scans, with what, to where."""
+    """Scans to reconstruct, with calibrations, parameters, results folder and store."""
 
     folders: list[Path]
     archives: tuple[Path, ...]
-    """Roots that the scans' paths may not leave; without one, that is two levels above each scan."""
+    """Folders that the paths in their scans may not leave; for other scans that is the folder two levels above."""
     calibrations: tuple[CalibrationPlace, ...]
-    """Win over the scans' own where `calibration_wins`, stand in for it otherwise."""
+    """Calibrations for scans without their own."""
     calibration_wins: bool
+    """True if `calibrations` replace the scans' own calibrations as well."""
     results: Path
     cache: Path | str
     """Folder of the store, or its URL."""
     parameters: ScanParameters
     threads: int
-    """Steps that run at once where no other pool is given."""
+    """Number of steps that run at once in the default pool."""
     group: int | None = None
-    """Number of the group that what is written is for, as well as its owner."""
+    """Number of the group that may access the written files as well as their owner."""
 
     def archive_of(self, folder: Path) -> Path | None:
-        """The archive that a scan lies in."""
+        """Return the archive that contains a scan; None without one."""
         return next((archive for archive in self.archives if folder.is_relative_to(archive)), None)
 
 
 class Waiting(NamedTuple):
-    """A step that a run would have to run, or to look at again."""
+    """A step that a run would execute, or look up again once its inputs are known."""
 
     scan: str
     kind: str
@@ -77,78 +79,80 @@ class Refused(NamedTuple):
     """A scan whose input breaks its format."""
 
     scan: str
-    """`patient/scan`; its folder where that cannot be read, or is another's."""
+    """`patient/scan`; the scan's folder if the name cannot be read or belongs to another scan."""
     folder: Path
     error: RefusedInput
 
 
 @dataclass(frozen=True)
 class PlannedScan:
-    """What is known of a scan before anything runs."""
+    """The plan of a scan in numbers."""
 
     scan: RecordedScan
     steps: int
-    """How many it has."""
+    """Number of its steps."""
     to_run: int
-    """How many of them are no hits."""
+    """Number of its steps that are not hits."""
     failure: Failure | None
-    """Why it is known that it cannot be measured."""
+    """Cached reason why the scan cannot be measured, if any."""
     delivered: Mapping[str, str]
-    """Digests of the files in its results, as far as they are known."""
+    """Digests of those delivered files that are known, by file name."""
 
 
 @dataclass
 class PlannedJob:
-    """What a job has to do."""
+    """The plan of a job."""
 
     job: Job
     workspace: Workspace
     calibrations: dict[Path, CalibrationFile] = field(default_factory=dict)
+    """Calibrations by their files."""
     captures: dict[Path, CaptureInputs] = field(default_factory=dict)
-    """By their folders, as `calibrations` by their files."""
+    """Captures by their folders."""
     refused: list[Refused] = field(default_factory=list)
     scans: list[PlannedScan] = field(default_factory=list)
     waiting: list[Waiting] = field(default_factory=list)
-    """Filled where reasons were asked for."""
+    """Steps that are not hits; empty unless reasons were asked for."""
 
     @property
     def steps(self) -> int:
-        """How many steps all scans have."""
+        """Number of steps of all scans."""
         return sum(planned.steps for planned in self.scans)
 
     @property
     def to_run(self) -> int:
-        """How many of them are no hits."""
+        """Number of steps of all scans that are not hits."""
         return sum(planned.to_run for planned in self.scans)
 
 
 @dataclass(frozen=True)
 class ScanEnd:
-    """What became of one scan."""
+    """The end of one scan of a job."""
 
     scan: str
     source: Path
-    """The scan's own folder."""
+    """Folder of the scan."""
     folder: Path | None
-    """Its results; None where it has none."""
+    """Folder of its results; None if it has none."""
     problem: str | None
     kind: str | None
     """`refused`, `finding`, `fault` or `damaged`, as in `Failure`."""
     digests: Mapping[str, str] = field(default_factory=dict)
-    """Of the files in its results."""
+    """Digests of the files in its results, by file name."""
     known: bool = False
-    """Whether nothing had to run for it."""
+    """True if all its steps were hits."""
     document: Scan | None = None
-    """Its scan.yaml; None where that was refused."""
+    """Content of its scan.yaml; None if that was refused."""
 
 
 def job_of_workflow(path: Path, threads: int | None = None, *, may_be_empty: bool = False) -> Job:
-    """The job that a workflow.yaml describes.
+    """Read the job from a workflow.yaml.
 
     Raises
     ------
     RefusedInput
-        It breaks its format, an archive is missing, or empty and may not be so, or no store can lie where it says.
+        The file breaks its format, an archive is missing, all archives are empty and `may_be_empty` is not set, or the
+        place of the store is not valid.
     """
     workflow = read_workflow(path)
     check_archives(path, workflow)
@@ -173,7 +177,7 @@ def job_of_workflow(path: Path, threads: int | None = None, *, may_be_empty: boo
 
 
 def job_of_scan(folder: Path, calibration: Path | None, results: Path, threads: int | None = None) -> Job:
-    """The job of one scan without a workflow."""
+    """Make the job of one scan without a workflow; RefusedInput if `results` is a file."""
     if results.exists() and not results.is_dir():
         raise RefusedInput(results, "is a file, expected a folder for the results")
     return Job(
@@ -189,15 +193,15 @@ def job_of_scan(folder: Path, calibration: Path | None, results: Path, threads: 
 
 
 def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None = None) -> PlannedJob:
-    """Draw the graph of each scan of a job and look every step up in the cache.
+    """Build the graph of each scan of a job and look up every step in the cache.
 
     Parameters
     ----------
     reasons : bool
-        Whether what would run is listed step by step, not only counted.
+        True if the steps that are not hits are listed, not only counted.
     folders : dict, optional
-        Of the scans of earlier jobs on the same archive, by name, so that none is overwritten; those of this job are
-        added.
+        Folders of the scans of earlier jobs on the same archive, by name, so that no results are overwritten; those of
+        this job are added.
     """
     planned = PlannedJob(job, workspace_of(job))
     folders = {} if folders is None else folders
@@ -223,12 +227,12 @@ def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None
 
 
 def workspace_of(job: Job) -> Workspace:
-    """Where the graphs of a job run; RefusedInput as in `Workspace`."""
+    """Open the workspace of a job; RefusedInput as in `Workspace`."""
     return Workspace(job.cache, job.cache if isinstance(job.cache, Path) else job.results / CACHE)
 
 
 def draw_steps(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
-    """The steps of one scan of a job, and those of the capture that it is calibrated from.
+    """Build the steps of one scan of a job, and those of the capture that it is calibrated from, if any.
 
     Raises
     ------
@@ -241,15 +245,15 @@ def draw_steps(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
 
 
 def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
-    """Run what is left of a planned job and deliver each scan's results; yields what became of each scan."""
+    """Run the steps of a planned job that are not hits, and deliver the results; yields the end of each scan."""
     for name, folder, error in planned.refused:
         yield ScanEnd(name, folder, None, str(error), "refused")
     waiting = iter(planned.scans)
     share_written(planned)
     warn_if_others_can_write(planned.workspace.store, planned.job.group)
-    for name in cut_off(planned.workspace.store):
-        log.warning("%s: its erasure was cut off; 'footscan forget' of it finishes that", name)
-    # What runs nothing uses what it has looked up.
+    for name in interrupted_erasures(planned.workspace.store):
+        log.warning("%s: its erasure was interrupted, run 'footscan forget' for it again", name)
+    # A job that runs no steps needs no lease: it uses only the results that it has looked up.
     held = planned.workspace.lease() if planned.to_run else nullcontext()
     with planned.workspace, held:
         while window := list(islice(waiting, WINDOW * pool.count)):
@@ -257,25 +261,25 @@ def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator
 
 
 def share_written(planned: PlannedJob) -> None:
-    """Let the group of a job, if it has one, read and write all that its run writes."""
+    """Give the group of a job, if it has one, access to all files that its run writes."""
     job = planned.job
     frames = [scan.scan.folder / GROUP for scan in planned.scans if scan.to_run]
     share([job.results, *([job.cache] if isinstance(job.cache, Path) else []), *frames], job.group)
 
 
-def _cache(workflow: Path, named: str | None) -> Path | str | None:
-    """Where the store lies that a workflow names; a URL is tried, for each scan would be refused for it otherwise."""
-    if named is None or "://" not in named:
-        return None if named is None else workflow.resolve().parent / named
+def _cache(workflow: Path, place: str | None) -> Path | str | None:
+    """Place of the store that a workflow names. A URL is opened here, so that a wrong one is reported only once."""
+    if place is None or "://" not in place:
+        return None if place is None else workflow.resolve().parent / place
     try:
-        open_files(named)
+        open_files(place)
     except RefusedInput as error:
-        raise RefusedInput(workflow, f"{named}: {error.problem}", field="cache") from None
-    return named
+        raise RefusedInput(workflow, f"{place}: {error.problem}", field="cache") from None
+    return place
 
 
 def _is_still(name: str, folder: Path, archive: Path | None) -> bool:
-    """Whether a scan lies where it was found before."""
+    """Return True if a scan still lies in the folder where it was found before."""
     try:
         return read_scan(folder, archive).name == name
     except RefusedInput:
@@ -294,7 +298,7 @@ def _sum_up(scan: RecordedScan, plan: Plan) -> PlannedScan:
 def _run_window(
     window: Sequence[PlannedScan], planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd
 ) -> Iterator[ScanEnd]:
-    """Run some scans together; of those that are known as a whole, only the results are looked at."""
+    """Run some scans together; scans without steps to run only have their results delivered."""
     steps: list[Step] = []
     for scan in window:
         if scan.to_run:
@@ -304,37 +308,37 @@ def _run_window(
         end = _end_scan(scan, outcomes, planned)
         if end.kind == "damaged":
             log.warning("%s", end.problem)
-            again = planned.workspace.run(draw_steps(scan.scan, planned), pool, on_step_end)
-            end = _end_scan(scan, again, planned)
+            outcomes_again = planned.workspace.run(draw_steps(scan.scan, planned), pool, on_step_end)
+            end = _end_scan(scan, outcomes_again, planned)
         yield end
 
 
 def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planned: PlannedJob) -> ScanEnd:
-    """Deliver a scan's results, if it has them."""
+    """Deliver the results of a scan, if it has them."""
     scan = planned_scan.scan
     target = planned.job.results / scan.document.patient / scan.document.scan
     digests: dict[str, str] = {}
     for file, kind in DELIVERED.items():
-        known = planned_scan.failure or Success(planned_scan.delivered.get(file, ""))
-        outcome = outcomes.get(f"{scan.name}/{kind}", known)
+        planned_outcome = planned_scan.failure or Success(planned_scan.delivered.get(file, ""))
+        outcome = outcomes.get(f"{scan.name}/{kind}", planned_outcome)
         if isinstance(outcome, Failure):
-            told = outcome.problem + _what_stays(target)
-            return ScanEnd(scan.name, scan.folder, None, told, outcome.kind, document=scan.document)
+            problem_text = outcome.problem + _older_results(target)
+            return ScanEnd(scan.name, scan.folder, None, problem_text, outcome.kind, document=scan.document)
         digests[file] = outcome.digest
     problem = planned.workspace.deliver(digests, target)
     if problem is not None:
-        has = planned.workspace.store.has  # not what is damaged: that has been set aside
-        whole = all(has(digest) for digest in digests.values())
-        kind = "fault" if whole else "damaged"
+        has = planned.workspace.store.has  # damaged blobs have been removed
+        is_complete = all(has(digest) for digest in digests.values())
+        kind = "fault" if is_complete else "damaged"
         return ScanEnd(scan.name, scan.folder, None, problem, kind, document=scan.document)
     finding = Measures.model_validate_json((target / "measures.json").read_bytes()).finding
-    ended = None if finding is None else "finding"
+    kind_of_end = None if finding is None else "finding"
     is_known = not planned_scan.to_run
-    return ScanEnd(scan.name, scan.folder, target, finding, ended, digests, is_known, scan.document)
+    return ScanEnd(scan.name, scan.folder, target, finding, kind_of_end, digests, is_known, scan.document)
 
 
-def _what_stays(target: Path) -> str:
-    """A warning where a scan that failed has results, which then are an earlier run's."""
+def _older_results(target: Path) -> str:
+    """Warning if a failed scan still has results of an earlier run; empty without."""
     return f" ({target} still holds the results of an earlier run)" if target.exists() else ""
 
 
@@ -346,7 +350,7 @@ def _calibration(scan: RecordedScan, planned: PlannedJob) -> CalibrationFile | C
     if place.is_capture:
         if path not in planned.captures:
             planned.captures[path] = recorded_inputs(read_capture(path), planned.workspace.digests)
-        return CaptureOfScan.drawn(scan.name, planned.captures[path])
+        return CaptureOfScan.from_capture(scan.name, planned.captures[path])
     if path not in planned.calibrations:
         text = read_text(path, "json_bytes")
         digest = sha256(text.encode())

@@ -1,4 +1,4 @@
-"""The page of an archive and its thumbnails, from the results that lie in its folder."""
+"""The page of an archive and its thumbnails, from the results in its folder."""
 
 import contextlib
 import os
@@ -22,16 +22,17 @@ if TYPE_CHECKING:
     from schemas.sizes import SizeTable
 
 PAGE, FILES = "index.html", "index.files"
-"""The page, and the folder of its pictures beside it: no patient can have that name, for it has a dot."""
+"""The page, and the folder of its pictures beside it. The dot excludes a patient of that name."""
 SIZES = "eu"
+"""Scale of the sizes on the page."""
 _MARK_CHARACTERS = 2**17
-"""The mark of a page lies within its first so many characters: styles come before it."""
+"""Number of characters at the start of a page in which its mark is searched; chosen by hand: styles come first."""
 
 
 def write_archive_page(ends: Sequence[ScanEnd], folder: Path) -> None:
-    """Write `index.html` into the folder of the results, unless it shows just these ends already.
+    """Write `index.html` into the folder of the results, unless it shows these ends already.
 
-    A row of it that cannot be drawn in full, since a person has moved a file meanwhile, is drawn with what is there.
+    A row whose result files were moved or damaged meanwhile has fewer entries.
 
     Raises
     ------
@@ -54,7 +55,7 @@ def write_archive_page(ends: Sequence[ScanEnd], folder: Path) -> None:
 
 
 def _mark(ends: Sequence[ScanEnd]) -> str:
-    """What a page depends on, as a digest: the same for the same ends, known or not."""
+    """Digest of all data that the page shows; it does not depend on `ScanEnd.known`."""
     shown = [
         [end.scan, end.kind, end.problem, dict(end.digests), _date(end), end.document and end.document.side]
         for end in ends
@@ -65,10 +66,10 @@ def _mark(ends: Sequence[ScanEnd]) -> str:
 def _mark_of(page: Path) -> str | None:
     try:
         with page.open(encoding="utf-8") as file:
-            found = re.search("<!-- ([0-9a-f]{64}) -->", file.read(_MARK_CHARACTERS))
+            match = re.search("<!-- ([0-9a-f]{64}) -->", file.read(_MARK_CHARACTERS))
     except (OSError, ValueError):
         return None
-    return None if found is None else found[1]
+    return None if match is None else match[1]
 
 
 def _row(end: ScanEnd, folder: Path, table: "SizeTable") -> "ScanRow":
@@ -100,7 +101,7 @@ def _date(end: ScanEnd) -> str:
 
 
 def _size(measures: Measures, table: "SizeTable") -> str | None:
-    """The size of the foot in the scale of Europe, where it has one."""
+    """European size of the foot; None if the scale has none for it."""
     from footscan.sizing.sizes import foot_sizes
     from schemas.feet import Foot
 
@@ -111,25 +112,25 @@ def _size(measures: Measures, table: "SizeTable") -> str | None:
 
 
 def _picture(end: ScanEnd, measures: Measures, folder: Path) -> str | None:
-    """The address of a scan's thumbnail, which is drawn where it is not there yet; none where it cannot be drawn."""
+    """Address of a scan's thumbnail, drawn if it is missing; None if it cannot be drawn."""
     from footscan.mesh.formats.files import read_mesh
     from footscan.report.thumbnail import thumbnail
 
     if end.folder is None or "foot.ply" not in end.digests:
         return None
-    told = canonical_json([end.digests["foot.ply"], measures.transform])
-    name = f"{FILES}/{sha256(told.encode())[:24]}.png"
+    content = canonical_json([end.digests["foot.ply"], measures.transform])
+    name = f"{FILES}/{sha256(content.encode())[:24]}.png"
     if not (folder / name).exists():
         try:
             vertices, faces = read_mesh(end.folder / "foot.ply")
-        except (FootscanError, OSError):  # moved or spoilt by a person; a page without it is worth having
+        except (FootscanError, OSError):  # moved or damaged by a person: the page does without it
             return None
         write_atomically(folder / name, thumbnail(vertices, faces, measures.transform))
     return name
 
 
 def _pictures(folder: Path) -> Iterator[str]:
-    """Thumbnails that are there."""
+    """Addresses of the existing thumbnails."""
     return (f"{FILES}/{file.name}" for file in (folder / FILES).glob("*.png"))
 
 

@@ -1,4 +1,4 @@
-"""All results of an archive as one table, a row a scan: for spreadsheets, for programs, and as a page for people."""
+"""The results of an archive as one table with a row for each scan, as CSV and Parquet; also writes the page."""
 
 import io
 import json
@@ -15,29 +15,31 @@ from schemas.quality import MeshQuality
 from schemas.tables import Cell, csv_text
 
 CSV, PARQUET = "results.csv", "results.parquet"
+"""File names of the table."""
 
 TEXTS = {"scan", "status", "problem", "side", "software", "calibration_sha256"} | {
     f"{file}_sha256" for file in DELIVERED
 }
+"""Names of the columns with text."""
 COUNTS = {"cameras", "frames_lost", "stripe_points", "cloud_points"} | {
     f"mesh_{name}"
     for name, field in MeshQuality.model_json_schema()["properties"].items()
     if {kind["type"] for kind in field.get("anyOf", [field])} <= {"integer", "null"}
 }
-"""Names of columns; all others hold measures, distances and shares."""
+"""Names of the columns with integers; all others hold measures, distances and shares as floats."""
 
 
 def write_results_table(ends: Sequence[ScanEnd], folder: Path) -> None:
-    """Write `results.csv`, `results.parquet` and `index.html` into the folder of the results; not again what is there.
+    """Write `results.csv`, `results.parquet` and `index.html` into the folder of the results, if their content changes.
 
-    A row holds the scan and what became of it, the foot's side, its measures (their unit in the name of the column),
-    quality figures, the version of this program and the digests of the scan's files.
+    A row holds the scan and its status, the foot's side, its measures (the unit is in the name of the column), quality
+    figures, the version of this program and the digests of the scan's files.
     """
     write_archive_page(ends, folder)
     rows = [_row(end) for end in ends]
     columns = list(dict.fromkeys(name for row in rows for name in row))
     table = _as_csv(columns, rows).encode()
-    if (folder / PARQUET).exists() and _is(folder / CSV, table):
+    if (folder / PARQUET).exists() and _has_content(folder / CSV, table):
         return
     write_atomically(folder / PARQUET, _as_parquet(columns, rows))
     write_atomically(folder / CSV, table)
@@ -75,7 +77,7 @@ def _read(path: Path) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
-def _is(path: Path, content: bytes) -> bool:
+def _has_content(path: Path, content: bytes) -> bool:
     try:
         return path.read_bytes() == content
     except OSError:
@@ -98,7 +100,7 @@ def _as_parquet(columns: Sequence[str], rows: Sequence[dict[str, Cell]]) -> byte
 
 
 def _type(column: str) -> Any:
-    """The same in every table, so that those of several archives can be joined."""
+    """Type of a column: the same in every table, so that tables of several archives can be joined."""
     import pyarrow
 
     if column in TEXTS:

@@ -1,4 +1,4 @@
-"""An archive under a new version of a library: a sample is computed again, and its results are kept where it agrees."""
+"""Upgrade of an archive to new versions of libraries or code: a sample is computed again, and accepted if it agrees."""
 
 import random
 from collections.abc import Collection, Iterator, Sequence
@@ -16,30 +16,30 @@ from schemas.base.errors import Fault, one_line
 
 @dataclass
 class Trial:
-    """What an upgrade does to one kind of step."""
+    """The trial of an upgrade for one kind of step."""
 
     upgrade: Upgrade
     changes: list[str]
-    """What differs between the two versions, a line each."""
+    """Differences between the two versions of the code, one line each."""
     stale: list[str]
     """Keys of the actions that would run again."""
     sample: list[str]
-    """Keys of those that were."""
+    """Keys of the actions that were run again."""
     differences: list[tuple[Difference, str]] = field(default_factory=list)
-    """Those of the sample that came to another result, and how far it is from the recorded one."""
+    """Actions of the sample with another result, each with its difference from the recorded one in words."""
     problems: list[str] = field(default_factory=list)
-    """Those that could not be computed, a line each."""
+    """Actions of the sample that could not be computed, one line each."""
 
     @property
     def agrees(self) -> bool:
-        """Whether the whole sample came to what is recorded."""
+        """True if the whole sample has the recorded results."""
         return not self.differences and not self.problems
 
 
 def try_upgrade(planned: PlannedJob, size: int, seed: int) -> list[Trial]:
-    """Compute `size` stale actions of each kind of step again, or all where there are fewer."""
+    """Run a random sample of `size` stale actions of each kind of step again, or all if there are fewer."""
     trials: dict[Upgrade, Trial] = {}
-    for key, stale in _every_stale(planned):
+    for key, stale in _all_stale(planned):
         if stale.upgrade not in trials:
             trials[stale.upgrade] = Trial(stale.upgrade, versions(stale, planned.workspace.store), [], [])
         trials[stale.upgrade].stale.append(key)
@@ -47,18 +47,18 @@ def try_upgrade(planned: PlannedJob, size: int, seed: int) -> list[Trial]:
         trial.sample = random.Random(seed).sample(sorted(trial.stale), min(size, len(trial.stale)))
     chosen = {key for trial in trials.values() for key in trial.sample}
     with ThreadPoolExecutor(planned.job.threads) as pool:
-        waiting = [
+        submitted = [
             (stale, pool.submit(repeat, stale.action, planned.workspace.store))
-            for key, stale in _every_stale(planned)
+            for key, stale in _all_stale(planned)
             if key in chosen
         ]
-        for stale, ended in waiting:
+        for stale, future in submitted:
             trial = trials[stale.upgrade]
             try:
-                difference = ended.result()
+                difference = future.result()
             except Fault as error:
                 trial.problems.append(str(error))
-            except Exception as error:  # a defect under the new version, in one step, must not hide the others
+            except Exception as error:  # a defect of the new version in one step must not hide the others
                 trial.problems.append(one_line(f"{stale.action.step.name}: {type(error).__name__}: {error}"))
             else:
                 if difference is not None:
@@ -67,16 +67,16 @@ def try_upgrade(planned: PlannedJob, size: int, seed: int) -> list[Trial]:
 
 
 def accept_upgrade(planned: PlannedJob, trials: Sequence[Trial], reason: str) -> int:
-    """Keep the results of all kinds of steps whose sample agreed; returns how many.
+    """Accept the results of all kinds of steps whose sample agrees; returns their number.
 
-    Results that follow from a kind that did not agree are not kept.
+    Results that depend on a kind of step whose sample differs are not accepted.
     """
     tried = {key: trial for trial in trials for key in trial.stale}
     refused = {trial.upgrade for trial in trials if not trial.agrees}
     date = datetime.now(UTC).isoformat(timespec="seconds")
     count = 0
     with planned.workspace.lease():
-        for key, stale in _every_stale(planned, refused):
+        for key, stale in _all_stale(planned, refused):
             trial = tried.get(key)
             if trial is None:  # it became stale after the sample was drawn
                 continue
@@ -86,7 +86,7 @@ def accept_upgrade(planned: PlannedJob, trials: Sequence[Trial], reason: str) ->
     return count
 
 
-def _every_stale(planned: PlannedJob, refused: Collection[Upgrade] = ()) -> Iterator[tuple[str, Stale]]:
+def _all_stale(planned: PlannedJob, refused: Collection[Upgrade] = ()) -> Iterator[tuple[str, Stale]]:
     """The stale actions of all scans, one scan at a time, each once."""
     seen: set[str] = set()
     for scan in planned.scans:
@@ -96,7 +96,7 @@ def _every_stale(planned: PlannedJob, refused: Collection[Upgrade] = ()) -> Iter
 
 
 def _words(difference: Difference, planned: PlannedJob) -> str:
-    """How far the results are apart; of a failure both are named already."""
+    """Difference of two results in words; empty for failures, whose texts are reported anyway."""
     if difference.result is None:
         return ""
     try:

@@ -1,4 +1,4 @@
-"""Scans that a store still knows, and that are gone from the archive."""
+"""Scans with actions in the store that were removed from the archive."""
 
 import os
 from collections.abc import Collection
@@ -8,16 +8,17 @@ from pipelines.engine.trace import Actions
 
 
 def vanished_scans(actions: Actions, present: Collection[str], archives: Collection[Path]) -> list[str]:
-    """The scans (`patient/scan`) whose films and scan.yaml lay in one of these archives, and are no more.
+    """Find the scans (`patient/scan`) whose films and scan.yaml were in one of these archives and are deleted.
 
-    A scan is judged by where its films lay when its steps ran last. What lay elsewhere may be another workflow's, and
-    an archive that is missing or empty may be a disk that is not mounted: of neither anything is said.
+    The places of the films are those of the last run. Scans in other folders may belong to another workflow, and a
+    missing or empty archive may be a disk that is not mounted: both are left out.
 
     Parameters
     ----------
     present : collection of str
-        Scans that the archives hold.
+        Scans that the archives contain.
     archives : collection of Path
+        Folders of the archives.
     """
     roots = [archive.resolve() for archive in archives if archive.is_dir() and list(archive.iterdir())]
     films: dict[str, list[Path]] = {}

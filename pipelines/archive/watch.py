@@ -1,4 +1,4 @@
-"""Scans that arrive while footscan runs: which of them are complete."""
+"""Detection of complete scans among those that arrive while footscan runs."""
 
 import time
 from dataclasses import dataclass, field
@@ -10,9 +10,9 @@ from footscan.recordings.scans import SCAN_FILE, read_scan, scan_folders
 from schemas.base.errors import FootscanError
 
 QUIET_S = 5.0
-"""A scan is complete when none of its files has changed for so long: a film that is being copied still grows.
+"""A scan is complete if none of its files has changed for this time, s; chosen by hand. A film that is copied grows.
 
-That is told by the files' times, or, where the clock that set them is ahead of this one's, by looking again.
+The age comes from the files' times or, if the clock that set them is ahead of this one, from repeated checks.
 """
 
 State = tuple[tuple[str, int, int], ...]
@@ -20,60 +20,61 @@ State = tuple[tuple[str, int, int], ...]
 
 
 class _Read(NamedTuple):
-    """A scan.yaml that has been read."""
+    """The content of a scan.yaml that was read."""
 
     version: tuple[int, int, int, int]
-    """Size, times of content and of inode, and inode: while these stay, the document is not read again."""
+    """Size, mtime, ctime and inode: while these stay, the document is not read again."""
     files: tuple[Path, ...]
-    """What it names; nothing where it breaks its format."""
+    """Files that it names; empty if it breaks its format."""
 
 
 @dataclass
 class Arrivals:
-    """The scans of archives, and in which state each was handed over."""
+    """The scans of archives, and the state in which each was last reported as complete."""
 
     archives: tuple[Path, ...]
-    _handed_over: dict[Path, State] = field(default_factory=dict)
+    _reported: dict[Path, State] = field(default_factory=dict)
     _seen: dict[Path, tuple[State, float]] = field(default_factory=dict)
-    """The last state of each, and since when it is so (s, monotonic)."""
+    """Last state of each scan, and since when it has that state (s, monotonic)."""
     _read: dict[Path, _Read] = field(default_factory=dict)
 
     def complete(self) -> list[Path]:
-        """Folders of scans that are complete, and new or changed since they were handed over last."""
-        found = []
+        """Return the folders of complete scans that are new or have changed since they were last returned."""
+        folders = []
         for archive in self.archives:
             for folder in scan_folders(archive):
                 state = self._state(folder, archive)
-                if state is None or state == self._handed_over.get(folder):
+                if state is None or state == self._reported.get(folder):
                     continue
                 if self._is_quiet(folder, state):
-                    self._handed_over[folder] = state
-                    found.append(folder)
-        return found
+                    self._reported[folder] = state
+                    folders.append(folder)
+        return folders
 
     def _is_quiet(self, folder: Path, state: State) -> bool:
         now = time.monotonic()
-        seen, since = self._seen.get(folder, (None, now))
-        if seen != state:
+        last_state, since = self._seen.get(folder, (None, now))
+        if last_state != state:
             self._seen[folder], since = (state, now), now
         youngest = max(mtime_ns for _, _, mtime_ns in state) / 1e9
         return max(time.time() - youngest, now - since) >= QUIET_S
 
     def _state(self, folder: Path, archive: Path) -> State | None:
-        """None while a film is missing. What breaks its format is handed over, to be refused."""
+        """State of a scan; None while a film is missing. A scan.yaml that breaks its format has a state: it is refused
+        later."""
         document = folder / SCAN_FILE
         try:
-            named = self._named_files(document, archive)
-            files = [document, *(file for path in named for file in (film_files(path) if path.is_dir() else [path]))]
+            paths = self._named_files(document, archive)
+            files = [document, *(file for path in paths for file in (film_files(path) if path.is_dir() else [path]))]
             states = [(str(file), file.stat()) for file in files]
-        except (OSError, FootscanError):  # a folder of frames is empty as yet
+        except (OSError, FootscanError):  # also a folder of frames that is still empty
             return None
         return tuple((name, status.st_size, status.st_mtime_ns) for name, status in states)
 
     def _named_files(self, document: Path, archive: Path) -> tuple[Path, ...]:
-        """What a scan.yaml names, read anew only where the file has changed.
+        """Files that a scan.yaml names; it is read again only if it has changed.
 
-        One that was written just now is not remembered: it may be written again within a tick of its clock.
+        A document that was just written is not remembered: it may change again within the resolution of its time stamp.
         """
         status = document.stat()
         version = (status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino)
@@ -91,5 +92,5 @@ def _read_named_files(document: Path, archive: Path) -> tuple[Path, ...]:
         scan = read_scan(document.parent, archive).document
     except FootscanError:
         return ()
-    named = [name for camera in scan.cameras for name in (camera.file, camera.background, camera.positions)]
-    return tuple(document.parent / name for name in named if name is not None)
+    names = [name for camera in scan.cameras for name in (camera.file, camera.background, camera.positions)]
+    return tuple(document.parent / name for name in names if name is not None)

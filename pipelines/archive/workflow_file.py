@@ -1,4 +1,4 @@
-"""Reading workflow.yaml: every mistake in it has its place, and all are told at once."""
+"""Reading workflow.yaml: all its mistakes are reported at once, each with line and column."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -15,23 +15,23 @@ from schemas.workflow import Workflow
 
 
 class PlacedMistake(NamedTuple):
-    """One mistake, and where in the file it stands."""
+    """One mistake in a workflow.yaml, with its place."""
 
     line: int
     column: int
     field: str
-    """Names that lead to it, joined by dots; empty for the document as a whole."""
+    """Path of the field, names joined by dots; empty for the document as a whole."""
     problem: str
 
 
 def read_workflow(path: Path) -> Workflow:
-    """The workflow in `path`.
+    """Read the workflow in `path`.
 
     Raises
     ------
     RefusedInput
-        The file is missing, no YAML, or breaks its format: the first mistake in the order of the file, and behind it
-        all others.
+        The file is missing, is not YAML, or breaks its format. The error is the first mistake in the file; `others`
+        holds the further ones.
     """
     text, value = _parsed(path)
     document = _validated(text, value)
@@ -41,15 +41,15 @@ def read_workflow(path: Path) -> Workflow:
 
 
 def check_archives(path: Path, document: Workflow) -> None:
-    """Refuse the workflow in `path` if an archive of it is not there, and tell what else is not there."""
+    """Raise RefusedInput if an archive of the workflow in `path` is missing; it names all missing files."""
     if not all((path.resolve().parent / archive).is_dir() for archive in document.archive):
         raise _refusal(path, _missing_files(path, read_text(path, "yaml_bytes"), document))
 
 
 def workflow_mistakes(path: Path) -> list[PlacedMistake]:
-    """All that is wrong with a workflow, in the order of the file; what it names and is not there, too.
+    """List all mistakes in a workflow in the order of the file; missing files that it names count as well.
 
-    A text that is no YAML has one mistake, and is refused as by any other command.
+    A text that is not YAML is refused, as in `read_workflow`.
     """
     text, value = _parsed(path)
     document = _validated(text, value)
@@ -72,11 +72,11 @@ def _validated(text: str, value: dict[str, Any]) -> Workflow | list[PlacedMistak
 
 
 def _missing_files(path: Path, text: str, document: Workflow) -> list[PlacedMistake]:
-    return _placed(text, [Mistake(names, problem, is_name=False) for names, problem in _not_there(path, document)])
+    return _placed(text, [Mistake(names, problem, is_name=False) for names, problem in _missing(path, document)])
 
 
-def _not_there(path: Path, document: Workflow) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """What the workflow names and is not there."""
+def _missing(path: Path, document: Workflow) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Path of the field and problem for each file or folder that the workflow names and that is missing."""
     base = path.resolve().parent
     for number, archive in enumerate(document.archive):
         if not (base / archive).is_dir():
@@ -89,29 +89,29 @@ def _not_there(path: Path, document: Workflow) -> Iterator[tuple[tuple[str | int
     for names, file in files:
         if not (base / file).is_file():
             yield names, f"no such file, expected a calibration, found {file[:80]!r}"
-    for number, chosen in enumerate(document.calibrations):
-        if chosen.capture is not None and not (base / chosen.capture).is_dir():
-            problem = f"no such folder, expected a capture, found {chosen.capture[:80]!r}"
+    for number, calibration in enumerate(document.calibrations):
+        if calibration.capture is not None and not (base / calibration.capture).is_dir():
+            problem = f"no such folder, expected a capture, found {calibration.capture[:80]!r}"
             yield ("calibrations", number, "capture"), problem
 
 
-def _placed(text: str, found: Sequence[Mistake]) -> list[PlacedMistake]:
-    """Mistakes in the order of the file."""
+def _placed(text: str, unplaced: Sequence[Mistake]) -> list[PlacedMistake]:
+    """The mistakes with their places, in the order of the file."""
     placed = [
         PlacedMistake(
             *place_in_yaml(text, mistake.path, of_name=mistake.is_name),
             ".".join(map(str, mistake.path)),
             mistake.problem,
         )
-        for mistake in found
+        for mistake in unplaced
     ]
     return sorted(placed, key=lambda mistake: (mistake.line, mistake.column))
 
 
-def _refusal(path: Path, found: Sequence[PlacedMistake]) -> RefusedInput:
+def _refusal(path: Path, placed: Sequence[PlacedMistake]) -> RefusedInput:
     refusals = [
         RefusedInput(path, f"{problem} (line {line}, column {column})" if field else problem, field=field or None)
-        for line, column, field, problem in found
+        for line, column, field, problem in placed
     ]
     refusals[0].others = tuple(refusals[1:])
     return refusals[0]

@@ -1,4 +1,4 @@
-"""Whether a store is what it says: everything in it read, and actions done again."""
+"""Audits of a store: read every file and check it, seal rows, and run actions again."""
 
 import importlib
 import logging
@@ -12,7 +12,7 @@ from pathlib import Path
 from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.files.digest import sha256
-from pipelines.engine.files.seal import BROKEN, sealed, unsealed
+from pipelines.engine.files.seal import UNSEALING_ERRORS, sealed, unsealed
 from pipelines.engine.files.secret import make_secret
 from pipelines.engine.plan import Plan, without_places
 from pipelines.engine.run import content_of
@@ -29,49 +29,50 @@ log = logging.getLogger("footscan.store")
 
 @dataclass(frozen=True)
 class Audit:
-    """What was read."""
+    """Result of reading all files of a store."""
 
     files: int
     damaged: list[str]
-    """How a person would name them; they are there no more."""
+    """Paths or URLs of the damaged files. All but pins have been removed."""
 
 
 @dataclass(frozen=True)
 class Sealing:
-    """What became of the rows and last actions of a store that were not sealed."""
+    """Counts of the rows and last actions without a seal."""
 
     sealed: int
     unsealed: int
-    """Left as they were: they count as missing."""
+    """Left unsealed: they count as missing."""
 
 
 @dataclass(frozen=True)
 class Repeatable:
-    """An action of the present plan whose inputs are all there."""
+    """An action of the present plan whose inputs are all in the store."""
 
     step: Step
     inputs: Mapping[str, str]
     """Digests by name."""
     outcome: Outcome
-    """As it is recorded."""
+    """Recorded outcome."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """An action that did not come to the same again."""
+    """An action whose repetition differs from the recorded outcome."""
 
     step: str
     recorded: str
-    """Digest of the result, or the failure."""
+    """Digest of the recorded result, or the problem of the recorded failure."""
     found: str
+    """The same of the repetition."""
     result: bytes | None = field(default=None, repr=False, compare=False)
-    """What came out this time; None for a failure."""
+    """Result of the repetition; None for a failure."""
 
 
 def verify(store: Store) -> Audit:
-    """Read all blobs, rows, last actions, pins and leases, and say, a line each, what is damaged.
+    """Read all blobs, rows, last actions, pins and leases, and log a warning for each damaged file.
 
-    It is removed, and will be made again; only a pin stays, for what it keeps must not go unnoticed.
+    Damaged files are removed and will be made again. A damaged pin stays: the user must learn what is no longer kept.
     """
     files = 0
     damaged = []
@@ -88,80 +89,81 @@ def verify(store: Store) -> Audit:
 
 
 def seal_store(store: Store, *, every: bool = False) -> Sealing:
-    """Seal the sound rows and last actions of a store: all where it was not sealed before, or where `every` says so."""
+    """Seal the sound rows and last actions of a store: all of them if the store had no secret yet or `every` is set."""
     secret = store.secret
     if secret is None:
         secret, every = make_secret(store.files), True
-    done = left = 0
+    sealed_count = unsealed_count = 0
     for name in [name for folder in ("actions", "latest") for name, _ in store.files.sizes(folder)]:
         data = _read(name, store)
         if data is None or not _is_sealed(data) or _is_sealed(data, secret):
             continue
         if every:
             store.files.write(name, sealed(unsealed(data), secret))
-        done, left = done + every, left + (not every)
-    return Sealing(done, left)
+        sealed_count += every
+        unsealed_count += not every
+    return Sealing(sealed_count, unsealed_count)
 
 
 def repeatable(plan: Plan, store: Store) -> dict[str, Repeatable]:
-    """What of a plan is known and could be done again, by key: the code is the present one, all inputs are there."""
+    """The actions of a plan that can be repeated, by key: their outcome is cached and all inputs are in the store."""
     outcomes = {planned.step.name: planned.outcome for planned in plan.steps}
-    found = {}
+    actions = {}
     for planned in plan.steps:
         outcome = planned.outcome
         if outcome is None or (isinstance(outcome, Failure) and outcome.cause != planned.step.name):
-            continue  # not known, or known only to fail with another
+            continue  # not cached, or it fails only because another step failed
         digests = input_digests(planned.step, outcomes)
         results = [digests.get(name) for name, source in planned.step.inputs.items() if isinstance(source, Output)]
         if all(digest is not None and store.has(digest) for digest in results):
-            found[key_of(image_text(planned.step, digests))] = Repeatable(planned.step, digests, outcome)
-    return found
+            actions[key_of(image_text(planned.step, digests))] = Repeatable(planned.step, digests, outcome)
+    return actions
 
 
 def sample(keys: Iterable[str], share: float, seed: int) -> set[str]:
-    """A share (0 to 1) of these, drawn at random, but at least one if there is any."""
-    every = sorted(set(keys))
-    return set(random.Random(seed).sample(every, ceil(share * len(every))))
+    """A random sample with a share (0 to 1) of `keys`, rounded up."""
+    unique_keys = sorted(set(keys))
+    return set(random.Random(seed).sample(unique_keys, ceil(share * len(unique_keys))))
 
 
 def repeat(action: Repeatable, store: Store) -> Difference | None:
-    """Do an action again without the cache, and hold what comes out against what is recorded.
+    """Run an action again without the cache, and compare the outcome with the recorded one.
 
-    What the step leaves behind beside its result goes to a folder that is thrown away.
+    Files that the step writes outside the store go to a temporary folder.
 
     Raises
     ------
     Fault
-        It could not be done: a file of the machine, or a result in the store, is damaged.
+        The step could not be run to its end, or a result in the store is damaged.
     """
     with tempfile.TemporaryDirectory(prefix="footscan-") as folder:
-        step = _elsewhere(action.step, Path(folder))
+        step = _redirected(action.step, Path(folder))
         inputs = {name: content_of(step, source, action.inputs[name], store) for name, source in step.inputs.items()}
         try:
             result = importlib.import_module(step.module).run(inputs, step.parameters, step.places)
-            found = sha256(result)
+            repeated = sha256(result)
         except (RefusedInput, Finding) as error:
-            result, found = None, without_places(str(error), step.places)
-    recorded = action.outcome
-    known = recorded.digest if isinstance(recorded, Success) else without_places(recorded.problem, action.step.places)
-    return None if found == known else Difference(step.name, known, found, result)
+            result, repeated = None, without_places(str(error), step.places)
+    step, outcome = action.step, action.outcome
+    recorded = outcome.digest if isinstance(outcome, Success) else without_places(outcome.problem, step.places)
+    return None if repeated == recorded else Difference(step.name, recorded, repeated, result)
 
 
 def input_digests(step: Step, outcomes: Mapping[str, Outcome | None]) -> dict[str, str]:
-    """Digests of a step's inputs, as far as the outcomes of the steps before are known."""
+    """Digests of those inputs of a step that are known; `outcomes` are those of the earlier steps."""
     digests = {}
     for name, source in step.inputs.items():
         if not isinstance(source, Output):
             digests[name] = source.digest
-        elif isinstance(before := outcomes.get(source.step), Success):
-            digests[name] = before.digest
+        elif isinstance(outcome := outcomes.get(source.step), Success):
+            digests[name] = outcome.digest
     return digests
 
 
 def _is_damaged_blob(name: str, store: Store) -> bool:
     digest = blob_digest(name)
     data = None if digest is None else _read(name, store)
-    return data is not None and sha256(data) != digest and _said(name, store)
+    return data is not None and sha256(data) != digest and _logged_as_damaged(name, store)
 
 
 def _is_damaged_row(name: str, store: Store) -> bool:
@@ -170,8 +172,8 @@ def _is_damaged_row(name: str, store: Store) -> bool:
     if key is None or data is None:
         return False
     if not _is_sealed(data):
-        return _said(name, store)
-    return store.row(key) is None and store.files.state(name) is not None  # the store itself has said it
+        return _logged_as_damaged(name, store)
+    return store.row(key) is None and store.files.state(name) is not None  # the store itself has logged it
 
 
 def _is_damaged_latest(name: str, store: Store) -> bool:
@@ -179,11 +181,11 @@ def _is_damaged_latest(name: str, store: Store) -> bool:
     if data is None:
         return False
     latest = store.read_latest(name) if _is_sealed(data) else None
-    return (latest is None or latest_name(latest.step) != name) and _said(name, store)
+    return (latest is None or latest_name(latest.step) != name) and _logged_as_damaged(name, store)
 
 
 def _is_damaged_lease(name: str, store: Store) -> bool:
-    return any(one.name == name and one.host is None for one in leases(store)) and _said(name, store)
+    return any(lease.name == name and lease.host is None for lease in leases(store)) and _logged_as_damaged(name, store)
 
 
 def _is_damaged_pin(name: str, store: Store) -> bool:
@@ -201,11 +203,11 @@ CHECKS: dict[str, Callable[[str, Store], bool]] = {
     "latest": _is_damaged_latest,
     LEASES: _is_damaged_lease,
 }
-"""Of each folder, what tells whether a file of it is damaged; files that are none of the store's are let be."""
+"""Check of the files of each folder: True if a file is damaged. Files that are not the store's own pass."""
 
 
 def _read(name: str, store: Store) -> bytes | None:
-    """A file's content; None where it has gone meanwhile, and nothing of use where it cannot be read."""
+    """Content of a file; None if it was removed meanwhile, empty if it cannot be read."""
     try:
         return store.files.read(name)
     except FileNotFoundError:
@@ -217,18 +219,18 @@ def _read(name: str, store: Store) -> bytes | None:
 def _is_sealed(data: bytes, secret: bytes | None = None) -> bool:
     try:
         unsealed(data, secret)
-    except BROKEN:
+    except UNSEALING_ERRORS:
         return False
     return True
 
 
-def _said(name: str, store: Store) -> bool:
+def _logged_as_damaged(name: str, store: Store) -> bool:
     log.warning("%s: damaged, will be made again", store.files.path(name))
     return True
 
 
-def _elsewhere(step: Step, folder: Path) -> Step:
-    """The same step, leaving what it writes in `folder`."""
+def _redirected(step: Step, folder: Path) -> Step:
+    """The same step, but writing its files into `folder`."""
     writes = step.writes
     if writes is None:
         return step

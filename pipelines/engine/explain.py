@@ -1,6 +1,6 @@
-"""Why a step runs: what its last action took, beside what it would take now.
+"""The reason why a step runs: the differences between its last action and the action it would be now.
 
-What an action took is read out of its pre-image, which may be anything: a store can be written to by others.
+The last action is read from its pre-image. Its content is not trusted, since others may write to a store.
 """
 
 import difflib
@@ -15,22 +15,23 @@ from pipelines.engine.actions.step import Output, Step, Value
 from pipelines.engine.store.store import Store, plain_hex
 
 GONE = "its result is gone"
+"""Reason of a miss whose pre-image has not changed."""
 BETWEEN = ("...", "...")
-"""Stands between lines that do not follow each other."""
+"""Pair of lines that marks an omission."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """One thing that is not what it was."""
+    """One difference between two actions of a step."""
 
     what: str
     """`input`, `parameter`, `parameters` (their model), `code` or `library`."""
     name: str
     old: str | None
-    """None where it was not there; for `value` inputs and code the text itself, if the store still has it."""
+    """Old value; None if there was none. For `value` inputs and code the text, if the store still has it."""
     new: str | None
     step: str | None = None
-    """Of an input: the step whose result it is."""
+    """The step whose result the input is, if it is one."""
 
     def __str__(self) -> str:
         noun = {"code": "code of ", "library": ""}.get(self.what, f"{self.what} ")
@@ -38,33 +39,40 @@ class Change:
 
     @property
     def with_versions(self) -> str:
-        """The change in words, with both versions of a library."""
+        """Text of the change; for a library with both versions."""
         if self.what != "library" or self.old is None or self.new is None:
             return str(self)
         return f"{self.name} {self.old} -> {self.new}"
 
 
 def changes(step: Step, old: PreImage, new: PreImage, store: Store) -> list[Change]:
-    """What differs between two pre-images of one step."""
-    found = []
+    """List the differences between two pre-images of one step."""
+    differences = []
     for name, was, now in _changed(inputs_of(old), inputs_of(new)):
-        given = step.inputs.get(name)
-        before = given.step if isinstance(given, Output) else None
-        found.append(Change("input", name, _input_text(was, store), _input_text(now, store, given), before))
-    found += _parameter_changes(_parameters(old), _parameters(new))
+        current = step.inputs.get(name)
+        producer = current.step if isinstance(current, Output) else None
+        differences.append(Change("input", name, _input_text(was, store), _input_text(now, store, current), producer))
+    differences += _parameter_changes(_parameters(old), _parameters(new))
     if _field(old, "code") != _field(new, "code"):
-        found += _code_changes(step, old, store)
-    return found
+        differences += _code_changes(step, old, store)
+    return differences
 
 
-def reason(found: list[Change]) -> str:
-    """The changes in words."""
-    return ", ".join(str(change) for change in found) or GONE
+def reason(differences: list[Change]) -> str:
+    """Text of all changes, or `GONE` without any."""
+    return ", ".join(str(change) for change in differences) or GONE
 
 
 def side_by_side(change: Change) -> list[tuple[str, str]]:
-    """Old and new text of a change, line by line: those that differ with a line around them, `BETWEEN` where lines are
-    left out. Lines that are on one side only stand beside an empty one."""
+    """Pairs of old and new lines of a change: the lines that differ, with one line of context before and after.
+
+    `BETWEEN` marks omitted lines. A line that only one side has is paired with an empty line.
+
+    Examples
+    --------
+    >>> side_by_side(Change("code", "module", "a = 1\\nb = 2", "a = 1\\nb = 3\\nc = 4"))
+    [('a = 1', 'a = 1'), ('b = 2', 'b = 3'), ('', 'c = 4')]
+    """
     old, new = (change.old or "").splitlines(), (change.new or "").splitlines()
     pairs: list[tuple[str, str]] = []
     for group in difflib.SequenceMatcher(None, old, new, autojunk=False).get_grouped_opcodes(n=1):
@@ -80,24 +88,23 @@ def side_by_side(change: Change) -> list[tuple[str, str]]:
 
 
 def kind_of(image: Any) -> str:
-    """The kind of step that a pre-image says it is of."""
+    """The kind of step that a pre-image names, or `unknown`."""
     kind = _field(image, "step")
     return kind if isinstance(kind, str) else "unknown"
 
 
 def inputs_of(image: Any) -> dict[str, tuple[str, str]]:
-    """What a pre-image says of its inputs: for each `value`, `file` or `result`, and the digest."""
-    named = _field(image, "inputs")
-    found = {}
-    for name, pair in named.items() if isinstance(named, dict) else ():
+    """The inputs that a pre-image names: for each its source (`value`, `file` or `result`) and its digest."""
+    inputs = {}
+    for name, pair in _mapping(image, "inputs").items():
         match pair:
             case [str(source), str(digest)] if _is_digest(digest):
-                found[name] = (source, digest)
-    return found
+                inputs[name] = (source, digest)
+    return inputs
 
 
 def code_of(image: Any, store: Store) -> CodeIdentity | None:
-    """The code of an action, as far as the store still has it."""
+    """Identity of the code of an action; None if the store has lost its document."""
     try:
         was = json.loads(store.get(_field(image, "code")) or b"")
         modules = {name: plain_hex(digest) for name, digest in was["modules"].items()}
@@ -118,22 +125,22 @@ def _code_changes(step: Step, old: PreImage, store: Store) -> Iterator[Change]:
     if was is None:
         yield Change("code", step.module, None, None)
         return
-    for name, before, after in _changed(was.modules, now.modules):
-        text = None if before is None else store.get(before)
-        new = None if after is None else code_text(name)
-        yield Change("code", name, _text(text), _text(new))
-    for name, before, after in _changed(was.libraries, now.libraries):
-        yield Change("library", name, before, after)
+    for name, old_digest, new_digest in _changed(was.modules, now.modules):
+        old_text = None if old_digest is None else store.get(old_digest)
+        new_text = None if new_digest is None else code_text(name)
+        yield Change("code", name, _text(old_text), _text(new_text))
+    for name, old_version, new_version in _changed(was.libraries, now.libraries):
+        yield Change("library", name, old_version, new_version)
 
 
-def _input_text(named: tuple[str, str] | None, store: Store, given: object = None) -> str | None:
-    """What an input is: the content of a small value, otherwise its digest."""
-    if named is None:
+def _input_text(source_and_digest: tuple[str, str] | None, store: Store, current: object = None) -> str | None:
+    """Text of an input: the content of a JSON value, or else the digest."""
+    if source_and_digest is None:
         return None
-    source, digest = named
+    source, digest = source_and_digest
     if source != "value":
         return digest
-    content = given.content if isinstance(given, Value) else store.get(digest)
+    content = current.content if isinstance(current, Value) else store.get(digest)
     try:
         return digest if content is None else json.dumps(json.loads(content), indent=1, sort_keys=True)
     except (ValueError, RecursionError):
@@ -145,8 +152,8 @@ def _parameters(image: Any) -> Mapping[str, Any]:
 
 
 def _mapping(value: Any, name: str) -> Mapping[str, Any]:
-    found = _field(value, name)
-    return found if isinstance(found, dict) else {}
+    field = _field(value, name)
+    return field if isinstance(field, dict) else {}
 
 
 def _field(value: Any, name: str) -> Any:

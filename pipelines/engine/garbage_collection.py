@@ -1,4 +1,4 @@
-"""What lies in a store, and what of it nothing needs any more."""
+"""The contents of a store, and the garbage collection of files that are no longer needed."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -12,36 +12,37 @@ from pipelines.engine.store.store import Store, blob_name, latest_name, row_name
 from pipelines.engine.trace import Actions, blob_digest, read_actions, row_key
 
 FOLDERS = ("actions", "blobs", "latest", "pins", LEASES)
+"""Folders of a store."""
 CODE, VALUES, OTHER = "(code)", "(values)", "(other)"
-"""Kinds of what is the result of no step."""
+"""Kinds of blobs that are not the result of a step."""
 CHECK_EVERY = 50
-"""Files that are deleted between two looks for runs that have begun meanwhile."""
+"""Number of files that are deleted between two checks for new runs; chosen by hand."""
 
 
 @dataclass
 class Share:
-    """What of a store is of one kind of step."""
+    """Share of one kind of step in a store."""
 
     actions: int = 0
     results: int = 0
-    """Equal ones lie in the store, and count, once."""
+    """Number of blobs; equal results are one blob."""
     bytes: int = 0
-    """Of the results and of the actions' rows."""
+    """Size of the results and rows."""
 
 
 @dataclass(frozen=True)
 class Contents:
-    """What lies in a store."""
+    """The files of a store, with the actions that they record."""
 
     sizes: dict[str, int]
     """Bytes of each file, by name."""
     actions: Actions
     owners: dict[str, str]
-    """Of each blob, by its digest: the kind of step whose result it is, or `(code)`, `(values)`, `(other)`."""
+    """For each blob by its digest: the kind of step whose result it is, or `(code)` or `(values)`."""
 
     def shares(self, names: Iterable[str]) -> dict[str, Share]:
-        """The files of these names, by kind of step."""
-        found: dict[str, Share] = {}
+        """Count the files of these names by kind of step."""
+        shares: dict[str, Share] = {}
         for name in names:
             key, digest = row_key(name), blob_digest(name)
             kind = OTHER
@@ -49,25 +50,25 @@ class Contents:
                 kind = kind_of(self.actions.rows[key].image)
             elif digest is not None:
                 kind = self.owners.get(digest, OTHER)
-            share = found.setdefault(kind, Share())
+            share = shares.setdefault(kind, Share())
             share.actions += key is not None
             share.results += digest is not None
             share.bytes += self.sizes[name]
-        return dict(sorted(found.items()))
+        return dict(sorted(shares.items()))
 
 
 @dataclass(frozen=True)
 class Garbage:
-    """What nothing needs."""
+    """Files of a store that are no longer needed."""
 
     names: list[str] = field(default_factory=list)
-    """Rows first: one without its result is a miss, a result without its row is only room that is taken."""
+    """Names of the files to delete, rows first: if interrupted, a row must not be left without its result."""
     young: list[str] = field(default_factory=list)
-    """What would go, too, if it were older."""
+    """Names of files that are not needed, but too young to delete."""
 
 
 def read_contents(store: Store) -> Contents:
-    """Reads all rows of a store and lists its files."""
+    """Read all rows of a store and list its files."""
     sizes = {name: size for name, size in store.files.sizes("") if name.split("/")[0] in FOLDERS or _is_partial(name)}
     actions = read_actions(store)
     owners: dict[str, str] = {}
@@ -92,35 +93,35 @@ def find_garbage(
     now: float,
     older_than_s: float,
 ) -> Garbage:
-    """What nothing reaches: no last action of a step, no pin, none of those below; and what interrupted runs left.
+    """Find files that no root reaches: last actions, pins, `keys` and `delivered`; also leftovers of interrupted runs.
 
     Parameters
     ----------
     keys : iterable of str
-        Of other actions that are in use: who went back to earlier parameters uses those of earlier runs.
+        Keys of further actions in use: after a return to earlier parameters these are actions of earlier runs.
     delivered : iterable of str
-        Digests of the files that lie in the results.
+        Digests of the files in the results folder.
     vanished : iterable of str
-        Scans (`patient/scan`) that are no more: what their steps did last goes, unless it is pinned.
+        Scans (`patient/scan`) that were removed from the archive: their last actions are garbage unless pinned.
     now : float
-        s since 1970.
+        Present time, s since 1970.
     older_than_s : float
-        What is younger is kept.
+        Younger files are kept.
 
     Raises
     ------
     DamagedError
-        A pin is damaged: what it keeps is not known.
+        A pin is damaged, so the actions that it keeps are unknown.
     """
-    gone = set(vanished)
-    left = [one for one in contents.actions.latest if one.step.rpartition("/")[0] in gone]
-    roots = {*keys, *(one.key for one in contents.actions.latest if one not in left)}
+    vanished_scans = set(vanished)
+    orphaned = [latest for latest in contents.actions.latest if latest.step.rpartition("/")[0] in vanished_scans]
+    roots = {*keys, *(latest.key for latest in contents.actions.latest if latest not in orphaned)}
     roots |= {key for pin in read_pins(store).values() for key in pin.values()}
     rows, blobs = reached(contents.actions, roots, set(delivered), store)
     kept = {row_name(key) for key in rows} | {blob_name(digest) for digest in blobs}
-    left_names = {latest_name(one.step) for one in left}
-    live = {one.name for one in live_leases(store)}
-    unused = [name for name in contents.sizes if name in left_names or _is_garbage(name, kept, live)]
+    orphaned_names = {latest_name(latest.step) for latest in orphaned}
+    live = {lease.name for lease in live_leases(store)}
+    unused = [name for name in contents.sizes if name in orphaned_names or _is_garbage(name, kept, live)]
     garbage = Garbage()
     for name in sorted(unused, key=lambda name: (row_key(name) is None, name)):
         written = store.files.written(name)
@@ -130,7 +131,7 @@ def find_garbage(
 
 
 def delete(garbage: Garbage, store: Store) -> tuple[list[str], list[Lease]]:
-    """Delete garbage, unless a run is under way or begins; returns what was deleted, and the runs that stopped it."""
+    """Delete garbage; stops if a run is under way or begins. Returns the deleted names and the leases of such runs."""
     deleted: list[str] = []
     for number, name in enumerate(garbage.names):
         if number % CHECK_EVERY == 0 and (live := live_leases(store)):
@@ -141,7 +142,7 @@ def delete(garbage: Garbage, store: Store) -> tuple[list[str], list[Lease]]:
 
 
 def _is_partial(name: str) -> bool:
-    """Whether a file is what `write_atomically` leaves behind when it is killed."""
+    """Return True for a file that `write_atomically` leaves behind when it is killed."""
     file = PurePosixPath(name)
     return (
         file.name.startswith(".") and file.suffix == ".partial" and (len(file.parts) == 1 or file.parts[0] in FOLDERS)
@@ -157,29 +158,29 @@ def _is_garbage(name: str, kept: set[str], live: set[str]) -> bool:
 
 
 def reached(actions: Actions, keys: set[str], delivered: set[str], store: Store) -> tuple[set[str], set[str]]:
-    """Keys of the rows and digests of the blobs that these actions and files came from, they themselves included."""
-    waiting = set(keys)
+    """Keys of the rows and digests of the blobs that these actions and files came from, themselves included."""
+    pending = set(keys)
     rows: set[str] = set()
     while True:
-        rows |= waiting & actions.rows.keys()
-        made = {actions.rows[key].digest for key in rows}
-        taken = delivered | set(_inputs(actions, rows, "result"))
-        # A result of which no reached action is known is an earlier action's: that tells where all came from.
-        waiting = {key for digest in taken - made for key in actions.makers.get(digest, [])}
-        if not waiting:
+        rows |= pending & actions.rows.keys()
+        results = {actions.rows[key].digest for key in rows}
+        inputs = delivered | set(_inputs(actions, rows, "result"))
+        # A result that no reached action made was made by an earlier action, which belongs to its origin.
+        pending = {key for digest in inputs - results for key in actions.makers.get(digest, [])}
+        if not pending:
             break
-    blobs = taken | {digest for digest in made if digest is not None}
+    blobs = inputs | {digest for digest in results if digest is not None}
     return rows, blobs | set(_inputs(actions, rows, "value")) | set(_code(actions, rows, store))
 
 
-def _inputs(actions: Actions, keys: Iterable[str], wanted: str) -> Iterator[str]:
-    """Digests of the inputs of actions that are of one kind, `value` or `result`."""
+def _inputs(actions: Actions, keys: Iterable[str], source: str) -> Iterator[str]:
+    """Digests of the inputs of actions that come from one source, `value` or `result`."""
     for key in keys:
-        yield from (digest for source, digest in inputs_of(actions.rows[key].image).values() if source == wanted)
+        yield from (digest for origin, digest in inputs_of(actions.rows[key].image).values() if origin == source)
 
 
 def _code(actions: Actions, keys: Iterable[str], store: Store) -> Iterator[str]:
-    """The documents that name the code of actions, and the texts that those name."""
+    """Digests of the code documents of actions, and of the module texts that these name."""
     images = {str(image.get("code")): image for image in (actions.rows[key].image for key in keys)}
     for document, image in images.items():
         identity = code_of(image, store)

@@ -1,4 +1,4 @@
-"""What would run, and why: a pure function of the graph and the action cache."""
+"""The plan of a run: which steps would run, and why. A pure function of the graph and the action cache."""
 
 import gc
 import json
@@ -13,29 +13,29 @@ from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.explain import changes, reason
 from pipelines.engine.store.store import Store
-from pipelines.engine.store.verified_index import Known
+from pipelines.engine.store.verified_index import VerifiedRow
 
 NO_SEAL = "its row bears no seal of the store's owner"
 
 
 class State(Enum):
-    """What the cache knows of a step."""
+    """State of a step in the action cache."""
 
     HIT = "hit"
     MISS = "miss"
     WAITS = "waits"
-    """An input is still to be made: whether the step runs depends on what comes out."""
+    """An input is not computed yet: whether the step runs depends on the digest of that result."""
 
 
 class PlannedStep(NamedTuple):
-    """A step, and what is to be done with it."""
+    """A step, its state in the cache, and the reason why it is not a hit."""
 
     step: Step
     state: State
     outcome: Outcome | None
-    """What the cache holds, for a hit."""
+    """Cached outcome of a hit."""
     reason: str
-    """Why the step is no hit."""
+    """Reason why the step is not a hit; empty for a hit."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Plan:
 
     @property
     def to_run(self) -> list[PlannedStep]:
-        """All that is no hit."""
+        """The steps that are not hits."""
         return [planned for planned in self.steps if planned.state is not State.HIT]
 
 
@@ -56,18 +56,18 @@ def make_plan(steps: Sequence[Step], store: Store) -> Plan:
     Parameters
     ----------
     steps : sequence of Step
-        Each after the steps whose results it takes.
+        In topological order: each step after the steps whose results it takes.
     """
     planned: dict[str, PlannedStep] = {}
-    with _all_kept(), nullcontext() if store.verified is None else store.verified.reading():
+    with _without_garbage_collection(), nullcontext() if store.verified is None else store.verified.reading():
         for step in steps:
             planned[step.name] = _plan_step(step, planned, store)
     return Plan(list(planned.values()))
 
 
 @contextmanager
-def _all_kept() -> Iterator[None]:
-    """Without Python's search for circles, a sixth of the time of a large plan, of which nothing is thrown away."""
+def _without_garbage_collection() -> Iterator[None]:
+    """Switch the cyclic garbage collector off: it takes a sixth of the time of a large plan and frees nothing."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -77,25 +77,31 @@ def _all_kept() -> Iterator[None]:
             gc.enable()
 
 
-def cached_outcome(step: Step, known: Known | None) -> Outcome | None:
-    """What the action cache says of a step; None where the step must run."""
-    if known is None:
+def cached_outcome(step: Step, row: VerifiedRow | None) -> Outcome | None:
+    """The outcome of a step in the action cache; None if the step must run."""
+    if row is None:
         return None
-    if known.digest is None:
-        return Failure(with_places(known.problem or "", step.places), known.kind or "", step.name)
+    if row.digest is None:
+        return Failure(with_places(row.problem or "", step.places), row.kind or "", step.name)
     is_there = step.writes is None or step.writes.exists()
-    return Success(known.digest) if is_there else None
+    return Success(row.digest) if is_there else None
 
 
 def without_places(problem: str, places: Mapping[str, Path]) -> str:
-    """`problem` with names in the stead of paths: an equal film elsewhere fails alike, but is another file."""
+    """`problem` with each path replaced by its name: an equal film in another folder then fails with the same text.
+
+    Examples
+    --------
+    >>> without_places("/scans/cam1.avi: no frames", {"film": Path("/scans/cam1.avi")})
+    '\\x00film\\x00: no frames'
+    """
     for name, path in places.items():
         problem = problem.replace(str(path), f"\0{name}\0")
     return problem
 
 
 def with_places(problem: str, places: Mapping[str, Path]) -> str:
-    """The opposite of `without_places`."""
+    """The inverse of `without_places`."""
     for name, path in places.items():
         problem = problem.replace(f"\0{name}\0", str(path))
     return problem
@@ -107,12 +113,12 @@ def _plan_step(step: Step, planned: dict[str, PlannedStep], store: Store) -> Pla
         if not isinstance(source, Output):
             digests[name] = source.digest
             continue
-        before = planned[source.step]
-        if isinstance(before.outcome, Failure):
-            return PlannedStep(step, State.HIT, before.outcome, "")
-        if before.outcome is None:
-            return PlannedStep(step, State.WAITS, None, f"waits for {_label(before.step)}")
-        digests[name] = before.outcome.digest
+        producer = planned[source.step]
+        if isinstance(producer.outcome, Failure):
+            return PlannedStep(step, State.HIT, producer.outcome, "")
+        if producer.outcome is None:
+            return PlannedStep(step, State.WAITS, None, f"waits for {_label(producer.step)}")
+        digests[name] = producer.outcome.digest
     image = image_text(step, digests)
     outcome = cached_outcome(step, store.lookup(key_of(image)))
     if outcome is not None:

@@ -1,6 +1,6 @@
-"""Where steps run: threads of this process, processes of this machine, or workers of a Dask cluster anywhere.
+"""Pools that run steps: threads of this process, processes of this machine, or workers of a remote Dask cluster.
 
-Tasks hand over digests, never arrays; a worker reads and writes the store itself.
+Tasks pass digests, never arrays; a worker reads and writes the store itself.
 """
 
 import logging
@@ -21,23 +21,24 @@ from schemas.base.errors import RefusedInput, one_line
 log = logging.getLogger("footscan.run")
 
 ANSWER_S = 10.0
-"""How long a scheduler is waited for."""
+"""Time to wait for the answer of a scheduler; chosen by hand."""
 LOOPBACK = "127.0.0.1"
+"""Address of this machine that no other machine can reach (RFC 1122, 3.2.1.3)."""
 FAILURES_ALLOWED = 1
-"""A task is tried again after it has killed so many workers; another one, and it is given up."""
+"""Workers that a task may kill and still be tried again; chosen by hand."""
 
 
 @dataclass(frozen=True)
 class StepEnd:
-    """Told when a step of a run has ended."""
+    """The end of one step of a run, as listeners receive it."""
 
     step: Step
     outcome: Outcome
     ran: bool
-    """False where the step's inputs turned out to be those of an earlier run."""
+    """False if the cache had a result for the step's inputs."""
     seconds: float
     otherwise: str | None = None
-    """What the same action came to before, where that was another result."""
+    """Digest or failure of an earlier run of the same action, if it differs."""
 
 
 OnStepEnd = Callable[[StepEnd], None]
@@ -45,31 +46,31 @@ OnStepEnd = Callable[[StepEnd], None]
 
 @dataclass(frozen=True)
 class Task:
-    """A step, and what is known of the steps before it."""
+    """A step, and the known outcomes of the steps before it."""
 
     step: Step
     code: str
-    """Digest of the step's code where it was planned: elsewhere another version may be installed."""
+    """Digest of the step's code on the machine that planned it: a worker may have another version installed."""
     before: Mapping[str, Outcome]
     """Outcomes of steps that are not tasks themselves."""
     waits_for: tuple[str, ...]
-    """Names of tasks."""
+    """Names of the tasks that must end before this one starts."""
 
 
 RunTask = Callable[[Task, Mapping[str, StepEnd]], StepEnd]
-"""Of a task, and how those that it waited for ended, by name; can be pickled."""
+"""Runs a task; takes also the ends of the tasks that it waited for, by name. It can be pickled."""
 
 
 class Pool(Protocol):
-    """Something that runs tasks."""
+    """An executor of tasks."""
 
     @property
     def count(self) -> int:
-        """How many it runs at once."""
+        """Number of tasks that run at once."""
         ...
 
     def run(self, tasks: Mapping[str, Task], run_task: RunTask, on_step_end: OnStepEnd) -> dict[str, Outcome]:
-        """Runs each task after those that it waits for; the outcome of each by its name."""
+        """Run each task after those that it waits for; returns the outcome of each by its name."""
         ...
 
 
@@ -78,20 +79,20 @@ class Threads:
     """Threads of this process."""
 
     count: int
-    """Steps that they run at once."""
+    """Number of steps that run at once."""
 
     def run(self, tasks: Mapping[str, Task], run_task: RunTask, on_step_end: OnStepEnd) -> dict[str, Outcome]:
         """See `Pool`."""
-        import dask  # not needed, and not waited for, when all is there
+        import dask  # imported late: it takes time, and a run without misses does not need it
 
-        def run_and_tell(task: Task, ended: Mapping[str, StepEnd]) -> StepEnd:
+        def run_and_report(task: Task, ended: Mapping[str, StepEnd]) -> StepEnd:
             end = run_task(task, ended)
             on_step_end(end)
             return end
 
-        drawn = _draw(tasks, run_and_tell, lambda step: step.name)
-        ends = dask.compute(*drawn.values(), scheduler="threads", num_workers=self.count)
-        return {name: end.outcome for name, end in zip(drawn, ends, strict=True)}
+        delayed = _delayed(tasks, run_and_report, lambda step: step.name)
+        ends = dask.compute(*delayed.values(), scheduler="threads", num_workers=self.count)
+        return {name: end.outcome for name, end in zip(delayed, ends, strict=True)}
 
 
 @dataclass(frozen=True)
@@ -100,9 +101,9 @@ class Cluster:
 
     client: Any
     count: int
-    """Steps that it runs at once."""
+    """Number of steps that run at once."""
     _memory: dict[str, int] = field(default_factory=dict)
-    """The most that each worker was seen to hold, bytes."""
+    """Largest memory observed of each worker, bytes, by its address."""
 
     def run(self, tasks: Mapping[str, Task], run_task: RunTask, on_step_end: OnStepEnd) -> dict[str, Outcome]:
         """See `Pool`."""
@@ -113,35 +114,37 @@ class Cluster:
             on_step_end(ended)
 
         with self._watching():
-            while left := {name: _with(task, outcomes) for name, task in tasks.items() if name not in outcomes}:
-                suspects = self._run_together(left, run_task, end)
+            while remaining := {
+                name: _with_outcomes(task, outcomes) for name, task in tasks.items() if name not in outcomes
+            }:
+                suspects = self._run_together(remaining, run_task, end)
                 for step, failure in suspects:
-                    # With a worker all die that it has been given. Who killed it is seen when each runs alone.
-                    alone = {step.name: _with(tasks[step.name], outcomes)}
+                    # All tasks of a worker die with it. A run of each task alone shows which one killed it.
+                    alone = {step.name: _with_outcomes(tasks[step.name], outcomes)}
                     if len(suspects) == 1 or self._run_together(alone, run_task, end):
                         end(StepEnd(step, failure, True, 0.0))
         return outcomes
 
     def _run_together(self, tasks: Mapping[str, Task], run_task: RunTask, end: OnStepEnd) -> list[tuple[Step, Failure]]:
-        """Run tasks; those that were given up since workers died of them, or beside them, are returned."""
+        """Run tasks; returns those that were given up because workers died while they had them."""
         from distributed import KilledWorker, as_completed
 
-        # What a scheduler knows by a name, it does not run again; and its pages group tasks by the first part.
+        # A scheduler does not run a known key again, so keys differ by run. Its pages group tasks by the first part.
         run = uuid4().hex[:8]
-        drawn = _draw(tasks, run_task, lambda step: (f"{step.kind}-{run}", step.scan, step.camera or 0))
-        steps = [tasks[name].step for name in drawn]
-        futures = dict(zip(self.client.compute(list(drawn.values())), steps, strict=True))
+        delayed = _delayed(tasks, run_task, lambda step: (f"{step.kind}-{run}", step.scan, step.camera or 0))
+        steps = [tasks[name].step for name in delayed]
+        futures = dict(zip(self.client.compute(list(delayed.values())), steps, strict=True))
         suspects = []
         try:
             for future in as_completed(futures):
                 step = futures[future]
                 try:
-                    ended = future.result()  # which is made again where it died with its worker before it was fetched
+                    ended = future.result()  # computed again if its worker died before it was fetched
                 except KilledWorker as error:
-                    if str(error.task) == str(future.key):  # not what only waits for such a task
+                    if str(error.task) == str(future.key):  # not a task that only waits for such a task
                         suspects.append((step, self._give_up(step, error)))
                     continue
-                except Exception as error:  # of Dask's: ours are in what a task returns
+                except Exception as error:  # an error of Dask; errors of steps are part of the returned StepEnd
                     problem = one_line(f"{step.name}: {type(error).__name__}: {error}")
                     ended = StepEnd(step, Failure(problem, "fault", step.name), True, 0.0)
                 end(ended)
@@ -151,14 +154,14 @@ class Cluster:
         return suspects
 
     def _give_up(self, step: Step, error: Any) -> Failure:
-        most = self._memory.get(getattr(error.last_worker, "address", ""), 0)
-        held = f", the last one when it held {most / 1e6:.0f} MB" if most else ""
+        peak_bytes = self._memory.get(getattr(error.last_worker, "address", ""), 0)
+        held = f", the last one when it held {peak_bytes / 1e6:.0f} MB" if peak_bytes else ""
         problem = f"{step.name}: killed {FAILURES_ALLOWED + 1} workers{held}; given up"
         return Failure(problem, "fault", step.name)
 
     @contextmanager
     def _watching(self) -> Iterator[None]:
-        """Notes how much memory each worker holds: one that was killed cannot be asked."""
+        """Poll the memory of each worker, since a killed worker cannot be asked."""
         done = threading.Event()
 
         def watch() -> None:
@@ -182,9 +185,9 @@ class Cluster:
 
 @contextmanager
 def local_cluster(workers: int, *, dashboard: bool = False) -> Iterator[Cluster]:
-    """So many processes of this machine, one step at a time in each; they listen on its loopback alone.
+    """Start worker processes on this machine, each with one step at a time; they listen on the loopback address only.
 
-    `dashboard` : whether Dask's status page is served there.
+    `dashboard` : True if Dask's status page is served there.
     """
     import dask
 
@@ -193,35 +196,35 @@ def local_cluster(workers: int, *, dashboard: bool = False) -> Iterator[Cluster]
 
     settings = {
         "distributed.scheduler.allowed-failures": FAILURES_ALLOWED,
-        # A worker that misses its scheduler at the end of a run calls it an error.
+        # At the end of a run a worker logs an error when its scheduler is gone.
         "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical",
     }
-    if not dashboard:  # Dask opens the ports of its pages in any case; then there is nothing behind them
+    if not dashboard:  # Dask opens the ports of its pages in any case; without routes they serve nothing
         settings |= {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
     with dask.config.set(settings):
-        with _deaf_to_ctrl_c():
-            here = LocalCluster(
+        with _sigint_blocked():
+            cluster = LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
                 host=LOOPBACK,
-                dashboard_address=f"{LOOPBACK}:0",  # a name alone, or none, would be all of this machine's addresses
+                dashboard_address=f"{LOOPBACK}:0",  # a port alone would listen on all addresses of this machine
                 scheduler_kwargs={"dashboard": dashboard},
             )
-        with here, Client(here) as client:
+        with cluster, Client(cluster) as client:
             yield Cluster(client, workers)
 
 
 @contextmanager
-def _deaf_to_ctrl_c() -> Iterator[None]:
-    """What is started here, be it by threads that are started here, is not interrupted from the terminal.
+def _sigint_blocked() -> Iterator[None]:
+    """Block SIGINT in processes that are started in this context, also by its threads.
 
-    A terminal interrupts all processes of a command. Workers would die of it in the midst of what they say to each
-    other; they are ended by the process that started them.
+    A terminal interrupts all processes of a command. Workers would die in the middle of their communication; the
+    process that started them ends them instead.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    resource_tracker.ensure_running()  # for it would take the mask off, when the first process is started
+    resource_tracker.ensure_running()  # started later, it would remove the mask
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -231,9 +234,9 @@ def _deaf_to_ctrl_c() -> Iterator[None]:
 
 @contextmanager
 def joined_cluster(address: str, certificates: Certificates | None = None) -> Iterator[Cluster]:
-    """The workers of a scheduler that was started elsewhere; RefusedInput where none answers.
+    """Join the workers of a running scheduler; RefusedInput if no scheduler answers or it has no workers.
 
-    `certificates` : for an address that begins with `tls://`; default: those of Dask's own configuration.
+    `certificates` : for an address that begins with `tls://`; default: those of Dask's configuration.
     """
     _quieten()
     from distributed import Client
@@ -247,35 +250,35 @@ def joined_cluster(address: str, certificates: Certificates | None = None) -> It
     with client:
         threads = sum(client.nthreads().values())
         if not threads:
-            raise RefusedInput(f"--cluster {address}", "has no workers, expected some that were started before")
+            raise RefusedInput(f"--cluster {address}", "has no workers, expected at least one that was started before")
         yield Cluster(client, threads)
 
 
 def _quieten() -> None:
-    """What Dask's parts say to each other is none of a person's business; it is set before they are imported."""
+    """Hide log lines of Dask below errors; must be called before `distributed` is imported."""
     import dask
 
     dask.config.set({"logging": {"distributed": "error", "tornado": "error"}})
 
 
-def _draw(tasks: Mapping[str, Task], run_task: RunTask, key: Callable[[Step], Any]) -> dict[str, Any]:
-    """The tasks as Dask's, each after those that it waits for, as they are given."""
+def _delayed(tasks: Mapping[str, Task], run_task: RunTask, key: Callable[[Step], Any]) -> dict[str, Any]:
+    """Delayed calls of Dask for the tasks; `tasks` is in topological order."""
     import dask
 
-    drawn: dict[str, Any] = {}
+    delayed: dict[str, Any] = {}
     for name, task in tasks.items():
-        ended = {waited: drawn[waited] for waited in task.waits_for}
-        drawn[name] = dask.delayed(run_task, pure=False)(task, ended, dask_key_name=key(task.step))
-    return drawn
+        ended = {waited: delayed[waited] for waited in task.waits_for}
+        delayed[name] = dask.delayed(run_task, pure=False)(task, ended, dask_key_name=key(task.step))
+    return delayed
 
 
-def _with(task: Task, outcomes: Mapping[str, Outcome]) -> Task:
-    """The task, with what has become known of those that it waits for."""
-    known = {name: outcomes[name] for name in task.waits_for if name in outcomes}
-    waits_for = tuple(name for name in task.waits_for if name not in known)
-    return replace(task, before={**task.before, **known}, waits_for=waits_for)
+def _with_outcomes(task: Task, outcomes: Mapping[str, Outcome]) -> Task:
+    """The task with those outcomes of the tasks it waits for that are known by now."""
+    known_outcomes = {name: outcomes[name] for name in task.waits_for if name in outcomes}
+    waits_for = tuple(name for name in task.waits_for if name not in known_outcomes)
+    return replace(task, before={**task.before, **known_outcomes}, waits_for=waits_for)
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""Carrying out a plan: only what is no hit becomes a task of Dask."""
+"""Running a plan: only steps that are not hits become Dask tasks."""
 
 import contextlib
 import importlib
@@ -27,36 +27,36 @@ log = logging.getLogger("footscan.run")
 
 
 def run_plan(plan: Plan, store: Store, *, pool: Pool, on_step_end: OnStepEnd) -> dict[str, Outcome]:
-    """Run what a plan has left to run.
+    """Run the steps of a plan that are not hits.
 
     Returns
     -------
     outcomes : dict
-        Result or failure of every step by its name, the hits included.
+        Result or failure of every step by its name, hits included.
     """
-    outcomes = {p.step.name: p.outcome for p in plan.steps if p.outcome is not None}
+    outcomes = {planned.step.name: planned.outcome for planned in plan.steps if planned.outcome is not None}
 
     def on_end(end: StepEnd) -> None:
         if end.otherwise is not None:
             log.warning(
-                "%s: came out otherwise than before (%s) from the same inputs, parameters and code: "
-                "it is not deterministic, see 'footscan cache verify --recompute'",
+                "%s: differs from the earlier result (%s) of the same inputs, parameters and code: "
+                "the step is not deterministic, see 'footscan cache verify --recompute'",
                 end.step.name, end.otherwise,
             )  # fmt: skip
         on_step_end(end)
 
     tasks: dict[str, Task] = {}
     for planned in plan.to_run:
-        before = [source.step for source in planned.step.inputs.values() if isinstance(source, Output)]
-        known = {name: outcomes[name] for name in before if name not in tasks}
+        producers = [source.step for source in planned.step.inputs.values() if isinstance(source, Output)]
+        outcomes_before = {name: outcomes[name] for name in producers if name not in tasks}
         code = code_identity(planned.step.module).digest
-        waits_for = tuple(name for name in before if name in tasks)
-        tasks[planned.step.name] = Task(planned.step, code, known, waits_for)
+        waits_for = tuple(name for name in producers if name in tasks)
+        tasks[planned.step.name] = Task(planned.step, code, outcomes_before, waits_for)
     return outcomes | pool.run(tasks, partial(run_step, store), on_end) if tasks else outcomes
 
 
 def run_step(store: Store, task: Task, ended: Mapping[str, StepEnd]) -> StepEnd:
-    """Run one step, unless its inputs turn out to be those of an earlier run, or one of them has failed."""
+    """Run one step, unless the cache has a result for its inputs, or one of them has failed."""
     start = time.perf_counter()
     step = task.step
     if code_identity(step.module).digest != task.code:
@@ -76,58 +76,58 @@ def run_step(store: Store, task: Task, ended: Mapping[str, StepEnd]) -> StepEnd:
 
 
 def execute(step: Step, inputs: Mapping[str, str], store: Store) -> StepEnd:
-    """A step with inputs of these digests, from the cache or by running it."""
+    """The outcome of a step with inputs of these digests, from the cache or by running the step."""
     start = time.perf_counter()
     image = image_text(step, inputs)
     key = key_of(image)
-    with _alone_at(key):
+    with _exclusive(key):
         try:
             outcome = cached_outcome(step, store.lookup(key))
-        except Fault as error:  # a store that is away costs this scan; where it stays away, the next plan says so
+        except Fault as error:  # the store is unreachable: this scan fails; the next plan reports a lasting failure
             return StepEnd(step, Failure(str(error), "fault", step.name), False, time.perf_counter() - start)
-        ran, otherwise = outcome is None, None
+        ran, earlier = outcome is None, None
         if outcome is None:
-            outcome, otherwise = _run_safely(step, image, inputs, store)
+            outcome, earlier = _run_safely(step, image, inputs, store)
         else:
             _note_latest(step, key, store)
-    return StepEnd(step, outcome, ran, time.perf_counter() - start, otherwise)
+    return StepEnd(step, outcome, ran, time.perf_counter() - start, earlier)
 
 
 @contextmanager
-def _alone_at(key: str) -> Iterator[None]:
-    """Threads that come to the same action, for scans with equal films, take turns: the first result serves all."""
-    with _LOCK:
-        under_way = _UNDER_WAY.setdefault(key, threading.Lock())
-    with under_way:
+def _exclusive(key: str) -> Iterator[None]:
+    """Let threads with the same action (scans with equal films) take turns: all use the first result."""
+    with _REGISTRY_LOCK:
+        action_lock = _ACTION_LOCKS.setdefault(key, threading.Lock())
+    with action_lock:
         yield
 
 
-_LOCK = threading.Lock()
-_UNDER_WAY: WeakValueDictionary[str, threading.Lock] = WeakValueDictionary()
-"""By key; a lock lasts as long as somebody holds it or waits."""
+_REGISTRY_LOCK = threading.Lock()
+_ACTION_LOCKS: WeakValueDictionary[str, threading.Lock] = WeakValueDictionary()
+"""Lock of each action by its key; a lock exists as long as a thread holds it or waits for it."""
 
 
 def _run_safely(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, str | None]:
-    """As `_run`; what goes wrong is an outcome, too."""
+    """Run a step as `_run` does, and return an error as a failure."""
     try:
         return _run(step, image, inputs, store)
     except Fault as error:
         return Failure(str(error), "damaged" if isinstance(error, DamagedError) else "fault", step.name), None
-    except Exception as error:  # a defect of ours, or of a library, in one scan must not cost the others
+    except Exception as error:  # a defect in our code or in a library must not stop the other scans
         log.debug("%s", step.name, exc_info=True)
         problem = one_line(f"{step.name}: {type(error).__name__}: {error}")
         return Failure(problem, "fault", step.name), None
 
 
 def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, str | None]:
-    """Run a step and record what came out, unless its files were changed meanwhile; and what came out once before."""
-    content = {name: content_of(step, source, inputs[name], store) for name, source in step.inputs.items()}
+    """Run a step and record its outcome, unless its files changed meanwhile; also returns a differing earlier one."""
+    contents = {name: content_of(step, source, inputs[name], store) for name, source in step.inputs.items()}
     try:
-        result = importlib.import_module(step.module).run(content, step.parameters, step.places)
+        result = importlib.import_module(step.module).run(contents, step.parameters, step.places)
     except (RefusedInput, Finding) as error:
         _check_sources(step)
         kind, problem = "finding" if isinstance(error, Finding) else "refused", str(error)
-        if isinstance(error, BeyondLimitError):  # the user may raise the limit, which is no input of the step
+        if isinstance(error, BeyondLimitError):  # not cached: the limit is no input of the step
             return Failure(problem, kind, step.name), None
         failure = kind, without_places(problem, step.places)
         return Failure(problem, kind, step.name), record_outcome(step, image, (None, failure), store)
@@ -143,22 +143,23 @@ def record_outcome(
     store: Store,
     accepted: Acceptance | None = None,
 ) -> str | None:
-    """Write an action's row, after all that it names: its code and the values that it took.
+    """Write an action's row, after the blobs that it names: its code and its input values.
 
     Parameters
     ----------
     step : Step
     image : pre-image of the action's key, as `image_text` gives it
     outcome : (digest, failure)
-        As in `Row`, one of them None.
+        As in `Row`; one of the two is None.
     store : Store
     accepted : Acceptance, optional
-        Of an outcome that is an earlier version's.
+        For an outcome of an earlier version of the code.
 
     Returns
     -------
     before : str or None
-        Another outcome that a row of the same action had: of a run beside this one, or of one whose result was lost.
+        The outcome in an earlier row of the same action, if it differs: of a concurrent run, or of a run whose result
+        was lost.
     """
     _keep_code(code_identity(step.module), store)
     for source in step.inputs.values():
@@ -171,39 +172,39 @@ def record_outcome(
 
 
 def _note_latest(step: Step, key: str, store: Store) -> None:
-    """What another step, or an earlier run, has made is this step's last result, too."""
-    with contextlib.suppress(Fault):  # the result is there all the same
+    """Record a cached result of another step or an earlier run as the last result of this step."""
+    with contextlib.suppress(Fault):  # the result is in the store in any case
         latest = store.latest(step.name)
         if latest is None or latest.key != key:
             store.note_latest(step.name, key, _sources(step))
 
 
 def _sources(step: Step) -> dict[str, str]:
-    """Where the files lie that a step's inputs are, or were read from, by the name of the input."""
+    """Paths of the files that a step's inputs are or were read from, by the name of the input."""
     paths = {name: source.path for name, source in step.inputs.items() if not isinstance(source, Output)}
     return {name: str(path) for name, path in paths.items() if path is not None}
 
 
 def _keep_code(identity: CodeIdentity, store: Store) -> None:
-    """Put the texts of a step's code into the store, where they are missing or damaged; looked at once in a process."""
-    if (store.files, identity.digest) in _KEPT and store.has(identity.digest):
+    """Store the texts of a step's code if they are missing or damaged; checked once in a process."""
+    if (store.files, identity.digest) in _STORED_CODE and store.has(identity.digest):
         return
     for module, digest in identity.modules.items():
         if store.get(digest) is None:
             store.put(code_text(module))
     store.put(identity.document)
-    _KEPT.add((store.files, identity.digest))
+    _STORED_CODE.add((store.files, identity.digest))
 
 
-_KEPT: set[tuple[Files, str]] = set()
+_STORED_CODE: set[tuple[Files, str]] = set()
 
 
 def content_of(step: Step, source: Input, digest: str, store: Store) -> bytes:
-    """An input of a step as it is handed over; DamagedError where the result that it is cannot be had."""
+    """The bytes of an input as the step receives them; DamagedError if the result of another step is damaged."""
     if isinstance(source, Value):
         return source.content
     if isinstance(source, SourceFile):
-        return b""  # the step reads it where it lies
+        return b""  # the step reads the file itself
     data = store.get(digest)
     if data is None:
         raise DamagedError(f"{step.name}: the result of {source.step} is damaged, expected what was stored")
@@ -211,7 +212,7 @@ def content_of(step: Step, source: Input, digest: str, store: Store) -> bytes:
 
 
 def _check_sources(step: Step) -> None:
-    """A film that was exchanged while it was read has given a result, or a failure, that belongs to no digest."""
+    """Raise Fault if a source file changed while the step read it: the outcome then belongs to no digest."""
     for source in step.inputs.values():
         if isinstance(source, SourceFile):
             for path, state in source.states:

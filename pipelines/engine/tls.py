@@ -1,4 +1,4 @@
-"""Certificates for the way to a Dask scheduler: both ends show one, signed by an authority of one's own."""
+"""TLS certificates for the connection to a Dask scheduler. Both ends present one, signed by a private authority."""
 
 import ssl
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ from typing import Any
 from schemas.base.errors import RefusedInput, one_line
 
 SCHEME = "tls://"
+"""Prefix of the address of a scheduler that requires TLS."""
 
 
 @dataclass(frozen=True)
@@ -15,20 +16,20 @@ class Certificates:
     """Files in PEM form."""
 
     ca: Path
-    """Certificate of the authority that signed those of all ends."""
+    """Certificate of the authority that signed the certificates of both ends."""
     cert: Path
-    """This end's own."""
+    """Certificate of this end."""
     key: Path
     """Private key of `cert`, without a password."""
 
 
 def security_of(certificates: Certificates | None) -> Any:
-    """What Dask needs to reach a scheduler; without certificates, what Dask's own configuration names.
+    """Build the `distributed.Security` for a connection; default certificates: those of Dask's configuration.
 
     Raises
     ------
     RefusedInput
-        A file is missing or is none of its kind, or the key is that of another certificate.
+        A file is missing or is not in PEM form, or the key does not belong to the certificate.
     """
     from distributed.security import Security
 
@@ -50,7 +51,7 @@ def security_of(certificates: Certificates | None) -> Any:
 
 
 def _check(certificates: Certificates) -> None:
-    """Refuses what Dask would fail at later, and with other words."""
+    """Refuse files on which Dask would fail later with a less clear message."""
     for option, path in vars(certificates).items():
         try:
             path.read_bytes()

@@ -1,4 +1,4 @@
-"""Everything that a result came from, as the rows of a store tell it."""
+"""Traces: all actions that a result came from, according to the rows of a store."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,7 +13,7 @@ from schemas.base.json_files import parse_json
 
 @dataclass(frozen=True)
 class Actions:
-    """All that a store knows of actions; what is damaged is left out, and was said."""
+    """All sound rows of a store and the last actions of its steps; damaged files are left out and were logged."""
 
     rows: dict[str, Row]
     """By key."""
@@ -21,54 +21,54 @@ class Actions:
 
     @cached_property
     def makers(self) -> dict[str, list[str]]:
-        """Keys of the actions that came to a result, by its digest."""
-        found: dict[str, list[str]] = {}
+        """Keys of the actions with the same result, by its digest."""
+        keys: dict[str, list[str]] = {}
         for key, row in self.rows.items():
             if row.digest is not None:
-                found.setdefault(row.digest, []).append(key)
-        return found
+                keys.setdefault(row.digest, []).append(key)
+        return keys
 
     @cached_property
     def steps(self) -> dict[str, list[Latest]]:
-        """The steps whose last action it was, by its key."""
-        found: dict[str, list[Latest]] = {}
+        """The steps with the same last action, by its key."""
+        steps: dict[str, list[Latest]] = {}
         for latest in self.latest:
-            found.setdefault(latest.key, []).append(latest)
-        return found
+            steps.setdefault(latest.key, []).append(latest)
+        return steps
 
 
 @dataclass(frozen=True)
 class TracedInput:
-    """What an action took."""
+    """One input of an action."""
 
     name: str
     source: str
     """`value`, `file` or `result`."""
     digest: str
     place: str | None
-    """Where a file lay; None where that is not known any more."""
+    """Path of a file; None if it is not recorded."""
     content: bytes | None
-    """Of a value, if the store still has it."""
+    """Content of a value, if the store still has it."""
     made_by: str | None
-    """Key of the action that it is the result of."""
+    """Key of the action whose result the input is."""
 
 
 @dataclass(frozen=True)
 class TracedAction:
-    """An action, as its row has it."""
+    """An action, as recorded in its row."""
 
     kind: str
     step: str | None
-    """Name of the step; None where its last action was another."""
+    """Name of the step; None if this is the last action of no step."""
     parameters: Any
     """Model and values; None for a step without parameters."""
     code: str | None
     libraries: dict[str, str]
-    """Empty where the store has the code no more."""
+    """Versions by name; empty if the store has lost the code."""
     result: str | None
     inputs: list[TracedInput] = field(default_factory=list)
     accepted: Acceptance | None = None
-    """Where the result is an earlier version's: which, and why it stands."""
+    """Set if the result is that of an earlier version of the code."""
 
 
 @dataclass(frozen=True)
@@ -77,54 +77,62 @@ class Trace:
 
     made_by: str
     actions: dict[str, TracedAction]
-    """By key; none came from itself."""
+    """Actions by key; no action came from itself."""
 
 
 def read_actions(store: Store) -> Actions:
-    """Reads all rows of a store."""
+    """Read all rows and last actions of a store."""
     rows = {}
     for name, _ in store.files.sizes("actions"):
         key = row_key(name)
         row = None if key is None else store.row(key)
-        if key is not None and row is not None and isinstance(row.image, dict):  # which a row made by hand need not be
+        if key is not None and row is not None and isinstance(row.image, dict):  # a row made by hand may be anything
             rows[key] = row
     names = (name for name, _ in store.files.sizes("latest") if name.endswith(".json"))
-    latest = (store.read_latest(name) for name in names)
-    return Actions(rows, [one for one in latest if one is not None])
+    latest_actions = (store.read_latest(name) for name in names)
+    return Actions(rows, [latest for latest in latest_actions if latest is not None])
 
 
 def row_key(name: str) -> str | None:
-    """The key that a file among the rows is named for; None for another file."""
+    """The key in the file name of a row; None for another file.
+
+    Examples
+    --------
+    >>> key = 64 * "a"
+    >>> row_key(f"actions/aa/{key}.json") == key
+    True
+    >>> row_key(f"blobs/aa/{key}") is None
+    True
+    """
     path = PurePosixPath(name)
     is_row = path.suffix == ".json" and _is_hex(path.stem) and path.parts[:2] == ("actions", path.stem[:2])
     return path.stem if is_row and len(path.parts) == 3 else None
 
 
 def blob_digest(name: str) -> str | None:
-    """The digest that a file among the blobs is named for; None for another file."""
+    """The digest in the file name of a blob; None for another file."""
     parts = PurePosixPath(name).parts
     is_blob = len(parts) == 3 and parts[0] == "blobs" and _is_hex(parts[2]) and parts[1] == parts[2][:2]
     return parts[2] if is_blob else None
 
 
 def trace(digest: str, actions: Actions, store: Store, scan: str = "") -> Trace | None:
-    """What the result `digest` came from; None where no action came to it.
+    """Trace of the result `digest`; None if no action has this result.
 
-    Results can be equal to the byte. Which of their actions is meant is then told by the scan (`patient/scan`) and by
-    the camera.
+    Several actions may have the same result. The scan (`patient/scan`) and the camera then decide between them.
     """
-    found: dict[str, TracedAction] = {}
+    traced: dict[str, TracedAction] = {}
     key = _maker(digest, actions, scan, None, set())
     if key is None:
         return None
-    _follow(key, actions, store, scan, set(), found)
-    return Trace(key, found)
+    _follow(key, actions, store, scan, set(), traced)
+    return Trace(key, traced)
 
 
 def _follow(
-    key: str, actions: Actions, store: Store, scan: str, above: set[str], found: dict[str, TracedAction]
+    key: str, actions: Actions, store: Store, scan: str, above: set[str], traced: dict[str, TracedAction]
 ) -> None:
-    if key in found:
+    if key in traced:
         return
     row, last = actions.rows[key], _step_of(key, actions, scan)
     scan = scan or (last.step.rpartition("/")[0] if last else "")
@@ -132,15 +140,15 @@ def _follow(
     inputs = []
     for name, (source, digest) in inputs_of(row.image).items():
         content = store.get(digest) if source == "value" else None
-        wanted = digest if source == "result" else _file_named_by(content)
+        traced_digest = digest if source == "result" else _file_named_by(content)
         camera = _camera(name) or _camera(last.step if last else "")
-        maker = None if wanted is None else _maker(wanted, actions, scan, camera, above)
+        maker = None if traced_digest is None else _maker(traced_digest, actions, scan, camera, above)
         place = None if last is None else last.sources.get(name)
         inputs.append(TracedInput(name, source, digest, place, content, maker))
         if maker is not None:
-            _follow(maker, actions, store, scan, above, found)
+            _follow(maker, actions, store, scan, above, traced)
     identity = code_of(row.image, store)
-    found[key] = TracedAction(
+    traced[key] = TracedAction(
         kind_of(row.image),
         None if last is None else last.step,
         row.image.get("parameters"),
@@ -153,20 +161,22 @@ def _follow(
 
 
 def _maker(digest: str, actions: Actions, scan: str, camera: str | None, above: set[str]) -> str | None:
-    """The action that came to a result; never one that came from it."""
+    """Key of the action with this result; never an action that came from it."""
 
-    def strangeness(key: str) -> tuple[bool, bool, bool, str]:
+    def rank(key: str) -> tuple[bool, bool, bool, str]:
         last = _step_of(key, actions, scan)
         name = "" if last is None else last.step
         return not name, not name.startswith(f"{scan}/"), _camera(name) != camera, key
 
-    return min((key for key in actions.makers.get(digest, []) if key not in above), key=strangeness, default=None)
+    return min((key for key in actions.makers.get(digest, []) if key not in above), key=rank, default=None)
 
 
 def _step_of(key: str, actions: Actions, scan: str) -> Latest | None:
-    """The step whose last action it was; rather one of `scan` where equal films made it that of several."""
+    """The step with this last action. Equal films may give several such steps: then one of `scan` is preferred."""
     return min(
-        actions.steps.get(key, []), key=lambda one: (not one.step.startswith(f"{scan}/"), one.step), default=None
+        actions.steps.get(key, []),
+        key=lambda latest: (not latest.step.startswith(f"{scan}/"), latest.step),
+        default=None,
     )
 
 
@@ -177,7 +187,7 @@ def _camera(name: str) -> str | None:
 
 
 def _file_named_by(content: bytes | None) -> str | None:
-    """The digest of a file that a value names, as `schemas.calibration.Source` does."""
+    """The digest of a file that a value names in the form of `schemas.calibration.Source`."""
     document = parsed(content)
     if isinstance(document, dict) and document.keys() == {"name", "sha256"} and isinstance(document["sha256"], str):
         return document["sha256"]
@@ -185,7 +195,7 @@ def _file_named_by(content: bytes | None) -> str | None:
 
 
 def parsed(content: bytes | None) -> Any:
-    """A value as the JSON document that it is; None for another."""
+    """The JSON document that a value holds; None if it is not JSON."""
     if content is None:
         return None
     try:

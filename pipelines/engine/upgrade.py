@@ -1,7 +1,7 @@
-"""Results that a new version of a library or of the code has made stale, and which of them may stay.
+"""Upgrades: results that a new version of a library or of the code has made stale, and their acceptance.
 
-A step's key stands for its code and the libraries that it computes with. Where a sample of the steps that an upgrade
-would run again comes to the same bytes, the results of all of them can be accepted under the new key.
+The key of a step covers its code and the libraries that it computes with. If a sample of the steps that an upgrade
+would run again gives the same bytes, the results of all these steps can be accepted under their new keys.
 """
 
 import json
@@ -19,7 +19,7 @@ from pipelines.engine.store.store import Acceptance, Row, Store
 
 
 class Upgrade(NamedTuple):
-    """A kind of step whose code, or a library that it computes with, is of another version than when it ran last."""
+    """A kind of step whose code, or a library that it computes with, has changed since its last run."""
 
     kind: str
     old: str
@@ -29,18 +29,18 @@ class Upgrade(NamedTuple):
 
 @dataclass(frozen=True)
 class Stale:
-    """An action that would run for its code alone: with the old code and the same inputs it has a result."""
+    """An action that would run only because its code changed: the old code has a result for the same inputs."""
 
     action: Repeatable
-    """With the result of the old code."""
+    """The action, with the result of the old code."""
     image: str
     """Pre-image of the key under the new code."""
     row: Row
-    """Of the old code."""
+    """Row of the old code."""
 
     @property
     def upgrade(self) -> Upgrade:
-        """What it shares with the same step of other scans and cameras."""
+        """The upgrade that made it stale, the same for this kind of step in other scans and cameras."""
         return Upgrade(self.action.step.kind, str(self.row.image["code"]), str(json.loads(self.image)["code"]))
 
 
@@ -50,10 +50,10 @@ def stale_actions(steps: Sequence[Step], store: Store, refused: Collection[Upgra
     Parameters
     ----------
     steps : sequence of Step
-        Each after the steps whose results it takes.
+        In topological order: each step after the steps whose results it takes.
     store : Store
     refused : collection of Upgrade
-        Whose results may not stay. What follows from one of them is left out: its inputs are not known.
+        Upgrades whose results are not accepted. Steps that depend on them are left out: their inputs are unknown.
     """
     outcomes: dict[str, Outcome | None] = {}
     stale: dict[str, Stale] = {}
@@ -73,13 +73,13 @@ def stale_actions(steps: Sequence[Step], store: Store, refused: Collection[Upgra
 
 
 def versions(stale: Stale, store: Store) -> list[str]:
-    """What differs between the two versions of the code, a line each."""
-    found = changes(stale.action.step, stale.row.image, json.loads(stale.image), store)
-    return [change.with_versions for change in found]
+    """List the differences between the two versions of the code, one line each."""
+    differences = changes(stale.action.step, stale.row.image, json.loads(stale.image), store)
+    return [change.with_versions for change in differences]
 
 
 def accept(stale: Stale, acceptance: Acceptance, store: Store) -> None:
-    """Record the old result under the new key, and why it stands there."""
+    """Record the old result under the new key, together with the acceptance."""
     record_outcome(stale.action.step, stale.image, (stale.row.digest, stale.row.failure), store, acceptance)
 
 

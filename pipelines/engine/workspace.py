@@ -1,6 +1,6 @@
-"""A workspace: the store of results with what this machine knows of files, in which graphs are planned and run.
+"""A workspace in which graphs are planned and run: the store of results and this machine's digests of files.
 
-Archives, the demo, the live scanner, nights of a regression and searches for parameters run their graphs here.
+Archives, the demo, the live scanner, regression runs and parameter searches run their graphs here.
 """
 
 import logging
@@ -29,14 +29,14 @@ class Workspace:
     Parameters
     ----------
     cache : Path or str
-        Folder of the store, or its URL as fsspec has it.
+        Folder of the store, or its URL in the form of fsspec.
     local : Path, optional
-        Folder for what this machine remembers; default: `cache`, which is a folder then.
+        Folder for the memory of this machine; default: `cache`, which must be a folder then.
 
     Raises
     ------
     RefusedInput
-        No store can lie there, or its secret cannot be read.
+        `cache` is not a valid place for a store, or the secret of the store cannot be read.
     """
 
     def __init__(self, cache: Path | str, local: Path | None = None) -> None:
@@ -45,30 +45,31 @@ class Workspace:
         self.digests = FileDigests.load(self.local / "files.json", self.store.secret)
 
     def plan(self, steps: Sequence[Step]) -> Plan:
-        """Which steps would run, and why."""
+        """Plan which steps would run, and why."""
         return make_plan(steps, self.store)
 
     def run(self, steps: Sequence[Step], pool: Pool, on_step_end: OnStepEnd) -> dict[str, Outcome]:
-        """Run steps: the outcome of each by its name.
+        """Run steps; returns the outcome of each by its name.
 
-        A damaged result has been set aside by the run that notices it, and is made again by a further run.
+        A run removes a damaged result when it notices it; a further run makes that result again.
         """
-        known: set[str] = set()
-        while True:  # there may be more damage behind what was damaged
+        reported: set[str] = set()
+        while True:  # steps after a damaged result may find more damage
             outcomes = run_plan(self.plan(steps), self.store, pool=pool, on_step_end=on_step_end)
-            damaged = {one.problem for one in outcomes.values() if isinstance(one, Failure) and one.kind == "damaged"}
-            if not damaged - known:
+            failures = [outcome for outcome in outcomes.values() if isinstance(outcome, Failure)]
+            damaged = {failure.problem for failure in failures if failure.kind == "damaged"}
+            if not damaged - reported:
                 return outcomes
-            for problem in sorted(damaged - known):
+            for problem in sorted(damaged - reported):
                 log.warning("%s", problem)
-            known |= damaged
+            reported |= damaged
 
     def lease(self) -> AbstractContextManager[str]:
-        """Keeps others from deleting results while it is held."""
+        """Hold a lease: others do not delete results while it is held."""
         return lease(self.store)
 
     def deliver(self, blobs: Mapping[str, str], folder: Path) -> str | None:
-        """Write each blob under its file name into `folder`, where another file or none is there.
+        """Write each blob under its file name into `folder`, unless the same file is there already.
 
         Parameters
         ----------
@@ -78,7 +79,7 @@ class Workspace:
         Returns
         -------
         problem : str or None
-            Why it could not be done for one of them, in one line.
+            Reason why a file could not be delivered, in one line.
         """
         problem = None
         for name, digest in blobs.items():
@@ -88,7 +89,7 @@ class Workspace:
             data = self.store.get(digest)
             if data is None:
                 problem = f"{target}: its content is damaged in the store; run again to make it anew"
-                continue  # so that all damage is noticed at once
+                continue  # checks the other files too, so that one further run repairs all
             try:
                 write_atomically(target, data)
             except Fault as error:
@@ -96,7 +97,7 @@ class Workspace:
         return problem
 
     def close(self) -> None:
-        """Save what is known of files, and close the index of what was verified."""
+        """Save the digests of files, and close the index of verified results."""
         self.digests.save()
         if self.store.verified is not None:
             self.store.verified.close()
@@ -111,7 +112,7 @@ class Workspace:
 
 
 def digests_by_kind(steps: Sequence[Step], outcomes: Mapping[str, Outcome]) -> dict[str, str]:
-    """What each of `steps` came to, by its kind; Fault where one failed."""
+    """Digest of the result of each of `steps`, by its kind; Fault if one failed."""
     digests: dict[str, str] = {}
     for step in steps:
         outcome = outcomes[step.name]

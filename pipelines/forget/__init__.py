@@ -1,1 +1,1 @@
-"""Forgetting a patient: finding all that is theirs, erasing it, and proving that nothing is left."""
+"""Erasure of a patient's data: find it, erase it, and prove that nothing is left."""

@@ -1,4 +1,4 @@
-"""Erasing a patient, or a scan, from archives, results and store, and proving it."""
+"""Erase a patient or a scan from archives, results and store, and search for remains."""
 
 import shutil
 from collections.abc import Callable, Collection
@@ -24,12 +24,12 @@ from schemas.base.json_files import parse_json
 from schemas.base.model import canonical_json
 
 CHECK_EVERY = 50
-"""Files that are erased between two looks for runs that have begun meanwhile."""
+"""Number of files that are erased between two checks for new runs; chosen by hand."""
 
 
 @dataclass
 class Erasure:
-    """What is to be erased, or was."""
+    """The data to be erased, or that were erased."""
 
     subject: Subject
     job: Job
@@ -40,7 +40,7 @@ class Erasure:
     nights: list[Nights]
     was_cut_off: bool
     remains: list[str] = field(default_factory=list)
-    """Where something was found after all."""
+    """Places where data of the subject were found after the erasure."""
 
     @property
     def store(self) -> Store:
@@ -49,32 +49,32 @@ class Erasure:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing of the subject is known."""
-        named = self.belongings.folders or self.belongings.scans or self.shares.scans or self.texts or self.nights
-        return not (named or self.was_cut_off)
+        """True if no data of the subject were erasure."""
+        has_any = self.belongings.folders or self.belongings.scans or self.shares.scans or self.texts or self.nights
+        return not (has_any or self.was_cut_off)
 
     @property
     def scans(self) -> list[str]:
-        """The scans that were found."""
+        """Names of the scans that were erasure."""
         return sorted(self.belongings.scans | self.shares.scans)
 
 
 def find_erasure(
     subject: Subject, job: Job, suites: Collection[Regression] = (), logs: Collection[Path] = ()
 ) -> Erasure:
-    """All that would be erased; nothing is changed.
+    """Find all data that would be erased; nothing is changed.
 
     Parameters
     ----------
     suites : collection of Regression
-        Suites that may run scans of the subject.
+        Regression suites that may run scans of the subject.
     logs : collection of Path
-        Logs that lie neither beside the results nor beside the store.
+        Log files in other folders than those of results and store.
 
     Raises
     ------
     RefusedInput
-        A folder of this name is a link, or a log is not there.
+        A folder of the subject is a link, or a log is missing.
     """
     workspace = workspace_of(job)
     store = workspace.store
@@ -85,72 +85,74 @@ def find_erasure(
     was_cut_off = store.files.state(note_name(subject.name)) is not None
     if was_cut_off:
         name = note_name(subject.name)
-        known = parse_json(store.files.path(name), store.files.read(name).decode())
-        belongings.digests |= set(known["digests"])
-        belongings.sizes |= set(known["sizes"])
+        note = parse_json(store.files.path(name), store.files.read(name).decode())
+        belongings.digests |= set(note["digests"])
+        belongings.sizes |= set(note["sizes"])
     texts = texts_that_name(subject, [job.results, *([workspace.local] if workspace.local.is_dir() else [])], logs)
     nights = find_nights(subject, suites, belongings.folders)
     return Erasure(subject, job, workspace, belongings, shares, texts, nights, was_cut_off)
 
 
-def erase(found: Erasure) -> list[Lease]:
-    """Erase it, and look for what remains; returns the runs under way, which stop it.
+def erase(erasure: Erasure) -> list[Lease]:
+    """Erase the data and search for remains. Stops if runs are under way, and returns their leases.
 
-    A note in the store says that it has begun, and is removed last. Whatever cuts it off, the same again finishes it.
+    A note in the store marks the erasure as begun and is removed last. After an interruption a
+    repetition finishes the erasure.
 
     Raises
     ------
     Fault
-        A file cannot be removed; all that comes before is erased.
+        A file cannot be removed; the files before it are erased.
     """
-    if live := live_leases(found.store):
+    if live := live_leases(erasure.store):
         return live
-    with lease(found.store) as own:
-        folders = found.belongings.folders
-        known = {"digests": sorted(found.belongings.digests), "sizes": sorted(found.belongings.sizes)}
-        found.store.files.write(note_name(found.subject.name), canonical_json(known).encode())
+    with lease(erasure.store) as own_lease:
+        folders = erasure.belongings.folders
+        note = {"digests": sorted(erasure.belongings.digests), "sizes": sorted(erasure.belongings.sizes)}
+        erasure.store.files.write(note_name(erasure.subject.name), canonical_json(note).encode())
         for place in folders:
             _remove(place)
-        _remove_empty_parents(found)
-        rewrite_tables(found.subject, found.job.archives, found.job.results)
-        for text in found.texts:
+        _remove_empty_parents(erasure)
+        rewrite_tables(erasure.subject, erasure.job.archives, erasure.job.results)
+        for text in erasure.texts:
             if text.exists():
-                erase_from_text(found.subject, text)
-        for nights in found.nights:
+                erase_from_text(erasure.subject, text)
+        for nights in erasure.nights:
             erase_nights(nights)
-        if live := _erase_from_store(found, own):
+        if live := _erase_from_store(erasure, own_lease):
             return live
-        _clear_folders(found, "pins")
-        found.remains = _remains(found)
-        if not found.remains:
-            found.store.files.remove(note_name(found.subject.name))
-            _clear_folders(found, FOLDER)
+        _clear_folders(erasure, "pins")
+        erasure.remains = _remains(erasure)
+        if not erasure.remains:
+            erasure.store.files.remove(note_name(erasure.subject.name))
+            _clear_folders(erasure, FOLDER)
     return []
 
 
-def _erase_from_store(found: Erasure, own: str) -> list[Lease]:
-    for number, name in enumerate(found.shares.names):
-        if number % CHECK_EVERY == 0 and (live := [one for one in live_leases(found.store) if one.name != own]):
+def _erase_from_store(erasure: Erasure, own_lease: str) -> list[Lease]:
+    for number, name in enumerate(erasure.shares.names):
+        if number % CHECK_EVERY == 0 and (live := [run for run in live_leases(erasure.store) if run.name != own_lease]):
             return live
-        found.store.files.remove(name)
-    if found.store.verified is not None:
-        found.store.verified.keep_only(found.shares.kept_keys)
-    roots = [place.absolute() for place in found.belongings.folders]
-    found.workspace.digests.forget(
+        erasure.store.files.remove(name)
+    if erasure.store.verified is not None:
+        erasure.store.verified.keep_only(erasure.shares.kept_keys)
+    roots = [place.absolute() for place in erasure.belongings.folders]
+    erasure.workspace.digests.forget(
         lambda path, digest: (
             any(Path(path).is_relative_to(root) for root in roots)
-            or digest in found.belongings.digests
-            or found.subject.pattern.search(path.encode()) is not None
+            or digest in erasure.belongings.digests
+            or erasure.subject.pattern.search(path.encode()) is not None
         )
     )
     return []
 
 
-def _remains(found: Erasure) -> list[str]:
-    folders = [*found.job.archives, found.job.results, *(one.regression.out for one in found.nights)]
-    digests = found.belongings.digests | found.shares.digests
-    places = find_remains(found.subject, digests, folders, found.store, found.belongings.sizes, found.shares.digests)
-    suites = [f"{one.regression.path}: sets {', '.join(one.sets)}" for one in found.nights]
+def _remains(erasure: Erasure) -> list[str]:
+    belongings, erased = erasure.belongings, erasure.shares.digests
+    folders = [*erasure.job.archives, erasure.job.results, *(nights.regression.out for nights in erasure.nights)]
+    digests = belongings.digests | erased
+    places = find_remains(erasure.subject, digests, folders, erasure.store, belongings.sizes, erased)
+    suites = [f"{nights.regression.path}: sets {', '.join(nights.sets)}" for nights in erasure.nights]
     return [*(place for place in places if f"/{FOLDER}/" not in place), *suites]
 
 
@@ -171,15 +173,15 @@ def _remove(place: Path) -> None:
         raise Fault(problems[0])
 
 
-def _remove_empty_parents(found: Erasure) -> None:
-    for root in (*found.job.archives, found.job.results):
-        with suppress(OSError):  # other scans are there
-            (root / found.subject.patient).rmdir()
+def _remove_empty_parents(erasure: Erasure) -> None:
+    for root in (*erasure.job.archives, erasure.job.results):
+        with suppress(OSError):  # not empty: other scans are in it
+            (root / erasure.subject.patient).rmdir()
 
 
-def _clear_folders(found: Erasure, kind: str) -> None:
-    """Empty folders in the store that bear the name, of pins or of notes."""
-    if isinstance(found.store.files, LocalFiles):
-        for folder in (f"{kind}/{found.subject.patient}", kind):
+def _clear_folders(erasure: Erasure, kind: str) -> None:
+    """Remove folders of pins or notes in the store that are empty, since their names hold the patient's."""
+    if isinstance(erasure.store.files, LocalFiles):
+        for folder in (f"{kind}/{erasure.subject.patient}", kind):
             with suppress(OSError):
-                Path(found.store.files.path(folder)).rmdir()
+                Path(erasure.store.files.path(folder)).rmdir()

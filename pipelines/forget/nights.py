@@ -1,4 +1,4 @@
-"""The nights of a regression over a patient's scans."""
+"""Regression nights over a patient's scans."""
 
 import json
 import shutil
@@ -15,40 +15,41 @@ from pipelines.regression.night import PAGE, Regression
 
 @dataclass(frozen=True)
 class Nights:
-    """What a suite knows of the subject."""
+    """The data of a subject in a regression suite."""
 
     regression: Regression
     sets: list[str]
-    """Recorded sets whose scan is the subject's."""
+    """Names of the recorded sets whose scan belongs to the subject."""
 
 
 def find_nights(subject: Subject, suites: Collection[Regression], folders: Collection[Path]) -> list[Nights]:
-    """The suites that run scans of the subject.
+    """Find the suites that run scans of the subject.
 
     Parameters
     ----------
     folders : collection of Path
         Folders that are to be erased.
     """
-    found = []
+    affected = []
     for regression in suites:
         base = regression.path.resolve().parent
-        scans = {name: base / one.scan for name, one in regression.suite.sets.items() if one.scan is not None}
-        names = [name for name, folder in scans.items() if _is_theirs(subject, folder, folders)]
+        recorded_sets = regression.suite.sets.items()
+        scans = {name: base / recorded.scan for name, recorded in recorded_sets if recorded.scan is not None}
+        names = [name for name, folder in scans.items() if _belongs_to(subject, folder, folders)]
         if names:
-            found.append(Nights(regression, names))
-    return found
+            affected.append(Nights(regression, names))
+    return affected
 
 
 def erase_nights(nights: Nights) -> None:
-    """Erase what the nights, the history and the baseline of a suite hold of the subject's sets.
+    """Erase the subject's sets from the nights, the history and the baseline of a suite.
 
-    The store of the nights goes as a whole: the next night computes all sets anew. The page is drawn by that night.
+    The store and the page of the nights are removed as a whole: the next night makes them anew.
 
     Raises
     ------
     Fault
-        A night is under way, or the disk refuses.
+        A night is under way, or a file cannot be written.
     """
     out = nights.regression.out
     if out.is_dir():
@@ -61,13 +62,13 @@ def erase_nights(nights: Nights) -> None:
     forget_sets(nights.regression.baseline, out, set(nights.sets))
 
 
-def _is_theirs(subject: Subject, scan: Path, folders: Collection[Path]) -> bool:
-    resolved = scan.resolve()
-    return subject.has("/".join(resolved.parts[-2:])) or any(resolved.is_relative_to(one.resolve()) for one in folders)
+def _belongs_to(subject: Subject, scan: Path, folders: Collection[Path]) -> bool:
+    place = scan.resolve()
+    return subject.has("/".join(place.parts[-2:])) or any(place.is_relative_to(folder.resolve()) for folder in folders)
 
 
 def _erase_from_history(file: Path, sets: set[str]) -> None:
-    """Each line without these sets; a line that cannot be read may hold anything, and goes."""
+    """Remove these sets from each line; a line that cannot be read may hold them and is removed."""
     if not file.exists():
         return
     kept = []

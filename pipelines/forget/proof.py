@@ -1,4 +1,4 @@
-"""Whether anything is left: a search for the name and the digests."""
+"""The search for remains after an erasure, by name and digest."""
 
 import os
 from collections.abc import Collection, Iterator
@@ -9,9 +9,9 @@ from pipelines.engine.store.store import Store
 from pipelines.forget.subject import CHUNK, Subject, digest_of, files_below
 
 OF_A_SCAN = (SCAN_FILE, "measures.json")
-"""A folder that holds one of these is a scan's, or that of its results."""
+"""A folder with one of these files is that of a scan or of its results."""
 LARGE_BYTES = 32_000_000
-"""A film or a mesh of more is not searched for a name; that it is a copy is seen by its digest."""
+"""Largest file that is searched for a name: a bound of time, chosen by hand. Copies of larger ones show by digest."""
 
 
 def find_remains(
@@ -22,22 +22,25 @@ def find_remains(
     sizes: Collection[int],
     erased: Collection[str],
 ) -> list[str]:
-    """Places in folders and store whose name or content bears the subject's name, or that are copies of theirs.
+    """Find files in folders and store with the subject's name in name or content, and copies of erased files.
 
     Parameters
     ----------
-    digests : of what was erased in archives and results.
-    sizes : of the files that were erased: others cannot be copies of them.
-    erased : digests and keys of what was erased in the store.
+    digests : collection of str
+        Digests of the files erased in archives and results.
+    sizes : collection of int
+        Sizes of these files, bytes: a file of another size cannot be a copy.
+    erased : collection of str
+        Digests and keys erased in the store.
     """
-    found = [str(file) for folder in folders for file in _remains(subject, digests, folder, sizes)]
+    remains = [str(file) for folder in folders for file in _remains(subject, digests, folder, sizes)]
     for name, _ in store.files.sizes(""):
         if name.startswith("runs/"):
             continue
         data = name.encode() + b"\0" + store.files.read(name)
         if subject.pattern.search(data) or name.rpartition("/")[2].removesuffix(".json") in erased:
-            found.append(store.files.path(name))
-    return sorted(set(found))
+            remains.append(store.files.path(name))
+    return sorted(set(remains))
 
 
 def _remains(subject: Subject, digests: Collection[str], folder: Path, sizes: Collection[int]) -> Iterator[Path]:
@@ -48,13 +51,14 @@ def _remains(subject: Subject, digests: Collection[str], folder: Path, sizes: Co
         if file.is_symlink() or not file.is_file() or CHUNK(file.name):
             continue
         size = file.stat().st_size
-        is_shared = file.name in digests or _is_anothers(file, folder)  # a blob is judged in the store, as one of it
+        # A blob in one of the folders is judged as a file of the store.
+        is_shared = file.name in digests or _belongs_to_a_scan(file, folder)
         is_copy = size in sizes and not is_shared and digest_of(file) in digests
         if is_copy or (size <= LARGE_BYTES and subject.pattern.search(file.read_bytes())):
             yield file
 
 
-def _is_anothers(file: Path, root: Path) -> bool:
-    """Whether a file is another scan's own, or of its results: equal films and results belong to both."""
+def _belongs_to_a_scan(file: Path, root: Path) -> bool:
+    """Return True if a file belongs to another scan or its results: two scans may have equal films and results."""
     folders = [folder for folder in file.parents if folder.is_relative_to(root)]
     return any((folder / name).is_file() for folder in folders for name in OF_A_SCAN)

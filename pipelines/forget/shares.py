@@ -1,4 +1,4 @@
-"""What of a store is a subject's alone, and what others need as well."""
+"""The files of a store that only a subject needs, apart from those that others need as well."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -17,18 +17,18 @@ class Shares:
     """Files of a store that are to be erased, and the digests that they bear."""
 
     names: list[str] = field(default_factory=list)
-    """What names the subject comes last, so that an erasure that was cut off is gone on with."""
+    """Names of the files. Those that name the subject come last, so that an interrupted erasure can be continued."""
     digests: set[str] = field(default_factory=set)
     kept_keys: set[str] = field(default_factory=set)
     scans: set[str] = field(default_factory=set)
 
 
 def find_shares(subject: Subject, store: Store, delivered: Iterable[str]) -> Shares:
-    """What nobody else is known to need.
+    """Find the rows and blobs that nobody else is known to need.
 
-    A row is another's if another scan's last actions, a pin or a result of theirs came from it, or if all films that it
-    came from are those of others. All else goes: rows do not bear names, and the films of a former recording may be
-    known to nothing but the rows that they left. A blob goes with the last row that names it.
+    A row belongs to others if their last actions, pins or results came from it, or if all films that it came from
+    belong to others. All other rows are erased: rows do not hold names, and only rows may know the films of an earlier
+    recording. A blob is erased with the last row that names it.
 
     Parameters
     ----------
@@ -38,12 +38,12 @@ def find_shares(subject: Subject, store: Store, delivered: Iterable[str]) -> Sha
     Raises
     ------
     DamagedError
-        A pin is damaged: what it keeps is not known.
+        A pin is damaged, so the actions that it keeps are unknown.
     """
     actions = read_actions(store)
-    mine = [one for one in actions.latest if subject.has(one.step.rpartition("/")[0])]
+    own_actions = [latest for latest in actions.latest if subject.has(latest.step.rpartition("/")[0])]
     pins = read_pins(store)
-    roots = {one.key for one in actions.latest if one not in mine}
+    roots = {latest.key for latest in actions.latest if latest not in own_actions}
     roots |= {key for scan, keys in pins.items() if not subject.has(scan) for key in keys.values()}
     rows, _ = reached(actions, roots, set(delivered), store)
     films = {digest for key in rows for digest in _digests(actions, key, "file")}
@@ -59,40 +59,41 @@ def find_shares(subject: Subject, store: Store, delivered: Iterable[str]) -> Sha
         if (code := code_of(image, store)) is not None:
             blobs |= {str(image.get("code")), *code.modules.values()}
     kept = {row_name(key) for key in rows} | {blob_name(digest) for digest in blobs if len(digest) == 64}
-    found = Shares(kept_keys=rows)
+    shares = Shares(kept_keys=rows)
     for name, _ in store.files.sizes(""):
         digest = row_key(name) or blob_digest(name)
         if digest is not None and name not in kept:
-            found.names.append(name)
-            found.digests.add(digest)
+            shares.names.append(name)
+            shares.digests.add(digest)
         elif name.rpartition("/")[2].startswith(".") and name.endswith(".partial"):
-            found.names.append(name)
-    found.scans = {one.step.rpartition("/")[0] for one in mine} | {scan for scan in pins if subject.has(scan)}
-    found.names.sort(key=lambda name: (row_key(name) is None, name))
-    found.names += [f"{PINS}/{scan}.json" for scan in sorted(pins) if subject.has(scan)]
-    found.names += [latest_name(one.step) for one in mine]
-    return found
+            shares.names.append(name)
+    own_pins = {scan for scan in pins if subject.has(scan)}
+    shares.scans = {latest.step.rpartition("/")[0] for latest in own_actions} | own_pins
+    shares.names.sort(key=lambda name: (row_key(name) is None, name))
+    shares.names += [f"{PINS}/{scan}.json" for scan in sorted(own_pins)]
+    shares.names += [latest_name(latest.step) for latest in own_actions]
+    return shares
 
 
 def _digests(actions: Actions, key: str, source: str) -> list[str]:
     return [digest for kind, digest in inputs_of(actions.rows[key].image).values() if kind == source]
 
 
-def _origins(key: str, actions: Actions, known: dict[str, set[str] | None], above: set[str]) -> set[str] | None:
-    """Digests of the files that an action came from; None where one of its inputs is of unknown origin."""
-    if key not in known:
-        found: set[str] | None = set(_digests(actions, key, "file"))
+def _origins(key: str, actions: Actions, cache: dict[str, set[str] | None], above: set[str]) -> set[str] | None:
+    """Digests of the files that an action came from; None if the origin of one of its inputs is unknown."""
+    if key not in cache:
+        files: set[str] | None = set(_digests(actions, key, "file"))
         for digest in _digests(actions, key, "result"):
             makers = [maker for maker in actions.makers.get(digest, []) if maker not in above]
-            befores = [_origins(maker, actions, known, above | {key}) for maker in makers]
-            sure = [before for before in befores if before is not None]
-            found = None if found is None or not sure else found.union(*sure)
-        known[key] = found
-    return known[key]
+            origins_of_makers = [_origins(maker, actions, cache, above | {key}) for maker in makers]
+            known_origins = [origins for origins in origins_of_makers if origins is not None]
+            files = None if files is None or not known_origins else files.union(*known_origins)
+        cache[key] = files
+    return cache[key]
 
 
 def _names(subject: Subject, actions: Actions, key: str, store: Store) -> bool:
-    """Whether an action took a value that names the subject, or failed with words that do."""
+    """Return True if the subject's name is in a value that an action took, or in the text of its failure."""
     problem = (actions.rows[key].failure or ("", ""))[1].encode()
     values = [store.get(digest) or b"" for digest in _digests(actions, key, "value")]
     return any(_is_named(subject, text) for text in (problem, *values))

@@ -1,4 +1,4 @@
-"""Who is to be forgotten, and what is theirs in the archive and in the results."""
+"""The subject of an erasure, and the search for their files in archives and results."""
 
 import hashlib
 import os
@@ -13,17 +13,18 @@ from schemas.base.model import pseudonym
 from schemas.frames import GROUP
 
 CHUNK = re.compile(r"\d+\.0\.0\.0").fullmatch
+"""Matches the file name of a chunk of a Zarr array of frames."""
 
 
 @dataclass(frozen=True)
 class Subject:
-    """A patient, or one scan of theirs."""
+    """A patient, or one scan of a patient."""
 
     patient: str
     scan: str | None = None
 
     def __post_init__(self) -> None:
-        """Refuses names that could not be folders, such as `..`."""
+        """Refuse names that cannot be folders, such as `..`."""
         pseudonym(self.patient, "PATIENT")
         if self.scan is not None:
             pseudonym(self.scan, "--scan")
@@ -34,12 +35,12 @@ class Subject:
         return self.patient if self.scan is None else f"{self.patient}/{self.scan}"
 
     def has(self, scan: str) -> bool:
-        """Whether a scan (`patient/scan`) is meant."""
+        """Return True if a scan (`patient/scan`) belongs to the subject."""
         return scan == self.name or (self.scan is None and scan.startswith(f"{self.patient}/"))
 
     @property
     def pattern(self) -> re.Pattern[bytes]:
-        """Finds the name in a file, in a path or in a JSON document; P0001 is not found in P00012."""
+        """Pattern of the name in a file, a path or a JSON document; P0001 does not match P00012."""
         if self.scan is None:
             return re.compile(rb"(?<![\w-])" + re.escape(self.patient.encode()) + rb"(?![\w-])", re.ASCII)
         patient, scan = (re.escape(part.encode()) for part in (self.patient, self.scan))
@@ -49,62 +50,64 @@ class Subject:
 
 @dataclass
 class Belongings:
-    """What is to be erased of the archives and the results."""
+    """The subject's files in archives and results."""
 
     scans: set[str] = field(default_factory=set)
-    """`patient/scan` of each scan that was found."""
+    """`patient/scan` of each scan that was belongings."""
     folders: list[Path] = field(default_factory=list)
-    """Folders, and films that lie outside of them."""
+    """Folders, and films outside these folders."""
     digests: set[str] = field(default_factory=set)
-    """Of the films and all other files in them, by which copies are found."""
+    """Digests of all files in them, which reveal copies."""
     sizes: set[int] = field(default_factory=set)
-    """Of these files, in bytes: no other can be a copy."""
+    """Sizes of these files, bytes: a file of another size cannot be a copy."""
     out_of_reach: list[str] = field(default_factory=list)
+    """Messages about links, whose targets are not erased."""
 
 
 def find_belongings(subject: Subject, archives: tuple[Path, ...], results: Path) -> Belongings:
-    """The folders of a patient, or of a scan, in archives and results, and the films that only their scans name.
+    """Find the folders of a subject in archives and results, and the films that only the subject's scans name.
 
     Raises
     ------
     RefusedInput
-        A folder that bears the name is a link, and leads elsewhere.
+        A folder of the subject is a link.
     """
-    found = Belongings()
-    others: set[Path] = set()
-    named: set[Path] = set()
+    belongings = Belongings()
+    places_of_others: set[Path] = set()
+    own_places: set[Path] = set()
     for archive in archives:
         for folder in scan_folders(archive):
             try:
                 scan = read_scan(folder, archive)
             except FootscanError:
                 if subject.has("/".join(folder.parts[-2:])):
-                    _add(folder, archive, found)
+                    _add(folder, archive, belongings)
                 continue
-            of_cameras = [(scan.film(one), scan.background(one), scan.positions(one)) for one in scan.document.cameras]
-            files = {file for files in of_cameras for file in files if file} | {scan.truth or scan.file}
+            files = {scan.truth or scan.file}
+            for camera in scan.document.cameras:
+                files |= {file for file in (scan.film(camera), scan.background(camera), scan.positions(camera)) if file}
             if subject.has(scan.name):
-                found.scans.add(scan.name)
-                _add(folder, archive, found)
-                named |= files
+                belongings.scans.add(scan.name)
+                _add(folder, archive, belongings)
+                own_places |= files
             else:
-                others |= files
-                others.add(folder.resolve())
-        _add(archive / subject.name, archive, found, others)
+                places_of_others |= files
+                places_of_others.add(folder.resolve())
+        _add(archive / subject.name, archive, belongings, places_of_others)
         parent = (archive / subject.name).parent
         for part in parent.glob(f".{subject.scan}.partial-*") if subject.scan else ():
-            _add(part, archive, found)
-    for film in sorted(named - others):
-        if film.exists() and not any(film.is_relative_to(folder.resolve()) for folder in found.folders):
-            found.folders.append(film)
-    _add(results / subject.name, results, found)
-    for folder in found.folders:
-        _look_into(folder, found)
-    return found
+            _add(part, archive, belongings)
+    for film in sorted(own_places - places_of_others):
+        if film.exists() and not any(film.is_relative_to(folder.resolve()) for folder in belongings.folders):
+            belongings.folders.append(film)
+    _add(results / subject.name, results, belongings)
+    for folder in belongings.folders:
+        _add_contents(folder, belongings)
+    return belongings
 
 
 def files_below(place: Path) -> Iterator[Path]:
-    """All files and links at or below a place; links are not followed."""
+    """Yield all files and links at or below a place; links are not followed."""
     if place.is_symlink() or not place.is_dir():
         yield place
         return
@@ -114,7 +117,7 @@ def files_below(place: Path) -> Iterator[Path]:
 
 
 def digest_of(file: Path) -> str | None:
-    """SHA-256 of a file; None where it cannot be read."""
+    """Return the SHA-256 of a file; None if it cannot be read."""
     try:
         with file.open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
@@ -122,22 +125,22 @@ def digest_of(file: Path) -> str | None:
         return None
 
 
-def _add(folder: Path, root: Path, found: Belongings, others: Collection[Path] = ()) -> None:
-    """Add a folder, unless it is there or holds what is another's."""
-    if not os.path.lexists(folder) or any(folder.is_relative_to(known) for known in found.folders):
+def _add(folder: Path, root: Path, belongings: Belongings, others: Collection[Path] = ()) -> None:
+    """Add a folder, unless it is missing, covered by an added one, or contains files of others."""
+    if not os.path.lexists(folder) or any(folder.is_relative_to(added) for added in belongings.folders):
         return
     if not folder.resolve().is_relative_to(root.resolve()) or folder.is_symlink():
-        raise RefusedInput(folder, "is a link, expected the folder itself: what it leads to is not touched")
+        raise RefusedInput(folder, "is a link, expected the folder itself; the target of a link is not erased")
     if any(other.is_relative_to(folder.resolve()) for other in others):
         return
-    found.folders[:] = [known for known in found.folders if not known.is_relative_to(folder)]
-    found.folders.append(folder)
+    belongings.folders[:] = [added for added in belongings.folders if not added.is_relative_to(folder)]
+    belongings.folders.append(folder)
 
 
-def _look_into(folder: Path, found: Belongings) -> None:
+def _add_contents(folder: Path, belongings: Belongings) -> None:
     for file in files_below(folder):
         if file.is_symlink():
-            found.out_of_reach.append(f"{file} is a link to {os.readlink(file)}: only the link is erased")  # noqa: PTH115
+            belongings.out_of_reach.append(f"{file} is a link to {os.readlink(file)}: only the link is erased")  # noqa: PTH115
         elif not (GROUP in file.parts and CHUNK(file.name)) and (digest := digest_of(file)) and file.stat().st_size:
-            found.digests.add(digest)
-            found.sizes.add(file.stat().st_size)
+            belongings.digests.add(digest)
+            belongings.sizes.add(file.stat().st_size)

@@ -13,8 +13,11 @@ from schemas.reference import ReferenceObject
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: the `reference` object, each camera's `stripe-N`, `recognised-N` and `fit-N`, the `digests` of the
-    files by name, and `about`: their names in order, that of the reference object's file, and the software."""
+    """Assemble the calibration of all cameras, as calibration.json.
+
+    `inputs`: the `reference` object, each camera's `stripe-N`, `recognised-N` and `fit-N`, the `digests` of the files
+    by name, and `about`: the names of the files in order, the name of the reference object's file, and the software.
+    """
     del parameters, places
     about, digests = json.loads(inputs["about"]), json.loads(inputs["digests"])
     arrays = {name: unpack(inputs[name]) for name in inputs if name.startswith(("stripe-", "recognised-", "fit-"))}

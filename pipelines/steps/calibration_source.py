@@ -10,7 +10,10 @@ from schemas.calibration import Source
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: the `calibration`, and the `name` of what it was made from."""
+    """Return name and digest of the calibration, as JSON.
+
+    `inputs`: the `calibration`, and the `name` of the capture that it was made from.
+    """
     del parameters, places
     source = Source(name=json.loads(inputs["name"]), sha256=hashlib.sha256(inputs["calibration"]).hexdigest())
     return canonical_json(source.model_dump(mode="json")).encode()

@@ -9,7 +9,10 @@ from schemas.calibration import Calibration
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: the `calibration`, and the numbers of the `cameras`."""
+    """Return the calibration with the maps of the `cameras` only, as JSON.
+
+    `inputs`: the `calibration`, and the numbers of the `cameras`.
+    """
     del parameters, places
     calibration, kept = Calibration.model_validate_json(inputs["calibration"]), json.loads(inputs["cameras"])
     maps = [camera for camera in calibration.cameras if camera.camera in kept]

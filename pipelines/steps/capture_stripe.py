@@ -1,4 +1,4 @@
-"""Film of the reference object to the stripe of one camera, frame by frame."""
+"""The film of the reference object to the stripe of one camera, frame by frame."""
 
 import hashlib
 import json
@@ -21,9 +21,17 @@ def run(inputs: Mapping[str, bytes], parameters: ExtractionParameters, places: M
 
     Parameters
     ----------
-    inputs : the `film`; empty, or the digests of all files by name where another step filmed them, and the `file`
+    inputs : mapping
+        The `film`: empty, or the digests of all files by name if another step filmed them. Then `file`, the name of
+        the film, makes the keys of the cameras differ.
     parameters : ExtractionParameters
-    places : the `film`, and the `capture` document
+    places : mapping
+        The `film`, and the `capture` document.
+
+    Raises
+    ------
+    DamagedError
+        The film or the document is not the one that was filmed.
     """
     if inputs["film"]:
         _check_filmed(places["film"], json.loads(inputs["film"]), places["capture"])
@@ -43,5 +51,5 @@ def run(inputs: Mapping[str, bytes], parameters: ExtractionParameters, places: M
 def _check_filmed(film: Path, digests: Mapping[str, str], capture: Path) -> None:
     for file in (film, capture):
         if not file.is_file() or hashlib.sha256(file.read_bytes()).hexdigest() != digests[file.name]:
-            capture.unlink(missing_ok=True)  # without it the capture is none, and is filmed anew
+            capture.unlink(missing_ok=True)  # the next run then films the capture again
             raise DamagedError(f"{file}: is not what was filmed; run again to film it anew")

@@ -15,7 +15,16 @@ from schemas.parameters.outliers import OutlierParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `points-N` of each camera and the `calibration` of all."""
+    """Remove the outliers from the points of all cameras.
+
+    `inputs`: `points-N` of each camera and the `calibration` of all. The result holds the kept `points`, the `codes` of
+    all points, and the counts of `removed` points by camera and reason.
+
+    Raises
+    ------
+    Finding
+        No camera has a point, or all points are outliers.
+    """
     del places
     views = views_of(Calibration.model_validate_json(inputs["calibration"]).cameras)
     cameras = sorted((name for name in inputs if name.startswith("points-")), key=lambda name: int(name[7:]))

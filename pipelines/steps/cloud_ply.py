@@ -12,7 +12,10 @@ from pipelines.arrays import unpack
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `oriented`."""
+    """Write the cleaned cloud with its normals as PLY.
+
+    `inputs`: `oriented`.
+    """
     del parameters, places
     oriented = unpack(inputs["oriented"])
     cloud = oriented["cloud"]

@@ -13,9 +13,10 @@ from schemas.frames import FrameManifest
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `stripe`, and the manifest of the camera's `background`; `places`: the array of the `background`.
+    """Look up the colour of each stripe point in the laser-off frames.
 
-    A background of one frame shows surroundings that travel along, and no skin: no point has a colour then.
+    `inputs`: `stripe`, and the manifest of the camera's `background`; `places`: the array of the `background`.
+    A background of one frame shows surroundings that move with the camera, not the skin: then no point has a colour.
     """
     del parameters
     stripe = unpack(inputs["stripe"])["stripe"]
@@ -28,6 +29,6 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     try:
         colours, seen = point_colours(stripe, laser_off)
     except DamagedError:
-        discard(places["background"])  # the next run ingests it anew
+        discard(places["background"])  # the next run ingests it again
         raise
     return pack(colours=colours, seen=seen)

@@ -17,8 +17,11 @@ from schemas.parameters.extraction import ExtractionParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: ExtractionParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `manifest` and, where the camera has one, that of its `background`; `places`: the `array` of the
-    frames, and the one of the `background`."""
+    """Extract the stripe points of all frames.
+
+    `inputs`: `manifest`, and that of the `background` if the camera has one; `places`: the `array` of the frames, and
+    that of the `background`. The result holds the `stripe` and the numbers of the `lost` frames.
+    """
     manifest = FrameManifest.model_validate_json(inputs["manifest"])
     lost: list[int] = []
     frames = _noting_lost(_frames(places["array"], manifest), lost)
@@ -52,4 +55,4 @@ def _backgrounds(array: Path, manifest: FrameManifest, count: int) -> Iterator[R
     backgrounds = _frames(array, manifest)
     if len(manifest.frames) == count:
         return backgrounds
-    return repeat(next(backgrounds), count)  # it stays as it is: no other is asked for
+    return repeat(next(backgrounds), count)  # the iterator is not used after its first frame

@@ -1,4 +1,4 @@
-"""The recognised edges of one camera and the poses of the object to the calibration of this camera."""
+"""The recognised edges and poses of the reference object to the calibration of one camera."""
 
 import json
 from collections.abc import Mapping
@@ -17,18 +17,21 @@ from schemas.reference import ReferenceObject
 
 
 def run(inputs: Mapping[str, bytes], parameters: CalibrationParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: the `reference` object, its `poses`, the `camera`, its `stripe`, and `recognised`; `places`: the
-    `capture` document. The result is empty if the camera does not recognise the object."""
+    """Fit the calibration of one camera.
+
+    `inputs`: the `reference` object, its `poses`, the `camera`, its `stripe`, and `recognised`; `places`: the `capture`
+    document. The result is empty if the camera does not recognise the object.
+    """
     camera = json.loads(inputs["camera"])["id"]
     _, recognised = seen_by(camera, unpack(inputs["stripe"]), unpack(inputs["recognised"]))
     if isinstance(recognised, str):
         return pack()
     edges = edges_of(ReferenceObject.model_validate_json(inputs["reference"]).profile_mm)
     poses = unpack(inputs["poses"])["poses"]
-    made = calibrate_view(recognised, edges, poses, parameters, str(places["capture"]))
+    fitted = calibrate_view(recognised, edges, poses, parameters, str(places["capture"]))
     document = {
-        "calibration": made.calibration.model_dump(mode="json"),
-        "trials": [asdict(trial) for trial in made.trials],
-        "corners": [asdict(corner) for corner in made.corners],
+        "calibration": fitted.calibration.model_dump(mode="json"),
+        "trials": [asdict(trial) for trial in fitted.trials],
+        "corners": [asdict(corner) for corner in fitted.corners],
     }
-    return pack(document=np.frombuffer(canonical_json(document).encode(), np.uint8), **points_arrays(made.points))
+    return pack(document=np.frombuffer(canonical_json(document).encode(), np.uint8), **points_arrays(fitted.points))

@@ -11,7 +11,10 @@ from schemas.parameters.foot import FootParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `surface`, the scan's `name` and, where cameras have laser-off frames, `texture`."""
+    """Write the mesh with all attributes of its vertices as PLY.
+
+    `inputs`: `surface`, the scan's `name` and, if cameras have laser-off frames, `texture`.
+    """
     del places
     surface, name = unpack(inputs["surface"]), json.loads(inputs["name"])
     mesh = Mesh(

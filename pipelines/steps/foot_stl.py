@@ -9,7 +9,10 @@ from schemas.parameters.foot import FootParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `surface`."""
+    """Write the mesh as binary STL.
+
+    `inputs`: `surface`.
+    """
     del places
     surface = unpack(inputs["surface"])
     return stl_bytes(surface["vertices"], surface["faces"], f"footscan unit=mm side={parameters.side}")

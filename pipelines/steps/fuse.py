@@ -11,7 +11,10 @@ from schemas.parameters.fusion import FusionParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: FusionParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `clean`."""
+    """Fuse the points of all cameras to one cloud.
+
+    `inputs`: `clean`. The result holds the `cloud` and the fusion `report`.
+    """
     del places
     fusion = fuse(unpack(inputs["clean"])["points"], parameters)
     return pack(cloud=fusion.cloud, report=np.frombuffer(fusion.report.model_dump_json().encode(), np.uint8))

@@ -17,7 +17,15 @@ from schemas.scan import Travel
 
 
 def run(inputs: Mapping[str, bytes], parameters: MappingParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `stripe`, `manifest`, the camera's `calibration`, and its `travel` or `positions`."""
+    """Map the stripe points of one camera to world points.
+
+    `inputs`: `stripe`, `manifest`, the camera's `calibration`, and its `travel` or `positions`.
+
+    Raises
+    ------
+    RefusedInput
+        A frame has no position.
+    """
     del places
     stripe = unpack(inputs["stripe"])["stripe"]
     camera = CameraCalibration.model_validate_json(inputs["calibration"])

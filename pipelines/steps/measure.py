@@ -14,13 +14,16 @@ from schemas.parameters.foot import FootParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `surface`."""
+    """Measure the foot, as measures.json.
+
+    `inputs`: `surface`. A foot that cannot be measured gives a document with the finding.
+    """
     del places
     surface = unpack(inputs["surface"])
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface["filled"])
     try:
         measures = measure_scanned_foot(mesh, parameters.side)
-    except Finding as finding:  # cloud and surface are worth having nevertheless
+    except Finding as finding:  # the other results are still of use
         unmoved = np.eye(4).tolist()
         measures = Measures(side=parameters.side, axis=None, transform=unmoved, measures={}, finding=str(finding))
     return (measures.model_dump_json(indent=2) + "\n").encode()

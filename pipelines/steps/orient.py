@@ -11,7 +11,10 @@ from schemas.parameters.normals import NormalParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: NormalParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `fused` and the `calibration` of all cameras."""
+    """Estimate the normals of the fused cloud.
+
+    `inputs`: `fused` and the `calibration` of all cameras.
+    """
     del places
     cloud = unpack(inputs["fused"])["cloud"]
     views = views_of(Calibration.model_validate_json(inputs["calibration"]).cameras)

@@ -9,7 +9,9 @@ from pipelines.arrays import unpack
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: the `poses`, each camera's `stripe-N` and `recognised-N`; `places`: the `capture` document.
+    """Return the `poses` unchanged, or refuse the capture if a camera sees the object from another side.
+
+    `inputs`: the `poses`, each camera's `stripe-N` and `recognised-N`; `places`: the `capture` document.
 
     Raises
     ------
@@ -17,6 +19,6 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
         A camera sees the object from another side.
     """
     del parameters
-    seen = camera_views_of({name: unpack(data) for name, data in inputs.items() if name != "poses"})
-    refuse_contradictions(seen.recognised, str(places["capture"]))
+    camera_views = camera_views_of({name: unpack(data) for name, data in inputs.items() if name != "poses"})
+    refuse_contradictions(camera_views.recognised, str(places["capture"]))
     return inputs["poses"]

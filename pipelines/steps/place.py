@@ -15,7 +15,9 @@ from schemas.reference import ReferenceObject
 
 
 def run(inputs: Mapping[str, bytes], parameters: PlacementParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: the `reference` object, each camera's `stripe-N` and `recognised-N`; `places`: the `capture` document.
+    """Find the poses of the reference object in the views of all cameras.
+
+    `inputs`: the `reference` object, each camera's `stripe-N` and `recognised-N`; `places`: the `capture` document.
 
     Raises
     ------
@@ -23,10 +25,10 @@ def run(inputs: Mapping[str, bytes], parameters: PlacementParameters, places: Ma
         The object was wrongly placed, or no camera recognises it.
     """
     reference = ReferenceObject.model_validate_json(inputs["reference"])
-    seen = camera_views_of({name: unpack(data) for name, data in inputs.items() if name != "reference"})
+    camera_views = camera_views_of({name: unpack(data) for name, data in inputs.items() if name != "reference"})
     edges, placements = edges_of(reference.profile_mm), np.array(reference.placements_mm, np.float64)
-    source = str(places["capture"])
-    check_placements(seen.views, seen.recognised, edges, placements, parameters.placement_tolerance_mm, source)
-    if not seen.recognised:
-        refuse_unrecognised(seen.views, seen.unrecognised, source)
-    return pack(poses=object_poses(seen.recognised, edges, placements))
+    source, tolerance_mm = str(places["capture"]), parameters.placement_tolerance_mm
+    check_placements(camera_views.views, camera_views.recognised, edges, placements, tolerance_mm, source)
+    if not camera_views.recognised:
+        refuse_unrecognised(camera_views.views, camera_views.unrecognised, source)
+    return pack(poses=object_poses(camera_views.recognised, edges, placements))

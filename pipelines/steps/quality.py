@@ -15,8 +15,11 @@ from schemas.quality import CameraQuality, Comparison, Quality
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `calibration` (its name and digest), `clean`, `fused`, `surface`, `manifest-N` and `stripe-N` of each
-    camera, `verified` where there is a truth."""
+    """Collect the quality figures of a scan, as quality.json.
+
+    `inputs`: `calibration` (its name and digest), `clean`, `fused`, `surface`, `manifest-N` and `stripe-N` of each
+    camera, and `verified` if the scan has a truth.
+    """
     del parameters, places
     removed = json.loads(unpack(inputs["clean"])["removed"].tobytes())
     fused = unpack(inputs["fused"])

@@ -14,7 +14,10 @@ from schemas.reference import ReferenceObject
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `stripe`, the `reference` object, and the `camera` with its number and the side it stands on."""
+    """Recognise the edges of the reference object in the stripe of one camera.
+
+    `inputs`: `stripe`, the `reference` object, and the `camera` with its number and the side it stands on.
+    """
     del parameters, places
     reference = ReferenceObject.model_validate_json(inputs["reference"])
     camera = json.loads(inputs["camera"])

@@ -1,4 +1,4 @@
-"""The page that a person opens."""
+"""The report of a scan: an HTML page."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,9 +25,12 @@ FRAMES_SHOWN = 12
 
 
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `calibration`, `clean`, `oriented`, `surface`, `measures`, `quality`, `about` and, where there is a
-    truth, `verified`; for each camera `manifest-N`, `stripe-N` and `points-N`; `places`: each camera's array of frames,
-    `array-N`."""
+    """Make the page of a scan, as HTML.
+
+    `inputs`: `calibration`, `clean`, `oriented`, `surface`, `measures`, `quality`, `about`, and `verified` if the scan
+    has a truth; for each camera `manifest-N`, `stripe-N` and `points-N`; `places`: each camera's array of frames,
+    `array-N`.
+    """
     surface = unpack(inputs["surface"])
     about = json.loads(inputs["about"])
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
@@ -55,12 +58,13 @@ def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping
 
 
 def _samples(ids: Sequence[int], inputs: Mapping[str, bytes], places: Mapping[str, Path]) -> list[FrameSample]:
-    """Frames from the first to the last that hold a stripe, as all cameras saw them; lost ones are left out."""
+    """Frames of all cameras, equally spaced from the first to the last frame with a stripe, without lost frames."""
     stripes = {camera: unpack(inputs[f"stripe-{camera}"])["stripe"] for camera in ids}
-    held = np.concatenate([stripe["frame"] for stripe in stripes.values()])
-    if not len(held):
+    stripe_frames = np.concatenate([stripe["frame"] for stripe in stripes.values()])
+    if not len(stripe_frames):
         return []
-    numbers = np.unique(np.rint(np.linspace(held.min(), held.max(), FRAMES_SHOWN)).astype(int)).tolist()
+    spaced = np.linspace(stripe_frames.min(), stripe_frames.max(), FRAMES_SHOWN)
+    numbers = np.unique(np.rint(spaced).astype(int)).tolist()
     return [
         sample for camera, stripe in stripes.items() for sample in _of_camera(camera, stripe, numbers, inputs, places)
     ]

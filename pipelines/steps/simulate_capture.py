@@ -11,11 +11,14 @@ from schemas.parameters.simulation import SimulationSettings
 from schemas.reference import ReferenceObject
 
 PLACEMENTS = 5
-"""Number of placements that are filmed, enough to fill the measured volume."""
+"""Number of placements that are filmed, enough to fill the measured volume. Chosen by hand."""
 
 
 def run(inputs: Mapping[str, bytes], parameters: SimulationSettings, places: Mapping[str, Path]) -> bytes:
-    """`places`: the `folder` of the capture."""
+    """Film the reference object, and return the digests of the files by name, as JSON.
+
+    `places`: the `folder` of the capture.
+    """
     del inputs
     folder = places["folder"]
     record_capture(folder, filmed_reference(), settings=parameters)
@@ -25,6 +28,6 @@ def run(inputs: Mapping[str, bytes], parameters: SimulationSettings, places: Map
 
 
 def filmed_reference() -> ReferenceObject:
-    """The reference object in the placements that are filmed."""
+    """Return the standard reference object with the first `PLACEMENTS` placements."""
     reference = standard_reference()
     return reference.model_copy(update={"placements_mm": reference.placements_mm[:PLACEMENTS]})

@@ -14,7 +14,10 @@ from schemas.parameters.demo import FilmedFoot
 
 
 def run(inputs: Mapping[str, bytes], parameters: FilmedFoot, places: Mapping[str, Path]) -> bytes:
-    """`places`: the `folder` of the scan."""
+    """Film the parametric foot, and return its true measures, as JSON.
+
+    `places`: the `folder` of the scan.
+    """
     del inputs
     foot = make_foot(side=parameters.side)
     record_scan(

@@ -1,4 +1,4 @@
-"""Cloud with normals to a triangle mesh."""
+"""The cloud with its normals to a triangle mesh."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,7 +11,10 @@ from schemas.parameters.surface import SurfaceParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: SurfaceParameters, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `oriented`."""
+    """Reconstruct the surface of the cloud.
+
+    `inputs`: `oriented`. The result holds `vertices` and `faces`, and the optional attributes of the mesh.
+    """
     del places
     oriented = unpack(inputs["oriented"])
     mesh = surface_of_cloud(oriented["cloud"], oriented["normals"], parameters)

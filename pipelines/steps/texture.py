@@ -1,4 +1,4 @@
-"""Colours of the surface's vertices, from those of the cameras that have laser-off frames."""
+"""Colours of the surface's vertices, from the cameras that have laser-off frames."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,9 +12,10 @@ from schemas.calibration import Calibration
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `surface`, the `calibration` of all cameras, `points-N` and `colours-N` of each that has colours.
+    """Colour the vertices of the surface.
 
-    The result has no `colours` if no point has a colour.
+    `inputs`: `surface`, the `calibration` of all cameras, `points-N` and `colours-N` of each that has colours. The
+    result has no `colours` if no point has a colour.
     """
     del parameters, places
     surface = unpack(inputs["surface"])

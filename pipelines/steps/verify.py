@@ -1,4 +1,4 @@
-"""Distances of the surface to the scan's reference model; the flat cut of the leg is no skin and left out."""
+"""Distances of the surface to the scan's reference model, without the flat cut of the leg, which is not skin."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,7 +13,11 @@ from pipelines.arrays import pack, unpack
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """`inputs`: `surface`, `truth`; `places`: the `truth` model."""
+    """Compare the surface with the true model of the foot.
+
+    `inputs`: `surface`, `truth`; `places`: the `truth` model. The result holds the `comparison` and the
+    signed `vertex_distance` of each vertex, mm.
+    """
     del parameters
     surface = unpack(inputs["surface"])
     truth = read_mesh(places["truth"])

@@ -1,4 +1,4 @@
-"""The small archive as something to plan and run."""
+"""Fixtures with a small archive that can be planned and run."""
 
 import shutil
 from pathlib import Path
@@ -14,7 +14,7 @@ from schemas.parameters.simulation import SimulationSettings
 
 
 class Archive:
-    """An archive with its workflow, and what can be done with it."""
+    """An archive with its workflow."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -26,14 +26,14 @@ class Archive:
         return job_of_workflow(self.workflow)
 
     def plan(self) -> tuple[int, dict[str, str]]:
-        """Number of steps; reason of each that is to run, by its name within the scan."""
+        """Number of steps, and the reason of each step to run by its name within the scan."""
         planned = plan_job(self.job(), reasons=True)
         assert planned.refused == []
         reasons = {w.name.removeprefix("P0001/S1/"): w.reason for w in planned.waiting}
         return planned.steps, reasons
 
     def run(self) -> tuple[list[ScanEnd], set[str]]:
-        """What became of the scans; names of the steps that ran."""
+        """The ends of the scans, and the names of the steps that ran."""
         ends: list[StepEnd] = []
         scans = list(run_job(plan_job(self.job()), Threads(2), ends.append))
         return scans, {end.step.name.removeprefix("P0001/S1/") for end in ends if end.ran}
@@ -54,13 +54,13 @@ def finished(pristine: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def archive(pristine: Path, tmp_path: Path) -> Archive:
-    """Films of which nothing has been made yet."""
+    """An archive that was not run yet."""
     return Archive(Path(shutil.copytree(pristine, tmp_path / "fresh")))
 
 
 @pytest.fixture
 def done(finished: Path, tmp_path: Path) -> Archive:
-    """The same after a run; moved, for nothing depends on where it lies."""
+    """The same archive after a run, at another place: results do not depend on the place."""
     return Archive(Path(shutil.copytree(finished, tmp_path / "done")))
 
 
@@ -79,5 +79,5 @@ def filmed_capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def capture(filmed_capture: Path, tmp_path: Path) -> Path:
-    """A copy of it to change."""
+    """A copy of `filmed_capture` that a test may change."""
     return Path(shutil.copytree(filmed_capture, tmp_path / "capture"))

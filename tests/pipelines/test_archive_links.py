@@ -1,4 +1,4 @@
-"""Links in an archive: what leads out of it is refused, and nothing behind one is touched."""
+"""Links in an archive: a link that leads out of it is refused, and its target is not changed."""
 
 import shutil
 from collections.abc import Callable
@@ -68,11 +68,11 @@ def test_a_link_among_the_frames_that_leads_out_is_refused(
     link(archive, elsewhere)
     before = content(elsewhere)
     status = run_command([command, str(archive.workflow if command == "run" else archive.scan)])
-    said = capsys.readouterr().err
+    messages = capsys.readouterr().err
     assert status in {1, 2}
-    assert LEAVES in said
-    assert str(archive.scan / "scan.yaml") in said
-    assert "frames" in said
+    assert LEAVES in messages
+    assert str(archive.scan / "scan.yaml") in messages
+    assert "frames" in messages
     assert content(elsewhere) == before
     assert not (elsewhere / "not there yet").exists()
 

@@ -1,4 +1,4 @@
-"""Backgrounds: what the laser-off frames of a camera change, and what they leave alone."""
+"""Backgrounds: the effects of a camera's laser-off frames."""
 
 import json
 import shutil
@@ -67,7 +67,7 @@ def write_background(path: Path, images: list[Image]) -> None:
 
 
 @pytest.fixture
-def five(archive: Any) -> Callable[[list[Image]], Path]:
+def film_camera_5(archive: Any) -> Callable[[list[Image]], Path]:
     """Films camera 5's bar anew, before these surroundings; the film."""
 
     def film(behind: list[Image]) -> Path:
@@ -93,11 +93,11 @@ def stripe(film: Path, background: Path | None, folder: Path) -> NDArray[Any]:
 
 @pytest.mark.parametrize("name", ["off.avi", "off", "off.png", "one.avi", "one"])
 def test_what_is_there_without_the_laser_is_no_stripe(
-    five: Callable[[list[Image]], Path], tmp_path: Path, name: str
+    film_camera_5: Callable[[list[Image]], Path], tmp_path: Path, name: str
 ) -> None:
     one_for_each = name in {"off.avi", "off"}
     behind = [surroundings(40 + 4 * frame * one_for_each) for frame in range(FRAMES)]
-    film = five(behind)
+    film = film_camera_5(behind)
     write_background(tmp_path / name, behind if one_for_each else behind[:1])
     without = stripe(film, None, tmp_path)
     points = stripe(film, tmp_path / name, tmp_path)
@@ -110,7 +110,7 @@ def test_what_is_there_without_the_laser_is_no_stripe(
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_each_frame_meets_its_background(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int) -> None:
-    """Whatever is done with one of them before the next is asked for."""
+    """A frame may be changed before the next one is requested."""
     met: list[tuple[int, int]] = []
 
     def meet(
@@ -187,22 +187,22 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("name", "how", "told"), REFUSED, ids=[f"{name} {how}" for name, how, _ in REFUSED])
-def test_refused_background_is_one_line(done: Any, name: str, how: str, told: str) -> None:
+@pytest.mark.parametrize(("name", "how", "expected"), REFUSED, ids=[f"{name} {how}" for name, how, _ in REFUSED])
+def test_refused_background_is_one_line(done: Any, name: str, how: str, expected: str) -> None:
     path = name_background(done, name)
     spoil(path, how)
     for again in (False, True):
         [end], ran = done.run()
         problem, _, _ = str(end.problem).partition(" (/")
-        assert problem.startswith(f"{path}: {told}")
+        assert problem.startswith(f"{path}: {expected}")
         assert problem.isprintable()
         assert (end.kind, end.folder) == ("refused", None)
         assert ran == (set() if again or how in {"missing", "empty folder"} else {"background-5"})
     assert not (done.scan / "frames.zarr/cam5-background").exists()
-    one, five = ingest_scans([done.scan])
-    assert one.problem is None
-    assert five.problem is not None
-    assert five.problem.startswith(f"{path}: {told}")
+    camera_1, camera_5 = ingest_scans([done.scan])
+    assert camera_1.problem is None
+    assert camera_5.problem is not None
+    assert camera_5.problem.startswith(f"{path}: {expected}")
 
 
 def test_background_is_a_path_as_others_are(archive: Any) -> None:
@@ -224,11 +224,11 @@ def test_background_is_a_path_as_others_are(archive: Any) -> None:
 def test_background_is_ingested_by_hand_as_well(archive: Any) -> None:
     background = name_background(archive, "off.avi")
     write_background(background, [surroundings(40)] * FRAMES)
-    _, five = ingest_scans([archive.scan])
-    assert (five.frames, five.lost, five.problem) == (FRAMES, 0, None)
-    assert five.film_bytes == (archive.scan / "cam5.avi").stat().st_size + background.stat().st_size
+    _, camera_5 = ingest_scans([archive.scan])
+    assert (camera_5.frames, camera_5.lost, camera_5.problem) == (FRAMES, 0, None)
+    assert camera_5.film_bytes == (archive.scan / "cam5.avi").stat().st_size + background.stat().st_size
     arrays = [archive.scan / "frames.zarr" / name for name in ("cam5", "cam5-background")]
-    assert five.store_bytes == sum(path.stat().st_size for array in arrays for path in array.iterdir())
+    assert camera_5.store_bytes == sum(path.stat().st_size for array in arrays for path in array.iterdir())
     attributes = json.loads((arrays[1] / "zarr.json").read_bytes())["attributes"]
     assert len(FrameManifest.model_validate(attributes["footscan"]).frames) == FRAMES
 
@@ -242,8 +242,8 @@ def test_only_the_steps_of_its_camera_know_of_a_background(
     steps = scan_steps(read_scan(archive.scan), calibrated, ScanParameters(), digests)
     known = {step.name.rpartition("/")[2]: step for step in steps}
     assert (set(known["extract-1"].inputs), set(known["extract-1"].places)) == ({"manifest"}, {"array"})
-    five = known["extract-5"]
-    assert (set(five.inputs), set(five.places)) == ({"manifest", "background"}, {"array", "background"})
+    camera_5 = known["extract-5"]
+    assert (set(camera_5.inputs), set(camera_5.places)) == ({"manifest", "background"}, {"array", "background"})
     assert [name for name in known if name.startswith("background")] == ["background-5"]
 
 

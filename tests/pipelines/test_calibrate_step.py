@@ -1,4 +1,4 @@
-"""The steps of a calibration from a capture: one by one, cached by camera, refused in one line."""
+"""The steps of a calibration from a capture: cached for each camera, refused in one line."""
 
 import json
 import shutil
@@ -40,7 +40,7 @@ def steps_of(capture: Path, cache: Path) -> list[Step]:
 
 
 def run(capture: Path, cache: Path) -> Calibrated:
-    """What each step came to, and which ran."""
+    """The result of each step, and the names of the steps that ran."""
     store = open_store(cache)
     ends: list[StepEnd] = []
     plan = make_plan(steps_of(capture, cache), store)
@@ -117,6 +117,8 @@ def test_each_camera_of_a_capture_that_is_to_be_filmed_has_its_own_stripe(tmp_pa
     keys = set()
     for step in steps:
         if step.kind == "stripe":  # all take the same listing of films
-            digests = {name: "0" * 64 if isinstance(one, Output) else one.digest for name, one in step.inputs.items()}
+            digests = {
+                name: "0" * 64 if isinstance(source, Output) else source.digest for name, source in step.inputs.items()
+            }
             keys.add(key_of(image_text(step, digests)))
     assert len(keys) == 8

@@ -1,4 +1,4 @@
-"""Every value of every choice among the parameters goes from films to measures."""
+"""Every value of every choice among the parameters works from films to measures."""
 
 import shutil
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""How far results are apart is said of arrays, of documents and of anything else."""
+"""Differences of arrays, of documents and of other files in words."""
 
 import numpy as np
 import pytest

@@ -27,11 +27,11 @@ def test_the_arrays_are_those_of_a_run(done: Any) -> None:
     surface = read_file(done.results / "foot.ply")
     assert np.array_equal(np.float32(scan.mesh.vertices), np.float32(surface.vertices))
     assert np.array_equal(scan.mesh.faces, surface.faces)
-    told = Measures.model_validate_json((done.results / "measures.json").read_bytes())
-    if told.finding is None:
-        assert scan.measures == told
+    delivered = Measures.model_validate_json((done.results / "measures.json").read_bytes())
+    if delivered.finding is None:
+        assert scan.measures == delivered
     else:
-        with pytest.raises(Finding, match=re.escape(told.finding)):
+        with pytest.raises(Finding, match=re.escape(delivered.finding)):
             _ = scan.measures
 
 

@@ -1,4 +1,4 @@
-"""A new release of a library: what an archive that is done has to run again."""
+"""A new release of a library: the steps of a finished archive that run again."""
 
 import importlib.metadata
 import json
@@ -22,7 +22,7 @@ def release(monkeypatch: pytest.MonkeyPatch) -> Iterator[Release]:
 
     def forget() -> None:
         libraries._version.cache_clear()
-        code._KNOWN.clear()
+        code._IDENTITIES.clear()
 
     def released(distribution: str) -> None:
         def version(name: str) -> str:
@@ -67,8 +67,8 @@ def upgrade(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str,
     def run(*arguments: object) -> tuple[int, str, str]:
         capsys.readouterr()
         status = run_command(["cache", "upgrade", *map(str, arguments)])
-        said = capsys.readouterr()
-        return status, said.out, said.err
+        output = capsys.readouterr()
+        return status, output.out, output.err
 
     return run
 

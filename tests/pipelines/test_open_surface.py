@@ -1,4 +1,4 @@
-"""Ball pivoting leaves a surface open: what was filled is said, and what needs a closed surface has no value."""
+"""Ball pivoting leaves a surface open: filled holes are reported, and measures of a closed surface have no value."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The scan's graph: what a change makes run again, and what it leaves alone."""
+"""The graph of a scan: the steps that run again after a change."""
 
 import os
 import re
@@ -84,9 +84,9 @@ def test_another_calibration_leaves_the_extraction_alone(done: Any, calibration:
     _, reasons = done.plan()
     assert set(reasons) == ALL - {"ingest-1", "ingest-5", "extract-1", "extract-5"}
     assert reasons["map-1"] == reasons["map-5"] == "input calibration changed"
-    one = calibration(1.01)
-    cameras = [one.camera(1), calibration().camera(5)]
-    path.write_text(one.model_copy(update={"cameras": cameras}).model_dump_json())
+    scaled = calibration(1.01)
+    cameras = [scaled.camera(1), calibration().camera(5)]
+    path.write_text(scaled.model_copy(update={"cameras": cameras}).model_dump_json())
     _, reasons = done.plan()
     assert "map-1" in reasons
     assert "map-5" not in reasons

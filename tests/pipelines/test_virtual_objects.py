@@ -1,4 +1,4 @@
-"""How things stand before the virtual scanner."""
+"""The objects in front of the virtual scanner."""
 
 import numpy as np
 import pytest

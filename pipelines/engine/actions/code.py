@@ -1,7 +1,7 @@
 """The identity of a step's code: the syntax trees of all project modules that it reaches by import.
 
-Comments, docstrings and layout do not count. Libraries whose arithmetic it uses count by their versions, and so does
-Python's own.
+Comments, docstrings and layout do not count. Libraries whose arithmetic it uses count by their versions; Python counts
+by its own.
 """
 
 import ast
@@ -20,31 +20,32 @@ from typing import Any
 from pipelines.engine.actions.libraries import versions_that_count
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import FileState, file_state, is_settled, sha256
-from pipelines.engine.files.seal import BROKEN, sealed, unsealed
+from pipelines.engine.files.seal import UNSEALING_ERRORS, sealed, unsealed
 from schemas.base.errors import Fault
 from schemas.base.model import canonical_json
 
 OWN = ROOMS = ("schemas", "footscan", "pipelines")
-"""The project's own packages."""
+"""The packages of this project."""
 MEMORY = Path(__file__).parent / "__pycache__" / f"code.{sys.implementation.cache_tag}.json"
+"""File that remembers the digests and imports of modules between processes."""
 
 _PARSING = threading.Lock()
-"""With Python 3.11, a thread that builds a syntax tree can fail where another one builds one, or runs code of its own
-while the first collects garbage (cpython#106905)."""
+"""Lock for building syntax trees. With Python 3.11 a thread that builds one can fail if another thread builds one too,
+or runs other code while the first collects garbage (cpython#106905)."""
 
 
 @dataclass(frozen=True)
 class CodeIdentity:
-    """What a module's behaviour depends on."""
+    """All code that a module's behaviour depends on."""
 
     modules: dict[str, str]
-    """Digest of the syntax tree of each project module reached, itself included."""
+    """Digest of the syntax tree of each project module that it reaches, itself included."""
     libraries: dict[str, str]
-    """Version of each library whose arithmetic one of them can use, and of Python."""
+    """Version of each library whose arithmetic these modules can use, and of Python."""
 
     @cached_property
     def document(self) -> bytes:
-        """All of it, as canonical JSON."""
+        """Modules and libraries as canonical JSON."""
         return canonical_json({"modules": self.modules, "libraries": self.libraries}).encode()
 
     @cached_property
@@ -54,50 +55,50 @@ class CodeIdentity:
 
 
 def code_identity(module: str) -> CodeIdentity:
-    """The identity of the module of this name and of everything in this project that it reaches by import."""
-    known = _KNOWN.get(module)
-    if known is not None:
-        return known
+    """Return the identity of a module and of all project modules that it reaches by import."""
+    identity = _IDENTITIES.get(module)
+    if identity is not None:
+        return identity
     with _parsing():
-        identity = _KNOWN[module] = _identity(module)
-        _remember()
+        identity = _IDENTITIES[module] = _identity(module)
+        _save_memory()
     return identity
 
 
 def code_text(module: str) -> bytes:
-    """The syntax tree of a project module without docstrings, as Python writes it down: its digest is that of this."""
+    """Return the source text of a module's syntax tree, without docstrings; its digest is that of this text."""
     with _parsing():
         return _text(module, file_state(_file(module))).encode()
 
 
-_KNOWN: dict[str, CodeIdentity] = {}
+_IDENTITIES: dict[str, CodeIdentity] = {}
 
 
 @contextmanager
 def _parsing() -> Iterator[None]:
     with _PARSING:
-        collecting = gc.isenabled()
+        was_on = gc.isenabled()
         gc.disable()
         try:
             yield
         finally:
-            if collecting:
+            if was_on:
                 gc.enable()
 
 
 def _identity(module: str) -> CodeIdentity:
     modules: dict[str, str] = {}
     libraries = {"python": ".".join(map(str, sys.version_info[:2]))}
-    waiting = [module]
-    while waiting:
-        name = waiting.pop()
+    pending = [module]
+    while pending:
+        name = pending.pop()
         if name in modules:
             continue
         source = _source(name)
         modules[name] = source.digest
         for imported in source.imports:
             if imported.split(".")[0] in ROOMS:
-                waiting.extend(_with_parents(imported))
+                pending.extend(_with_parents(imported))
             elif imported not in sys.stdlib_module_names:
                 libraries |= versions_that_count(imported)
     return CodeIdentity(dict(sorted(modules.items())), dict(sorted(libraries.items())))
@@ -106,17 +107,17 @@ def _identity(module: str) -> CodeIdentity:
 @dataclass(frozen=True)
 class _Source:
     digest: str
-    """Of the text."""
+    """Digest of the text."""
     imports: frozenset[str]
-    """Project modules by full name, others by the first part of theirs."""
+    """Imported modules: those of the project by full name, others by the first part of the name."""
 
 
 @cache
 def _source(name: str) -> _Source:
     state = file_state(_file(name))
-    known = _remembered().get(name)
-    if known is not None and known[0] == list(state):
-        return _Source(known[1], frozenset(known[2]))
+    remembered = _remembered().get(name)
+    if remembered is not None and remembered[0] == list(state):
+        return _Source(remembered[1], frozenset(remembered[2]))
     source = _Source(sha256(_text(name, state).encode()), frozenset(_imports(_tree(name))))
     if name.split(".", maxsplit=1)[0] in OWN and is_settled(state):
         _remembered()[name] = [list(state), source.digest, sorted(source.imports)]
@@ -126,17 +127,17 @@ def _source(name: str) -> _Source:
 
 @cache
 def _remembered() -> dict[str, list[Any]]:
-    """What is known of modules that have not been touched since: their states, digests and imports."""
+    """Read state, digest and imports of each module from `MEMORY`; an entry is valid while the state is the same."""
     try:
         return dict(unsealed(MEMORY.read_bytes())["modules"])
-    except (OSError, *BROKEN):
+    except (OSError, *UNSEALING_ERRORS):
         return {}
 
 
 _CHANGED: set[str] = set()
 
 
-def _remember() -> None:
+def _save_memory() -> None:
     if _CHANGED:
         _CHANGED.clear()
         with contextlib.suppress(Fault):
@@ -145,7 +146,7 @@ def _remember() -> None:
 
 @cache
 def _text(name: str, _: FileState) -> str:
-    """The syntax tree of a module without docstrings, as Python writes it down, in a state of its file."""
+    """Source text of the syntax tree of a module without docstrings, for one state of its file."""
     tree = _tree(name)
     for node in ast.walk(tree):
         _drop_docstring(node)
@@ -164,19 +165,19 @@ def _file(name: str) -> Path:
 
 
 def _imports(tree: ast.Module) -> set[str]:
-    found: set[str] = set()
+    names: set[str] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
-            found.add(node.module)
+            names.add(node.module)
             # `from package import module` reaches the module, too
-            found |= {
+            names |= {
                 full
                 for full in (f"{node.module}.{alias.name}" for alias in node.names)
                 if node.module.split(".")[0] in ROOMS and _is_module(full)
             }
-    return {name if name.split(".")[0] in ROOMS else name.split(".")[0] for name in found}
+    return {name if name.split(".")[0] in ROOMS else name.split(".")[0] for name in names}
 
 
 def _is_module(name: str) -> bool:
@@ -194,6 +195,6 @@ def _with_parents(name: str) -> list[str]:
 
 def _drop_docstring(node: ast.AST) -> None:
     if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-        # A text that stands alone documents what is above it, wherever it stands.
+        # A string expression documents the statement above it, so it counts as a docstring everywhere.
         kept = [s for s in node.body if not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant))]
         node.body = kept or [ast.Pass()]

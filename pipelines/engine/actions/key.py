@@ -1,4 +1,4 @@
-"""The key of an action: what a result depends on, written down in full, and its hash."""
+"""The key of an action: the hash of its pre-image, which lists everything that its result depends on."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,10 +14,11 @@ from pipelines.engine.files.digest import sha256
 from schemas.base.model import canonical_json
 
 PreImage = dict[str, Any]
+"""Decoded pre-image of a key; see `image_text`."""
 
 
 def image_text(step: Step, inputs: Mapping[str, str]) -> str:
-    """Everything that decides a step's result, as canonical JSON.
+    """Pre-image of an action's key: everything that its result depends on, as canonical JSON.
 
     Parameters
     ----------
@@ -27,18 +28,19 @@ def image_text(step: Step, inputs: Mapping[str, str]) -> str:
 
     Returns
     -------
-    An object: `step`; `code`, the digest of what `CodeIdentity` says; `parameters`, their model and their values;
-    `inputs`, for each whether it is a `value`, a `file` or the `result` of another step, and its digest.
+    image : str
+        A JSON object: `step`, the kind of step; `code`, the digest of its `CodeIdentity`; `parameters`, their model and
+        their values; `inputs`, for each its source (`value`, `file`, or `result` of another step) and its digest.
     """
-    # Written down piece by piece, for this is most of what a warm plan does.
-    named = ",".join(
+    # Written piece by piece, since a plan without misses spends most of its time here.
+    input_texts = ",".join(
         f'{encode_basestring(name)}:["{source.source}","{inputs[name]}"]'
         for name, source in sorted(step.inputs.items())
     )
     code = code_identity(step.module).digest
     parameters = "null" if step.parameters is None else parameters_text(step.parameters)
     kind = encode_basestring(step.kind)
-    return f'{{"code":"{code}","inputs":{{{named}}},"parameters":{parameters},"step":{kind}}}'
+    return f'{{"code":"{code}","inputs":{{{input_texts}}},"parameters":{parameters},"step":{kind}}}'
 
 
 def key_of(image: PreImage | str) -> str:
@@ -48,12 +50,12 @@ def key_of(image: PreImage | str) -> str:
 
 def parameters_text(parameters: BaseModel) -> str:
     """Name of the model, and the values of all its fields, as canonical JSON."""
-    return _parameters_text(_Same(parameters))
+    return _parameters_text(_ByIdentity(parameters))
 
 
 @dataclass(frozen=True)
-class _Same:
-    """Parameters, by which object they are: equal numbers of two types are not the same."""
+class _ByIdentity:
+    """Parameters that compare by object identity, since equal numbers of different types differ in JSON."""
 
     parameters: BaseModel
 
@@ -61,10 +63,10 @@ class _Same:
         return id(self.parameters)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.parameters is self.parameters
+        return isinstance(other, _ByIdentity) and other.parameters is self.parameters
 
 
 @lru_cache(maxsize=1024)
-def _parameters_text(same: _Same) -> str:
-    model = type(same.parameters).__name__
-    return canonical_json({"model": model, "values": same.parameters.model_dump(mode="json")})
+def _parameters_text(wrapped: _ByIdentity) -> str:
+    model = type(wrapped.parameters).__name__
+    return canonical_json({"model": model, "values": wrapped.parameters.model_dump(mode="json")})

@@ -1,4 +1,4 @@
-"""Which libraries a key stands for: those whose arithmetic can change a result."""
+"""Classes of libraries: the keys of steps cover those whose arithmetic can change a result."""
 
 import importlib.metadata
 from functools import cache
@@ -29,20 +29,20 @@ CARRYING = frozenset(
 """Libraries that carry values without changing them. Their versions are in no key."""
 
 COMPANIONS = {"numba": ("llvmlite",)}
-"""Libraries that compute for another one, and that the project itself does not import."""
+"""Libraries that compute for another library; the project need not import them itself."""
 
 DISTRIBUTIONS = {
     "PIL": ("pillow",),
     "skimage": ("scikit-image",),
     "open3d": ("open3d-cpu", "open3d"),
 }
-"""Distributions that bring a module of another name."""
+"""Names of the distributions of a module, if they differ from its name."""
 
 
 def versions_that_count(library: str) -> dict[str, str]:
     """Versions of an imported library and its companions; none of a library that only carries values.
 
-    A library in neither class counts. Raises `ModuleNotFoundError` if a library that counts is not installed.
+    A library in neither class counts as well. Raises `ModuleNotFoundError` if a library that counts is not installed.
     """
     if library in CARRYING:
         return {}

@@ -1,4 +1,4 @@
-"""What the engine runs: steps, and the actions that they become once their inputs are known."""
+"""Steps as the engine runs them: their inputs and outcomes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,11 +22,11 @@ class Output:
 
 @dataclass(frozen=True)
 class Value:
-    """An input that is known when the graph is drawn, small enough to be handed over as it is."""
+    """A small input that is known when the graph is built; its content is passed to the step."""
 
     content: bytes
     path: Path | None = None
-    """The file that it was read from, where there is one; no part of the key."""
+    """The file that it was read from, if any; not part of the key."""
     source: ClassVar[str] = "value"
 
     @cached_property
@@ -37,12 +37,12 @@ class Value:
 
 @dataclass(frozen=True)
 class SourceFile:
-    """An input that lies in files of the archive; the step reads them where they are."""
+    """An input in files of the archive; the step reads these files itself."""
 
     path: Path
     digest: str
     states: tuple[tuple[Path, FileState], ...]
-    """The state of each file when its digest was taken: a file that changes meanwhile is noticed."""
+    """State of each file when its digest was computed; it shows a later change."""
     source: ClassVar[str] = "file"
 
 
@@ -50,21 +50,24 @@ Input = Output | Value | SourceFile
 
 
 class Step(NamedTuple):
-    """A pure function with parameters and named inputs. A tuple, for an archive's plan makes tens of thousands."""
+    """A pure function with parameters and named inputs.
+
+    A named tuple is cheap to make: the plan of an archive makes tens of thousands.
+    """
 
     scan: str
     """The scan it belongs to, as `patient/scan`."""
     kind: str
-    """What it does, e.g. `extract`."""
+    """Kind of step, e.g. `extract`."""
     module: str
-    """Name of the one that holds `run(inputs, parameters, places) -> bytes`; imported when the step runs."""
+    """Name of the module with `run(inputs, parameters, places) -> bytes`; imported when the step runs."""
     parameters: BaseModel | None = None
     inputs: Mapping[str, Input] = {}
     camera: int | None = None
     places: Mapping[str, Path] = {}
-    """Folders and files that the step reads or writes beside the store; no part of the key."""
+    """Folders and files outside the store that the step reads or writes; not part of the key."""
     writes: Path | None = None
-    """A file outside the store that the step leaves behind and without which it must run again."""
+    """A file outside the store that the step writes; if it is missing, the step must run again."""
 
     @property
     def name(self) -> str:
@@ -74,21 +77,21 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True)
 class Success:
-    """A result, by its digest in the content store."""
+    """The digest of a result in the content store."""
 
     digest: str
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a step has no result."""
+    """The reason why a step has no result."""
 
     problem: str
     """One line."""
     kind: str
-    """`refused` input, a `finding`, or a `fault` of the machine."""
+    """`refused` input, a `finding`, a `fault` of the machine, or a `damaged` result in the store."""
     cause: str
-    """Name of the step that failed; others that wait for it fail with it."""
+    """Name of the step that failed; the steps that depend on it fail with the same cause."""
 
 
 Outcome = Success | Failure

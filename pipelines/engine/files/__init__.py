@@ -1,1 +1,1 @@
-"""Files as the engine reads and writes them: whole, by their digests, in a folder or at a URL."""
+"""File access of the engine: atomic writes, digests, seals, and stores in a folder or at a URL."""

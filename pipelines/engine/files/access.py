@@ -1,7 +1,7 @@
-"""Who can read what is written: its owner alone, or also the group that a workflow names.
+"""Access rights of written files: for the owner only, or also for the group that a workflow names.
 
-The rights stand in the process's umask, which files and folders have from the moment they are made, those of libraries
-and of child processes too. A group is passed on by the folders: what is made in one with the setgid bit gets its group.
+The umask of the process sets the rights of files and folders from the moment they are made, also in libraries and
+child processes. Folders pass on their group: a file made in a folder with the setgid bit gets the group of the folder.
 """
 
 import os
@@ -12,13 +12,13 @@ from pathlib import Path
 from schemas.base.errors import Fault, RefusedInput
 
 PRIVATE, SHARED = 0o077, 0o007
-"""Umasks."""
+"""Umasks: access for the owner, or for owner and group (POSIX)."""
 FOLDER_MODE, FILE_MODE = 0o2770, 0o660
-"""Of what a group shares."""
+"""Modes of folders and files that a group shares; 0o2000 is the setgid bit (POSIX)."""
 
 
 def keep_private() -> None:
-    """From now on, what this process makes is its user's alone: folders 0700, files 0600."""
+    """Set the umask for private files: from now on new folders have mode 0700, new files 0600."""
     os.umask(PRIVATE)
 
 
@@ -42,14 +42,14 @@ def group_number(name: str, workflow: Path) -> int:
 
 
 def share(folders: Iterable[Path], group: int | None) -> None:
-    """From now on, what is made in `folders`, which are made if missing, is the group's as well.
+    """Share `folders` and all that is made in them from now on with a group; missing folders are made.
 
-    Where one of them was not shared before, what is in it already is handed over, too.
+    If a folder was not shared before, its present content is given to the group as well.
 
     Raises
     ------
     Fault
-        A folder cannot be made, or is another user's and not the group's.
+        A folder cannot be made, or belongs to another user and not to the group.
     """
     if group is None:
         return

@@ -1,4 +1,4 @@
-"""Writing files so that a reader meets the old content or the new, never a part."""
+"""Atomic writes: a reader finds the old content of a file or the new one, never a part."""
 
 import contextlib
 import os
@@ -9,11 +9,15 @@ from schemas.base.errors import Fault
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write `data` to a file beside `path`, then give it that name. Fault where the disk refuses.
+    """Write `data` to a temporary file beside `path`, then rename it to `path`. Missing folders are made.
 
-    File and missing folders are never for all users; the process's umask says whether they are for its group.
+    Other users get no access to new files and folders; the umask decides about the group. A symbolic link stays, and
+    the file that it points to is replaced. Data are appended to a device or a pipe.
 
-    A symbolic link stays one: what it points to is written. A device or a pipe is written into.
+    Raises
+    ------
+    Fault
+        The file cannot be written.
     """
     try:
         if is_stream(path):
@@ -26,29 +30,29 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 STREAMS = {Path("/dev"), Path("/dev/fd")}
-"""Folders of names that stand for what is open already, as /dev/stdout does."""
+"""Folders whose names stand for open streams, e.g. /dev/stdout."""
 
 
 def is_stream(path: Path) -> bool:
-    """Whether a path is a device or a pipe, which may have any name."""
+    """Return True for a device or a pipe; a pipe may have any name."""
     return path.parent in STREAMS or (path.exists() and not path.is_file() and not path.is_dir())
 
 
 def _replace(path: Path, data: bytes) -> None:
     partial = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.partial")
     try:
-        _make(path.parent)
+        _make_folders(path.parent)
         with contextlib.suppress(FileNotFoundError):
-            partial.unlink()  # of a killed process that had the same number
+            partial.unlink()  # left by a killed process with the same number
         os.close(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o660))
         partial.write_bytes(data)
         partial.replace(path)
     finally:
         with contextlib.suppress(OSError):
-            partial.unlink()  # there after a failure or an interruption only
+            partial.unlink()  # exists only after a failure or an interruption
 
 
-def _make(folder: Path) -> None:
+def _make_folders(folder: Path) -> None:
     if not folder.is_dir():
-        _make(folder.parent)
+        _make_folders(folder.parent)
         folder.mkdir(mode=0o770, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Digests of bytes, and the state of a file by which a change is seen."""
+"""Digests of bytes, and the state of a file, which shows a change."""
 
 import hashlib
 import os
@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 SETTLED_NS = 2_000_000_000
-"""A file younger than this may change again within its time stamp's resolution: its digest is not remembered."""
+"""Smallest age of a file, ns, whose digest is remembered; chosen by hand.
+
+A younger file may change again within the resolution of its time stamp, which is 2 s on FAT.
+"""
 
 
 class FileState(NamedTuple):
-    """What the file system says of a file; a change of content changes it (ctime cannot be set back)."""
+    """The metadata of a file that change with its content; ctime cannot be set back."""
 
     size: int
     mtime_ns: int
@@ -25,17 +28,17 @@ def sha256(data: bytes) -> str:
 
 
 def file_state(path: Path) -> FileState:
-    """The present state of a file; OSError where there is none."""
+    """Return the present state of a file; OSError if it does not exist."""
     status = path.stat()
     return FileState(status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino)
 
 
 def is_settled(state: FileState) -> bool:
-    """Whether a further change of the file would change its state, too."""
+    """Return True if a further change of the file would change its state."""
     return time.time_ns() - max(state.mtime_ns, state.ctime_ns) > SETTLED_NS
 
 
 def state_of_open(descriptor: int) -> FileState:
-    """The present state of a file that is open."""
+    """Return the present state of an open file."""
     status = os.fstat(descriptor)
     return FileState(status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino)

@@ -1,4 +1,4 @@
-"""Where a store lies: a folder of this machine, or any place that fsspec reaches."""
+"""Places of a store: a folder of this machine, or any URL that fsspec supports."""
 
 import os
 from collections.abc import Iterator
@@ -12,45 +12,45 @@ from pipelines.engine.files.atomic import write_atomically
 from schemas.base.errors import Fault, RefusedInput, one_line
 
 LOCAL = ("file", "local")
-"""fsspec's names for this machine, where it would write into files that others may be reading."""
+"""Protocols of fsspec for this machine. They are not used, since fsspec does not write atomically there."""
 ABSENT = (FileNotFoundError, NotADirectoryError, IsADirectoryError)
-"""What any kind of store raises where no file of a name is; see `RemoteFiles` for all else."""
+"""Errors that any kind of store raises for a missing file; see `RemoteFiles` for all others."""
 
 FACTS = ("size", "ETag", "etag", "md5Hash", "mtime", "created", "LastModified", "modify", "modificationTime")
-"""What kinds of store tell of a file: object stores a digest, others a time; the last two are FTP's and WebHDFS's."""
+"""Metadata of a file by kind of store: object stores give a digest, others a time; the last two are FTP and WebHDFS."""
 
 
 class Files(Protocol):
     """Files of a store, by names such as `blobs/ab/abcd`."""
 
     def path(self, name: str) -> str:
-        """How a person would name the file."""
+        """Path or URL of the file, for messages."""
         ...
 
     def read(self, name: str) -> bytes:
-        """Its content; FileNotFoundError where there is none, Fault or another OSError where it cannot be had."""
+        """Content of the file; FileNotFoundError if it is missing, Fault or another OSError if it cannot be read."""
         ...
 
     def write(self, name: str, data: bytes) -> None:
-        """Puts `data` there at once: a reader meets the old content or the new. Fault where it cannot."""
+        """Write `data` atomically: a reader finds the old content or the new. Fault if it cannot be written."""
         ...
 
     def remove(self, name: str) -> None:
-        """Removes the file, if it is there. Fault or an OSError where it cannot."""
+        """Remove the file, if it exists. Fault or an OSError if it cannot be removed."""
         ...
 
     def state(self, name: str) -> str | None:
-        """What is known of the file without reading it: a change of content changes it. None where there is none;
-        Fault where that cannot be known."""
+        """Metadata of the file as text, which changes with the content. None if the file is missing; Fault if the store
+        cannot tell."""
         ...
 
     def written(self, name: str) -> float | None:
-        """When the file got its content or its name, s since 1970; None where there is none, or nobody tells. Fault as
-        above."""
+        """Time of the last change of content or name, s since 1970; None if the file is missing or the store has no
+        times. Fault as above."""
         ...
 
     def sizes(self, folder: str) -> Iterator[tuple[str, int]]:
-        """The files below a folder, each with its size in bytes, in order. Fault where they cannot be listed."""
+        """Names and sizes in bytes of the files below a folder, in order. Fault if they cannot be listed."""
         ...
 
 
@@ -61,7 +61,7 @@ class LocalFiles:
     root: str
 
     def path(self, name: str) -> str:
-        """See `Files`, as all below."""
+        """See `Files`, as for all methods below."""
         return f"{self.root}/{name}"
 
     def read(self, name: str) -> bytes:
@@ -76,18 +76,18 @@ class LocalFiles:
 
     def state(self, name: str) -> str | None:
         try:
-            found = os.stat(f"{self.root}/{name}")  # noqa: PTH116 (as above)
+            status = os.stat(f"{self.root}/{name}")  # noqa: PTH116 (as above)
         except OSError:
             return None
-        # Of these, ctime cannot be set back.
-        return f"{found.st_size} {found.st_mtime_ns} {found.st_ctime_ns} {found.st_ino}"
+        # ctime cannot be set back.
+        return f"{status.st_size} {status.st_mtime_ns} {status.st_ctime_ns} {status.st_ino}"
 
     def written(self, name: str) -> float | None:
         try:
-            found = os.stat(self.path(name))  # noqa: PTH116 (as above)
+            status = os.stat(self.path(name))  # noqa: PTH116 (as above)
         except OSError:
             return None
-        return max(found.st_mtime, found.st_ctime)
+        return max(status.st_mtime, status.st_ctime)
 
     def sizes(self, folder: str) -> Iterator[tuple[str, int]]:
         top = Path(self.root)
@@ -97,19 +97,19 @@ class LocalFiles:
                 file = Path(here, name)
                 try:
                     yield file.relative_to(top).as_posix(), file.stat().st_size
-                except FileNotFoundError:  # another run has just given it its name
+                except FileNotFoundError:  # another run has just renamed it
                     continue
 
 
 @dataclass(frozen=True)
 class RemoteFiles:
-    """A place that fsspec reaches by its URL; there a file appears as a whole, once it is written.
+    """A folder at a URL of fsspec. A file appears there as a whole, once it is written.
 
-    Each kind of store has errors of its own. Only what says that no file is there counts as such. All else is a Fault,
-    never an OSError, which `Store.get` takes for a miss: of a server that is away, or that refuses, nothing is known.
-    Were its store taken for empty, an archive would be computed anew, and 'cache gc' would see no run under way. So who
-    cannot be told what is there ends with one line, and the next run goes on. Nothing is tried twice here: the
-    libraries below fsspec do so, each as its kind of store needs it.
+    Each kind of store has its own errors. Only `ABSENT` means that a file is missing. All others become a Fault, never
+    an OSError, which `Store.get` takes for a miss: the content of a store that is offline or refuses is unknown. If
+    such a store were taken for empty, an archive would be computed anew, and 'cache gc' would see no run under way.
+    Therefore the command ends with one line, and the next run continues. Requests are not repeated here: the libraries
+    below fsspec do so as their kind of store needs it.
     """
 
     url: str
@@ -118,56 +118,57 @@ class RemoteFiles:
         return f"{self.url.rstrip('/')}/{name}"
 
     def read(self, name: str) -> bytes:
-        with self._asked(name, "read") as (system, inside):
+        with self._file_system(name, "read") as (system, inside):
             return bytes(system.cat_file(inside))
 
     def write(self, name: str, data: bytes) -> None:
         try:
-            with self._asked(name, "written") as (system, inside):
+            with self._file_system(name, "written") as (system, inside):
                 system.makedirs(inside.rpartition("/")[0], exist_ok=True)
                 system.pipe_file(inside, data)
-        except FileNotFoundError as error:  # no such bucket, or a file in a folder's stead
+        except FileNotFoundError as error:  # no such bucket, or a file in place of a folder
             raise Fault(f"{self.path(name)}: cannot be written ({error})") from None
 
     def remove(self, name: str) -> None:
-        with suppress(FileNotFoundError), self._asked(name, "removed") as (system, inside):
+        with suppress(FileNotFoundError), self._file_system(name, "removed") as (system, inside):
             system.rm_file(inside)
 
     def state(self, name: str) -> str | None:
         try:
-            with self._asked(name, "looked up") as (system, inside):
-                found = system.info(inside)
+            with self._file_system(name, "looked up") as (system, inside):
+                info = system.info(inside)
         except FileNotFoundError:
             return None
-        return " ".join(str(found.get(fact)) for fact in FACTS)
+        return " ".join(str(info.get(fact)) for fact in FACTS)
 
     def written(self, name: str) -> float | None:
         with (
             suppress(FileNotFoundError),
-            self._asked(name, "looked up") as (system, inside),
+            self._file_system(name, "looked up") as (system, inside),
             suppress(NotImplementedError),
         ):
             return float(system.modified(inside).timestamp())
         return None
 
     def sizes(self, folder: str) -> Iterator[tuple[str, int]]:
-        with self._asked(folder, "listed") as (system, inside):
-            found = sorted(_below(inside, system))
+        with self._file_system(folder, "listed") as (system, inside):
+            entries = sorted(_below(inside, system))
         start = len(inside.removesuffix(folder).rstrip("/")) + 1
-        for path, size in found:
+        for path, size in entries:
             yield path[start:], size
 
     @contextmanager
-    def _asked(self, name: str, done: str) -> Iterator[tuple[Any, str]]:
-        """The file system and the name in it, for what is `done` there; FileNotFoundError, or a Fault that says why."""
+    def _file_system(self, name: str, done: str) -> Iterator[tuple[Any, str]]:
+        """Give the file system and the path in it. Errors become FileNotFoundError or a Fault that names what was not
+        `done`."""
         system, root = _open(self.url)
         try:
-            system.invalidate_cache()  # of listings, by which fsspec answers: others write there, too
+            system.invalidate_cache()  # fsspec caches listings, but other processes write there too
             yield system, f"{root.rstrip('/')}/{name}".rstrip("/")
         except ABSENT as error:
-            raise FileNotFoundError(_words(error)) from None
-        except Exception as error:  # each kind of store has errors of its own
-            raise Fault(f"{self.path(name)}: cannot be {done} ({_words(error)})") from None
+            raise FileNotFoundError(_error_text(error)) from None
+        except Exception as error:  # each kind of store has its own errors
+            raise Fault(f"{self.path(name)}: cannot be {done} ({_error_text(error)})") from None
 
 
 def open_files(place: Path | str) -> Files:
@@ -176,9 +177,9 @@ def open_files(place: Path | str) -> Files:
     Raises
     ------
     RefusedInput
-        No store can lie at this URL, or the library is not installed that reaches it.
+        The URL is not valid for a store, or the library for its protocol is not installed.
     Fault
-        Nothing answers there.
+        The store cannot be reached.
     """
     if isinstance(place, Path) or "://" not in place:
         return LocalFiles(str(place))
@@ -187,13 +188,13 @@ def open_files(place: Path | str) -> Files:
         if not Path(path).is_absolute():
             raise RefusedInput(place, f"expected {protocol}:// and a path from the root, as {protocol}:///srv/store")
         return LocalFiles(path)
-    _open(place)  # so that it is refused before anything is asked of it
+    _open(place)  # a wrong URL is refused here, before the first request
     return RemoteFiles(place)
 
 
 @cache
 def _open(url: str) -> tuple[Any, str]:
-    """The file system at a URL and the place in it; once in a process, for connections do not travel to another."""
+    """The file system of a URL and the path in it; opened once in each process, since connections cannot be pickled."""
     if not url.partition("://")[2].strip("/"):
         raise RefusedInput(url, "names no place, expected PROTOCOL://BUCKET/FOLDER or the like")
     from fsspec.core import url_to_fs
@@ -201,12 +202,12 @@ def _open(url: str) -> tuple[Any, str]:
 
     try:
         system, root = url_to_fs(url)
-    except (ImportError, ValueError, TypeError) as error:  # no library, no such protocol, a part is missing
-        problem = one_line(": ".join(str(one) for one in (error, error.__cause__) if one))
+    except (ImportError, ValueError, TypeError) as error:  # missing library, unknown protocol, incomplete URL
+        problem = one_line(": ".join(str(cause) for cause in (error, error.__cause__) if cause))
         raise RefusedInput(url, f"expected a place that fsspec reaches ({problem})") from None
-    except Exception as error:  # as in `RemoteFiles`; some connect at once
-        raise Fault(f"{url}: cannot be opened ({_words(error)})") from None
-    if isinstance(system, LocalFileSystem):  # which fsspec takes where no protocol is named
+    except Exception as error:  # as in `RemoteFiles`; some file systems connect here
+        raise Fault(f"{url}: cannot be opened ({_error_text(error)})") from None
+    if isinstance(system, LocalFileSystem):  # the default of fsspec without a protocol
         raise RefusedInput(url, "names no protocol, expected PROTOCOL://BUCKET/FOLDER or the like")
     return system, str(root)
 
@@ -222,7 +223,7 @@ def _below(folder: str, system: Any) -> Iterator[tuple[str, int]]:
         return
     for entry in listed:
         path = entry["name"].rstrip("/")
-        if path == folder:  # an object store may have an empty object in the name of a folder
+        if path == folder:  # an object store may have an empty object with the name of a folder
             continue
         if entry["type"] == "directory":
             yield from _below(path, system)
@@ -230,6 +231,6 @@ def _below(folder: str, system: Any) -> Iterator[tuple[str, int]]:
             yield path, int(entry["size"])
 
 
-def _words(error: Exception) -> str:
-    """The kind of an error and what it says, which for some is nothing, or just a path."""
+def _error_text(error: Exception) -> str:
+    """Type and message of an error; the message alone may be empty or just a path."""
     return one_line(f"{type(error).__name__}: {error}").removesuffix(":")

@@ -1,4 +1,4 @@
-"""Seals of what the engine writes: a digest that tells damage, and with a secret one that nobody else can make."""
+"""Seals of small files of the engine: a digest that shows damage, and an HMAC that only the owner can make."""
 
 import hmac
 import json
@@ -7,24 +7,40 @@ from typing import Any
 from pipelines.engine.files.digest import sha256
 from schemas.base.model import canonical_json
 
-BROKEN = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
-"""What `unsealed`, and reading what it gives, may raise."""
+UNSEALING_ERRORS = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
+"""Errors that `unsealed`, and code that reads its result, may raise."""
 
 
 class UnsealedError(ValueError):
-    """A row that bears no seal of the owner of its store, or a wrong one."""
+    """A row without the seal of the owner of its store, or with a wrong one."""
 
 
 def sealed(value: dict[str, Any], secret: bytes | None = None) -> bytes:
-    """An object as canonical JSON, with its digest as `seal`; with a `secret` also with what none makes without."""
+    """An object as canonical JSON, with its digest as `seal` and, given a `secret`, its HMAC as `owner_seal`.
+
+    Examples
+    --------
+    >>> unsealed(sealed({"key": 1}))
+    {'key': 1}
+    >>> unsealed(sealed({"key": 1}).replace(b"1", b"2", 1))
+    Traceback (most recent call last):
+    ValueError: broken seal
+    """
     if secret is not None:
         value = {**value, "owner_seal": seal_of(value, secret)}
     return canonical_json({**value, "seal": sha256(canonical_json(value).encode())}).encode()
 
 
 def unsealed(data: bytes, secret: bytes | None = None) -> dict[str, Any]:
-    """The object that was sealed; one of the errors in `BROKEN` where it is none, UnsealedError where it bears not the
-    seal of the `secret`, if any."""
+    """The object that was sealed, without its seals.
+
+    Raises
+    ------
+    One of `UNSEALING_ERRORS`
+        `data` is not a sealed object, or its seal is broken.
+    UnsealedError
+        A `secret` is given, and the object does not bear its seal.
+    """
     value = json.loads(data)
     seal = value.pop("seal")
     if seal != sha256(canonical_json(value).encode()):
@@ -41,6 +57,6 @@ def seal_of(value: dict[str, Any], secret: bytes) -> str:
 
 
 def _check_seal(value: dict[str, Any], seal: object, secret: bytes) -> None:
-    """UnsealedError where an object does not bear this seal."""
+    """Raise UnsealedError unless `seal` is the owner's seal of an object."""
     if not isinstance(seal, str) or not hmac.compare_digest(seal.encode(), seal_of(value, secret).encode()):
         raise UnsealedError("bears no seal of its owner")

@@ -1,7 +1,7 @@
-"""The secret of a store's owner, with which rows are sealed: who can write to the store cannot make such a row.
+"""The secret of a store's owner, which seals rows: other users who can write to the store cannot make such rows.
 
-It lies outside of the store, in a file that is its owner's alone. That it is there says that the store is sealed; were
-that said in the store, who can write there could take it back.
+The secret lies outside the store, in a file that only its owner can read. Its existence marks the store as sealed. A
+mark in the store could be removed by anyone who can write there.
 """
 
 import os
@@ -16,17 +16,18 @@ from pipelines.engine.files.places import Files
 from schemas.base.errors import Fault, RefusedInput
 
 VARIABLE = "FOOTSCAN_SEAL_KEY"
-"""Environment variable that names the file of the secret, of whatever store."""
+"""Environment variable that names the file of the secret, for every store."""
 BYTES = 32
+"""Length of a secret. RFC 2104 (section 3) advises at least the length of the digest, here 32 for SHA-256."""
 
 
 def secret_of(files: Files) -> bytes | None:
-    """The secret of a store; None where it is not sealed.
+    """Read the secret of a store; None if the store is not sealed.
 
     Raises
     ------
     RefusedInput
-        Others can read the secret, or the file holds none.
+        Others can read the file, or the file does not hold a secret.
     """
     path = secret_file(files)
     try:
@@ -50,7 +51,7 @@ def secret_of(files: Files) -> bytes | None:
 
 
 def make_secret(files: Files) -> bytes:
-    """A new secret for a store, in its file; Fault where that cannot be written."""
+    """Make a new secret for a store and write its file; Fault if it cannot be written."""
     secret = secrets.token_bytes(BYTES)
     path = secret_file(files)
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -63,9 +64,9 @@ def make_secret(files: Files) -> bytes:
 
 
 def secret_file(files: Files) -> Path:
-    """Where the secret of a store lies: in the user's configuration, by the place of the store."""
-    if given := os.environ.get(VARIABLE):
-        return Path(given)
+    """Path of the secret of a store: in the user's configuration, named by the digest of the store's place."""
+    if configured := os.environ.get(VARIABLE):
+        return Path(configured)
     configuration = Path(os.environ.get("XDG_CONFIG_HOME", ""))
     try:
         configuration = configuration if configuration.is_absolute() else Path.home() / ".config"

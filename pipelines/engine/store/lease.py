@@ -1,4 +1,4 @@
-"""Runs under way say so in the store, so that nobody takes away what they are about to use."""
+"""Leases: files in the store that mark runs under way, so that nobody deletes results that they are about to use."""
 
 import contextlib
 import json
@@ -21,33 +21,38 @@ from schemas.base.model import canonical_json
 log = logging.getLogger("footscan.store")
 
 FOLDER = "runs"
+"""Folder of the leases in a store."""
 HEARTBEAT_S = 60.0
+"""Interval between two renewals of a lease; chosen by hand."""
 STALE_S = 600.0
-"""Without a heartbeat for so long, a run is taken for dead."""
+"""Time without a heartbeat after which a run counts as dead: ten missed heartbeats, chosen by hand."""
 LATEST = 253_402_214_400.0
-"""s since 1970: the last day of the year 9999, beyond which no calendar of Python goes."""
+"""Last valid time, s since 1970: the last day of the year 9999, the limit of Python's `datetime`."""
+START_TIME = 18
+"""Index of `starttime` among the fields of /proc/PID/stat that follow the state (proc(5), field 22)."""
 
 
 @dataclass(frozen=True)
 class Lease:
-    """What a run says of itself."""
+    """The lease of one run."""
 
     name: str
-    """Its file in the store."""
+    """Name of its file in the store."""
     host: str | None
-    """None, as all below, where the file is damaged."""
+    """Host of the run; None, like all fields below, if the file is damaged."""
     process: int | None
     started: float | None
     """s since 1970, by the clock of its host; so is `heartbeat`."""
     heartbeat: float | None
     system: str | None
-    """What its process has this number in, and when it started there; None where that is not known."""
+    """Boot and process namespace in which `process` is counted; None if unknown."""
     birth: str | None
+    """Start of the process, in ticks since the boot; None if unknown."""
 
 
 @contextmanager
 def lease(store: Store) -> Iterator[str]:
-    """Holds a lease while a run lasts; gives its name. A store that cannot be written to gets none; that is said."""
+    """Hold a lease while a run lasts; gives its name. If the store cannot be written to, a warning is logged."""
     host = re.sub(r"[^A-Za-z0-9.]", "-", socket.gethostname())[:64] or "host"
     name = f"{FOLDER}/{host}-{os.getpid()}-{secrets.token_hex(4)}.json"
     started = time.time()
@@ -58,7 +63,7 @@ def lease(store: Store) -> Iterator[str]:
             try:
                 _write(name, host, started, store)
             except Fault as error:
-                log.debug("%s", error)  # the next may do; the run itself says what it cannot write
+                log.debug("%s", error)  # the next heartbeat may succeed; the run reports what it cannot write
 
     try:
         _write(name, host, started, store)
@@ -71,83 +76,83 @@ def lease(store: Store) -> Iterator[str]:
     finally:
         ended.set()
         thread.join()
-        with contextlib.suppress(OSError, Fault):  # it will be taken for dead
+        with contextlib.suppress(OSError, Fault):  # without heartbeats it becomes stale
             store.files.remove(name)
 
 
 def leases(store: Store) -> list[Lease]:
-    """All that lie in the store, whether their runs are alive or not."""
-    found = []
+    """Return all leases in the store, of live and of dead runs."""
+    read = []
     for name, _ in store.files.sizes(FOLDER):
         if name.endswith(".json"):
             with contextlib.suppress(FileNotFoundError):  # its run has just ended
-                found.append(_read(name, store.files.read(name)))
-    return found
+                read.append(_read(name, store.files.read(name)))
+    return read
 
 
 def live_leases(store: Store) -> list[Lease]:
-    """Those of runs that are to be taken for alive; one of which nothing is known is."""
+    """Return the leases of runs that count as alive; a damaged lease does so as well."""
     now = time.time()
-    beating = (one for one in leases(store) if one.heartbeat is None or now - one.heartbeat < STALE_S)
-    return [one for one in beating if not _is_gone(one)]
+    beating = (held for held in leases(store) if held.heartbeat is None or now - held.heartbeat < STALE_S)
+    return [held for held in beating if not _is_gone(held)]
 
 
-def is_ahead(one: Lease) -> bool:
-    """Whether a lease was renewed in the future: by the clock of its host, or by this one's, which then is wrong."""
-    return one.heartbeat is not None and one.heartbeat - time.time() > STALE_S
+def is_ahead(held: Lease) -> bool:
+    """Return True if a lease was renewed in the future: the clock of its host or of this machine is wrong then."""
+    return held.heartbeat is not None and held.heartbeat - time.time() > STALE_S
 
 
 def take_over(store: Store) -> list[Lease]:
-    """Remove the leases that block a store, but for those of processes seen to run on this machine; returns them.
+    """Remove and return the leases that block a store, except those of processes that run on this machine.
 
-    A run that is alive after all writes its lease again with the next heartbeat.
+    A run that is alive after all writes its lease again at the next heartbeat.
     """
-    taken = [one for one in live_leases(store) if not _is_here(one)]
-    for one in taken:
-        store.files.remove(one.name)
-    return taken
+    blocking = [held for held in live_leases(store) if not _runs_here(held)]
+    for held in blocking:
+        store.files.remove(held.name)
+    return blocking
 
 
-def _is_here(one: Lease) -> bool:
-    """Whether the process of a lease was looked for where it ran, and found."""
-    return one.process is not None and one.system is not None and one.system == _system() and not _is_gone(one)
+def _runs_here(held: Lease) -> bool:
+    """Return True if the process of a lease runs on this machine."""
+    return held.process is not None and held.system is not None and held.system == _system() and not _is_gone(held)
 
 
-def _is_gone(one: Lease) -> bool:
-    """Whether the process of a lease is known to have ended: it can be looked for where it ran, and there alone."""
-    if one.process is None or one.system is None or one.system != _system():
+def _is_gone(held: Lease) -> bool:
+    """Return True if the process of a lease is known to have ended; unknown for a process of another machine."""
+    if held.process is None or held.system is None or held.system != _system():
         return False
     try:
-        os.kill(one.process, 0)
+        os.kill(held.process, 0)
     except ProcessLookupError:
         return True
-    except OSError:  # another user's
+    except OSError:  # a process of another user
         return False
-    birth = _birth(one.process)
-    return birth is not None and birth != one.birth  # its number is another's by now
+    birth = _birth(held.process)
+    return birth is not None and birth != held.birth  # its number belongs to another process by now
 
 
 def _system() -> str | None:
-    """This boot of this machine, and what its processes are counted in: a container has numbers of its own."""
+    """Boot of this machine and its process namespace: a container numbers its processes separately."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
         return f"{boot} {Path('/proc/self/ns/pid').readlink()}"
-    except OSError:  # no Linux
+    except OSError:  # not Linux
         return None
 
 
 def _birth(process: int) -> str | None:
-    """When a process started, in ticks since the boot; `ended` of one that only waits for its parent to hear of it."""
+    """Start of a process in ticks since the boot, or `ended` for a zombie; None if it does not exist."""
     try:
         status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
     except OSError:
         return None
-    state, *facts = status.rpartition(")")[2].split()
-    return "ended" if state in "ZX" else facts[18]
+    state, *fields = status.rpartition(")")[2].split()
+    return "ended" if state in "ZX" else fields[START_TIME]
 
 
 def _write(name: str, host: str, started: float, store: Store) -> None:
-    now = {
+    content = {
         "host": host,
         "process": os.getpid(),
         "started": started,
@@ -155,7 +160,7 @@ def _write(name: str, host: str, started: float, store: Store) -> None:
         "system": _system(),
         "birth": _birth(os.getpid()),
     }
-    store.files.write(name, canonical_json(now).encode())
+    store.files.write(name, canonical_json(content).encode())
 
 
 def _read(name: str, data: bytes) -> Lease:
@@ -166,11 +171,11 @@ def _read(name: str, data: bytes) -> Lease:
                 "process": int(process),
                 "started": float(started),
                 "heartbeat": float(heartbeat),
-                **more,
+                **optional,
             }:
-                if not all(0.0 <= one < LATEST for one in (started, heartbeat)):
+                if not all(0.0 <= seconds < LATEST for seconds in (started, heartbeat)):
                     raise ValueError("no time")
-                system, birth = (str(more[fact]) if more.get(fact) else None for fact in ("system", "birth"))
+                system, birth = (str(optional[fact]) if optional.get(fact) else None for fact in ("system", "birth"))
                 return Lease(name, host, process, started, heartbeat, system, birth)
     except (ValueError, RecursionError):
         pass

@@ -1,4 +1,4 @@
-"""Who can write to a store: its results are taken for true, so nobody else should."""
+"""Check of who can write to a store: its results are trusted, so no other user should."""
 
 import logging
 import os
@@ -13,13 +13,14 @@ from pipelines.engine.store.store import Store
 log = logging.getLogger("footscan.store")
 
 FOLDERS = ("", "blobs", "actions", "latest", "pins", "runs")
+"""The folder of a store, and the folders in it."""
 
 
 def warn_if_others_can_write(store: Store, group: int | None = None) -> None:
-    """Say, once for a store, that users other than this one can exchange what is in it.
+    """Log a warning, once for each store, if other users can replace its files.
 
-    A seal and a digest tell what was damaged, not what was made to match. Of a store behind a URL nothing is known.
-    Members of a `group` that the workflow names are no others.
+    Digests show damage, but not a deliberate exchange. The rights of a store at a URL are unknown. Members of the
+    workflow's `group` may write.
     """
     if isinstance(store.files, LocalFiles) and hasattr(os, "geteuid"):
         _warn(store.files, group)
@@ -29,20 +30,20 @@ def warn_if_others_can_write(store: Store, group: int | None = None) -> None:
 def _warn(files: LocalFiles, group: int | None) -> None:
     for path in _folders(files):
         try:
-            status = os.stat(path)  # noqa: PTH116 (as the store itself does: each of its files is reached so)
+            status = os.stat(path)  # noqa: PTH116 (names of a store are text, as in `LocalFiles`)
         except OSError:
             continue
         is_shared = status.st_gid == group
         if status.st_uid != os.geteuid() and not is_shared:
-            log.warning("%s: belongs to another user, who can exchange results; expected a store of your own", path)
+            log.warning("%s: belongs to another user, who can exchange results, expected your own store", path)
             return
         if status.st_mode & stat.S_IWOTH or (status.st_mode & stat.S_IWGRP and not is_shared):
-            log.warning("%s: other users can write to it, and so exchange results; expected 'chmod -R go-w'", path)
+            log.warning("%s: other users can write to it and so exchange results, expected 'chmod -R go-w'", path)
             return
 
 
 def _folders(files: LocalFiles) -> Iterator[str]:
-    """The folders of a store, and those in them, which hold files alone."""
+    """The folders of a store and their sub-folders, which hold only files."""
     for folder in FOLDERS:
         path = files.path(folder).rstrip("/")
         yield path

@@ -1,4 +1,4 @@
-"""Scans whose results are kept, whatever is computed of them later."""
+"""Pins: scans whose present results are kept, whatever is computed for them later."""
 
 import json
 
@@ -8,10 +8,11 @@ from schemas.base.errors import DamagedError, RefusedInput
 from schemas.base.model import canonical_json, pseudonym
 
 FOLDER = "pins"
+"""Folder of the pins in a store."""
 
 
 def pin(scan: str, store: Store) -> int:
-    """Keep the present results of all steps of a scan (`patient/scan`); returns how many. A former pin is replaced.
+    """Pin the present results of all steps of a scan (`patient/scan`); returns their number. Replaces an older pin.
 
     Raises
     ------
@@ -20,7 +21,7 @@ def pin(scan: str, store: Store) -> int:
     """
     name = _name(scan)
     latest = [store.read_latest(file) for file, _ in store.files.sizes("latest") if file.endswith(".json")]
-    keys = {one.step: one.key for one in latest if one is not None and one.step.rpartition("/")[0] == scan}
+    keys = {last.step: last.key for last in latest if last is not None and last.step.rpartition("/")[0] == scan}
     if not keys:
         raise RefusedInput(scan, f"has no results in {store.files.path('').rstrip('/')}, expected a scan that was run")
     store.files.write(name, _sealed(scan, keys))
@@ -28,22 +29,22 @@ def pin(scan: str, store: Store) -> int:
 
 
 def unpin(scan: str, store: Store) -> None:
-    """Keep them no longer; RefusedInput where the scan is not pinned."""
+    """Remove the pin of a scan; RefusedInput if the scan is not pinned."""
     name = _name(scan)
     if store.files.state(name) is None:
         pinned = ", ".join(map(_scan, pin_names(store)))
-        raise RefusedInput(scan, f"is not pinned, expected one of: {pinned or 'none is'}")
+        raise RefusedInput(scan, f"is not pinned, expected a pinned scan: {pinned or 'there is none'}")
     store.files.remove(name)
 
 
 def read_pins(store: Store) -> dict[str, dict[str, str]]:
-    """Of each pinned scan, the keys of its actions by the names of their steps; DamagedError if one is damaged."""
-    found = {name: read_pin(name, store) for name in pin_names(store)}
-    return {_scan(name): keys for name, keys in found.items() if keys is not None}
+    """Return for each pinned scan the keys of its actions by step name; DamagedError if a pin is damaged."""
+    keys_by_pin = {name: read_pin(name, store) for name in pin_names(store)}
+    return {_scan(name): keys for name, keys in keys_by_pin.items() if keys is not None}
 
 
 def read_pin(name: str, store: Store) -> dict[str, str] | None:
-    """One of them, by the name of its file; None where it is not there any more."""
+    """Read a pin by its file name: keys by step name; None if the file is missing, DamagedError if it is damaged."""
     try:
         value = json.loads(store.files.read(name))
         keys = {step: plain_hex(key) for step, key in value["keys"].items()}
@@ -58,12 +59,12 @@ def read_pin(name: str, store: Store) -> dict[str, str] | None:
 
 
 def pin_names(store: Store) -> list[str]:
-    """The files of all pins."""
+    """Return the file names of all pins."""
     return [name for name, _ in store.files.sizes(FOLDER) if name.endswith(".json")]
 
 
 def _name(scan: str) -> str:
-    """The file of a scan's pin; the scan's name must not lead elsewhere."""
+    """File name of a scan's pin; RefusedInput if the scan's name would lead out of the folder."""
     parts = [pseudonym(part, "scan") for part in scan.split("/")]
     return f"{FOLDER}/{'/'.join(parts)}.json"
 

@@ -1,8 +1,8 @@
 """The content store (blobs by their digest) and the action cache (which action gave which blob).
 
-Every write is atomic; an action's row is written after its blob. Nothing in here is trusted: a row bears a seal, a blob
-is checked against its digest whenever it is read, and what is damaged counts as missing. What has not been touched
-since it was checked is not read again (`verified`).
+Every write is atomic; the row of an action is written after its blob. Stored files are not trusted: a row bears a seal,
+a blob is checked against its digest whenever it is read, and a damaged file counts as missing. A file that has not
+changed since it was checked is not read again (`verified`).
 """
 
 import contextlib
@@ -15,47 +15,47 @@ from typing import Any
 from pipelines.engine.actions.key import PreImage, key_of
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.places import Files, open_files
-from pipelines.engine.files.seal import BROKEN, UnsealedError, sealed, unsealed
+from pipelines.engine.files.seal import UNSEALING_ERRORS, UnsealedError, sealed, unsealed
 from pipelines.engine.files.secret import secret_of
-from pipelines.engine.store.verified_index import Known, VerifiedIndex
+from pipelines.engine.store.verified_index import VerifiedIndex, VerifiedRow
 from schemas.base.errors import Fault
 
 log = logging.getLogger("footscan.store")
 
 KINDS = ("refused", "finding")
-"""Of failures that are remembered."""
+"""Kinds of failures that are stored."""
 
 
 @dataclass(frozen=True)
 class Acceptance:
-    """Why a result of an earlier version of the code stands for an action that was not run itself."""
+    """Acceptance of a result of an earlier version of the code for an action that was not run itself."""
 
     code: str
     """Digest of that version, see `CodeIdentity`."""
     changes: list[str]
-    """What differs between it and the version of the action, a line each."""
+    """Differences between that version and the version of the action, one line each."""
     sample: int
-    """Actions of the same step and versions that were run again, all with the recorded result."""
+    """Number of actions of the same step and versions that were run again, all with the recorded result."""
     of: int
-    """Actions of the same step and versions."""
+    """Number of actions of the same step and versions."""
     date: str
-    """ISO 8601, UTC."""
+    """Date and time of the acceptance, ISO 8601, UTC."""
     reason: str
-    """In the words of whoever accepted it."""
+    """Reason that the user gave."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """What an action came to."""
+    """The recorded outcome of an action."""
 
     image: PreImage
     """Pre-image of its key."""
     digest: str | None
-    """The result, in the content store; None for a failure."""
+    """Digest of the result in the content store; None for a failure."""
     failure: tuple[str, str] | None = None
-    """Kind (`refused` or `finding`) and problem of an action that failed by its input's fault."""
+    """Kind (`refused` or `finding`) and problem of an action that failed because of its input."""
     accepted: Acceptance | None = None
-    """Of an action that was not run: its outcome is that of an earlier version."""
+    """Set if the action was not run and its outcome is that of an earlier version."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Latest:
     step: str
     key: str
     sources: dict[str, str]
-    """Where the files lay that it took, by the name of the input."""
+    """Paths of the files that it took, by the name of the input."""
 
 
 @dataclass(frozen=True)
@@ -75,20 +75,20 @@ class Store:
     files: Files
     verified: VerifiedIndex | None = None
     secret: bytes | None = field(default=None, repr=False)
-    """Of the store's owner, if it is sealed."""
+    """Secret of the store's owner, if the store is sealed."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _reopened, (self.files,)  # what one machine remembers does not go to another, and secrets do not travel
+        return _reopened, (self.files,)  # the index belongs to one machine, and a secret must not be pickled
 
     def put(self, data: bytes) -> str:
-        """Keep `data`; returns its digest."""
+        """Store `data`; returns its digest."""
         digest = sha256(data)
         if self.get(digest) is None:
             self.files.write(blob_name(digest), data)
         return digest
 
     def get(self, digest: str) -> bytes | None:
-        """The blob with this digest; None where it is missing or damaged."""
+        """Return the blob with this digest; None if it is missing or damaged."""
         name = blob_name(digest)
         try:
             data = self.files.read(name)
@@ -96,41 +96,41 @@ class Store:
             return None
         if sha256(data) != digest:
             log.warning("%s: damaged, will be made again", self.files.path(name))
-            with contextlib.suppress(OSError, Fault):  # a store that one may only read stays as it is
+            with contextlib.suppress(OSError, Fault):  # the store may be read-only
                 self.files.remove(name)
             return None
         return data
 
     def has(self, digest: str) -> bool:
-        """Whether the blob is there; whether it is sound is seen on reading."""
+        """Return True if the blob exists; only `get` checks its content."""
         return self.files.state(blob_name(digest)) is not None
 
-    def lookup(self, key: str) -> Known | None:
-        """What an action came to, if its result is there and sound."""
+    def lookup(self, key: str) -> VerifiedRow | None:
+        """Return the recorded outcome of an action; None if there is none, or its result is missing or damaged."""
         row_state = self.files.state(row_name(key))
         if row_state is None:
             return None
-        known = None if self.verified is None else self.verified.get(key)
-        if known is None or known.row != row_state:
+        verified_row = None if self.verified is None else self.verified.get(key)
+        if verified_row is None or verified_row.row != row_state:
             row = self.row(key)
             if row is None:
                 return None
-            known = _known(row_state, row, None)
-        if known.digest is None:
-            self._remember(key, known)
-            return known
-        blob_state = self.files.state(blob_name(known.digest))
+            verified_row = _verified_row(row_state, row, None)
+        if verified_row.digest is None:
+            self._remember(key, verified_row)
+            return verified_row
+        blob_state = self.files.state(blob_name(verified_row.digest))
         if blob_state is None:
             return None
-        if known.blob != blob_state:
-            if self.get(known.digest) is None:
+        if verified_row.blob != blob_state:
+            if self.get(verified_row.digest) is None:
                 return None
-            known = known._replace(blob=blob_state)
-            self._remember(key, known)
-        return known
+            verified_row = verified_row._replace(blob=blob_state)
+            self._remember(key, verified_row)
+        return verified_row
 
     def record(self, step_name: str, row: Row, sources: dict[str, str] | None = None) -> None:
-        """Write the row of an action, and remember it as the last one of its step."""
+        """Write the row of an action, and note it as the last action of its step."""
         key = key_of(row.image)
         content = {"image": row.image, "digest": row.digest, "failure": row.failure}
         if row.accepted is not None:
@@ -140,21 +140,21 @@ class Store:
         state = self.files.state(row_name(key))
         if self.verified is not None and state is not None:
             blob = None if row.digest is None else self.files.state(blob_name(row.digest))
-            self.verified.put(key, _known(state, row, blob))
+            self.verified.put(key, _verified_row(state, row, blob))
 
     def note_latest(self, step_name: str, key: str, sources: dict[str, str]) -> None:
-        """Remember an action as the last one of a step."""
+        """Note an action as the last one of a step."""
         self.files.write(
             latest_name(step_name), sealed({"step": step_name, "key": key, "sources": sources}, self.secret)
         )
 
     def latest(self, step_name: str) -> Latest | None:
-        """The last action of a step, whatever its key."""
+        """Return the last action of a step; None if there is none or its file is damaged."""
         latest = self.read_latest(latest_name(step_name))
         return latest if latest is not None and latest.step == step_name else None
 
     def read_latest(self, name: str) -> Latest | None:
-        """The last action of a step by the name of its file."""
+        """Return the last action of a step by the name of its file; None as for `latest`."""
         value = self._read_sealed(name)
         try:
             return None if value is None else Latest(value["step"], plain_hex(value["key"]), dict(value["sources"]))
@@ -162,7 +162,7 @@ class Store:
             return None
 
     def row(self, key: str) -> Row | None:
-        """The row of an action, whether its result is there or not."""
+        """Return the row of an action, even if its result is missing; None if the row is missing or damaged."""
         value = self._read_sealed(row_name(key))
         if value is None:
             return None
@@ -182,21 +182,21 @@ class Store:
             return None
 
     def bears_no_seal(self, key: str) -> bool:
-        """Whether there is a row of an action that the owner of a sealed store did not make."""
+        """Return True if the store is sealed and the action has a row without the seal of the owner."""
         try:
             unsealed(self.files.read(row_name(key)), self.secret)
         except UnsealedError:
             return True
-        except (OSError, *BROKEN):
+        except (OSError, *UNSEALING_ERRORS):
             pass
         return False
 
-    def _remember(self, key: str, known: Known) -> None:
+    def _remember(self, key: str, verified_row: VerifiedRow) -> None:
         if self.verified is not None:
-            self.verified.put(key, known)
+            self.verified.put(key, verified_row)
 
     def _read_sealed(self, name: str) -> dict[str, Any] | None:
-        """The content of a small file, if its seal is right."""
+        """Content of a small file, if its seal is right."""
         try:
             return unsealed(self.files.read(name), self.secret)
         except FileNotFoundError:
@@ -204,35 +204,41 @@ class Store:
         except UnsealedError as error:
             log.warning("%s: %s, will be made again", self.files.path(name), error)
             return None
-        except (OSError, *BROKEN):
+        except (OSError, *UNSEALING_ERRORS):
             log.warning("%s: damaged, will be made again", self.files.path(name))
             return None
 
 
 def open_store(place: Path | str, verified: Path | None = None) -> Store:
-    """The store at a path or URL, with what the file `verified` remembers of it."""
+    """Open the store at a path or URL, with the index of verified results in the file `verified`."""
     files = open_files(place)
     secret = secret_of(files)
     return Store(files, None if verified is None else VerifiedIndex(verified, secret), secret)
 
 
 def _reopened(files: Files) -> Store:
-    """The store where another process works with it."""
+    """Open the store of a pickled one in another process."""
     return Store(files, None, secret_of(files))
 
 
 def blob_name(digest: str) -> str:
-    """The file of a blob."""
+    """Return the file name of a blob; ValueError if `digest` is not a SHA-256 digest.
+
+    Examples
+    --------
+    >>> blob_name(64 * "a")[:12]
+    'blobs/aa/aaa'
+    """
     return f"blobs/{plain_hex(digest)[:2]}/{digest}"
 
 
 def row_name(key: str) -> str:
-    """The file of an action's row."""
+    """Return the file name of an action's row."""
     return f"actions/{plain_hex(key)[:2]}/{key}.json"
 
 
 def latest_name(step_name: str) -> str:
-    """The file that names the last action of a step."""
+    """Return the name of the file that names the last action of a step."""
     digest = sha256(step_name.encode())
     return f"latest/{digest[:2]}/{digest}.json"
 
@@ -241,12 +247,12 @@ _IS_HEX = re.compile("[0-9a-f]{64}").fullmatch
 
 
 def plain_hex(digest: Any) -> str:
-    """`digest` where it is one: a name out of a file of the store must not become a path."""
+    """Return `digest` if it is a SHA-256 digest, else raise ValueError: a text from a file must not become a path."""
     if not isinstance(digest, str) or not _IS_HEX(digest):
         raise ValueError(f"{str(digest)[:80]!r} is no SHA-256 digest")
     return digest
 
 
-def _known(state: str, row: Row, blob_state: str | None) -> Known:
+def _verified_row(state: str, row: Row, blob_state: str | None) -> VerifiedRow:
     kind, problem = row.failure or (None, None)
-    return Known(state, row.digest, kind, problem, blob_state)
+    return VerifiedRow(state, row.digest, kind, problem, blob_state)

@@ -1,4 +1,4 @@
-"""Ingesting scans by hand."""
+"""Ingest of scans by a command."""
 
 from typing import Any
 
@@ -7,15 +7,16 @@ from pipelines.archive.ingest import ingest_scans
 
 def test_archive_is_ingested_camera_by_camera(archive: Any) -> None:
     (archive.scan / "cam5.avi").write_bytes(b"RIFF")
-    [one, five] = ingest_scans([archive.root / "archive"])
-    assert (one.scan, one.camera, one.frames, one.lost, one.problem) == ("P0001/S1", 1, 20, 0, None)
-    assert one.film_bytes == (archive.scan / "cam1.avi").stat().st_size
+    [camera_1, camera_5] = ingest_scans([archive.root / "archive"])
+    assert (camera_1.scan, camera_1.camera, camera_1.problem) == ("P0001/S1", 1, None)
+    assert (camera_1.frames, camera_1.lost) == (20, 0)
+    assert camera_1.film_bytes == (archive.scan / "cam1.avi").stat().st_size
     array = archive.scan / "frames.zarr/cam1"
-    assert one.store_bytes == sum(path.stat().st_size for path in array.iterdir())
-    assert one.store_bytes <= 1.05 * one.film_bytes
-    assert (five.camera, five.frames) == (5, 0)
-    assert five.problem == f"{archive.scan / 'cam5.avi'}: header: expected an AVI film"
-    assert ingest_scans([archive.scan])[0] == one
+    assert camera_1.store_bytes == sum(path.stat().st_size for path in array.iterdir())
+    assert camera_1.store_bytes <= 1.05 * camera_1.film_bytes
+    assert (camera_5.camera, camera_5.frames) == (5, 0)
+    assert camera_5.problem == f"{archive.scan / 'cam5.avi'}: header: expected an AVI film"
+    assert ingest_scans([archive.scan])[0] == camera_1
 
 
 def test_what_is_no_scan_is_said(archive: Any) -> None:

@@ -1,4 +1,4 @@
-"""An archive: each scan's failure is its own, in one line, and is told again without any work."""
+"""A job: a failed scan is reported in one line, does not stop the others, and is cached."""
 
 import itertools
 import json
@@ -66,12 +66,12 @@ def test_each_broken_scan_is_one_line_and_the_rest_is_whole(done: Any) -> None:
 
 
 def test_no_later_job_overwrites_the_scan_of_an_earlier_one(done: Any) -> None:
-    """As in a watch, where each scan that arrives is a job of its own."""
+    """Plan as in a watch, where each new scan is a job of its own."""
     folders: dict[str, Path] = {}
 
     def refused(folder: Path) -> list[str]:
         planned = plan_job(replace(done.job(), folders=[folder]), folders=folders)
-        return [str(one.error) for one in planned.refused]
+        return [str(refusal.error) for refusal in planned.refused]
 
     assert refused(done.scan) == refused(done.scan) == []
     twin = add_scan(done, "S0", "scan: S0", "scan: S1")
@@ -187,9 +187,9 @@ def test_own_calibration_of_a_scan_comes_before_the_workflows(
 
 
 def test_calibration_without_a_camera_is_refused(done: Any, calibration: Callable[..., Calibration]) -> None:
-    one = calibration()
+    complete = calibration()
     path = done.root / "calibration.json"
-    path.write_text(one.model_copy(update={"cameras": [one.camera(1)]}).model_dump_json())
+    path.write_text(complete.model_copy(update={"cameras": [complete.camera(1)]}).model_dump_json())
     [scan], _ = done.run()
     assert scan.problem == f"{path}: cameras: has no camera 5, expected one of 1"
 
@@ -208,7 +208,7 @@ LAST = ("surface", "foot.stl", "quality", "measure", "report")
 
 
 class UnreachableError(Exception):
-    """Of a kind that only a store's own library knows."""
+    """An error class that only the library of a store knows."""
 
 
 @pytest.fixture
@@ -273,8 +273,8 @@ def test_plan_of_a_store_that_is_away_is_one_fault(
 def test_store_that_fails_costs_no_result(
     remote: Any, finished: Path, count: int, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """At whichever call: while planning, in a step, at the delivery, at the end of the run."""
-    told = re.compile(
+    """The store fails in any call: while planning, in a step, at the delivery, at the end of the run."""
+    expected = re.compile(
         rf"{remote.job().cache}/\S+: cannot be (looked up|read|written|removed|listed) "
         r"\(UnreachableError: Connect timeout on endpoint\)"
     )
@@ -295,7 +295,7 @@ def test_store_that_fails_costs_no_result(
         assert complete.isdisjoint(to_run)
         complete = {*LAST} - to_run
     assert len(problems) > 3
-    assert [problem for problem in problems if not told.fullmatch(problem)] == []
+    assert [problem for problem in problems if not expected.fullmatch(problem)] == []
     assert [line for line in caplog.messages if not line.endswith("will not know of this run")] == []
     [scan], ran = remote.run()
     assert scan.problem is None

@@ -1,4 +1,4 @@
-"""The page of an archive: written once for what it shows, whatever else has gone wrong."""
+"""The page of an archive is written only if its content changes, even if files are missing."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""A row a scan, for people's spreadsheets and for programs alike."""
+"""The table of results has one row for each scan, as CSV and as Parquet."""
 
 import csv
 import json

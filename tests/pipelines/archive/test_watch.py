@@ -1,4 +1,4 @@
-"""Scans are handed over once they are complete, and again only when they have changed."""
+"""Scans are reported once they are complete, and again only after a change."""
 
 import os
 import shutil
@@ -21,7 +21,7 @@ def arriving(archive: Any, tmp_path: Path) -> tuple[Path, Path]:
 
 
 def age(folder: Path, seconds: float = 2 * QUIET_S) -> None:
-    """As if nothing had been written to the files for a while."""
+    """Make all files older than `QUIET_S`."""
     for path in folder.rglob("*"):
         if path.is_file():
             os.utime(path, (time.time() - seconds,) * 2)

@@ -1,4 +1,4 @@
-"""Steps of made-up modules, in a package of their own that the engine takes for a room of the project."""
+"""Fixtures for steps of generated modules, in a package that the engine counts as part of the project."""
 
 import importlib
 import itertools
@@ -25,7 +25,7 @@ def run(inputs, parameters, places):
 
 
 class MadeUpPackage:
-    """A package whose modules are written, and written anew, by a test."""
+    """A package whose modules a test writes and rewrites."""
 
     def __init__(self, folder: Path) -> None:
         self.name = f"made_up_{next(PACKAGES)}"
@@ -39,7 +39,7 @@ class MadeUpPackage:
         path.write_text(source.replace("PACKAGE", self.name))
 
     def load(self, module: str) -> str:
-        """The name of the module, which will be imported as a new process would."""
+        """The name of the module, which is imported as in a new process."""
         self.forget()
         return f"{self.name}.{module}"
 
@@ -47,7 +47,7 @@ class MadeUpPackage:
         for name in [name for name in sys.modules if name.split(".")[0] == self.name]:
             del sys.modules[name]
         importlib.invalidate_caches()
-        code._KNOWN.clear()
+        code._IDENTITIES.clear()
         code._source.cache_clear()
 
     def step_module(self, name: str, source: str = JOIN) -> str:
@@ -75,7 +75,7 @@ RunSteps = Callable[..., tuple[dict[str, Outcome], list[str]]]
 
 @pytest.fixture
 def run_steps(store: Store) -> RunSteps:
-    """Plans and runs steps; returns their outcomes by kind, and the kinds that ran."""
+    """Plan and run steps; returns their outcomes by kind, and the kinds that ran."""
 
     def run(*steps: Step, workers: int = 2) -> tuple[dict[str, Outcome], list[str]]:
         ends: list[StepEnd] = []

@@ -1,4 +1,4 @@
-"""Damage is found and removed; actions that do not come to the same again are found."""
+"""Audits find and remove damaged files, and find actions whose repetition differs."""
 
 import logging
 from collections.abc import Callable
@@ -172,7 +172,7 @@ def run(*_):
     steps = chain(second=package.step_module("sly", source))
     steps.append(Step("P/S", "behind", steps[0].module, None, {"second": Output("P/S/second")}))
     run_steps(*steps)
-    assert repeated(steps, store) == [None, None]  # the step behind has no action of its own
+    assert repeated(steps, store) == [None, None]  # the second step has no action of its own
     hidden.touch()
     assert repeated(steps, store) == [None, Difference("P/S/second", "no stripe", sha256(b"found"))]
 

@@ -1,4 +1,4 @@
-"""What differs between two actions of one step."""
+"""The differences between two actions of one step."""
 
 import json
 from pathlib import Path

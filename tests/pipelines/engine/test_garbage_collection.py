@@ -1,4 +1,4 @@
-"""What can go, and what never does."""
+"""Garbage collection deletes what nothing needs, and nothing else."""
 
 import time
 from collections.abc import Callable
@@ -48,7 +48,7 @@ def chain(package: Any) -> Chain:
 
 
 def garbage(store: Store, *delivered: str, days: float = 2.0) -> Garbage:
-    """What goes after so many days, if nothing happens meanwhile."""
+    """The garbage after this number of days."""
     now = time.time() + days * DAY_S
     return find_garbage(read_contents(store), store, delivered=delivered, now=now, older_than_s=DAY_S)
 
@@ -65,14 +65,14 @@ def test_what_ran_last_is_kept_and_what_ran_before_goes(chain: Chain, store: Sto
     old, _ = run_steps(*chain(2, remark=b"old"))
     before = files(store)
     new, _ = run_steps(*chain(3))
-    found = garbage(store)
-    assert found.young == []
-    first, second = found.names[0], found.names[1:]
+    unneeded = garbage(store)
+    assert unneeded.young == []
+    first, second = unneeded.names[0], unneeded.names[1:]
     assert first.startswith("actions/")
     assert set(second) == {blob_name(old["second"].digest), blob_name(Value(b"old").digest)}
-    assert set(found.names) <= before
-    assert delete(found, store) == (found.names, [])
-    assert files(store).isdisjoint(found.names)
+    assert set(unneeded.names) <= before
+    assert delete(unneeded, store) == (unneeded.names, [])
+    assert files(store).isdisjoint(unneeded.names)
     assert hits(store, chain(3)) == [True, True]
     assert hits(store, chain(2, remark=b"old")) == [True, False]
     assert store.get(new["second"].digest) == b"film+remark*3"
@@ -88,7 +88,7 @@ def test_code_goes_with_the_last_action_that_it_was_of(
     package.forget()
     run_steps(*steps)
     shares = read_contents(store).shares(garbage(store).names)
-    assert {kind: (one.actions, one.results) for kind, one in shares.items()} == {CODE: (0, 2), "second": (1, 0)}
+    assert {kind: (share.actions, share.results) for kind, share in shares.items()} == {CODE: (0, 2), "second": (1, 0)}
     delete(garbage(store), store)
     package.write("second", (package.folder / "second.py").read_text() + "\nX = 2\n")
     package.forget()
@@ -98,8 +98,8 @@ def test_code_goes_with_the_last_action_that_it_was_of(
 def test_nothing_young_goes(chain: Chain, store: Store, run_steps: Any) -> None:
     run_steps(*chain(2))
     run_steps(*chain(3))
-    found = garbage(store, days=0.9)
-    assert (found.names, len(found.young)) == ([], 2)
+    unneeded = garbage(store, days=0.9)
+    assert (unneeded.names, len(unneeded.young)) == ([], 2)
     assert garbage(store, days=1.1).young == []
 
 
@@ -120,7 +120,7 @@ def test_what_a_last_action_took_is_kept_though_its_step_has_gone_on(
     chain: Chain, store: Store, run_steps: Any
 ) -> None:
     old, _ = run_steps(*chain())
-    run_steps(chain(film=b"other film")[0])  # interrupted there
+    run_steps(chain(film=b"other film")[0])  # interrupted after this step
     assert garbage(store) == Garbage()
     assert store.get(old["first"].digest) == b"film"
 
@@ -131,7 +131,7 @@ def test_what_lies_in_the_results_is_kept(chain: Chain, store: Store, run_steps:
     run_steps(*chain(2, b"old film"))  # known: no step's last action is changed
     assert len(garbage(store).names) == 4
     assert garbage(store, old["second"].digest) == Garbage()
-    assert len(garbage(store, "0" * 64).names) == 4  # of no step
+    assert len(garbage(store, "0" * 64).names) == 4  # a key of no step
     keys = repeatable(make_plan(chain(2, b"old film"), store), store)
     in_use = find_garbage(read_contents(store), store, keys=keys, now=time.time() + 2 * DAY_S, older_than_s=DAY_S)
     assert in_use == Garbage()
@@ -151,12 +151,12 @@ def test_what_was_killed_leaves_parts_that_go(chain: Chain, store: Store, run_st
 def test_a_run_under_way_keeps_all(chain: Chain, store: Store, run_steps: Any) -> None:
     run_steps(*chain(2))
     run_steps(*chain(3))
-    found, before = garbage(store), files(store)
+    unneeded, before = garbage(store), files(store)
     with lease(store):
-        deleted, [live] = delete(found, store)
+        deleted, [live] = delete(unneeded, store)
         assert (deleted, live.process is not None) == ([], True)
         assert files(store) - {live.name} == before
-    assert delete(found, store) == (found.names, [])
+    assert delete(unneeded, store) == (unneeded.names, [])
 
 
 def test_a_run_that_begins_while_garbage_is_deleted_stops_it(
@@ -164,7 +164,7 @@ def test_a_run_that_begins_while_garbage_is_deleted_stops_it(
 ) -> None:
     run_steps(*chain(2))
     run_steps(*chain(3))
-    found = garbage(store)
+    unneeded = garbage(store)
     monkeypatch.setattr("pipelines.engine.garbage_collection.CHECK_EVERY", 1)
     original = type(store.files).remove
     with ExitStack() as runs:
@@ -174,11 +174,11 @@ def test_a_run_that_begins_while_garbage_is_deleted_stops_it(
             runs.enter_context(lease(store))
 
         monkeypatch.setattr(type(store.files), "remove", remove)
-        deleted, live = delete(found, store)
+        deleted, live = delete(unneeded, store)
         monkeypatch.setattr(type(store.files), "remove", original)
-    assert deleted == found.names[:1]
+    assert deleted == unneeded.names[:1]
     assert len(live) == 1
-    assert store.files.state(found.names[1]) is not None
+    assert store.files.state(unneeded.names[1]) is not None
 
 
 def test_the_lease_of_a_dead_run_goes_and_a_live_one_stays(store: Store) -> None:
@@ -191,25 +191,25 @@ def test_shares_by_kind(chain: Chain, store: Store, run_steps: Any) -> None:
     outcomes, _ = run_steps(*chain(2))
     contents = read_contents(store)
     shares = contents.shares(contents.sizes)
-    assert {kind: (one.actions, one.results) for kind, one in shares.items()} == {
+    assert {kind: (share.actions, share.results) for kind, share in shares.items()} == {
         CODE: (0, 4), VALUES: (0, 1), "first": (1, 1), "second": (1, 1), "(other)": (0, 0),
     }  # fmt: skip  # the film is equal to the result of first; code: two documents and two modules
     row = contents.sizes[
         next(row_name(key) for key, row in contents.actions.rows.items() if row.image["step"] == "second")
     ]
     assert shares["second"].bytes == row + len(b"film+remark*2")
-    assert sum(one.bytes for one in shares.values()) == sum(size for _, size in store.files.sizes(""))
+    assert sum(share.bytes for share in shares.values()) == sum(size for _, size in store.files.sizes(""))
     assert store.has(outcomes["first"].digest)
 
 
 def test_when_a_file_was_written(store: Store) -> None:
-    for one in (store, open_store("memory://collect-test")):
+    for opened in (store, open_store("memory://collect-test")):
         before = time.time() - 1
-        digest = one.put(b"x")
-        written = one.files.written(blob_name(digest))
+        digest = opened.put(b"x")
+        written = opened.files.written(blob_name(digest))
         assert written is not None
         assert before <= written <= time.time() + 1
-        assert one.files.written(blob_name("0" * 64)) is None
+        assert opened.files.written(blob_name("0" * 64)) is None
 
 
 def test_a_store_elsewhere(chain: Chain, run_steps: Any, store: Store) -> None:
@@ -218,10 +218,10 @@ def test_a_store_elsewhere(chain: Chain, run_steps: Any, store: Store) -> None:
     elsewhere = open_store("memory://collect-elsewhere")
     for name in files(store):
         elsewhere.files.write(name, store.files.read(name))
-    found = garbage(elsewhere)
-    assert found == garbage(store)
-    delete(found, elsewhere)
-    assert files(elsewhere) == files(store) - set(found.names)
+    unneeded = garbage(elsewhere)
+    assert unneeded == garbage(store)
+    delete(unneeded, elsewhere)
+    assert files(elsewhere) == files(store) - set(unneeded.names)
 
 
 def test_an_empty_store(store: Store) -> None:

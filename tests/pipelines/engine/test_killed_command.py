@@ -42,7 +42,7 @@ def test_killed_command_is_gone_on_with(number: int, archive: Any, finished: Pat
 
 
 def complete_steps(root: Path) -> set[str]:
-    """Names, within the scan, of the steps whose row is there with its result."""
+    """Names, within the scan, of the steps with a row and its result."""
     store = root / "results" / ".footscan"
     found = set()
     for file in (store / "latest").rglob("[!.]*.json"):
@@ -55,7 +55,7 @@ def complete_steps(root: Path) -> set[str]:
 
 
 def results(root: Path) -> dict[str, bytes]:
-    """What was delivered, and what the store holds of results and actions."""
+    """The delivered files, and the results and actions in the store."""
     store = root / "results" / ".footscan"
     files = [file for kind in (root / "results/P0001", store / "blobs", store / "actions") for file in kind.rglob("*")]
     return {

@@ -1,4 +1,4 @@
-"""What would run, and why."""
+"""A plan lists the steps that would run, with the reasons."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -37,7 +37,7 @@ def chain(package: Any) -> Callable[..., list[Step]]:
     return draw
 
 
-def told(steps: list[Step], store: Store) -> list[tuple[str, str]]:
+def states_of(steps: list[Step], store: Store) -> list[tuple[str, str]]:
     return [(planned.state.value, planned.reason) for planned in make_plan(steps, store).steps]
 
 
@@ -46,7 +46,7 @@ HITS = [("hit", "")] * 3
 
 def test_nothing_has_run(chain: Any, store: Store) -> None:
     plan = make_plan(chain(), store)
-    assert told(chain(), store) == [
+    assert states_of(chain(), store) == [
         ("miss", "never run"), ("waits", "waits for first of camera 3"), ("waits", "waits for second"),
     ]  # fmt: skip
     assert plan.to_run == plan.steps
@@ -56,7 +56,7 @@ def test_nothing_has_run(chain: Any, store: Store) -> None:
 def test_all_has_run(chain: Any, store: Store, run_steps: RunSteps) -> None:
     run_steps(*chain())
     plan = make_plan(chain(), store)
-    assert told(chain(), store) == HITS
+    assert states_of(chain(), store) == HITS
     assert plan.to_run == []
     outcome = plan.steps[2].outcome
     assert isinstance(outcome, Success)
@@ -66,10 +66,10 @@ def test_all_has_run(chain: Any, store: Store, run_steps: RunSteps) -> None:
 def test_reasons(chain: Any, store: Store, run_steps: RunSteps) -> None:
     run_steps(*chain())
     behind = ("waits", "waits for second")
-    assert told(chain(film=b"other"), store)[0] == ("miss", "input film changed")
-    assert told(chain(remark=b"other"), store) == [HITS[0], ("miss", "input remark changed"), behind]
-    assert told(chain(factor=3), store) == [HITS[0], ("miss", "parameter factor changed"), behind]
-    both = told(chain(factor=3, remark=b"other"), store)[1]
+    assert states_of(chain(film=b"other"), store)[0] == ("miss", "input film changed")
+    assert states_of(chain(remark=b"other"), store) == [HITS[0], ("miss", "input remark changed"), behind]
+    assert states_of(chain(factor=3), store) == [HITS[0], ("miss", "parameter factor changed"), behind]
+    both = states_of(chain(factor=3, remark=b"other"), store)[1]
     assert both == ("miss", "input remark changed, parameter factor changed")
 
 
@@ -79,10 +79,10 @@ def test_reason_of_changed_code(chain: Any, store: Store, run_steps: RunSteps, p
     package.write("second", source + "\n# a remark\n")
     steps = chain()
     package.forget()
-    assert told(steps, store) == HITS
+    assert states_of(steps, store) == HITS
     package.write("second", source + "\nX = 1\n")
     package.forget()
-    assert told(steps, store)[1] == ("miss", f"code of {package.name}.second changed")
+    assert states_of(steps, store)[1] == ("miss", f"code of {package.name}.second changed")
 
 
 def test_reason_of_a_result_that_is_gone(chain: Any, store: Store, run_steps: RunSteps, tmp_path: Path) -> None:
@@ -90,29 +90,29 @@ def test_reason_of_a_result_that_is_gone(chain: Any, store: Store, run_steps: Ru
     written.parent.mkdir(parents=True)
     written.touch()
     outcomes, _ = run_steps(*chain(writes=written))
-    assert told(chain(writes=written), store) == HITS
+    assert states_of(chain(writes=written), store) == HITS
     written.unlink()
-    assert told(chain(writes=written), store)[0] == ("miss", "cam3 is not there")
+    assert states_of(chain(writes=written), store)[0] == ("miss", "cam3 is not there")
     store.files.remove(blob_name(outcomes["second"].digest))
-    assert told(chain(), store) == [HITS[0], ("miss", "its result is gone"), ("waits", "waits for second")]
+    assert states_of(chain(), store) == [HITS[0], ("miss", "its result is gone"), ("waits", "waits for second")]
 
 
 def test_a_first_plan_says_never_run_whatever_the_step_would_write(
     chain: Any, store: Store, run_steps: RunSteps, tmp_path: Path
 ) -> None:
     written = tmp_path / "frames/cam3/zarr.json"
-    assert told(chain(writes=written), store)[0] == ("miss", "never run")
+    assert states_of(chain(writes=written), store)[0] == ("miss", "never run")
     written.parent.mkdir(parents=True)
     written.touch()
     run_steps(*chain(writes=written))
     written.unlink()
-    assert told(chain(writes=written, film=b"other"), store)[0] == ("miss", "cam3 is not there")
+    assert states_of(chain(writes=written, film=b"other"), store)[0] == ("miss", "cam3 is not there")
 
 
 def test_going_back_to_an_earlier_parameter_is_a_hit(chain: Any, store: Store, run_steps: RunSteps) -> None:
     run_steps(*chain(factor=2))
     run_steps(*chain(factor=3))
-    assert told(chain(factor=2), store) == told(chain(factor=3), store) == HITS
+    assert states_of(chain(factor=2), store) == states_of(chain(factor=3), store) == HITS
 
 
 def test_planning_writes_nothing(chain: Any, store: Store) -> None:

@@ -1,4 +1,4 @@
-"""The same results by threads, by processes and by a cluster; a worker that dies costs its own task."""
+"""Threads, processes and a cluster give the same results; a dying worker costs only its own task."""
 
 import re
 from collections.abc import Iterator
@@ -46,7 +46,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 
 
 def draw(scan: str = "P/S", first: str = "join", **places: Any) -> list[Step]:
-    """Of a scan: two cameras, joined, and one step behind."""
+    """The steps of a scan: two cameras, their join, and one step after it."""
     join = "step_of_pool_join"
     return [
         Step(scan, "extract", f"step_of_pool_{first}", None, {"film": Value(scan.encode())}, 1, places=places),

@@ -1,4 +1,4 @@
-"""What processes of this machine listen on."""
+"""The ports on which processes of a run listen."""
 
 import urllib.error
 import urllib.request
@@ -15,8 +15,9 @@ def listening() -> set[tuple[str, int]]:
     """Addresses and ports of this process and all that it has started."""
     here = psutil.Process()
     processes = [here, *here.children(recursive=True)]
-    connections = [one for process in processes for one in process.net_connections("inet")]
-    return {(one.laddr.ip, one.laddr.port) for one in connections if one.status == psutil.CONN_LISTEN}
+    connections = [connection for process in processes for connection in process.net_connections("inet")]
+    listening = [connection.laddr for connection in connections if connection.status == psutil.CONN_LISTEN]
+    return {(address.ip, address.port) for address in listening}
 
 
 def status_of(page: str) -> int:

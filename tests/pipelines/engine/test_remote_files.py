@@ -1,4 +1,4 @@
-"""A store at a URL: what its server says becomes one line, and is never taken for a missing blob."""
+"""A store at a URL: an error of its server becomes one line and is never taken for a missing blob."""
 
 import logging
 import pickle
@@ -30,20 +30,20 @@ IMAGE = {"step": "clean", "code": "d" * 64, "parameters": None, "inputs": {}}
 
 
 class ServerError(Exception):
-    """Of a kind that only its own library knows, as botocore's ClientError is."""
+    """An error class that only the library of the store knows, such as botocore's ClientError."""
 
 
 class Server(AbstractFileSystem):  # type: ignore[misc]  # fsspec has no types
-    """A store that answers by listings which it remembers, as fsspec's object stores and FTP do, and that fails."""
+    """A failing store that caches its listings, as fsspec's object stores and FTP do."""
 
     protocol = "made-up"
     cachable = False
     root_marker = ""
     content: ClassVar[dict[str, bytes]] = {}
     error: ClassVar[Exception | None] = None
-    """What it raises instead of an answer."""
+    """Error that it raises."""
     fails: ClassVar[Callable[[str, str], bool]]
-    """Whether it does so when it is asked to do something to a path."""
+    """True if an operation on a path raises the error."""
 
     def _ask(self, what: str, path: str) -> str:
         if Server.error is not None and Server.fails(what, path):
@@ -95,7 +95,7 @@ class Server(AbstractFileSystem):  # type: ignore[misc]  # fsspec has no types
 
 @pytest.fixture
 def server() -> Iterator[type[Server]]:
-    """Empty, and well."""
+    """An empty server without errors."""
     fsspec.register_implementation("made-up", Server, clobber=True)
     yield Server
     Server.content.clear()
@@ -107,8 +107,8 @@ def test_state_is_what_the_kind_of_store_tells(
     server: type[Server], monkeypatch: pytest.MonkeyPatch, fact: str
 ) -> None:
     files, states = open_files(PLACE), []
-    for told in ("a", "b", "b"):
-        monkeypatch.setattr(server, "info", lambda *_, now=told: {"size": 3, "atime": object(), fact: now})
+    for fact_value in ("a", "b", "b"):
+        monkeypatch.setattr(server, "info", lambda *_, now=fact_value: {"size": 3, "atime": object(), fact: now})
         states.append(files.state(NAME))
     assert states[0] != states[1] == states[2]
 
@@ -152,7 +152,7 @@ def test_whatever_a_store_raises_is_one_fault(server: type[Server], error: Excep
             ask()
         assert str(fault.value) == f"{problem} ({words})"
         assert fault.value.exit_status == 3
-        assert not isinstance(fault.value, OSError)  # which is a miss
+        assert not isinstance(fault.value, OSError)  # an OSError would be a miss
     server.error = None
     assert files.read(NAME) == b"x"
 
@@ -182,7 +182,7 @@ def test_folder_that_cannot_be_listed_is_not_left_out(server: type[Server]) -> N
 
 
 def test_listings_are_not_believed_for_long(server: type[Server]) -> None:
-    """What others write, exchange or delete is seen at once, whatever was listed before."""
+    """Files that others write, replace or delete are seen at once, despite cached listings."""
     files, inside = open_files(PLACE), "bucket/feet"
     files.write(NAME, b"x")
     assert list(files.sizes("blobs")) == [(NAME, 1)]
@@ -200,7 +200,7 @@ def test_listings_are_not_believed_for_long(server: type[Server]) -> None:
 
 
 @pytest.fixture
-def known(server: type[Server], tmp_path: Path) -> Store:
+def remote(server: type[Server], tmp_path: Path) -> Store:
     """A store on that server, with a result."""
     del server
     store = open_store(PLACE, tmp_path / "known.sqlite")
@@ -211,15 +211,15 @@ def known(server: type[Server], tmp_path: Path) -> Store:
 @pytest.mark.parametrize("error", [error for error, _ in ERRORS])
 @pytest.mark.parametrize("failing", ["all", "actions", "blobs"])
 def test_server_that_is_away_is_no_miss(
-    known: Store, server: type[Server], error: Exception, failing: str, caplog: pytest.LogCaptureFixture
+    remote: Store, server: type[Server], error: Exception, failing: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     step = Step("P/S", "clean", "pipelines.steps.measure", None, {"a": Value(b"a")})
-    digest, key = known.put(b"result"), key_of(IMAGE)
+    digest, key = remote.put(b"result"), key_of(IMAGE)
     server.error, server.fails = error, lambda _, path: failing == "all" or f"/{failing}/" in path
-    blobs: list[Callable[[], object]] = [lambda: known.get(digest), lambda: known.put(b"result")]
-    rows: list[Callable[[], object]] = [lambda: known.row(key), lambda: make_plan([step], known)]
+    blobs: list[Callable[[], object]] = [lambda: remote.get(digest), lambda: remote.put(b"result")]
+    rows: list[Callable[[], object]] = [lambda: remote.row(key), lambda: make_plan([step], remote)]
     for ask in [
-        lambda: known.lookup(key),
+        lambda: remote.lookup(key),
         *(blobs if failing != "actions" else []),
         *(rows if failing != "blobs" else []),
     ]:
@@ -228,58 +228,58 @@ def test_server_that_is_away_is_no_miss(
         assert len(str(fault.value).splitlines()) == 1
     assert caplog.messages == []
     server.error = None
-    assert known.get(digest) == b"result"
-    assert known.lookup(key) is not None
+    assert remote.get(digest) == b"result"
+    assert remote.lookup(key) is not None
 
 
 @pytest.mark.parametrize("error", [error for error, _ in ERRORS])
-def test_server_that_is_away_costs_nothing_in_the_store(known: Store, server: type[Server], error: Exception) -> None:
-    """Neither is what cannot be read taken for damaged, nor a run under way for none."""
+def test_server_that_is_away_costs_nothing_in_the_store(remote: Store, server: type[Server], error: Exception) -> None:
+    """An unreadable file does not count as damaged, and an unreadable lease does not count as missing."""
     before = dict(server.content)
     server.error, server.fails = error, lambda what, _: what != "rm_file"
     asked: list[Callable[[], object]] = [
-        lambda: audit.verify(known), lambda: collect.read_contents(known), lambda: live_leases(known),
-        lambda: collect.delete(collect.Garbage([*before]), known), lambda: known.files.written(NAME),
+        lambda: audit.verify(remote), lambda: collect.read_contents(remote), lambda: live_leases(remote),
+        lambda: collect.delete(collect.Garbage([*before]), remote), lambda: remote.files.written(NAME),
     ]  # fmt: skip
     for ask in asked:
         with pytest.raises(Fault, match=f"^{PLACE}/.*: cannot be "):
             ask()
     server.fails = lambda what, _: what == "cat_file"
     with pytest.raises(Fault, match="cannot be read"):
-        audit.verify(known)
+        audit.verify(remote)
     assert server.content == before
 
 
 @pytest.mark.parametrize("kept", [0, 3])
 def test_half_an_upload_is_a_miss_said_aloud(
-    known: Store, server: type[Server], kept: int, caplog: pytest.LogCaptureFixture
+    remote: Store, server: type[Server], kept: int, caplog: pytest.LogCaptureFixture
 ) -> None:
-    digest, key = known.put(b"result"), key_of(IMAGE)
+    digest, key = remote.put(b"result"), key_of(IMAGE)
     server.content[f"bucket/feet/{blob_name(digest)}"] = b"result"[:kept]
     with caplog.at_level(logging.WARNING):
-        assert known.lookup(key) is None
+        assert remote.lookup(key) is None
     assert caplog.messages == [f"{PLACE}/{blob_name(digest)}: damaged, will be made again"]
-    assert known.put(b"result") == digest
-    assert known.lookup(key) is not None
+    assert remote.put(b"result") == digest
+    assert remote.lookup(key) is not None
     row = f"bucket/feet/{row_name(key)}"
     server.content[row] = server.content[row][: -7 - kept]
     caplog.clear()
-    assert known.lookup(key) is None
+    assert remote.lookup(key) is None
     assert caplog.messages == [f"{PLACE}/{row_name(key)}: damaged, will be made again"]
 
 
-def test_damage_in_a_store_that_one_may_only_read_is_a_miss(known: Store, server: type[Server]) -> None:
-    server.content[f"bucket/feet/{blob_name(known.put(b'result'))}"] = b"half"
+def test_damage_in_a_store_that_one_may_only_read_is_a_miss(remote: Store, server: type[Server]) -> None:
+    server.content[f"bucket/feet/{blob_name(remote.put(b'result'))}"] = b"half"
     server.error, server.fails = PermissionError("Forbidden"), lambda what, _: what in ("rm_file", "pipe_file")
-    assert known.lookup(key_of(IMAGE)) is None
+    assert remote.lookup(key_of(IMAGE)) is None
 
 
-def test_run_that_cannot_take_its_lease_away_has_ended_well(known: Store, server: type[Server]) -> None:
-    with lease(known):
-        assert len(live_leases(known)) == 1
+def test_run_that_cannot_take_its_lease_away_has_ended_well(remote: Store, server: type[Server]) -> None:
+    with lease(remote):
+        assert len(live_leases(remote)) == 1
         server.error, server.fails = ServerError("gone"), lambda *_: True
     server.error = None
-    assert len(live_leases(known)) == 1
+    assert len(live_leases(remote)) == 1
 
 
 def test_step_of_which_nothing_can_be_known_costs_its_scan_alone(server: type[Server], package: Any) -> None:
@@ -294,10 +294,10 @@ def test_step_of_which_nothing_can_be_known_costs_its_scan_alone(server: type[Se
     assert isinstance(second, Success)
 
 
-def test_no_connection_and_no_content_travels_to_a_worker(known: Store) -> None:
-    known.put(bytes(100_000))
-    travelling = pickle.dumps(known)
+def test_no_connection_and_no_content_travels_to_a_worker(remote: Store) -> None:
+    remote.put(bytes(100_000))
+    travelling = pickle.dumps(remote)
     assert len(travelling) < 1000
     there: Store = pickle.loads(travelling)
-    assert there.files == known.files
-    assert there.get(known.put(b"result")) == b"result"
+    assert there.files == remote.files
+    assert there.get(remote.put(b"result")) == b"result"

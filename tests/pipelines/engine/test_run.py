@@ -1,4 +1,4 @@
-"""Only misses run; what fails by its input is remembered, what fails by the machine is not."""
+"""Only misses run; failures of the input are cached, faults of the machine are not."""
 
 import logging
 from collections.abc import Callable
@@ -30,7 +30,7 @@ def raising(error: str) -> str:
 
 @pytest.fixture
 def diamond(package: Any) -> Callable[..., list[Step]]:
-    """left(a) and right(b), joined by both."""
+    """left(a), right(b), and both(left, right)."""
     module = package.step_module("join")
 
     def draw(a: bytes = b"a", b: bytes = b"b", left: Any = None, right: Any = None) -> list[Step]:
@@ -287,18 +287,18 @@ def test_code_that_was_changed_and_back_hits_again(package: Any, run_steps: RunS
     assert run_steps(step("# only a remark\n"))[1] == []
 
 
-OTHERWISE = "import time\ndef run(*_):\n    return str(time.perf_counter_ns()).encode()\n"
+NOT_DETERMINISTIC = "import time\ndef run(*_):\n    return str(time.perf_counter_ns()).encode()\n"
 
 
-def test_a_result_that_comes_out_otherwise_is_said_aloud(
+def test_warns_of_a_result_that_differs_from_the_earlier_one(
     package: Any, store: Store, run_steps: RunSteps, caplog: pytest.LogCaptureFixture
 ) -> None:
-    step = Step("P/S", "odd", package.step_module("odd", OTHERWISE))
+    step = Step("P/S", "odd", package.step_module("odd", NOT_DETERMINISTIC))
     (first, _) = run_steps(step)
     assert not caplog.records
     store.files.remove(blob_name(first["odd"].digest))
     (second, ran) = run_steps(step)
     assert ran == ["odd"]
     assert second != first
-    (told,) = [record.getMessage() for record in caplog.records]
-    assert told.startswith(f"P/S/odd: came out otherwise than before ({first['odd'].digest})")
+    (warning,) = [record.getMessage() for record in caplog.records]
+    assert warning.startswith(f"P/S/odd: differs from the earlier result ({first['odd'].digest})")

@@ -1,4 +1,4 @@
-"""Certificates on the way to a scheduler, as docs/archives.md has it, with what that says typed word for word."""
+"""TLS connections to a scheduler, with the commands of docs/archives.md copied word for word."""
 
 import contextlib
 import os
@@ -28,16 +28,16 @@ def block_with(word: str) -> str:
 
 
 def line_with(word: str, port: int) -> list[str]:
-    """A command of the page, for this machine and a port of the test's own."""
+    """A command of the page, for this machine and a free port."""
     [line] = [line for line in block_with("--tls-key").splitlines() if f".venv/bin/{word}" in line]
     line = line.replace(".venv/bin/", f"{BIN}/").replace("one:8786", f"127.0.0.1:{port}")
     return shlex.split(line.replace("--port 8786", f"--host 127.0.0.1 --port {port}").replace("--nworkers 4", ""))
 
 
 def free_port() -> int:
-    with contextlib.closing(socket.socket()) as one:
-        one.bind(("127.0.0.1", 0))
-        return int(one.getsockname()[1])
+    with contextlib.closing(socket.socket()) as listener:
+        listener.bind(("127.0.0.1", 0))
+        return int(listener.getsockname()[1])
 
 
 def make_certificates(folder: Path) -> Path:
@@ -53,13 +53,13 @@ def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def others(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of another authority."""
+    """Certificates of another authority."""
     return make_certificates(tmp_path_factory.mktemp("tls") / "others")
 
 
 @pytest.fixture(scope="module")
 def port(certificates: Path) -> Iterator[int]:
-    """Of a scheduler with a worker."""
+    """Port of a scheduler with a worker."""
     number = free_port()
     with contextlib.ExitStack() as stack:
         for word in ("dask scheduler", "dask worker"):
@@ -95,14 +95,14 @@ def test_the_page_types_right(archive: object, certificates: Path, port: int) ->
 
 @pytest.fixture
 def refusal(archive: object, capsys: pytest.CaptureFixture[str]) -> Refusal:
-    """The one line that a run ends with."""
+    """The last line of a run."""
     workflow = str(archive.workflow)  # type: ignore[attr-defined]
 
     def run(address: str, *arguments: str) -> str:
         assert run_command(["run", workflow, "--cluster", address, *arguments]) == 2
-        said = capsys.readouterr()
-        lines = said.err.splitlines()
-        assert (said.out, len(lines)) == ("", 2)
+        output = capsys.readouterr()
+        lines = output.err.splitlines()
+        assert (output.out, len(lines)) == ("", 2)
         assert "steps to run" in lines[0]
         return lines[1].removeprefix("footscan: ")
 
@@ -115,7 +115,7 @@ def test_who_has_no_certificate_of_the_authority_is_not_let_in(refusal: Refusal,
 
 
 def test_files_that_are_none(refusal: Refusal, certificates: Path, others: Path, tmp_path: Path) -> None:
-    """Before anything is asked of a scheduler."""
+    """Wrong files are refused before a scheduler is contacted."""
     address = "tls://127.0.0.1:9"
     assert "needs certificates, expected --tls-ca, --tls-cert and --tls-key" in refusal(address)
     good = options(certificates)
@@ -148,5 +148,5 @@ def test_options_that_do_not_go_together(
 ) -> None:
     for command in ("run", "tune"):
         assert run_command([command, *arguments]) == 2
-        said = capsys.readouterr()
-        assert (said.out, said.err.count("\n"), problem in said.err) == ("", 1, True)
+        output = capsys.readouterr()
+        assert (output.out, output.err.count("\n"), problem in output.err) == ("", 1, True)

@@ -1,4 +1,4 @@
-"""Where results came from."""
+"""Traces name all actions that a result came from."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,10 +22,10 @@ Chain = Callable[..., list[Step]]
 
 
 def traced(digest: str, store: Store, scan: str = "") -> Trace:
-    found = trace(digest, read_actions(store), store, scan)
-    assert found is not None
-    assert found.made_by in found.actions
-    return found
+    origin = trace(digest, read_actions(store), store, scan)
+    assert origin is not None
+    assert origin.made_by in origin.actions
+    return origin
 
 
 def result(outcomes: Any, kind: str) -> str:
@@ -34,7 +34,7 @@ def result(outcomes: Any, kind: str) -> str:
 
 @pytest.fixture
 def chain(package: Any, tmp_path: Path) -> Chain:
-    """ingest-3(film), its bytes as they are; extract-3(ingest, remark)."""
+    """ingest-3(film), which returns its bytes unchanged; extract-3(ingest, remark)."""
     copy = package.step_module(
         "copy", "import numpy\ndef run(inputs, parameters, places):\n    return places['film'].read_bytes()"
     )
@@ -57,8 +57,8 @@ def chain(package: Any, tmp_path: Path) -> Chain:
 
 def test_down_to_films_and_versions(chain: Chain, store: Store, run_steps: Any, tmp_path: Path) -> None:
     outcomes, _ = run_steps(*chain(remark=b'{"a":1}'))
-    found = traced(result(outcomes, "extract"), store)
-    extract = found.actions[found.made_by]
+    origin = traced(result(outcomes, "extract"), store)
+    extract = origin.actions[origin.made_by]
     assert (extract.step, extract.kind) == ("P/S/extract-3", "extract")
     assert extract.parameters == {"model": "Factor", "values": {"factor": 2}}
     assert extract.result == result(outcomes, "extract")
@@ -66,12 +66,12 @@ def test_down_to_films_and_versions(chain: Chain, store: Store, run_steps: Any, 
     assert (remark.name, remark.source, remark.content, remark.made_by) == ("remark", "value", b'{"a":1}', None)
     assert (manifest.name, manifest.source, manifest.digest) == ("manifest", "result", result(outcomes, "ingest"))
     assert manifest.made_by is not None
-    ingest = found.actions[manifest.made_by]
+    ingest = origin.actions[manifest.made_by]
     assert ingest.step == "P/S/ingest-3"
     assert set(ingest.libraries) == {"numpy", "python"}
     [film] = ingest.inputs
     assert (film.source, film.place) == ("file", str(tmp_path / "archive/P/S/cam3.avi"))
-    assert len(found.actions) == 2
+    assert len(origin.actions) == 2
 
 
 def test_what_no_step_made(chain: Chain, store: Store, run_steps: Any) -> None:
@@ -103,10 +103,10 @@ def test_of_equal_results_the_scans_own(store: Store) -> None:
 def test_an_earlier_action_is_traced_though_its_step_has_gone_on(chain: Chain, store: Store, run_steps: Any) -> None:
     outcomes, _ = run_steps(*chain(factor=2))
     run_steps(*chain(factor=3))
-    found = traced(result(outcomes, "extract"), store)
-    assert found.actions[found.made_by].step is None
-    assert found.actions[found.made_by].parameters["values"] == {"factor": 2}
-    assert len(found.actions) == 2
+    origin = traced(result(outcomes, "extract"), store)
+    assert origin.actions[origin.made_by].step is None
+    assert origin.actions[origin.made_by].parameters["values"] == {"factor": 2}
+    assert len(origin.actions) == 2
 
 
 def test_of_cameras_with_equal_results_each_its_own(package: Any, store: Store, run_steps: Any) -> None:
@@ -116,8 +116,8 @@ def test_of_cameras_with_equal_results_each_its_own(package: Any, store: Store, 
     stripes = {f"stripe-{n}": Output(f"P/S/extract-{n}") for n in (1, 2, 3)}
     step = Step("P/S", "fuse", join, None, stripes)
     store_outcomes, _ = run_steps(*extract, step)
-    found = traced(result(store_outcomes, "fuse"), store)
-    made = {taken.name: found.actions[str(taken.made_by)].step for taken in found.actions[found.made_by].inputs}
+    origin = traced(result(store_outcomes, "fuse"), store)
+    made = {taken.name: origin.actions[str(taken.made_by)].step for taken in origin.actions[origin.made_by].inputs}
     assert made == {f"stripe-{n}": f"P/S/extract-{n}" for n in (1, 2, 3)}
 
 
@@ -129,12 +129,12 @@ def test_a_step_that_gives_back_what_it_took_does_not_come_from_itself(store: St
     ]
     for image in loops:
         store.record(f"P/S/{image['step']}", Row(image, digest))
-    found = traced(digest, store)
-    first = found.actions[found.made_by]
+    origin = traced(digest, store)
+    first = origin.actions[origin.made_by]
     [taken] = first.inputs
     assert taken.made_by is not None
-    assert taken.made_by != found.made_by
-    [last] = found.actions[taken.made_by].inputs
+    assert taken.made_by != origin.made_by
+    [last] = origin.actions[taken.made_by].inputs
     assert last.made_by is None
 
 
@@ -143,9 +143,9 @@ def test_a_value_that_names_a_file_leads_on_to_who_made_it(package: Any, store: 
     outcomes, _ = run_steps(Step("demo", "calibrate", join, None, {"capture": Value(b"capture")}))
     source = f'{{"name":"calibration.json","sha256":"{result(outcomes, "calibrate")}"}}'.encode()
     outcomes, _ = run_steps(Step("P/S", "quality", join, None, {"calibration": Value(source)}))
-    found = traced(result(outcomes, "quality"), store)
-    [taken] = found.actions[found.made_by].inputs
-    assert found.actions[str(taken.made_by)].step == "demo/calibrate"
+    origin = traced(result(outcomes, "quality"), store)
+    [taken] = origin.actions[origin.made_by].inputs
+    assert origin.actions[str(taken.made_by)].step == "demo/calibrate"
 
 
 def test_names_of_files_that_are_no_rows_and_no_blobs() -> None:

@@ -1,4 +1,4 @@
-"""Results of an earlier version of the code stay where a person accepts them, and are told apart from later on."""
+"""Results of an earlier version of the code can be accepted, and are marked as such."""
 
 from collections.abc import Callable
 from typing import Any
@@ -25,10 +25,10 @@ def chain(package: Any) -> Chain:
     """first(film) -> second(first)."""
 
     def draw(first: str = FIRST, second: str = SECOND, film: bytes = b"Film") -> list[Step]:
-        one, two = package.step_module("first", first), package.step_module("second", second)
+        first_module, second_module = package.step_module("first", first), package.step_module("second", second)
         return [
-            Step("P/S", "first", one, None, {"film": Value(film)}),
-            Step("P/S", "second", two, None, {"first": Output("P/S/first")}),
+            Step("P/S", "first", first_module, None, {"film": Value(film)}),
+            Step("P/S", "second", second_module, None, {"first": Output("P/S/first")}),
         ]
 
     return draw
@@ -44,7 +44,7 @@ def test_steps_whose_code_alone_is_new_are_stale_and_what_follows_is_known(
     run_steps(*chain())
     assert stale_actions(chain(), store) == {}
     steps = chain(SAME_FIRST)
-    [stale] = stale_actions(steps, store).values()  # the second took what the first came to, and is known
+    [stale] = stale_actions(steps, store).values()  # the input of the second step is unchanged: it is a hit
     assert (stale.action.step.kind, versions(stale, store)) == ("first", [f"code of {steps[0].module} changed"])
     assert repeat(stale.action, store) is None
 
@@ -52,7 +52,7 @@ def test_steps_whose_code_alone_is_new_are_stale_and_what_follows_is_known(
 def test_another_input_or_a_step_that_never_ran_is_not_stale(chain: Chain, store: Store, run_steps: Any) -> None:
     run_steps(chain()[0])
     assert stale_actions(chain(SAME_FIRST, film=b"another"), store) == {}
-    assert [one.action.step.kind for one in stale_actions(chain(SAME_FIRST), store).values()] == ["first"]
+    assert [stale.action.step.kind for stale in stale_actions(chain(SAME_FIRST), store).values()] == ["first"]
 
 
 def test_what_is_accepted_is_a_hit_and_trace_tells(chain: Chain, store: Store, run_steps: Any) -> None:
@@ -61,16 +61,16 @@ def test_what_is_accepted_is_a_hit_and_trace_tells(chain: Chain, store: Store, r
     [stale] = stale_actions(steps, store).values()
     accept(stale, acceptance(stale.upgrade.old), store)
     plan = make_plan(steps, store)
-    assert [one.state for one in plan.steps] == [State.HIT, State.HIT]
+    assert [planned.state for planned in plan.steps] == [State.HIT, State.HIT]
     assert verify(store).damaged == []
     result = outcomes["second"]
     assert isinstance(result, Success)
-    found = trace(result.digest, read_actions(store), store, "P/S")
-    assert found is not None
-    by_step = {action.step: action.accepted for action in found.actions.values()}
+    origin = trace(result.digest, read_actions(store), store, "P/S")
+    assert origin is not None
+    by_step = {action.step: action.accepted for action in origin.actions.values()}
     assert by_step == {"P/S/first": acceptance(stale.upgrade.old), "P/S/second": None}
     run_steps(*chain())
-    assert stale_actions(chain(), store) == {}  # the old rows stand as they were
+    assert stale_actions(chain(), store) == {}  # the old rows are unchanged
 
 
 def test_what_follows_from_a_refused_step_is_not_known(chain: Chain, store: Store, run_steps: Any) -> None:

@@ -1,7 +1,7 @@
-"""What the key of each step stands for: `keys.txt` beside this file, one line a step.
+"""The key of each step covers the libraries and modules listed in `keys.txt` beside this file.
 
-Where a change is meant, `FOOTSCAN_WRITE_KEYS=1 pytest tests/pipelines/steps/test_keys.py` writes the file anew. Its
-diff says what the change costs: a step whose lines change loses all hits once.
+After an intended change, `FOOTSCAN_WRITE_KEYS=1 pytest tests/pipelines/steps/test_keys.py` writes the file anew. Its
+diff shows the cost of the change: a step whose lines change loses all hits once.
 """
 
 import difflib
@@ -32,11 +32,11 @@ def lines_of(step: str) -> list[str]:
 
 
 def test_keys_stand_for_what_the_list_says() -> None:
-    found = [line for step in STEPS for line in lines_of(step)]
+    actual = [line for step in STEPS for line in lines_of(step)]
     if os.environ.get("FOOTSCAN_WRITE_KEYS"):
-        LIST.write_text("\n".join(found) + "\n", encoding="utf-8")
-    known = LIST.read_text(encoding="utf-8").splitlines()
-    difference = list(difflib.unified_diff(known, found, "keys.txt", "the code", lineterm="", n=1))
+        LIST.write_text("\n".join(actual) + "\n", encoding="utf-8")
+    expected = LIST.read_text(encoding="utf-8").splitlines()
+    difference = list(difflib.unified_diff(expected, actual, "keys.txt", "the code", lineterm="", n=1))
     assert not difference, "\n".join(
         ["the keys of steps stand for other code or libraries:", *difference, __doc__ or ""]
     )

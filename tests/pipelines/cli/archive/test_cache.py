@@ -27,8 +27,8 @@ def cache(capsys: pytest.CaptureFixture[str]) -> Command:
     def run(*arguments: object) -> tuple[int, str, list[str]]:
         capsys.readouterr()
         status = run_command(["cache", *map(str, arguments)])
-        said = capsys.readouterr()
-        return status, said.out, said.err.splitlines()
+        output = capsys.readouterr()
+        return status, output.out, output.err.splitlines()
 
     return run
 
@@ -55,8 +55,8 @@ def test_stats(done: Any, cache: Command) -> None:
     assert found["kinds"]["extract"]["actions"] == found["kinds"]["extract"]["results"] == 2
     assert (found["gc"]["files"], found["gc"]["young_files"]) == (0, 0)
     assert as_json(cache("stats", "--cache", place(done), "--json")) == found
-    status, printed, told = cache("stats", done.workflow)
-    assert (status, told) == (0, [])
+    status, printed, messages = cache("stats", done.workflow)
+    assert (status, messages) == (0, [])
     assert f"{found['bytes'] / 1e6:.2f}" in printed
     assert printed.splitlines()[-1] == "gc would free 0 files, 0.00 MB"
 
@@ -85,11 +85,11 @@ def test_gc_waits_for_runs(done: Any, cache: Command) -> None:
     done.run()
     before = size(done)
     with lease(open_store(place(done))):
-        status, printed, told = cache("gc", done.workflow, "--older-than", 0, "--delete")
+        status, printed, messages = cache("gc", done.workflow, "--older-than", 0, "--delete")
         assert (status, size(done)) == (1, before)
         assert "deleted: 0 files" in printed
-        assert len(told) == 1
-        assert "is running since" in told[0]
+        assert len(messages) == 1
+        assert "is running since" in messages[0]
         [run] = as_json(cache("gc", done.workflow, "--json"))["runs"]
         assert run["process"] > 0
     assert cache("gc", done.workflow, "--older-than", 0, "--delete")[0] == 0
@@ -104,10 +104,10 @@ def test_a_lease_from_the_future_is_said_and_taken_over(done: Any, cache: Comman
     (place(done) / "runs/attic-7-ab.json").write_text(
         json.dumps({"host": "attic", "process": 7, "started": ahead, "heartbeat": ahead})
     )
-    status, _, told = cache("gc", done.workflow, "--older-than", 0, "--delete")
+    status, _, messages = cache("gc", done.workflow, "--older-than", 0, "--delete")
     assert status == 1
-    assert "process 7 on attic is dated in the future" in told[0]
-    assert "--take-over" in told[0]
+    assert "process 7 on attic is dated in the future" in messages[0]
+    assert "--take-over" in messages[0]
     [run] = as_json(cache("gc", done.workflow, "--json"))["runs"]
     assert (run["host"], run["ahead"]) == ("attic", True)
     found = as_json(cache("gc", done.workflow, "--older-than", 0, "--delete", "--take-over", "--json"))
@@ -192,21 +192,21 @@ def test_verify_does_actions_again(done: Any, cache: Command, monkeypatch: pytes
 
     monkeypatch.setattr(measure, "run", lambda *_: b"other")
     monkeypatch.setattr(cloud_ply, "run", lambda *_: 1 // 0)
-    status, printed, told = cache("verify", done.workflow, "--recompute", "100%", "--seed", 3)
+    status, printed, messages = cache("verify", done.workflow, "--recompute", "100%", "--seed", 3)
     assert (status, printed.splitlines()[-1]) == (1, "16 actions done again, 1 came to something else")
     recorded = open_store(place(done)).latest("P0001/S1/measure")
     assert recorded is not None
     row = open_store(place(done)).row(recorded.key)
     assert row is not None
     other = "d9298a10d1b0735837dc4bd85dac641b0f3cef27a47e5d53a54f2f3f5b2fcffa"  # sha256sum of "other"
-    assert told == [
+    assert messages == [
         f"footscan: P0001/S1/measure: NOT REPRODUCED: recorded {row.digest}, now {other}",
         "footscan: P0001/S1: ZeroDivisionError: integer division or modulo by zero",
     ]
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "expected"),
     [
         (["stats", "WORKFLOW", "--cache", "x"], "a workflow and --cache exclude each other, expected one of them"),
         (["stats", "--cache", "nowhere"], "nowhere: no such folder, expected the store of a run"),
@@ -230,16 +230,16 @@ def test_verify_does_actions_again(done: Any, cache: Command, monkeypatch: pytes
         ),
         (["verify", "--cache", "CACHE", "--recompute", "5%"], "--recompute: needs the workflow"),
         (["pin", "P0001/S2", "--cache", "CACHE"], "P0001/S2: has no results in"),
-        (["unpin", "P0001/S1", "--cache", "CACHE"], "P0001/S1: is not pinned, expected one of: none is"),
+        (["unpin", "P0001/S1", "--cache", "CACHE"], "P0001/S1: is not pinned, expected a pinned scan: there is none"),
         (["pin", "../S1", "--cache", "CACHE"], "scan: expected 1 to 64 letters"),
         (["stats", "--cache", "nosuch://x"], "expected a place that fsspec reaches"),
     ],
 )
-def test_wrong_use_is_one_line(finished: Path, cache: Command, arguments: list[str], told: str) -> None:
+def test_wrong_use_is_one_line(finished: Path, cache: Command, arguments: list[str], expected: str) -> None:
     paths = {"WORKFLOW": str(finished / "workflow.yaml"), "CACHE": str(finished / "results/.footscan")}
     status, printed, lines = cache(*(paths.get(argument, argument) for argument in arguments))
     assert (status, printed, len(lines)) == (2, "", 1)
-    assert told in lines[0]
+    assert expected in lines[0]
 
 
 def test_others_who_can_write_are_warned_about(done: Any, cache: Command, caplog: pytest.LogCaptureFixture) -> None:

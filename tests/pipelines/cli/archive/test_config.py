@@ -25,7 +25,7 @@ parameters:
 """
 
 MISTAKES = [
-    # what stands there, what is written instead, line and column, what is told
+    # original text, replacement, line and column, expected message
     ("format: footscan.workflow/1", "format: footscan.workflow/9", 1, 9, "footscan.workflow/1"),
     ("format: footscan.workflow/1", "", 2, 1, "format: is missing"),
     ("format:", "fromat:", 1, 1, "did you mean 'format'?"),
@@ -85,24 +85,24 @@ def checked(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
     return found
 
 
-@pytest.mark.parametrize(("right", "wrong", "line", "column", "told"), MISTAKES)
+@pytest.mark.parametrize(("right", "wrong", "line", "column", "expected"), MISTAKES)
 def test_a_mistake_has_its_place(
-    workflow: Path, capsys: pytest.CaptureFixture[str], right: str, wrong: str, line: int, column: int, told: str
+    workflow: Path, capsys: pytest.CaptureFixture[str], right: str, wrong: str, line: int, column: int, expected: str
 ) -> None:
     assert RIGHT.count(right) == 1
     workflow.write_text(RIGHT.replace(right, wrong))
     found = checked(capsys)
-    place = next(mistake for mistake in found if told in f"{mistake['field']}: {mistake['problem']}")
+    place = next(mistake for mistake in found if expected in f"{mistake['field']}: {mistake['problem']}")
     assert (place["line"], place["column"]) == (line, column)
 
 
-@pytest.mark.parametrize(("right", "wrong", "told"), NO_YAML)
+@pytest.mark.parametrize(("right", "wrong", "expected"), NO_YAML)
 def test_a_text_that_is_no_yaml(
-    workflow: Path, capsys: pytest.CaptureFixture[str], right: str, wrong: str, told: str
+    workflow: Path, capsys: pytest.CaptureFixture[str], right: str, wrong: str, expected: str
 ) -> None:
     workflow.write_text(RIGHT.replace(right, wrong))
     assert run_command(["config", "check"]) == 2
-    assert f"workflow.yaml: {told}" in capsys.readouterr().err
+    assert f"workflow.yaml: {expected}" in capsys.readouterr().err
 
 
 def test_all_mistakes_are_told_in_the_order_of_the_file(workflow: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -161,7 +161,7 @@ def test_every_value_says_where_it_is_from(capsys: pytest.CaptureFixture[str]) -
 
 @pytest.mark.usefixtures("workflow")
 @pytest.mark.parametrize(
-    ("setting", "told"),
+    ("setting", "expected"),
     [
         ("extraction.red_treshold=3", "--set: extraction.red_treshold: unknown field, did you mean 'red_threshold'?"),
         ("extracton.red_threshold=3", "--set: extracton: unknown field, did you mean 'extraction'?"),
@@ -172,6 +172,6 @@ def test_every_value_says_where_it_is_from(capsys: pytest.CaptureFixture[str]) -
         ("extraction", "--set: expected NAME=VALUE, found 'extraction'"),
     ],
 )
-def test_wrong_settings(capsys: pytest.CaptureFixture[str], setting: str, told: str) -> None:
+def test_wrong_settings(capsys: pytest.CaptureFixture[str], setting: str, expected: str) -> None:
     assert run_command(["config", "show", "--set", setting]) == 2
-    assert told in capsys.readouterr().err
+    assert expected in capsys.readouterr().err

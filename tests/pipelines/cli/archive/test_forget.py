@@ -10,7 +10,7 @@ import pytest
 
 from pipelines.cli.main import run_command
 from pipelines.engine.files.places import LocalFiles
-from pipelines.engine.store.erasure_notes import cut_off
+from pipelines.engine.store.erasure_notes import interrupted_erasures
 from pipelines.engine.store.lease import lease
 from pipelines.engine.store.store import open_store
 
@@ -22,8 +22,8 @@ def footscan(capsys: pytest.CaptureFixture[str]) -> Command:
     def run(*arguments: object) -> tuple[int, str, str]:
         capsys.readouterr()
         status = run_command(list(map(str, arguments)))
-        said = capsys.readouterr()
-        return status, said.out, said.err
+        output = capsys.readouterr()
+        return status, output.out, output.err
 
     return run
 
@@ -41,8 +41,8 @@ def two(done: Any, footscan: Command) -> Any:
     (other / "cam5.avi").write_bytes(film)
     for parameters in ("{outliers: {z_mm: [-1, 100]}}", "{}"):
         done.set_parameters(parameters)
-        status, _, said = footscan("run", done.workflow, "--log-json", done.root / "results/log.jsonl")
-        assert status == 0, said
+        status, _, messages = footscan("run", done.workflow, "--log-json", done.root / "results/log.jsonl")
+        assert status == 0, messages
     footscan("cache", "pin", "P0002/S1", "--workflow", done.workflow)
     return done
 
@@ -57,8 +57,8 @@ def traces(root: Path, name: str) -> list[str]:
 
 
 def forget(two: Any, footscan: Command, *options: object) -> Any:
-    status, out, said = footscan("forget", "P0002", "--workflow", two.workflow, "--yes", "--json", *options)
-    assert status == 0, said
+    status, out, messages = footscan("forget", "P0002", "--workflow", two.workflow, "--yes", "--json", *options)
+    assert status == 0, messages
     return json.loads(out)
 
 
@@ -104,20 +104,20 @@ def test_nights_over_their_scans_and_logs_elsewhere(two: Any, footscan: Command)
     suite, log = two.root / "suite.yaml", two.root / "elsewhere.log"
     suite.write_text(SUITE)
     log.write_text("P0001/S1: done\nP0002/S1: done\n")
-    status, _, said = footscan("regress", suite, "--accept", "first night")
-    assert status == 0, said
+    status, _, messages = footscan("regress", suite, "--accept", "first night")
+    assert status == 0, messages
     files = ("baseline.yaml", "baseline.steps.yaml", "nights/history.jsonl", "nights/good.steps.yaml")
     assert all("second" in (two.root / name).read_text() for name in files)
     more = ("--suite", suite, "--log", log)
-    status, out, said = footscan("forget", "P0002", "--workflow", two.workflow, "--yes", *more)
+    status, out, messages = footscan("forget", "P0002", "--workflow", two.workflow, "--yes", *more)
     assert status == 1, out
-    assert "suite.yaml: sets second: still bears P0002" in said
+    assert "suite.yaml: sets second: still bears P0002" in messages
     assert log.read_text() == "P0001/S1: done\n"
     assert not any("second" in (two.root / name).read_text() for name in files)
     assert all("first" in (two.root / name).read_text() for name in files)
     suite.write_text("".join(line for line in SUITE.splitlines(keepends=True) if "second" not in line))
-    status, _, said = footscan("forget", "P0002", "--workflow", two.workflow, "--yes", *more)
-    assert status == 0, said
+    status, _, messages = footscan("forget", "P0002", "--workflow", two.workflow, "--yes", *more)
+    assert status == 0, messages
     assert traces(two.root, "P0002") == []
     assert footscan("regress", suite)[0] == 0
 
@@ -156,9 +156,9 @@ def test_what_was_cut_off_is_finished(
         patch.setattr(LocalFiles, "remove", fail)
         with pytest.raises(Killed):
             footscan("forget", "P0002", "--workflow", two.workflow, "--yes")
-    assert cut_off(open_store(two.root / "results/.footscan")) == ["P0002"]
+    assert interrupted_erasures(open_store(two.root / "results/.footscan")) == ["P0002"]
     assert footscan("run", two.workflow)[0] == 0
-    assert "P0002: its erasure was cut off" in caplog.text
+    assert "P0002: its erasure was interrupted" in caplog.text
     assert forget(two, footscan)["erased"]
     assert traces(two.root, "P0002") == []
     assert two.run()[1] == set()
@@ -167,14 +167,14 @@ def test_what_was_cut_off_is_finished(
 def test_it_does_not_run_beside_a_run(two: Any, footscan: Command) -> None:
     before = all_bytes(two.root / "archive")
     with lease(open_store(two.root / "results/.footscan")):
-        status, _, said = footscan("forget", "P0002", "--workflow", two.workflow, "--yes")
+        status, _, messages = footscan("forget", "P0002", "--workflow", two.workflow, "--yes")
     assert status == 1
-    assert "is running since" in said
+    assert "is running since" in messages
     assert all_bytes(two.root / "archive") == before
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "expected"),
     [
         (["..", "--yes"], "PATIENT"),
         (["P0001/S1", "--yes"], "PATIENT"),
@@ -183,11 +183,11 @@ def test_it_does_not_run_beside_a_run(two: Any, footscan: Command) -> None:
         (["P0001"], "--yes: is missing, expected it where nobody can be asked"),
     ],
 )
-def test_what_is_refused(done: Any, footscan: Command, arguments: list[str], told: str) -> None:
+def test_what_is_refused(done: Any, footscan: Command, arguments: list[str], expected: str) -> None:
     before = all_bytes(done.root)
-    status, _, said = footscan("forget", *arguments, "--workflow", done.workflow)
-    assert (status, len(said.splitlines())) == (2, 1)
-    assert told in said
+    status, _, messages = footscan("forget", *arguments, "--workflow", done.workflow)
+    assert (status, len(messages.splitlines())) == (2, 1)
+    assert expected in messages
     assert all_bytes(done.root) == before
 
 
@@ -196,19 +196,19 @@ def test_a_folder_that_is_a_link_out_is_refused(done: Any, footscan: Command, tm
     elsewhere.mkdir()
     (elsewhere / "letter.txt").write_text("mine")
     (done.root / "results/P0007").symlink_to(elsewhere)
-    status, _, said = footscan("forget", "P0007", "--workflow", done.workflow, "--yes")
+    status, _, messages = footscan("forget", "P0007", "--workflow", done.workflow, "--yes")
     assert status == 2
-    assert "is a link" in said
+    assert "is a link" in messages
     assert (elsewhere / "letter.txt").read_text() == "mine"
 
 
 def test_what_remains_is_told(two: Any, footscan: Command) -> None:
     shutil.copy(two.root / "archive/P0002/S1/cam5.avi", two.root / "archive/copy.avi")
     (two.root / "archive/notes.txt").write_text("the left foot of P0002 hurts")
-    status, _, said = footscan("forget", "P0002", "--workflow", two.workflow, "--yes")
+    status, _, messages = footscan("forget", "P0002", "--workflow", two.workflow, "--yes")
     assert status == 1
-    assert f"{two.root / 'archive/copy.avi'}: still bears P0002" in said
-    assert f"{two.root / 'archive/notes.txt'}: still bears P0002" in said
+    assert f"{two.root / 'archive/copy.avi'}: still bears P0002" in messages
+    assert f"{two.root / 'archive/notes.txt'}: still bears P0002" in messages
     for name in ("copy.avi", "notes.txt"):
         (two.root / "archive" / name).unlink()
     assert forget(two, footscan)["erased"]

@@ -22,8 +22,8 @@ def trace(capsys: pytest.CaptureFixture[str]) -> Trace:
     def run(*arguments: object) -> tuple[int, str, list[str]]:
         capsys.readouterr()
         status = run_command(["trace", *map(str, arguments)])
-        said = capsys.readouterr()
-        return status, said.out, said.err.splitlines()
+        output = capsys.readouterr()
+        return status, output.out, output.err.splitlines()
 
     return run
 
@@ -34,8 +34,8 @@ def taken(action: Any, name: str) -> Any:
 
 def test_a_mesh_down_to_its_films(finished: Path, trace: Trace) -> None:
     mesh = finished / "results/P0001/S1/foot.stl"
-    status, printed, told = trace(mesh, "--json")
-    assert (status, told) == (0, [])
+    status, printed, messages = trace(mesh, "--json")
+    assert (status, messages) == (0, [])
     found = json.loads(printed)
     assert found["digest"] == sha256(mesh.read_bytes())
     actions = found["actions"]
@@ -67,9 +67,9 @@ def test_each_file_of_the_results(finished: Path, trace: Trace, file: str) -> No
 
 def test_a_file_elsewhere_with_the_store_named(finished: Path, trace: Trace, tmp_path: Path) -> None:
     copy = Path(shutil.copy(finished / "results/P0001/S1/measures.json", tmp_path / "m.json"))
-    status, _, told = trace(copy)
+    status, _, messages = trace(copy)
     problem = "no workflow.yaml and no folder above it leads to its store, expected --cache PLACE"
-    assert (status, told) == (2, [f"footscan: {copy}: {problem}"])
+    assert (status, messages) == (2, [f"footscan: {copy}: {problem}"])
     assert trace(copy, "--cache", finished / "results/.footscan")[0] == 0
 
 
@@ -79,8 +79,8 @@ def test_the_store_that_the_workflow_names_is_found(done: Any, trace: Trace) -> 
     shutil.move(notes, done.root / "elsewhere")
     notes.mkdir()
     (notes / "files.json").touch()
-    status, _, told = trace(mesh)
-    assert (status, "expected --cache PLACE" in told[0]) == (2, True)
+    status, _, messages = trace(mesh)
+    assert (status, "expected --cache PLACE" in messages[0]) == (2, True)
     done.workflow.write_text(f"{done.workflow.read_text()}cache: elsewhere\n")
     shutil.copytree(done.root / "elsewhere/latest", notes / "actions")
     assert trace(mesh)[0] == 0
@@ -90,9 +90,9 @@ def test_what_no_step_made(done: Any, trace: Trace) -> None:
     changed = done.results / "measures.json"
     changed.write_bytes(changed.read_bytes() + b"\n")
     place = done.root / "results/.footscan"
-    status, printed, told = trace(changed)
+    status, printed, messages = trace(changed)
     assert (status, printed) == (1, "")
-    assert told == [f"footscan: {changed}: no step made it, as far as {place} knows"]
+    assert messages == [f"footscan: {changed}: no step made it, as far as {place} knows"]
     status, printed, _ = trace(changed, "--json")
     assert status == 1
     assert (json.loads(printed)["made_by"], json.loads(printed)["actions"]) == (None, {})
@@ -114,11 +114,11 @@ def test_results_of_earlier_parameters(done: Any, trace: Trace, tmp_path: Path) 
 
 def test_wrong_use_is_one_line(finished: Path, trace: Trace, tmp_path: Path) -> None:
     mesh = finished / "results/P0001/S1/foot.stl"
-    for arguments, told in (
+    for arguments, expected in (
         ((tmp_path / "x.stl",), "x.stl: no such file"),
         ((tmp_path,), "expected a file"),
         ((mesh, "--cache", tmp_path / "no"), "no: no such folder, expected the store of a run"),
     ):
         status, printed, lines = trace(*arguments)
         assert (status, printed, len(lines)) == (2, "", 1)
-        assert told in lines[0]
+        assert expected in lines[0]

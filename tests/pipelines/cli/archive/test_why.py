@@ -20,8 +20,8 @@ def why(capsys: pytest.CaptureFixture[str]) -> Why:
     def run(*arguments: object) -> tuple[int, str, list[str]]:
         capsys.readouterr()
         status = run_command(["why", *map(str, arguments)])
-        said = capsys.readouterr()
-        return status, said.out, said.err.splitlines()
+        output = capsys.readouterr()
+        return status, output.out, output.err.splitlines()
 
     return run
 
@@ -33,8 +33,8 @@ def explained(done: tuple[int, str, list[str]]) -> dict[str, Any]:
 
 
 def test_nothing_would_run(done: Any, why: Why) -> None:
-    status, printed, told = why("P0001/S1", "--workflow", done.workflow)
-    assert (status, told) == (0, [])
+    status, printed, messages = why("P0001/S1", "--workflow", done.workflow)
+    assert (status, messages) == (0, [])
     assert re.fullmatch(
         r"P0001/S1: nothing would run; last result: \S+, [0-9a-f]{12} of [-0-9]{10} [:0-9]{8}\n", printed
     )
@@ -53,7 +53,7 @@ def test_a_parameter(done: Any, why: Why) -> None:
     change = {"what": "parameter", "name": "red_threshold", "step": None, "old": "18", "new": "20"}
     assert found["extract-1"]["changes"] == found["extract-5"]["changes"] == [change]
     assert (found["extract-1"]["state"], found["clean"]["state"]) == ("miss", "waits")
-    # What waits can be told already as far as it is known.
+    # The known inputs of a waiting step are reported.
     assert [change["name"] for change in found["clean"]["changes"]] == ["z_mm"]
     assert found["fuse"]["changes"] == []
     assert "ingest-1" not in found
@@ -98,14 +98,14 @@ def test_code(done: Any, why: Why, monkeypatch: pytest.MonkeyPatch) -> None:
     original = code._text
     monkeypatch.setattr(code, "_text", lambda name: original(name).replace("def fuse(", "def fuse_all("))
     monkeypatch.setattr(code, "_remembered", dict)
-    monkeypatch.setattr(code, "_remember", lambda: None)
-    for known in (code._KNOWN.clear, code._source.cache_clear):
+    monkeypatch.setattr(code, "_save_memory", lambda: None)
+    for known in (code._IDENTITIES.clear, code._source.cache_clear):
         known()
     try:
         found = explained(why("P0001/S1", "fuse", "--workflow", done.workflow, "--json"))
         printed = why("P0001/S1", "fuse", "--workflow", done.workflow)[1]
     finally:
-        for known in (code._KNOWN.clear, code._source.cache_clear):
+        for known in (code._IDENTITIES.clear, code._source.cache_clear):
             known()
     [change] = found["fuse"]["changes"]
     assert change["what"] == "code"
@@ -139,7 +139,7 @@ def test_a_remembered_failure(archive: Any, why: Why, monkeypatch: pytest.Monkey
 
 def test_wrong_use_is_one_line(finished: Path, why: Why, tmp_path: Path) -> None:
     workflow = finished / "workflow.yaml"
-    for arguments, told in (
+    for arguments, expected in (
         (("P0001/S1", "clear", "--workflow", workflow), "footscan: clear: no such step, expected one of ingest, "),
         (("P0001/S2", "--workflow", workflow), "footscan: P0001/S2: no such scan in the workflow's archive"),
         ((tmp_path, "--out", tmp_path / "out"), f"footscan: {tmp_path}/scan.yaml: no such file"),
@@ -149,4 +149,4 @@ def test_wrong_use_is_one_line(finished: Path, why: Why, tmp_path: Path) -> None
     ):
         status, printed, lines = why(*arguments)
         assert (status, printed, len(lines)) == (2, "", 1)
-        assert lines[0].startswith(told)
+        assert lines[0].startswith(expected)

@@ -1,4 +1,4 @@
-"""The identity of code: all that a step reaches by import, without what does not run."""
+"""The identity of code covers all modules that a step reaches by import, without comments and docstrings."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ def run(inputs, parameters, places):
 
 @pytest.fixture
 def tree(package: Any) -> Any:
-    """A step that reaches a helper three imports away, by every way to import."""
+    """A step that reaches a helper over three imports, with every form of import."""
     package.write("step", STEP)
     package.write("first", "from PACKAGE import second\n\ndef prepare():\n    return second.go()\n")
     package.write("second", "def go():\n    import PACKAGE.inner.third as third\n    return third.VALUE\n")

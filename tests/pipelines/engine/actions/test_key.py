@@ -1,4 +1,4 @@
-"""The key of an action depends on all that decides its result, and on nothing else."""
+"""The key of an action depends on everything that its result depends on, and on nothing else."""
 
 import json
 import os

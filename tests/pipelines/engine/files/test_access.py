@@ -1,4 +1,4 @@
-"""What is written is its owner's alone, from the moment it is made, or also its group's."""
+"""Written files are accessible to their owner only, or also to a group, from the moment they are made."""
 
 import grp
 import os
@@ -21,7 +21,7 @@ FOOTSCAN = Path(sys.executable).with_name("footscan")
 
 @pytest.fixture
 def umask() -> Iterator[None]:
-    """Of the process, put back in the end; 022 in between."""
+    """Umask of the process: 022 during the test, restored after it."""
     before = os.umask(0o022)
     yield
     os.umask(before)
@@ -29,14 +29,14 @@ def umask() -> Iterator[None]:
 
 @pytest.fixture
 def group() -> grp.struct_group:
-    """One that a file does not get by itself."""
+    """A group that new files do not have by default."""
     mine = {os.getegid()}
-    known = [one for one in grp.getgrall() if one.gr_gid not in mine]
+    groups = [group for group in grp.getgrall() if group.gr_gid not in mine]
     if os.geteuid() != 0:
-        known = [one for one in known if one.gr_gid in os.getgroups()]
-    if not known:
+        groups = [group for group in groups if group.gr_gid in os.getgroups()]
+    if not groups:
         pytest.skip("this user is in one group only")
-    return known[0]
+    return groups[0]
 
 
 def mode(path: Path) -> int:
@@ -44,7 +44,7 @@ def mode(path: Path) -> int:
 
 
 def wrong(root: Path, folder_mode: int, file_mode: int) -> dict[str, str]:
-    """What below a folder, itself included, has other rights."""
+    """Paths at or below a folder with other rights."""
     paths = [root, *(path for path in root.rglob("*"))]
     assert len(paths) > 1
     expected = {path: folder_mode if path.is_dir() else file_mode for path in paths}
@@ -52,7 +52,7 @@ def wrong(root: Path, folder_mode: int, file_mode: int) -> dict[str, str]:
 
 
 def footscan(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """The command as a process of its own, begun with the rights that are usual."""
+    """The command as a separate process, with the usual umask."""
     command = [str(part) for part in (FOOTSCAN, *arguments)]
     return subprocess.run(
         command, check=False, capture_output=True, text=True, timeout=300, preexec_fn=lambda: os.umask(0o022) and None
@@ -124,9 +124,9 @@ def test_an_unknown_group_is_one_line(done: object, capsys: pytest.CaptureFixtur
     workflow: Path = done.workflow  # type: ignore[attr-defined]
     workflow.write_text(workflow.read_text() + "group: no-such-group\n")
     assert run_command(["plan", str(workflow)]) == 2
-    said = capsys.readouterr()
+    output = capsys.readouterr()
     problem = "group: expected a group of this machine, found 'no-such-group'"
-    assert (said.out, said.err) == ("", f"footscan: {workflow}: {problem}\n")
+    assert (output.out, output.err) == ("", f"footscan: {workflow}: {problem}\n")
 
 
 @pytest.mark.parametrize("options", [[], ["--workers", 1]], ids=["threads", "workers"])

@@ -1,4 +1,4 @@
-"""A reader meets the old content or the new."""
+"""Atomic writes: a reader finds the old content or the new."""
 
 import os
 import threading

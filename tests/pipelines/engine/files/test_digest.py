@@ -1,4 +1,4 @@
-"""Digests of files: a file that has changed is read again, one that has not is not."""
+"""Digests of files: only a changed file is read again."""
 
 import json
 import os
@@ -22,7 +22,7 @@ def film(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def settled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Files count as old at once."""
+    """All files count as settled."""
     monkeypatch.setattr(digest, "SETTLED_NS", -(10**18))
 
 

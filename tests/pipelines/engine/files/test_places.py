@@ -1,4 +1,4 @@
-"""A store's files are the same to it wherever they lie."""
+"""The files of a store behave alike in a folder and at a URL."""
 
 import os
 import uuid
@@ -24,7 +24,7 @@ OTHER = "blobs/cd/cdef"
 
 @pytest.fixture(params=["folder", "file://", "local://", "memory://", "memory:// and a slash"])
 def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path | str]:
-    """Where a store may lie; nothing is there yet."""
+    """Places for a store, all empty."""
     kind: str = request.param
     if kind == "folder":
         yield tmp_path / "store"
@@ -195,7 +195,7 @@ def test_plan_and_run_on_a_store_anywhere(place: Path | str, package: Any, tmp_p
     memory = tmp_path / "known.sqlite"
 
     def run(value: bytes) -> tuple[list[State], list[str], bytes | None]:
-        """What was known, what ran, and the result."""
+        """States of the planned steps, the steps that ran, and the result."""
         steps = [
             Step("P/S", "first", module, None, {"a": Value(value), "b": Value(b"b")}),
             Step("P/S", "second", module, None, {"x": Output("P/S/first"), "y": Value(b"y")}),

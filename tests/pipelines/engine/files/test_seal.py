@@ -1,4 +1,4 @@
-"""Rows that only who has the secret can make."""
+"""Seals of rows, which only the owner of the secret can make."""
 
 import json
 import logging
@@ -15,7 +15,7 @@ from pipelines.engine.files import secret as secret_file
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.seal import seal_of, sealed, unsealed
 from pipelines.engine.store.store import Row, Store, blob_name, open_store, row_name
-from pipelines.engine.store.verified_index import Known
+from pipelines.engine.store.verified_index import VerifiedRow
 from schemas.base.errors import RefusedInput
 
 IMAGE = {"step": "made_up", "inputs": {}}
@@ -23,7 +23,7 @@ IMAGE = {"step": "made_up", "inputs": {}}
 
 @pytest.fixture(autouse=True)
 def configuration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Of a user of the test's own."""
+    """A configuration folder for this test."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     monkeypatch.delenv(secret_file.VARIABLE, raising=False)
     return tmp_path / "config"
@@ -34,7 +34,7 @@ def opened(tmp_path: Path) -> Store:
 
 
 def poison(tmp_path: Path, result: bytes, image: object = IMAGE) -> str:
-    """What somebody does who can write to the store and has read this program, but has no secret."""
+    """Forge a row with write access to the store, but without the secret."""
     digest, key = sha256(result), key_of(image)
     for name, data in (
         (blob_name(digest), result),
@@ -98,7 +98,7 @@ def test_the_seal_of_another_row_and_of_another_secret(tmp_path: Path) -> None:
 
 
 def test_what_a_machine_remembers_is_no_way_in(tmp_path: Path) -> None:
-    """The memory lies beside the store, and a row that it knows is not read."""
+    """A forged entry of the index is not used, although the rows that it lists are not read."""
     store = opened(tmp_path)
     seal_store(store)
     key = poison(tmp_path, b"poison")
@@ -106,7 +106,7 @@ def test_what_a_machine_remembers_is_no_way_in(tmp_path: Path) -> None:
     assert plain.verified is not None
     plain.verified.secret = None
     state, blob = (store.files.state(name) for name in (row_name(key), blob_name(sha256(b"poison"))))
-    plain.verified.put(key, Known(str(state), sha256(b"poison"), None, None, blob))
+    plain.verified.put(key, VerifiedRow(str(state), sha256(b"poison"), None, None, blob))
     plain.verified.close()
     assert plain.lookup(key) is not None
     assert opened(tmp_path).lookup(key) is None
@@ -162,7 +162,7 @@ def test_the_commands(done: object, capsys: pytest.CaptureFixture[str]) -> None:
     actions = Path(done.root) / "results/.footscan/actions"  # type: ignore[attr-defined]
     rows = {path: unsealed(path.read_bytes()) for path in sorted(actions.rglob("*.json"))}
     [(path, value)] = [(path, value) for path, value in rows.items() if '"measure"' in json.dumps(value["image"])][:1]
-    path.write_bytes(sealed(value))  # as anybody can
+    path.write_bytes(sealed(value))  # no secret is needed for that
     assert run_command(["plan", workflow, "--json"]) == 0
     reasons = [miss["reason"] for miss in json.loads(capsys.readouterr().out)["misses"]]
     assert "its row bears no seal of the store's owner" in reasons

@@ -1,4 +1,4 @@
-"""Runs under way are known to all who use the store."""
+"""Leases announce runs under way to all users of the store."""
 
 import json
 import logging
@@ -21,11 +21,11 @@ def test_a_lease_lasts_as_long_as_its_run(store: Store) -> None:
     assert leases(store) == []
     before = time.time()
     with lease(store), lease(store):
-        one, other = live_leases(store)
-        assert one.name != other.name
-        assert one.process == other.process == os.getpid()
-        assert one.started is not None
-        assert before <= one.started <= time.time()
+        held, other = live_leases(store)
+        assert held.name != other.name
+        assert held.process == other.process == os.getpid()
+        assert held.started is not None
+        assert before <= held.started <= time.time()
     assert leases(store) == []
     assert not [thread for thread in threading.enumerate() if thread.name == "lease"]
 
@@ -71,7 +71,7 @@ def test_a_run_that_was_killed_on_this_machine_is_known_to_be_dead(store: Store)
     try:
         assert process.stdout is not None
         assert process.stdout.readline() == b"held\n"
-        [one] = live_leases(store)
+        [held] = live_leases(store)
         process.kill()
         os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
         assert live_leases(store) == []  # though its number is not free yet
@@ -79,17 +79,17 @@ def test_a_run_that_was_killed_on_this_machine_is_known_to_be_dead(store: Store)
         process.kill()
         process.communicate()
     assert (len(leases(store)), live_leases(store)) == (1, [])
-    facts = json.loads(store.files.read(one.name))
+    facts = json.loads(store.files.read(held.name))
     for others, alive in (({"system": "another"}, 1), ({"process": os.getpid()}, 0), ({"system": None}, 1)):
-        store.files.write(one.name, canonical_json({**facts, **others}).encode())
+        store.files.write(held.name, canonical_json({**facts, **others}).encode())
         assert len(live_leases(store)) == alive, others
 
 
 @pytest.mark.parametrize("damaged", [b"", b"[]", b"{}", b'{"host":1}', b"\xff", b"[" * 100_000])
 def test_a_damaged_lease_may_be_a_run(store: Store, damaged: bytes) -> None:
     store.files.write("runs/h-7-ab.json", damaged)
-    [one] = live_leases(store)
-    assert (one.name, one.host, one.started) == ("runs/h-7-ab.json", None, None)
+    [held] = live_leases(store)
+    assert (held.name, held.host, held.started) == ("runs/h-7-ab.json", None, None)
 
 
 def test_a_store_that_cannot_be_written_to_does_not_keep_a_run_from_trying(
@@ -103,9 +103,9 @@ def test_a_store_that_cannot_be_written_to_does_not_keep_a_run_from_trying(
 
 def test_a_lease_from_the_future_can_be_taken_over(store: Store) -> None:
     write(store, -86400.0)
-    [one] = live_leases(store)
-    assert is_ahead(one)
-    assert take_over(store) == [one]
+    [held] = live_leases(store)
+    assert is_ahead(held)
+    assert take_over(store) == [held]
     assert leases(store) == []
 
 
@@ -117,7 +117,7 @@ def test_a_lease_of_another_host_can_be_taken_over_but_none_of_a_process_that_is
     assert not is_ahead(other)
     with lease(store) as name:
         assert take_over(store) == [other]
-        assert [one.name for one in live_leases(store)] == [name]
+        assert [held.name for held in live_leases(store)] == [name]
 
 
 def test_a_run_whose_lease_was_taken_over_announces_itself_again(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -133,5 +133,5 @@ def test_a_run_whose_lease_was_taken_over_announces_itself_again(store: Store, m
 @pytest.mark.parametrize("time_s", ["Infinity", "NaN", "1e300", "-1.0"])
 def test_a_lease_of_no_time_is_damaged(store: Store, time_s: str) -> None:
     store.files.write("runs/h-7-ab.json", f'{{"host":"h","process":7,"started":1.0,"heartbeat":{time_s}}}'.encode())
-    [one] = live_leases(store)
-    assert one.host is None
+    [held] = live_leases(store)
+    assert held.host is None

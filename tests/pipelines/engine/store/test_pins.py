@@ -1,4 +1,4 @@
-"""Scans whose results are kept."""
+"""Pins keep the results of scans."""
 
 from pathlib import Path
 from typing import Any
@@ -24,10 +24,10 @@ def test_pinned_until_unpinned(store: Store) -> None:
     for scan in ("P/S", "demo", "P/S-2", "P-S/2"):
         assert pin(scan, store) == 2
         latest = {f"{scan}/{kind}": store.latest(f"{scan}/{kind}") for kind in ("a", "b")}
-        assert read_pins(store)[scan] == {step: one.key for step, one in latest.items() if one is not None}
+        assert read_pins(store)[scan] == {step: last.key for step, last in latest.items() if last is not None}
     unpin("P/S-2", store)
     assert set(read_pins(store)) == {"P/S", "demo", "P-S/2"}
-    with pytest.raises(RefusedInput, match=r"P/S-2: is not pinned, expected one of: demo, P/S, P-S/2"):
+    with pytest.raises(RefusedInput, match=r"P/S-2: is not pinned, expected a pinned scan: demo, P/S, P-S/2"):
         unpin("P/S-2", store)
 
 

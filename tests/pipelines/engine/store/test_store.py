@@ -1,4 +1,4 @@
-"""The store trusts nothing that it reads."""
+"""The store checks everything that it reads."""
 
 import json
 import logging
@@ -12,7 +12,7 @@ from pipelines.engine.actions.key import key_of
 from pipelines.engine.files import places as files_module
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.store.store import Latest, Row, Store, blob_name, row_name
-from pipelines.engine.store.verified_index import Known
+from pipelines.engine.store.verified_index import VerifiedRow
 from schemas.base.errors import Fault
 from schemas.base.model import canonical_json
 
@@ -36,7 +36,7 @@ def sealed(value: dict[str, Any]) -> bytes:
 
 
 def result(store: Store, key: str = key_of(IMAGE)) -> str | None:
-    """Digest of what an action came to, as far as the store knows it."""
+    """Recorded result of an action, by its digest."""
     known = store.lookup(key)
     return None if known is None else known.digest
 
@@ -88,7 +88,7 @@ def test_rows_come_back(store: Store, digest: str) -> None:
     failure = Row(IMAGE | {"step": "x"}, None, ("finding", "no stripe in camera 3"))
     store.record("P/S/clean", failure)
     known = store.lookup(key_of(failure.image))
-    assert isinstance(known, Known)
+    assert isinstance(known, VerifiedRow)
     assert (known.digest, known.kind, known.problem) == (None, "finding", "no stripe in camera 3")
     assert store.latest("P/S/clean") == Latest("P/S/clean", key_of(failure.image), {})
     assert store.row(key_of(failure.image)) == failure

@@ -1,4 +1,4 @@
-"""What is remembered of a store saves reading; without it, or with it in ruins, all is slower and nothing is wrong."""
+"""The index of verified rows saves reading; if it is lost or damaged, all is slower and still right."""
 
 import os
 import sqlite3
@@ -17,7 +17,7 @@ import pytest
 from pipelines.engine.actions.key import key_of
 from pipelines.engine.store import verified_index as memory_module
 from pipelines.engine.store.store import Row, Store, blob_name, open_store, row_name
-from pipelines.engine.store.verified_index import Known, VerifiedIndex
+from pipelines.engine.store.verified_index import VerifiedIndex, VerifiedRow
 
 FLIPS = 150 if (asked := os.environ.get("FOOTSCAN_FUZZ")) is None else 20 * int(asked)
 IMAGES = [{"step": "clean", "code": "d" * 64, "parameters": None, "inputs": {"n": ["value", c * 64]}} for c in "abcdef"]
@@ -44,20 +44,20 @@ def file(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def truth(tmp_path: Path, file: Path) -> Truth:
-    """Actions in a store, all of them remembered."""
+    """Actions in a store, all of them in the index."""
     store = open_store(tmp_path / "store", file)
     for number, image in enumerate(IMAGES):
         failed = ("refused", "finding")[number % 2], f"camera {number}"
         row = Row(image, None, failed) if number < 2 else Row(image, store.put(b"%d" % number))
         store.record(f"P/S/{number}", row)
     close(store)
-    return {key: answer for key, answer in told(open_store(tmp_path / "store")).items() if answer}
+    return {key: answer for key, answer in lookups(open_store(tmp_path / "store")).items() if answer}
 
 
-def told(store: Store) -> dict[str, tuple[str | None, str | None, str | None] | None]:
-    """What a store says of each action."""
-    known = {key: store.lookup(key) for key in KEYS}
-    return {key: one and (one.digest, one.kind, one.problem) for key, one in known.items()}
+def lookups(store: Store) -> dict[str, tuple[str | None, str | None, str | None] | None]:
+    """Outcome of each action according to the store."""
+    rows = {key: store.lookup(key) for key in KEYS}
+    return {key: row and (row.digest, row.kind, row.problem) for key, row in rows.items()}
 
 
 def close(store: Store) -> None:
@@ -66,7 +66,7 @@ def close(store: Store) -> None:
 
 
 def reads_of(store: Store, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Files of the store that are read from now on."""
+    """Names of the store's files that are read from now on."""
     reads: list[str] = []
     original = type(store.files).read
 
@@ -79,12 +79,12 @@ def reads_of(store: Store, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def check_only_slower(file: Path, truth: Truth, monkeypatch: pytest.MonkeyPatch, *, heals: bool = True) -> None:
-    """The store tells the truth now and the next time; by then, nothing needs to be read again."""
+    """The store gives the true outcomes twice; the second time it reads nothing again."""
     for last in (False, True):
         store = open_store(file.parent / "store", file)
         with monkeypatch.context() as patch:
             reads = reads_of(store, patch)
-            assert told(store) == truth
+            assert lookups(store) == truth
         assert not (last and heals and reads)
         close(store)
 
@@ -93,7 +93,7 @@ def test_remembered_is_not_read(file: Path, truth: Truth, monkeypatch: pytest.Mo
     assert len(truth) == len(KEYS)
     store = open_store(file.parent / "store", file)
     reads = reads_of(store, monkeypatch)
-    assert told(store) == truth
+    assert lookups(store) == truth
     assert reads == []
     close(store)
 
@@ -107,7 +107,7 @@ def test_what_was_touched_is_read(file: Path, truth: Truth, monkeypatch: pytest.
     (file.parent / "store" / (row if touched == "row" else blob)).touch()
     store = open_store(file.parent / "store", file)
     reads = reads_of(store, monkeypatch)
-    assert told(store) == truth
+    assert lookups(store) == truth
     assert reads == ([row, blob] if touched == "row" else [blob])
     close(store)
 
@@ -119,9 +119,9 @@ def test_lost(file: Path, truth: Truth, monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_lost_while_it_is_used(file: Path, truth: Truth, monkeypatch: pytest.MonkeyPatch) -> None:
     store = open_store(file.parent / "store", file)
-    assert told(store) == truth
+    assert lookups(store) == truth
     file.unlink()
-    assert told(store) == truth
+    assert lookups(store) == truth
     close(store)
     check_only_slower(file, truth, monkeypatch)
 
@@ -178,7 +178,7 @@ def test_flipped_bits(file: Path, truth: Truth) -> None:
             damaged[at] ^= 1 << random.randrange(8)
         file.write_bytes(damaged)
         store = open_store(file.parent / "store", file)
-        assert told(store) == truth, places
+        assert lookups(store) == truth, places
         close(store)
 
 
@@ -190,7 +190,7 @@ def test_a_folder_in_its_place(file: Path, truth: Truth, monkeypatch: pytest.Mon
 
 def test_a_file_where_its_folder_should_be(file: Path, truth: Truth) -> None:
     store = open_store(file.parent / "store", file / "below" / "known.sqlite")
-    assert told(store) == truth
+    assert lookups(store) == truth
     close(store)
 
 
@@ -205,9 +205,9 @@ def test_read_only(file: Path, truth: Truth, monkeypatch: pytest.MonkeyPatch) ->
         patch.setattr(memory_module.sqlite3, "connect", connect)
         store = open_store(file.parent / "store", file)
         store.record("P/S/9", Row(IMAGES[0] | {"step": "more"}, None, ("finding", "x")))
-        assert told(store) == truth
+        assert lookups(store) == truth
         close(store)
-        assert told(store) == truth
+        assert lookups(store) == truth
         close(store)
     assert file.read_bytes() == before
     check_only_slower(file, truth, monkeypatch)
@@ -225,7 +225,7 @@ def test_busy_with_another_run(file: Path, truth: Truth, monkeypatch: pytest.Mon
     with closing(original(file)) as other:
         other.execute("BEGIN EXCLUSIVE")
         store = open_store(file.parent / "store", file)
-        assert told(store) == truth
+        assert lookups(store) == truth
         assert len(waits) == 1
         close(store)
         other.execute("UPDATE known SET blob = 'of the other run'")
@@ -235,11 +235,11 @@ def test_busy_with_another_run(file: Path, truth: Truth, monkeypatch: pytest.Mon
 
 def test_threads_use_it_at_once(file: Path) -> None:
     memory = VerifiedIndex(file)
-    wrong: list[Known] = []
+    wrong: list[VerifiedRow] = []
 
     def use(thread: int) -> None:
         for number in range(50):
-            key, known = f"{thread} {number}", Known("row", f"{thread} {number}", None, None, "blob")
+            key, known = f"{thread} {number}", VerifiedRow("row", f"{thread} {number}", None, None, "blob")
             memory.put(key, known)
             if number % 10 == 0:
                 memory.save()
@@ -255,7 +255,7 @@ def test_threads_use_it_at_once(file: Path) -> None:
     memory.close()
     assert wrong == []
     again = VerifiedIndex(file)
-    assert again.get("3 49") == Known("row", "3 49", None, None, "blob")
+    assert again.get("3 49") == VerifiedRow("row", "3 49", None, None, "blob")
     assert again.get("4 0") is None
     again.close()
 
@@ -263,15 +263,15 @@ def test_threads_use_it_at_once(file: Path) -> None:
 USE = """
 import sys
 from pathlib import Path
-from pipelines.engine.store.verified_index import Known, VerifiedIndex
+from pipelines.engine.store.verified_index import VerifiedRow, VerifiedIndex
 
 memory, name = VerifiedIndex(Path(sys.argv[1])), sys.argv[2]
 for number in range(60):
     for key in ("both", f"{name} {number}"):
-        memory.put(key, Known("row", key, None, None, "blob"))
+        memory.put(key, VerifiedRow("row", key, None, None, "blob"))
     memory.save()
     for key in ("both", f"{name} {number}"):
-        assert memory.get(key) == Known("row", key, None, None, "blob")
+        assert memory.get(key) == VerifiedRow("row", key, None, None, "blob")
 memory.close()
 """
 
@@ -281,13 +281,13 @@ def test_processes_use_it_at_once(file: Path) -> None:
     assert [user.wait() for user in users] == [0, 0]
     memory = VerifiedIndex(file)
     for key in ("both", *(f"{name} {number}" for name in ("one", "two") for number in range(60))):
-        assert memory.get(key) == Known("row", key, None, None, "blob")
+        assert memory.get(key) == VerifiedRow("row", key, None, None, "blob")
     memory.close()
 
 
 @pytest.fixture(autouse=True)
 def no_connection_left_open(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Python tells of them from 3.13 on."""
+    """Python reports unclosed connections since 3.13."""
     opened: list[sqlite3.Connection] = []
     original = sqlite3.connect
 
