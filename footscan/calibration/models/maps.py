@@ -7,12 +7,13 @@ from scipy.spatial import cKDTree
 from footscan.calibration.models.homography import HomographyModel
 from footscan.calibration.models.polynomial import PolynomialModel
 from footscan.calibration.models.region import supported
+from schemas.base.image_size import FRAME_SIZE
 from schemas.calibration import CameraCalibration, HomographyMap, PolynomialMap
 
 Floats = NDArray[np.float64]
 Model = PolynomialModel | HomographyModel
 
-IMAGE_PX = (640, 480)
+IMAGE_PX = FRAME_SIZE.px
 """Default columns and rows of the images: those of the scanner's cameras."""
 STARTS = 12
 """Places a side of the region; Newton's method starts at the nearest. Chosen by hand."""

@@ -106,7 +106,7 @@ def _hardware(random: np.random.Generator) -> Floats:
     for _ in range(7):
         angle, offset, breadth = random.uniform(0.0, np.pi), random.uniform(-260.0, 260.0), random.uniform(6.0, 50.0)
         cos, sin = cos_sin(np.degrees(angle))
-        across = cos * (columns - 320.0) + sin * (rows - 240.0) - offset
+        across = cos * (columns - WIDTH / 2) + sin * (rows - HEIGHT / 2) - offset
         grey = np.where(np.abs(across) < breadth / 2.0, random.uniform(0.02, 0.3), grey)
     side, length = random.integers(4), random.uniform(100.0, 220.0)
     start = random.uniform(0.0, (WIDTH if side < 2 else HEIGHT) - length)
