@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from schemas.base.errors import RefusedInput
+from schemas.base.image_size import ImageSize
 from schemas.base.limits import BeyondLimitError, beyond, limit, read_bounded
 
 Rgb = NDArray[np.uint8]
@@ -81,8 +82,8 @@ def decode_image(data: bytes, buffer: Rgb | None = None) -> Rgb:
         raise ValueError(f"a torn PNG image ({error})") from None
 
 
-def image_size(data: bytes) -> tuple[int, int]:
-    """(rows, columns) of an encoded image, without decoding its pixels; ValueError as in `decode_image`."""
+def image_size(data: bytes) -> ImageSize:
+    """Size of an encoded image, without decoding its pixels; ValueError as in `decode_image`."""
     if _is_jpeg(data):
         try:
             rows, columns, _, _ = simplejpeg.decode_jpeg_header(data, strict=False)
@@ -96,7 +97,7 @@ def image_size(data: bytes) -> tuple[int, int]:
         raise ValueError(f"{columns} x {rows} pixels")
     if rows * columns > limit("image_pixels"):
         raise TooManyPixelsError(f"{columns} x {rows} pixels: {beyond('image_pixels', rows * columns)}")
-    return int(rows), int(columns)
+    return ImageSize(int(rows), int(columns))
 
 
 def encode_png(pixels: Rgb) -> bytes:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from footscan.capture.film_frames import FilmFrames
 from footscan.capture.grbl.settings import BoardSettings
-from footscan.frames.film import encoded_frames, open_film
+from footscan.frames.film import open_film
 from footscan.frames.travel import read_positions
 from footscan.recordings.scans import read_scan
 from footscan.virtual.board.board import Board
@@ -92,7 +92,7 @@ class Bench:
         recording = read_json(scan.folder / "recording.json", Recording)
         assert [camera.id for camera in scan.document.cameras] == list(CAMERAS)
         for camera, told in zip(scan.document.cameras, recording.cameras, strict=True):
-            frames = list(encoded_frames(open_film(scan.film(camera))))
+            frames = list(open_film(scan.film(camera)).stored())
             x_mm = read_positions(scan.folder / str(camera.positions))
             film = result.stored.films[camera.id]
             lost = [k for k, frame in enumerate(frames) if frame is None]

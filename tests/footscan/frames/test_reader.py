@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from footscan.frames.array import chunk_name
+from footscan.frames.array import StoredFrames, chunk_name
 from footscan.frames.ingest import ingest_film
-from footscan.frames.reader import read_frame, read_frames
+from footscan.frames.reader import pixel_frames
 from schemas.base.errors import DamagedError
+from schemas.base.image_size import ImageSize
 from schemas.frames import FrameManifest
 
-SIZE = (48, 64)
+SIZE = ImageSize(rows=48, columns=64)
 Ingested = tuple[Path, FrameManifest]
 
 
@@ -45,9 +46,9 @@ def flip(path: Path, at: int) -> None:
 
 
 def test_one_frame_is_as_all_give_it(ingested: Ingested) -> None:
-    for number, frame in enumerate(read_frames(*ingested)):
+    for number, frame in enumerate(pixel_frames(StoredFrames(*ingested))):
         assert frame is not None
-        np.testing.assert_array_equal(read_frame(*ingested, number), frame)
+        np.testing.assert_array_equal(next(pixel_frames(StoredFrames(*ingested), [number])), frame)
 
 
 @pytest.mark.parametrize("damage", ["first byte", "middle byte", "cut", "emptied", "removed", "exchanged"])
@@ -67,12 +68,12 @@ def test_damaged_frame_is_noticed(ingested: Ingested, damage: str) -> None:
             chunk.unlink()
         case "exchanged":
             shutil.copy(array / chunk_name(3), chunk)
-    frames = read_frames(array, manifest)
+    frames = pixel_frames(StoredFrames(array, manifest))
     assert next(frames) is not None
     assert next(frames) is not None
     with pytest.raises(DamagedError, match=r"cam1: frame 2 is damaged, expected the frame that was ingested$"):
         next(frames)
-    assert read_frame(array, manifest, 3) is not None
+    assert next(pixel_frames(StoredFrames(array, manifest), [3])) is not None
 
 
 @pytest.mark.parametrize("metadata", [None, b"", b"{}", b'{"zarr_format": 3, "node_type": "group"}', b"\xff", b"[1]"])
@@ -82,14 +83,14 @@ def test_damaged_metadata_are_noticed_where_they_are_needed(ingested: Ingested, 
     if metadata is not None:
         (array / "zarr.json").write_bytes(metadata)
     if manifest.encoding == "image":
-        assert len(list(read_frames(array, manifest))) == 4
+        assert len(list(pixel_frames(StoredFrames(array, manifest)))) == 4
     else:
         with pytest.raises(DamagedError, match=r"cam1: expected a Zarr array"):
-            list(read_frames(array, manifest))
+            list(pixel_frames(StoredFrames(array, manifest)))
 
 
 def test_array_that_is_gone_is_noticed(ingested: Ingested) -> None:
     array, manifest = ingested
     shutil.rmtree(array)
     with pytest.raises(DamagedError):
-        read_frame(array, manifest, 0)
+        next(pixel_frames(StoredFrames(array, manifest), [0]))
