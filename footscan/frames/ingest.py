@@ -27,6 +27,10 @@ from schemas.base.image_size import FRAME_SIZE, ImageSize
 from schemas.base.limits import read_bounded
 from schemas.frames import Encoding, FrameManifest
 
+SINGLE = "single_frame"
+"""First dimension of an array of one frame, such as a background beside films of many: xarray wants all dimensions of
+a name in a group to have one length."""
+
 
 def ingest_film(film: Path, array: Path, size: ImageSize | None = FRAME_SIZE) -> FrameManifest:
     """Write the frames of `film` as the Zarr array `array`, in place of what is there.
@@ -113,7 +117,7 @@ class FrameWriter:
         return _describe(_create_array(self._folder, "image", frames, size), "image", digests, None)
 
 
-def ingest_background(background: Path, array: Path, frames: int) -> FrameManifest:
+def ingest_background(background: Path, array: Path, frames: int, size: ImageSize = FRAME_SIZE) -> FrameManifest:
     """`ingest_film` for the background of a film of so many `frames`.
 
     Raises
@@ -121,8 +125,8 @@ def ingest_background(background: Path, array: Path, frames: int) -> FrameManife
     RefusedInput
         As in `ingest_film` and `open_background`.
     """
-    open_background(background, FRAME_SIZE, frames)
-    return ingest_film(background, array)
+    open_background(background, size, frames)
+    return ingest_film(background, array, size)
 
 
 def make_group(folder: Path) -> None:
@@ -181,7 +185,7 @@ def _create_array(folder: Path, encoding: Encoding, frames: int, size: ImageSize
         chunks=(1, *size, 3),
         dtype="uint8",
         fill_value=0,
-        dimension_names=("frame", "row", "column", "rgb"),
+        dimension_names=("frame" if frames != 1 else SINGLE, "row", "column", "rgb"),
         chunk_key_encoding={"name": "v2", "separator": "."},  # one flat folder of images
         **(
             {"compressors": BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")}
