@@ -31,8 +31,8 @@ from footscan.calibration.chart.column_checks import (
 from footscan.calibration.chart.plane_fit import PASSED, agreeing, fit_homographies, misfits, sees_mirrored
 from footscan.calibration.chart.repair_proposals import place_of
 from footscan.calibration.chart.suspect_points import suspects
-from footscan.calibration.models.maps import IMAGE_PX
 from schemas.base.errors import RefusedInput
+from schemas.base.image_size import FRAME_SIZE
 from schemas.base.units import MILLIMETRES
 
 Floats = NDArray[np.float64]
@@ -140,7 +140,7 @@ def _check_camera(
     reasons = {suspect.point: f"; {suspect.message}" for suspect in suspected}
     for point in np.flatnonzero(outside_image(chart.pixels)).tolist():
         i, j = chart.pixels[point]
-        expected = f"expected 0 to {IMAGE_PX[0] - 1} and 0 to {IMAGE_PX[1] - 1}"
+        expected = f"expected 0 to {FRAME_SIZE.columns - 1} and 0 to {FRAME_SIZE.rows - 1}"
         message = f"i = {i:g}, j = {j:g} lies outside of the image, {expected}"
         yield ChartWarning(chart.camera, chart.points[point], "outside", message + reasons.get(point, ""))
     yield from _below(chart, named)
