@@ -33,27 +33,26 @@ class StoredFrames:
 
     @property
     def size(self) -> ImageSize:
-        """Rows and columns of each frame."""
         return self.manifest.size
 
     @property
     def count(self) -> int:
-        """Number of frames, those that are lost included."""
         return len(self.manifest.frames)
 
     @property
     def encoding(self) -> Encoding:
-        """What a chunk is."""
         return self.manifest.encoding
 
     def stored(self, numbers: Iterable[int] | None = None) -> Iterator[bytes | Rgb | None]:
-        """The chunks: images as they are, pixels decompressed."""
         read = partial(_stored_bytes, self.path) if self.encoding == "image" else _pixel_reader(self.path, self.size)
         for number in range(self.count) if numbers is None else numbers:
             digest = self.manifest.frames[number]
             frame = None if digest is None else read(number)
             if digest is not None and (frame is None or frame_digest(frame) != digest):
-                raise _damage(self.path, number)
+                problem = f"{self.path}: frame {number} is damaged, expected the frame that was"
+                if is_recorded(self.path):
+                    raise Fault(f"{problem} recorded: restore it from a copy")
+                raise DamagedError(f"{problem} ingested")
             yield frame
 
 
@@ -62,7 +61,6 @@ class IngestedFrames(StoredFrames):
     """Frames that an earlier step has ingested: a damaged array is discarded, so that the next run ingests it anew."""
 
     def stored(self, numbers: Iterable[int] | None = None) -> Iterator[bytes | Rgb | None]:
-        """As of any array."""
         try:
             yield from super().stored(numbers)
         except DamagedError:
@@ -128,13 +126,6 @@ def _stored_bytes(array: Path, frame: int) -> bytes | None:
         raise
     except (OSError, RefusedInput):
         return None
-
-
-def _damage(array: Path, frame: int) -> Fault:
-    """What to raise where a frame is not the one that was stored."""
-    if is_recorded(array):
-        return Fault(f"{array}: frame {frame} is damaged, expected the frame that was recorded: restore it from a copy")
-    return DamagedError(f"{array}: frame {frame} is damaged, expected the frame that was ingested")
 
 
 def _pixel_reader(array: Path, size: ImageSize) -> Callable[[int], Rgb | None]:

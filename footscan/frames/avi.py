@@ -38,7 +38,6 @@ class AviFilm:
     """`image`: an AVI of JPEG packets; `pixels`: one of plain pixels."""
 
     def stored(self, numbers: Iterable[int] | None = None) -> Iterator[bytes | Rgb | None]:
-        """The packets, or the pixels of a raw film."""
         wanted = None if numbers is None else set(numbers)
         for number, frame in enumerate(self._every_frame()):
             if wanted is None or number in wanted:

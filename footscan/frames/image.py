@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from schemas.base.errors import RefusedInput
 from schemas.base.image_size import ImageSize
-from schemas.base.limits import BeyondLimitError, beyond, limit, read_bounded
+from schemas.base.limits import BeyondLimitError, beyond, limit
 
 Rgb = NDArray[np.uint8]
 """(rows, columns, 3) uint8: red, green, blue."""
@@ -101,16 +101,6 @@ def encode_png(pixels: Rgb) -> bytes:
     out = io.BytesIO()
     Image.fromarray(pixels).save(out, format="PNG")
     return out.getvalue()
-
-
-def read_image(path: Path) -> Rgb:
-    """The pixels of an image file; RefusedInput where it is none."""
-    try:
-        return decode_image(read_bounded(path, "image_bytes"))
-    except OSError as error:
-        raise RefusedInput(path, error.strerror or "cannot be read") from None
-    except ValueError as error:
-        raise refused_image(path, error) from None
 
 
 def _is_jpeg(data: bytes) -> bool:

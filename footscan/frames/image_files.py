@@ -22,11 +22,9 @@ class ImageFiles:
 
     @property
     def count(self) -> int:
-        """Number of files."""
         return len(self.files)
 
     def stored(self, numbers: Iterable[int] | None = None) -> Iterator[bytes | None]:
-        """The bytes of the files."""
         files = self.files if numbers is None else (self.files[number] for number in numbers)
         yield from (read_bounded(file, "image_bytes") or None for file in files)
 

@@ -32,7 +32,7 @@ SINGLE = "single_frame"
 a name in a group to have one length."""
 
 
-def ingest_film(film: Path, array: Path, size: ImageSize | None = FRAME_SIZE) -> FrameManifest:
+def ingest_film(film: Path, array: Path, size: ImageSize = FRAME_SIZE) -> FrameManifest:
     """Write the frames of `film` as the Zarr array `array`, in place of what is there.
 
     JPEG and PNG frames keep their bytes; raw ones are compressed without loss. Frames that were recorded straight into
@@ -61,7 +61,8 @@ def ingest_film(film: Path, array: Path, size: ImageSize | None = FRAME_SIZE) ->
         return read_manifest(array)
     if is_recorded(array):
         raise RefusedInput(array, "holds frames that were recorded into it, expected scan.yaml to name it as the film")
-    _check_group(array.parent)
+    if (array.parent / METADATA).exists():
+        read_bounded(array.parent / METADATA, "json_bytes")  # before Zarr reads them, of any size
     _expect_own(array)
     partial = partial_folder(array.parent.parent, array.name)  # outside of the group: no reader of it meets a part
     try:
@@ -137,12 +138,6 @@ def make_group(folder: Path) -> None:
         return
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:  # what damaged metadata do to it
         raise RefusedInput(folder / METADATA, f"expected a Zarr group ({error})") from None
-
-
-def _check_group(folder: Path) -> None:
-    """Refuses metadata of a group that are too large to be any, before Zarr reads them."""
-    if (folder / METADATA).exists():
-        read_bounded(folder / METADATA, "json_bytes")
 
 
 def _expect_own(array: Path) -> None:

@@ -11,23 +11,22 @@ from schemas.frames import Encoding
 
 
 class FrameReader(Protocol):
-    """A film, a folder of images or a Zarr array; opening it reads no frames. `footscan.frames.film.open_film` does."""
+    """A film, a folder of images or a Zarr array. `footscan.frames.film.open_film` opens one, and reads no frames.
+
+    path : where the frames lie
+    size : rows and columns of each
+    count : number of frames, those that are lost included
+    encoding : `image`, the frames are JPEG or PNG images; `pixels`, they are plain pixels
+    """
 
     @property
-    def path(self) -> Path:
-        """Where the frames lie."""
-
+    def path(self) -> Path: ...
     @property
-    def size(self) -> ImageSize:
-        """Rows and columns of each frame."""
-
+    def size(self) -> ImageSize: ...
     @property
-    def count(self) -> int:
-        """Number of frames, those that are lost included."""
-
+    def count(self) -> int: ...
     @property
-    def encoding(self) -> Encoding:
-        """`image`: the frames are JPEG or PNG images; `pixels`: they are plain pixels."""
+    def encoding(self) -> Encoding: ...
 
     def stored(self, numbers: Iterable[int] | None = None) -> Iterator[bytes | Rgb | None]:
         """The frames as they lie there, None for each that is lost: all, or those of these ascending `numbers`.
