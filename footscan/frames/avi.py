@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from av.container import InputContainer
     from av.video.stream import VideoStream
 
+_Numbered = tuple[int, bytes | Rgb | None]
 
 ENCODINGS: Mapping[str, Encoding] = {"mjpeg": "image", "rawvideo": "pixels"}
 """What the codecs of the films are, by FFmpeg's names of them."""
@@ -38,18 +40,14 @@ class AviFilm:
     """`image`: an AVI of JPEG packets; `pixels`: one of plain pixels."""
 
     def stored(self, numbers: Iterable[int] | None = None) -> Iterator[bytes | Rgb | None]:
-        wanted = None if numbers is None else set(numbers)
-        for number, frame in enumerate(self._every_frame()):
-            if wanted is None or number in wanted:
-                yield frame
-
-    def _every_frame(self) -> Iterator[bytes | Rgb | None]:
+        wanted = range(self.count) if numbers is None else set(numbers)
         next_number = 0
-        for number, frame in _packets(self.path) if self.encoding == "image" else _raw_frames(self.path):
-            yield from (None for _ in range(next_number, number))
-            yield frame
+        filmed: Iterator[_Numbered] = _packets(self.path) if self.encoding == "image" else _raw_frames(self.path)
+        for number, frame in chain(filmed, [(self.count, None)]):
+            yield from (None for gap in range(next_number, number) if gap in wanted)
+            if number in wanted:
+                yield frame
             next_number = number + 1
-        yield from (None for _ in range(next_number, self.count))
 
 
 def open_avi(path: Path) -> AviFilm:

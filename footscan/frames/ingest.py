@@ -27,10 +27,6 @@ from schemas.base.image_size import FRAME_SIZE, ImageSize
 from schemas.base.limits import read_bounded
 from schemas.frames import Encoding, FrameManifest
 
-SINGLE = "single_frame"
-"""First dimension of an array of one frame, such as a background beside films of many: xarray wants all dimensions of
-a name in a group to have one length."""
-
 
 def ingest_film(film: Path, array: Path, size: ImageSize = FRAME_SIZE) -> FrameManifest:
     """Write the frames of `film` as the Zarr array `array`, in place of what is there.
@@ -180,7 +176,8 @@ def _create_array(folder: Path, encoding: Encoding, frames: int, size: ImageSize
         chunks=(1, *size, 3),
         dtype="uint8",
         fill_value=0,
-        dimension_names=("frame" if frames != 1 else SINGLE, "row", "column", "rgb"),
+        # A background of one frame lies beside films of many, and xarray wants dimensions of one name to be as long.
+        dimension_names=("single_frame" if frames == 1 else "frame", "row", "column", "rgb"),
         chunk_key_encoding={"name": "v2", "separator": "."},  # one flat folder of images
         **(
             {"compressors": BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")}
