@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.compare import interleave, print_ratios, python, ratio_text, spread
-from footscan.frames.film import encoded_frames, open_film
+from footscan.frames.film import open_film
 from footscan.recordings.scans import read_scan
 from footscan.virtual.filming.film import write_film
 
@@ -135,8 +135,9 @@ def _thin_out(scan: Path, folder: Path, cameras: int, mark: bytes = b"", shift_m
     ]  # fmt: skip
     for camera in recorded.document.cameras[:: 8 // cameras]:
         film = open_film(recorded.film(camera))
-        frames = [_commented(frame, mark) for frame in list(encoded_frames(film))[::EVERY] if frame is not None]
-        write_film(folder / f"cam{camera.id}.avi", frames, film.width, film.height, 18)
+        kept = film.stored(range(0, film.count, EVERY))
+        frames = [_commented(frame, mark) for frame in kept if isinstance(frame, bytes)]
+        write_film(folder / f"cam{camera.id}.avi", frames, *film.size.px, 18)
         lines.append(f"- {{id: {camera.id}, file: cam{camera.id}.avi}}")
     (folder / "scan.yaml").write_text("\n".join(lines) + "\n")
 

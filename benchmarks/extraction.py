@@ -22,13 +22,14 @@ from scipy.ndimage import grey_closing
 from skimage.measure import label
 
 from benchmarks.compare import interleave, print_ratios
-from footscan.frames.film import encoded_frames, open_film
+from footscan.frames.array import StoredFrames
+from footscan.frames.film import open_film
 from footscan.frames.image import Rgb, decode_or_none, pixel_buffer
 from footscan.frames.ingest import ingest_film
-from footscan.frames.reader import read_frames
+from footscan.frames.reader import pixel_frames
 from footscan.recordings.scans import RecordedScan, read_scan
 from footscan.stripe.film import extract_film
-from schemas.frames import FrameManifest
+from schemas.base.image_size import ImageSize
 from schemas.parameters.extraction import ExtractionParameters
 
 DEFAULT = Path("demo/archive/P0001/demo-R")
@@ -42,12 +43,13 @@ _Camera = TypeVar("_Camera")
 MEMORY = """
 import re, sys
 from pathlib import Path
-from footscan.frames.reader import read_frames
+from footscan.frames.array import StoredFrames
+from footscan.frames.reader import pixel_frames
 from footscan.stripe.film import extract_film
 from schemas.frames import FrameManifest
 from schemas.parameters.extraction import ExtractionParameters
 what, array, manifest = sys.argv[1:]
-frames = read_frames(Path(array), FrameManifest.model_validate_json(Path(manifest).read_bytes()))
+frames = pixel_frames(StoredFrames(Path(array), FrameManifest.model_validate_json(Path(manifest).read_bytes())))
 if what == "decode":
     for frame in frames:
         pass
@@ -57,13 +59,13 @@ print(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1
 """
 FIRST_CALL = """
 import sys, time
-from itertools import islice
 from pathlib import Path
-from footscan.frames.film import open_film, pixel_frames
+from footscan.frames.film import open_film
+from footscan.frames.reader import pixel_frames
 from footscan.stripe.film import extract_film
 from schemas.parameters.extraction import ExtractionParameters
 film = open_film(Path(sys.argv[1]))
-frames = [frame.copy() for frame in islice(pixel_frames(film), film.frames // 2, film.frames // 2 + 3)]
+frames = [frame.copy() for frame in pixel_frames(film, range(film.count // 2, film.count // 2 + 3))]
 for _ in range(2):
     start = time.perf_counter()
     extract_film(frames, ExtractionParameters())
@@ -87,8 +89,7 @@ class Packets:
     """A film's JPEG frames in memory: no disk is timed."""
 
     frames: list[bytes | None]
-    size: tuple[int, int]
-    """Rows and columns."""
+    size: ImageSize
 
     def decoded(self) -> Iterator[Rgb | None]:
         buffer = pixel_buffer(*self.size)
@@ -98,7 +99,7 @@ class Packets:
 def load(film: Path) -> Packets:
     """The packets of a film."""
     opened = open_film(film)
-    return Packets(list(encoded_frames(opened)), (opened.height, opened.width))
+    return Packets(list(opened.stored()), opened.size)
 
 
 def extract(film: Packets, parameters: ExtractionParameters | None = None) -> NDArray[np.float64]:
@@ -185,24 +186,13 @@ def _decode(film: Packets) -> None:
         pass
 
 
-@dataclass(frozen=True)
-class Stored:
-    """A camera's frames in the store that a run reads them from."""
-
-    array: Path
-    manifest: FrameManifest
-
-    def read(self) -> Iterator[Rgb | None]:
-        return read_frames(self.array, self.manifest)
-
-
-def _ingest(scan: RecordedScan, place: Path) -> list[Stored]:
+def _ingest(scan: RecordedScan, place: Path) -> list[StoredFrames]:
     arrays = {scan.film(camera): place / "frames.zarr" / f"cam{camera.id}" for camera in scan.document.cameras}
-    return [Stored(array, ingest_film(film, array)) for film, array in arrays.items()]
+    return [StoredFrames(array, ingest_film(film, array)) for film, array in arrays.items()]
 
 
-def _compare_from_store(cameras: list[Stored]) -> None:
-    frames = sum(len(camera.manifest.frames) for camera in cameras)
+def _compare_from_store(cameras: list[StoredFrames]) -> None:
+    frames = sum(camera.count for camera in cameras)
     with ThreadPoolExecutor(THREADS) as pool:
         runs = {
             "reading, checking digests, decoding": partial(_each, pool, _read, cameras),
@@ -212,21 +202,21 @@ def _compare_from_store(cameras: list[Stored]) -> None:
         print_ratios(title, interleave(runs), frames, "frame")
 
 
-def _read(camera: Stored) -> None:
-    for _ in camera.read():
+def _read(camera: StoredFrames) -> None:
+    for _ in pixel_frames(camera):
         pass
 
 
-def _read_and_extract(camera: Stored) -> None:
-    extract_film(camera.read(), ExtractionParameters())
+def _read_and_extract(camera: StoredFrames) -> None:
+    extract_film(pixel_frames(camera), ExtractionParameters())
 
 
-def _print_memory(camera: Stored, manifest: Path) -> None:
+def _print_memory(camera: StoredFrames, manifest: Path) -> None:
     manifest.write_text(camera.manifest.model_dump_json())
     print(f"\nPeak memory of a process, one camera of {len(camera.manifest.frames)} frames")
     names = {"import": "imports alone", "decode": "reading and decoding", "extract": "the same, and extraction"}
     for what, name in names.items():
-        [kilobytes] = _process(MEMORY, what, str(camera.array), str(manifest))
+        [kilobytes] = _process(MEMORY, what, str(camera.path), str(manifest))
         print(f"  {name:<44}{kilobytes * 1024 / 1e6:9.1f} MB")
 
 

@@ -6,15 +6,17 @@
 import sys
 import tempfile
 import time
+from math import prod
 from pathlib import Path
 
 import numpy as np
 import zarr
 
 from benchmarks.compare import interleave, print_ratios
-from footscan.frames.film import open_film, pixel_frames
+from footscan.frames.array import StoredFrames
+from footscan.frames.film import open_film
 from footscan.frames.ingest import ingest_film
-from footscan.frames.reader import read_frames
+from footscan.frames.reader import pixel_frames
 from footscan.recordings.scans import read_scan
 from schemas.frames import FrameManifest
 
@@ -37,7 +39,7 @@ def main() -> None:
 def _print_sizes(films: dict[int, Path], place: Path, manifests: dict[int, FrameManifest], seconds: float) -> None:
     film_bytes = sum(film.stat().st_size for film in films.values())
     store_bytes = sum(file.stat().st_size for file in place.rglob("*") if file.is_file())
-    decoded_bytes = sum(len(m.frames) * m.height * m.width * 3 for m in manifests.values())
+    decoded_bytes = sum(len(m.frames) * prod(m.size) * 3 for m in manifests.values())
     frames = sum(len(m.frames) for m in manifests.values())
     print(f"{len(films)} films, {frames} frames, ingested in {seconds:.2f} s")
     for name, size in (("films", film_bytes), ("Zarr store", store_bytes), ("decoded frames", decoded_bytes)):
@@ -52,7 +54,7 @@ def _compare_reading(film: Path, array: Path, manifest: FrameManifest) -> None:
             pass
 
     def read() -> None:
-        for _ in read_frames(array, manifest):
+        for _ in pixel_frames(StoredFrames(array, manifest)):
             pass
 
     def read_by_zarr() -> None:

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from benchmarks.compare import interleave, print_ratios, python, spread
 from footscan.cloud.points import coordinates, stripe_step
-from footscan.frames.reader import read_frames
+from footscan.frames.array import StoredFrames
+from footscan.frames.reader import pixel_frames
 from footscan.mesh.formats.files import Shape, read_mesh
 from footscan.mesh.sampling import sample_surface
 from footscan.recordings.scans import RecordedScan, read_scan
@@ -183,7 +184,7 @@ def _compare_with_decoding(scan: RecordedScan, calibration: Path, place: Path) -
 
 
 def _decode(array: Path, manifest: FrameManifest) -> None:
-    for _ in read_frames(array, manifest):
+    for _ in pixel_frames(StoredFrames(array, manifest)):
         pass
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from footscan.frames.film import open_film, pixel_frames
+from footscan.frames.film import open_film
+from footscan.frames.reader import pixel_frames
 from footscan.mesh.formats.files import read_mesh
 from footscan.recordings.scans import read_scan
 from footscan.report.calibration.figure import calibration_figure

@@ -5,7 +5,6 @@ Every property is computed when it is first asked for, by the functions that the
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from itertools import repeat
 from pathlib import Path
 from typing import cast
 
@@ -17,8 +16,9 @@ from footscan.cloud.mapping import map_stripe
 from footscan.cloud.normals import estimate_normals
 from footscan.cloud.outliers import remove_outliers
 from footscan.cloud.views import views_of
-from footscan.frames.film import open_background, open_film, pixel_frames
+from footscan.frames.film import open_background, open_film
 from footscan.frames.image import Rgb
+from footscan.frames.reader import backgrounds_of, pixel_frames
 from footscan.frames.travel import read_positions, travelled
 from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
@@ -110,15 +110,12 @@ class OpenScan:
         film = open_film(self.recorded.film(self._film(camera)))
         backgrounds: Iterator[Rgb | None] | None = None
         if (place := self.recorded.background(self._film(camera))) is not None:
-            background = open_background(place, (film.height, film.width), film.frames)
-            backgrounds = pixel_frames(background)
-            if background.frames < film.frames:
-                backgrounds = repeat(next(backgrounds), film.frames)
+            backgrounds = backgrounds_of(open_background(place, film.size, film.count), film.count)
         return extract_film(pixel_frames(film), self.parameters.extraction, backgrounds)
 
     def _points(self, camera: int) -> NDArray[np.void]:
         film = self._film(camera)
-        count = open_film(self.recorded.film(film)).frames
+        count = open_film(self.recorded.film(film)).count
         positions = self.recorded.positions(film)
         if positions is not None:
             x_of_frame = read_positions(positions)

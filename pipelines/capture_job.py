@@ -5,7 +5,6 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -19,7 +18,8 @@ from footscan.calibration.capture.from_capture import CalibratedView, Recognised
 from footscan.calibration.capture.refused_capture import RefusedCapture
 from footscan.calibration.checks.drift import Drift, drift_of
 from footscan.calibration.models.selection import ModelTrial
-from footscan.frames.film import open_film, pixel_frames
+from footscan.frames.film import open_film
+from footscan.frames.reader import pixel_frames
 from footscan.report.calibration.capture_figure import capture_figure
 from pipelines.arrays import unpack
 from pipelines.calibrate import CaptureInputs, calibration_steps, camera_steps, fit_steps, recorded_inputs
@@ -120,7 +120,7 @@ def picture_of(capture: RecordedCapture, refused: RefusedCapture) -> bytes:
     """Draw the evidence for which a capture was refused, as PNG."""
     films = {camera.id: capture.film(camera) for camera in capture.document.cameras}
     shown = [
-        (evidence, next(islice(pixel_frames(open_film(films[evidence.camera])), evidence.frame, None), None))
+        (evidence, next(pixel_frames(open_film(films[evidence.camera]), [evidence.frame]), None))
         for evidence in refused.evidence
     ]
     return capture_figure(str(refused), shown)

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AwareDatetime, Field, model_validator
 
 from schemas.base.errors import RefusedInput
+from schemas.base.image_size import FRAME_SIZE, ImageSize
 from schemas.base.json_files import parse_json, read_text, validate
 from schemas.base.model import Document
 from schemas.base.units import Point
@@ -120,6 +121,11 @@ class CameraCalibration(Document):
     """Largest distance, of the points held out if there are any."""
     residuals: Annotated[list[Residual], Field(max_length=10_000)] = Field(default_factory=list)
     """Residuals of the fit at each control point, or across each stretch of an edge; empty if unknown."""
+
+    @property
+    def image_size(self) -> ImageSize:
+        """Rows and columns of the images; of the scanner's cameras if unknown."""
+        return ImageSize(*reversed(self.image_px)) if self.image_px else FRAME_SIZE
 
     @model_validator(mode="after")
     def _is_triangle(self) -> Self:

@@ -20,6 +20,7 @@ from footscan.capture.head_motion import HeadMotion
 from footscan.capture.pass_agreement import Agreement, Prior, Seen, agree
 from footscan.stripe.points import StripePoints
 from schemas.base.errors import Finding
+from schemas.base.image_size import FRAME_SIZE
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +48,6 @@ WAVES = 4
 """Cosines of 0 to 3 half waves over the picture's columns and rows."""
 COMPONENTS = 6
 """Principal components of the sums: most of what changes is the stripe's length."""
-PICTURE_PX = (640, 480)
 ROUNDS = 15
 LARGEST_STEP = np.array([0.02, 0.2, 0.5])
 
@@ -154,7 +154,7 @@ def _cosine_sums(stripe: StripePoints, frames: int) -> Floats:
     """(F, WAVES^2) sums over the points of each frame of products of cosines over the picture."""
     across, down = (
         np.cos(np.pi * np.arange(WAVES) * (stripe[axis][:, None] + 0.5) / size)
-        for axis, size in zip(("i", "j"), PICTURE_PX, strict=True)
+        for axis, size in zip(("i", "j"), FRAME_SIZE.px, strict=True)
     )
     products = (across[:, :, None] * down[:, None, :]).reshape(-1, WAVES**2)
     return np.stack([np.bincount(stripe["frame"], column, minlength=frames) for column in products.T], axis=1)

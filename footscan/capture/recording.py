@@ -17,9 +17,10 @@ from typing import Self
 
 import yaml
 
-from footscan.frames.ingest import FRAME_SIZE, FrameWriter, make_group
+from footscan.frames.ingest import FrameWriter, make_group
 from footscan.frames.partial import partial_folder, sweep
 from schemas.base.errors import Fault, RefusedInput
+from schemas.base.image_size import FRAME_SIZE
 from schemas.frames import GROUP, FrameManifest
 from schemas.scan import Scan
 
@@ -141,7 +142,7 @@ class ScanRecording:
         writer = self._writers.pop(name)
         try:
             writer.renumber(frames)
-            return writer.finish(count, FRAME_SIZE, None)
+            return writer.finish(count, FRAME_SIZE)
         except OSError as error:
             raise self._refused_by_disk(error) from None
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from footscan.calibration.models.maps import IMAGE_PX, to_world
+from footscan.calibration.models.maps import to_world
 from footscan.calibration.models.pose import camera_centres
 from schemas.calibration import CameraCalibration
 
@@ -52,7 +52,7 @@ def views_of(cameras: Iterable[CameraCalibration]) -> dict[int, View]:
 
 def _outline(camera: CameraCalibration) -> Floats:
     """The convex outline (M, 2) of a camera's region in the laser plane, mm; (0, 2) if its map is singular."""
-    right, bottom = np.array(camera.image_px or IMAGE_PX) - 1.0
+    right, bottom = np.array(camera.image_size.px) - 1.0
     corners = np.array(camera.region_px or [(0.0, 0.0), (right, 0.0), (right, bottom), (0.0, bottom)])
     parts = np.arange(STEPS_A_SIDE)[:, None, None] / STEPS_A_SIDE
     border = (1 - parts) * corners + parts * np.roll(corners, -1, axis=0)

@@ -1,7 +1,8 @@
 """A Zarr v3 codec whose chunks are encoded images: a camera's JPEG lies in the array bit for bit.
 
 Registered with Zarr through the entry point `zarr.codecs`, so that `zarr.open` reads the frames wherever footscan is
-installed.
+installed, be it without its dependencies: this module needs numpy, zarr and simplejpeg, and Pillow for PNG images.
+docs/frames.md has a codec for those who do without footscan.
 """
 
 import asyncio
@@ -16,7 +17,10 @@ from zarr.core.common import JSON
 
 from footscan.frames.image import decode_image, encode_png
 
-CODEC_NAME = "footscan.image"
+CODEC_NAME = "https://footscan.invalid/zarr/image"
+"""A name that is in no registry has to be an HTTP URI (ZEP 9, phase 1); nobody else can own this one (RFC 2606).
+
+Arrays of earlier versions have `footscan.image`, under which the codec is registered too."""
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,14 @@ from pathlib import Path
 import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
-from PIL import Image
 
 from schemas.base.errors import RefusedInput
-from schemas.base.limits import BeyondLimitError, beyond, limit, read_bounded
+from schemas.base.image_size import ImageSize
+from schemas.base.limits import BeyondLimitError, beyond, limit
 
 Rgb = NDArray[np.uint8]
 """(rows, columns, 3) uint8: red, green, blue."""
 
-Image.MAX_IMAGE_PIXELS = None  # `schemas.base.limits` bounds them; Pillow's own guard would warn at half of its bound
 SUFFIXES = (".jpg", ".jpeg", ".png")
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
@@ -74,15 +73,11 @@ def decode_image(data: bytes, buffer: Rgb | None = None) -> Rgb:
     size = image_size(data)
     if _is_jpeg(data):
         return _decode_jpeg(data, buffer if buffer is not None and buffer.shape == (*size, 3) else None)
-    try:
-        with Image.open(io.BytesIO(data), formats=("PNG",)) as image:
-            return np.asarray(_eight_bit(image).convert("RGB"))
-    except (OSError, SyntaxError, IndexError) as error:
-        raise ValueError(f"a torn PNG image ({error})") from None
+    return _decode_png(data)
 
 
-def image_size(data: bytes) -> tuple[int, int]:
-    """(rows, columns) of an encoded image, without decoding its pixels; ValueError as in `decode_image`."""
+def image_size(data: bytes) -> ImageSize:
+    """Size of an encoded image, without decoding its pixels; ValueError as in `decode_image`."""
     if _is_jpeg(data):
         try:
             rows, columns, _, _ = simplejpeg.decode_jpeg_header(data, strict=False)
@@ -96,24 +91,16 @@ def image_size(data: bytes) -> tuple[int, int]:
         raise ValueError(f"{columns} x {rows} pixels")
     if rows * columns > limit("image_pixels"):
         raise TooManyPixelsError(f"{columns} x {rows} pixels: {beyond('image_pixels', rows * columns)}")
-    return int(rows), int(columns)
+    return ImageSize(int(rows), int(columns))
 
 
 def encode_png(pixels: Rgb) -> bytes:
     """`pixels` as PNG, the lossless counterpart of `decode_image`."""
+    from PIL import Image
+
     out = io.BytesIO()
     Image.fromarray(pixels).save(out, format="PNG")
     return out.getvalue()
-
-
-def read_image(path: Path) -> Rgb:
-    """The pixels of an image file; RefusedInput where it is none."""
-    try:
-        return decode_image(read_bounded(path, "image_bytes"))
-    except OSError as error:
-        raise RefusedInput(path, error.strerror or "cannot be read") from None
-    except ValueError as error:
-        raise refused_image(path, error) from None
 
 
 def _is_jpeg(data: bytes) -> bool:
@@ -133,11 +120,17 @@ def _decode_jpeg(data: bytes, buffer: Rgb | None) -> Rgb:
     return np.asarray(pixels) if buffer is None or padded is None else buffer
 
 
-def _eight_bit(image: Image.Image) -> Image.Image:
-    """16-bit grey as 8-bit grey; Pillow's own conversion would clip it."""
-    if image.mode in {"I", "I;16", "I;16B"}:
-        return Image.fromarray((np.asarray(image).astype(np.uint32) >> 8).astype(np.uint8))
-    return image
+def _decode_png(data: bytes) -> Rgb:
+    from PIL import Image  # not needed to read a camera's JPEGs
+
+    Image.MAX_IMAGE_PIXELS = None  # `schemas.base.limits` bounds them; Pillow would warn at half of its own bound
+    try:
+        with Image.open(io.BytesIO(data), formats=("PNG",)) as image:
+            if image.mode in {"I", "I;16", "I;16B"}:  # grey of 16 bits, which Pillow would clip to 8
+                return np.stack([(np.asarray(image).astype(np.uint32) >> 8).astype(np.uint8)] * 3, axis=-1)
+            return np.asarray(image.convert("RGB"))
+    except (OSError, SyntaxError, IndexError) as error:
+        raise ValueError(f"a torn PNG image ({error})") from None
 
 
 def decode_or_none(data: bytes | None, buffer: Rgb) -> Rgb | None:

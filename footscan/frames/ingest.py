@@ -7,29 +7,28 @@ import os
 import re
 import shutil
 import stat
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import zarr
 from zarr.codecs import BloscCodec
 from zarr.errors import ContainsGroupError
 
-from footscan.frames.array import METADATA, chunk_name, is_recorded
+from footscan.frames.array import METADATA, chunk_name, is_recorded, read_manifest
 from footscan.frames.codec import ImageCodec
-from footscan.frames.film import Film, encoded_frames, open_background, open_film, pixel_frames
+from footscan.frames.film import open_background, open_film
 from footscan.frames.image import frame_digest
 from footscan.frames.partial import make_partial, move_into_place, partial_folder, sweep
+from footscan.frames.reader import FrameReader
 from schemas.base.errors import Fault, RefusedInput
+from schemas.base.image_size import FRAME_SIZE, ImageSize
 from schemas.base.limits import read_bounded
-from schemas.frames import FrameManifest
-
-FRAME_SIZE = (480, 640)
-"""(rows, columns) of a recorded scan's frames."""
+from schemas.frames import Encoding, FrameManifest
 
 
-def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SIZE) -> FrameManifest:
+def ingest_film(film: Path, array: Path, size: ImageSize = FRAME_SIZE) -> FrameManifest:
     """Write the frames of `film` as the Zarr array `array`, in place of what is there.
 
     JPEG and PNG frames keep their bytes; raw ones are compressed without loss. Frames that were recorded straight into
@@ -41,7 +40,7 @@ def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SI
         An AVI, a folder of images, or a recorded array.
     array : Path
         Folder of the array, e.g. `SCAN/frames.zarr/cam1`; its parent becomes a Zarr group.
-    size : (rows, columns), optional
+    size : ImageSize, optional
         Expected size of the frames.
 
     Raises
@@ -54,10 +53,12 @@ def ingest_film(film: Path, array: Path, size: tuple[int, int] | None = FRAME_SI
     """
     opened = open_film(film, size)
     if film.resolve() == array.resolve():
-        return _checked(opened)
+        deque(opened.stored(), maxlen=0)  # each is checked on reading
+        return read_manifest(array)
     if is_recorded(array):
         raise RefusedInput(array, "holds frames that were recorded into it, expected scan.yaml to name it as the film")
-    _check_group(array.parent)
+    if (array.parent / METADATA).exists():
+        read_bounded(array.parent / METADATA, "json_bytes")  # before Zarr reads them, of any size
     _expect_own(array)
     partial = partial_folder(array.parent.parent, array.name)  # outside of the group: no reader of it meets a part
     try:
@@ -107,21 +108,13 @@ class FrameWriter:
             waiting[old].unlink()
         self._digests = {new: self._digests[old] for new, old in numbers.items()}
 
-    def finish(self, frames: int, size: tuple[int, int], film: str | None) -> FrameManifest:
-        """Makes the folder an array of so many frames; those that were never added are lost.
-
-        Parameters
-        ----------
-        size : (rows, columns)
-        film : name of what they were ingested from; None for frames that come straight from a camera.
-        """
+    def finish(self, frames: int, size: ImageSize) -> FrameManifest:
+        """Makes the folder an array of so many frames, which no film holds; those that were never added are lost."""
         digests = [self._digests.get(number) for number in range(frames)]
-        manifest = FrameManifest(encoding="image", height=size[0], width=size[1], frames=digests)
-        _describe(_create_array(self._folder, "image", (frames, *size)), manifest, film)
-        return manifest
+        return _describe(_create_array(self._folder, "image", frames, size), "image", digests, None)
 
 
-def ingest_background(background: Path, array: Path, frames: int) -> FrameManifest:
+def ingest_background(background: Path, array: Path, frames: int, size: ImageSize = FRAME_SIZE) -> FrameManifest:
     """`ingest_film` for the background of a film of so many `frames`.
 
     Raises
@@ -129,8 +122,8 @@ def ingest_background(background: Path, array: Path, frames: int) -> FrameManife
     RefusedInput
         As in `ingest_film` and `open_background`.
     """
-    open_background(background, FRAME_SIZE, frames)
-    return ingest_film(background, array)
+    open_background(background, size, frames)
+    return ingest_film(background, array, size)
 
 
 def make_group(folder: Path) -> None:
@@ -141,12 +134,6 @@ def make_group(folder: Path) -> None:
         return
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:  # what damaged metadata do to it
         raise RefusedInput(folder / METADATA, f"expected a Zarr group ({error})") from None
-
-
-def _check_group(folder: Path) -> None:
-    """Refuses metadata of a group that are too large to be any, before Zarr reads them."""
-    if (folder / METADATA).exists():
-        read_bounded(folder / METADATA, "json_bytes")
 
 
 def _expect_own(array: Path) -> None:
@@ -170,43 +157,27 @@ _IS_OURS = re.compile(r"zarr\.json|\d+\.0\.0\.0|\d+\.renumbered|[\w.]+\.[0-9a-f]
 """Names of a frame, of Zarr's document, and of what is left of either by a process that was killed."""
 
 
-def _checked(recorded: Film) -> FrameManifest:
-    """The manifest of a recorded array, each of whose frames is as it was recorded."""
-    digests = [None if data is None else frame_digest(data) for data in encoded_frames(recorded)]
-    return FrameManifest(encoding="image", height=recorded.height, width=recorded.width, frames=digests)
-
-
-def _write_frames(film: Film, folder: Path) -> FrameManifest:
-    if film.kind == "raw":
-        return _write_pixels(film, folder)
-    writer = FrameWriter(folder)
-    for number, data in enumerate(encoded_frames(film)):
-        if data is not None:
-            writer.add(number, data)
-    return writer.finish(film.frames, (film.height, film.width), film.path.name)
-
-
-def _write_pixels(film: Film, folder: Path) -> FrameManifest:
-    target = _create_array(folder, "pixels", (film.frames, film.height, film.width))
+def _write_frames(film: FrameReader, folder: Path) -> FrameManifest:
+    array = _create_array(folder, film.encoding, film.count, film.size)
     digests: list[str | None] = []
-    for number, pixels in enumerate(pixel_frames(film)):
-        digests.append(None if pixels is None else frame_digest(pixels))
-        if pixels is not None:
-            target[number] = pixels
-    manifest = FrameManifest(encoding="pixels", height=film.height, width=film.width, frames=digests)
-    _describe(target, manifest, film.path.name)
-    return manifest
+    for number, frame in enumerate(film.stored()):
+        digests.append(None if frame is None else frame_digest(frame))
+        if isinstance(frame, bytes):
+            (folder / chunk_name(number)).write_bytes(frame)
+        elif frame is not None:
+            array[number] = frame
+    return _describe(array, film.encoding, digests, film.path.name)
 
 
-def _create_array(folder: Path, encoding: Literal["image", "pixels"], shape: tuple[int, int, int]) -> "zarr.Array[Any]":
-    """`shape` : frames, rows, columns."""
+def _create_array(folder: Path, encoding: Encoding, frames: int, size: ImageSize) -> "zarr.Array[Any]":
     return zarr.create_array(
         store=str(folder),
-        shape=(*shape, 3),
-        chunks=(1, *shape[1:], 3),
+        shape=(frames, *size, 3),
+        chunks=(1, *size, 3),
         dtype="uint8",
         fill_value=0,
-        dimension_names=("frame", "row", "column", "rgb"),
+        # A background of one frame lies beside films of many, and xarray wants dimensions of one name to be as long.
+        dimension_names=("single_frame" if frames == 1 else "frame", "row", "column", "rgb"),
         chunk_key_encoding={"name": "v2", "separator": "."},  # one flat folder of images
         **(
             {"compressors": BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")}
@@ -216,5 +187,10 @@ def _create_array(folder: Path, encoding: Literal["image", "pixels"], shape: tup
     )
 
 
-def _describe(array: "zarr.Array[Any]", manifest: FrameManifest, film: str | None) -> None:
+def _describe(
+    array: "zarr.Array[Any]", encoding: Encoding, digests: list[str | None], film: str | None
+) -> FrameManifest:
+    """Writes down what an array holds, and the `film` that it was ingested from."""
+    manifest = FrameManifest(encoding=encoding, height=array.shape[1], width=array.shape[2], frames=digests)
     array.update_attributes({"footscan": manifest.model_dump(mode="json"), "film": film})
+    return manifest

@@ -4,7 +4,6 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,8 +13,8 @@ from pipelines.cli.terminal.output import AsJson, keep_inputs, message, print_js
 from schemas.base.errors import RefusedInput
 
 if TYPE_CHECKING:
-    from footscan.frames.film import Film
     from footscan.frames.image import Rgb
+    from footscan.frames.reader import FrameReader
     from footscan.stripe.points import StripePoints
     from schemas.parameters.extraction import ExtractionParameters
 
@@ -58,7 +57,9 @@ def extract(
     as_json: AsJson = False,
 ) -> None:
     """Find the laser stripe: CSV with one sub-pixel point per row (frame,i,j,width,peak,score)."""
-    from footscan.frames.film import film_files, open_film, pixel_frames
+    from footscan.frames.film import film_files, open_background, open_film
+    from footscan.frames.image import SUFFIXES
+    from footscan.frames.reader import backgrounds_of, pixel_frames
     from footscan.stripe.film import extract_film, points_csv
     from pipelines.engine.files.atomic import write_atomically
     from schemas.base.overrides import overridden
@@ -66,9 +67,11 @@ def extract(
 
     parameters = overridden(ExtractionParameters, {}, settings or [])
     film = open_film(file)
-    if file.is_file() and film.kind == "images" and next(pixel_frames(film)) is None:
+    if file.is_file() and file.suffix.lower() in SUFFIXES and next(pixel_frames(film)) is None:
         raise RefusedInput(file, "expected a whole image, found one that is torn")
-    backgrounds = None if background is None else _backgrounds(background, film)
+    backgrounds = None
+    if background is not None:
+        backgrounds = backgrounds_of(open_background(background, film.size, film.count, str(file)), film.count)
     inputs = [path for source in (file, background) if source is not None for path in film_files(source)]
     keep_inputs([out, overlay], *inputs)
     _check_outputs(out, overlay, [path for path in (file, background) if path is not None])
@@ -88,7 +91,7 @@ def extract(
                 "file": str(file),
                 "background": None if background is None else str(background),
                 "parameters": parameters.model_dump(mode="json"),
-                "frames": film.frames,
+                "frames": film.count,
                 "lost": seen.lost,
                 **_figures(film, points),
                 "out": None if out is None else str(out),
@@ -96,15 +99,6 @@ def extract(
             }
         )
     message(_summary(film, points, seen))
-
-
-def _backgrounds(path: Path, film: "Film") -> "Iterable[Rgb | None]":
-    """The background of each frame: its own, or one for all."""
-    from footscan.frames.film import open_background, pixel_frames
-
-    background = open_background(path, (film.height, film.width), film.frames, str(film.path))
-    frames = pixel_frames(background)
-    return frames if background.frames > 1 else repeat(next(frames), film.frames)
 
 
 def _check_outputs(out: Path | None, overlay: Path | None, sources: Sequence[Path]) -> None:
@@ -155,17 +149,17 @@ class _Seen:
             yield frame
 
 
-def _drawn(film: "Film", points: "StripePoints", lost: list[int], about: str) -> bytes:
-    from footscan.frames.film import pixel_frames
+def _drawn(film: "FrameReader", points: "StripePoints", lost: list[int], about: str) -> bytes:
+    from footscan.frames.reader import pixel_frames
     from footscan.report.scan.stripe_figure import film_figure, frame_figure
 
     frames = pixel_frames(film)
-    if film.frames == 1 and (frame := next(frames)) is not None:
+    if film.count == 1 and (frame := next(frames)) is not None:
         return frame_figure(frame, points, about)
-    return film_figure(pixel_frames(film), film.frames, points, lost, about)
+    return film_figure(pixel_frames(film), film.count, points, lost, about)
 
 
-def _about(film: "Film", background: Path | None, parameters: "ExtractionParameters") -> str:
+def _about(film: "FrameReader", background: Path | None, parameters: "ExtractionParameters") -> str:
     """Title of an overlay: names, and the parameters that differ from the defaults."""
     names = [_name(film.path)] + ([] if background is None else [f"background {_name(background)}"])
     return ", ".join(
@@ -177,25 +171,25 @@ def _name(path: Path) -> str:
     return path.name or path.resolve().name
 
 
-def _figures(film: "Film", points: "StripePoints") -> dict[str, Any]:
+def _figures(film: "FrameReader", points: "StripePoints") -> dict[str, Any]:
     """The summary as a JSON document."""
     import numpy as np
 
     return {
         "points": len(points),
-        "points_per_frame": np.bincount(points["frame"], minlength=film.frames).tolist(),
+        "points_per_frame": np.bincount(points["frame"], minlength=film.count).tolist(),
         "median_width_px": round(float(np.median(points["width"])), 3) if len(points) else None,
         "median_sigma_px": round(float(np.median(points["sigma"])), 4) if len(points) else None,
     }
 
 
-def _summary(film: "Film", points: "StripePoints", seen: _Seen) -> str:
+def _summary(film: "FrameReader", points: "StripePoints", seen: _Seen) -> str:
     """The summary in one line."""
     with_points = len(set(points["frame"].tolist()))
-    of = f"{with_points} of " if 0 < with_points < film.frames else ""
+    of = f"{with_points} of " if 0 < with_points < film.count else ""
     lost = f", {len(seen.lost)} lost" if seen.lost else ""
-    found = f"{film.path}: {len(points)} stripe points in {of}{film.frames} frame{'s' * (film.frames != 1)}{lost}"
-    if seen.colour or len(seen.lost) == film.frames:
+    found = f"{film.path}: {len(points)} stripe points in {of}{film.count} frame{'s' * (film.count != 1)}{lost}"
+    if seen.colour or len(seen.lost) == film.count:
         return found
     so = "what was found is bright, not red" if len(points) else "no red stripe can be found in it"
     return f"{found}; it has no colour (R = G = B in every pixel), so that {so}"

@@ -11,7 +11,8 @@ from footscan.capture.cameras.usb_bus import Pass
 from pipelines.console.scanner import Device, Health, Level, Scanned, Side
 from pipelines.live.devices import passes_of
 from pipelines.live.light import ScanLight
-from pipelines.live.scanner import REPORT_SECONDS, LiveScanner, ScanOrder
+from pipelines.live.scan_order import ScanOrder
+from pipelines.live.scanner import REPORT_SECONDS, LiveScanner
 from pipelines.live.state import OnState, ScannerState
 from pipelines.live.storing import ScanName, next_scan_name
 from schemas.base.errors import FootscanError

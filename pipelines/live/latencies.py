@@ -1,7 +1,7 @@
 """Latency of each camera, measured by passes over an object that stands still on the glass."""
 
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,14 +13,15 @@ from footscan.capture.latency import Latency, estimate_latency
 from footscan.capture.latency import Pass as LatencyPass
 from footscan.capture.passes import FilmedPass, PassPlan, film_name
 from footscan.capture.recording import ScanRecording
-from footscan.frames.array import stored_bytes
-from footscan.frames.image import Rgb, decode_or_none, pixel_buffer
-from footscan.frames.ingest import FRAME_SIZE
+from footscan.frames.array import chunk_name
+from footscan.frames.image_files import ImageFiles
+from footscan.frames.reader import pixel_frames
 from footscan.stripe.film import extract_film
 from pipelines.live.devices import passes_of
 from pipelines.live.light import ScanLight
 from pipelines.live.scanner import LiveScanner
 from schemas.base.errors import Finding
+from schemas.base.image_size import FRAME_SIZE
 from schemas.frames import GROUP
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.rig import Rig, RigLatency
@@ -122,13 +123,8 @@ def _observed(
         if 0 <= arrival - first < len(usable) and usable[arrival - first]
     ]
     array = recording.file(GROUP) / film_name(camera)
-    stripe = extract_film(_frames(array, arrivals), ExtractionParameters(), None)
+    film = ImageFiles(array, [array / chunk_name(arrival) for arrival in arrivals], FRAME_SIZE)
+    stripe = extract_film(pixel_frames(film), ExtractionParameters())
     rows = np.array(arrivals, np.int64) - first
     motion = motion_of_head(scanner.heads.log, head, filmed.travel)
     return LatencyPass(stripe, clock.seconds[rows], clock.delay_s[rows], motion)
-
-
-def _frames(array: Path, arrivals: Sequence[int]) -> Iterator[Rgb | None]:
-    buffer = pixel_buffer(*FRAME_SIZE)
-    for arrival in arrivals:
-        yield decode_or_none(stored_bytes(array, arrival), buffer)

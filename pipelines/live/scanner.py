@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -20,14 +19,14 @@ from pipelines.live.devices import heads_of, passes_of, sources_of, timing_of
 from pipelines.live.light import ScanLight, fix_light, measured_light
 from pipelines.live.observer import looking_on
 from pipelines.live.recording_document import ScanStory
+from pipelines.live.scan_order import LiveResult, ScanOrder
 from pipelines.live.state import Activity, OnState, ScannerState, StateBoard, with_board
 from schemas.base.errors import Fault, FootscanError, RefusedInput
 from schemas.rig import Rig
 
 if TYPE_CHECKING:  # heads that are only moved do not wait for Zarr, Dask and the reconstruction
     from footscan.capture.recording import ScanRecording
-    from pipelines.live.measuring import Measured
-    from pipelines.live.storing import FilmedScan, ScanName
+    from pipelines.live.storing import FilmedScan
 
 FRAME_BYTES = 40_000
 """Expected size of a frame, for the check of the free space before a scan."""
@@ -42,32 +41,6 @@ UNDER_WAY = ("moving", "jogging", "homing", "held", "door")
 ANSWERING = (*UNDER_WAY, "ready", "not homed", "alarm", "restarting")
 """States of the board in which a stop is sent to it during an activity of the scanner."""
 STOPPED = "stopped; nothing of this scan is kept"
-
-
-@dataclass(frozen=True)
-class ScanOrder:
-    """Order of a scan: its name, its folders and its options."""
-
-    name: "ScanName"
-    archive: Path
-    results: Path | None = None
-    """Folder of the results; None: the scan is stored, but not measured."""
-    calibration: Path | None = None
-    """Calibration file; default: that of the rig."""
-    light: ScanLight | None = None
-    """Light of the scan; default: measured with the cameras."""
-    texture: bool = False
-    """True to film the way back with the lasers off: frames all along the foot, for the colours of its skin."""
-    keep_partial: bool = False
-    """True to store a scan although films of some cameras are incomplete; these cameras are left out."""
-
-
-@dataclass(frozen=True)
-class LiveResult:
-    """The outcome of a scan."""
-
-    stored: "FilmedScan"
-    measured: "Measured | None"
 
 
 class LiveScanner:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.capture.stripe_arrays import stripe_arrays
-from footscan.frames.film import open_film, pixel_frames
+from footscan.frames.film import open_film
+from footscan.frames.reader import pixel_frames
 from footscan.stripe.extract import extract_stripe
 from pipelines.arrays import pack
 from schemas.base.errors import DamagedError
@@ -45,7 +46,7 @@ def run(inputs: Mapping[str, bytes], parameters: ExtractionParameters, places: M
             continue
         points = extract_stripe(frame, parameters)
         stripes.append(np.column_stack([points["i"], points["j"]]))
-    return pack(**stripe_arrays(stripes, (film.width, film.height), lost))
+    return pack(**stripe_arrays(stripes, film.size.px, lost))
 
 
 def _check_filmed(film: Path, digests: Mapping[str, str], capture: Path) -> None:

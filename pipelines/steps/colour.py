@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from footscan.cloud.colour import point_colours
-from footscan.frames.array import discard
+from footscan.frames.array import IngestedFrames
 from footscan.frames.image import Rgb
-from footscan.frames.reader import read_frame
+from footscan.frames.reader import pixel_frames
 from pipelines.arrays import pack, unpack
-from schemas.base.errors import DamagedError
 from schemas.frames import FrameManifest
 
 
@@ -20,15 +19,10 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     """
     del parameters
     stripe = unpack(inputs["stripe"])["stripe"]
-    manifest = FrameManifest.model_validate_json(inputs["background"])
-    frames = len(manifest.frames)
+    background = IngestedFrames(places["background"], FrameManifest.model_validate_json(inputs["background"]))
 
     def laser_off(number: int) -> Rgb | None:
-        return read_frame(places["background"], manifest, number) if frames > 1 and number < frames else None
+        return next(pixel_frames(background, [number])) if background.count > 1 and number < background.count else None
 
-    try:
-        colours, seen = point_colours(stripe, laser_off)
-    except DamagedError:
-        discard(places["background"])  # the next run ingests it again
-        raise
+    colours, seen = point_colours(stripe, laser_off)
     return pack(colours=colours, seen=seen)

@@ -6,14 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.frames.array import discard
-from footscan.frames.reader import read_frame
+from footscan.frames.array import IngestedFrames
+from footscan.frames.reader import pixel_frames
 from footscan.report.sample_frames import FrameSample
 from footscan.report.scan.foot_colours import FootSurface
 from footscan.report.scan.page import ScanPoints, ScanTitle, scan_page
 from footscan.stripe.points import StripePoints
 from pipelines.arrays import unpack
-from schemas.base.errors import DamagedError
 from schemas.calibration import Calibration
 from schemas.frames import FrameManifest
 from schemas.measures import Measures
@@ -74,15 +73,9 @@ def _of_camera(
     camera: int, stripe: StripePoints, numbers: Sequence[int], inputs: Mapping[str, bytes], places: Mapping[str, Path]
 ) -> Iterator[FrameSample]:
     manifest = FrameManifest.model_validate_json(inputs[f"manifest-{camera}"])
-    array = places[f"array-{camera}"]
-    for number in numbers:
-        if number >= len(manifest.frames):
-            return
-        try:
-            image = read_frame(array, manifest, number)
-        except DamagedError:
-            discard(array)
-            raise
+    frames = IngestedFrames(places[f"array-{camera}"], manifest)
+    filmed = [number for number in numbers if number < frames.count]
+    for number, image in zip(filmed, pixel_frames(frames, filmed), strict=True):
         if image is not None:
             points = stripe[stripe["frame"] == number]
-            yield FrameSample(camera, number, image, points["i"], points["j"])
+            yield FrameSample(camera, number, image.copy(), points["i"], points["j"])

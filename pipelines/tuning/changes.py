@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.outliers import KEPT
-from footscan.frames.reader import read_frame
+from footscan.frames.array import IngestedFrames
+from footscan.frames.reader import pixel_frames
 from footscan.recordings.scans import RecordedScan
 from footscan.stripe.points import STRIPE_DTYPE, StripePoints
 from pipelines.arrays import unpack
@@ -48,7 +49,7 @@ def frame_changes(
         manifest, before, after = results[scan.name, camera]
         array = next(scan.array(film) for film in scan.document.cameras if film.id == camera)
         try:
-            image = read_frame(array, manifest, frame)
+            image = next(pixel_frames(IngestedFrames(array, manifest), [frame]))
         except DamagedError:  # it is not shown; the next run ingests it anew
             continue
         if image is not None:

@@ -14,7 +14,8 @@ from shared_folders import MadeOnce
 
 from footscan.calibration.chart.chart import read_chart
 from footscan.calibration.models.maps import is_supported, to_world
-from footscan.frames.film import open_film, pixel_frames
+from footscan.frames.film import open_film
+from footscan.frames.reader import pixel_frames
 from footscan.virtual.optics.scanner import standard_scanner
 from schemas.calibration import read_calibration
 

@@ -13,7 +13,8 @@ from damage_frames import Film, damage_film
 from damage_text import damage_text
 from PIL import Image
 
-from footscan.frames.film import open_film, pixel_frames
+from footscan.frames.film import open_film
+from footscan.frames.reader import pixel_frames
 from schemas.base.errors import FootscanError
 
 Document = dict[str, Any]

@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 
 from footscan.capture.film_frames import FilmFrames
 from footscan.capture.grbl.settings import BoardSettings
-from footscan.frames.film import encoded_frames, open_film
+from footscan.frames.film import open_film
 from footscan.frames.travel import read_positions
 from footscan.recordings.scans import read_scan
 from footscan.virtual.board.board import Board
 from footscan.virtual.filming.streams import SentFrame, VirtualStreams, free_running
 from pipelines.live.light import light_by_hand
-from pipelines.live.scanner import LiveResult, LiveScanner, ScanOrder
+from pipelines.live.scan_order import LiveResult, ScanOrder
+from pipelines.live.scanner import LiveScanner
 from pipelines.live.storing import ScanName, next_scan_name
 from schemas.base.json_files import read_json
 from schemas.recording import RecordedCamera, Recording
@@ -92,7 +93,7 @@ class Bench:
         recording = read_json(scan.folder / "recording.json", Recording)
         assert [camera.id for camera in scan.document.cameras] == list(CAMERAS)
         for camera, told in zip(scan.document.cameras, recording.cameras, strict=True):
-            frames = list(encoded_frames(open_film(scan.film(camera))))
+            frames = list(open_film(scan.film(camera)).stored())
             x_mm = read_positions(scan.folder / str(camera.positions))
             film = result.stored.films[camera.id]
             lost = [k for k, frame in enumerate(frames) if frame is None]

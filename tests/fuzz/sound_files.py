@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.frames.film import encoded_frames, open_film
+from footscan.frames.film import open_film
 from footscan.frames.image import decode_image, encode_png
 from footscan.mesh.formats.files import mesh_bytes
 from footscan.mesh.mesh import Mesh
@@ -63,7 +63,8 @@ def make_sound_files(pristine: Path, folder: Path) -> None:
     rows = [" ".join(map(str, row)) for row in corners.tolist()]
     rows += [f"3 {a} {b} {c}" for a, b, c in faces.tolist()]
     (folder / "text.ply").write_text(header + "\n".join(rows) + "\n")
-    frame = next(encoded_frames(open_film(scan / "cam1.avi"))) or b""
+    frame = next(open_film(scan / "cam1.avi").stored())
+    assert isinstance(frame, bytes)
     (folder / "frame.jpg").write_bytes(frame)
     (folder / "frame.png").write_bytes(encode_png(decode_image(frame)))
     thesis = Path(__file__).parents[1] / "footscan" / "calibration" / "chart" / "data" / "calibration_charts.csv"

@@ -24,7 +24,8 @@ from scanner_troubles import Coming, Trouble, lift, random_trouble
 from waiting import LONG_SECONDS, wait_until
 
 from footscan.capture.board.heads import Heads
-from pipelines.live.scanner import STOPPED, LiveResult
+from pipelines.live.scan_order import LiveResult
+from pipelines.live.scanner import STOPPED
 from schemas.base.errors import Fault, Finding, FootscanError
 
 pytestmark = pytest.mark.real_time  # cameras stream while heads move

@@ -11,9 +11,10 @@ import pytest
 import simplejpeg
 from numpy.typing import NDArray
 
-from footscan.frames.film import open_film, pixel_frames
+from footscan.frames.film import open_film
 from footscan.frames.image import encode_png
 from footscan.frames.ingest import chunk_name, ingest_film
+from footscan.frames.reader import pixel_frames
 from footscan.mesh.formats.files import read_file
 from footscan.recordings.scans import read_scan
 from footscan.virtual.filming.film import write_film

@@ -18,6 +18,7 @@ from footscan.calibration.capture.edge_points import edge_distances
 from footscan.calibration.capture.lines import ImageLine, find_lines
 from footscan.calibration.capture.reference import Edges
 from footscan.calibration.models.homography import algebraic_homography, project
+from schemas.base.image_size import FRAME_SIZE
 from schemas.mounting import Mounting, Sign
 
 Floats = NDArray[np.float64]
@@ -58,7 +59,7 @@ UNKNOWN = Mounting(0, 0, 0)
 APART_MM = 5.0
 """Distance from which two maps place a point differently; maps differ if more than `STRAY_SHARE` of the points do.
 Chosen by hand."""
-MIDDLE_PX, REACH_PX = (320.0, 240.0), 200.0
+MIDDLE_PX, REACH_PX = (FRAME_SIZE.columns / 2, FRAME_SIZE.rows / 2), 200.0
 """Middle and scale of an image by which lines are normalised when the condition of four of them is judged."""
 FROM_PAIR, FROM_ALL = 3, 8
 """Number of the longest pieces of each of two frames, and of all frames, from which sets are formed if single frames

@@ -32,6 +32,7 @@ from footscan.calibration.chart.plane_fit import PASSED, agreeing, fit_homograph
 from footscan.calibration.chart.repair_proposals import place_of
 from footscan.calibration.chart.suspect_points import suspects
 from schemas.base.errors import RefusedInput
+from schemas.base.image_size import FRAME_SIZE
 from schemas.base.units import MILLIMETRES
 
 Floats = NDArray[np.float64]
@@ -139,7 +140,8 @@ def _check_camera(
     reasons = {suspect.point: f"; {suspect.message}" for suspect in suspected}
     for point in np.flatnonzero(outside_image(chart.pixels)).tolist():
         i, j = chart.pixels[point]
-        message = f"i = {i:g}, j = {j:g} lies outside of the image, expected 0 to 639 and 0 to 479"
+        expected = f"expected 0 to {FRAME_SIZE.columns - 1} and 0 to {FRAME_SIZE.rows - 1}"
+        message = f"i = {i:g}, j = {j:g} lies outside of the image, {expected}"
         yield ChartWarning(chart.camera, chart.points[point], "outside", message + reasons.get(point, ""))
     yield from _below(chart, named)
     yield from _border(chart, named, limit)

@@ -16,7 +16,7 @@ from footscan.calibration.chart.plane_fit import (
     project,
     samples,
 )
-from footscan.calibration.models.maps import IMAGE_PX
+from schemas.base.image_size import FRAME_SIZE
 from schemas.base.units import MILLIMETRES
 
 Floats = NDArray[np.float64]
@@ -42,13 +42,13 @@ MOST_NAMED = 10
 
 def outside_image(pixels: Floats) -> NDArray[np.bool_]:
     """Select the `pixels` (N, 2) that lie outside the image and its border; (N,)."""
-    low, high = -OUTSIDE_PX, np.array(IMAGE_PX) - 1.0 + OUTSIDE_PX
+    low, high = -OUTSIDE_PX, np.array(FRAME_SIZE.px) - 1.0 + OUTSIDE_PX
     return np.asarray(((pixels < low) | (pixels > high)).any(axis=1))
 
 
 def is_on_border(pixels: Floats) -> NDArray[np.bool_]:
     """Select the `pixels` (N, 2) on the border of the image, whether counted from 0 or from 1; (N,)."""
-    high = np.array(IMAGE_PX) - 1.0 - BORDER_PX
+    high = np.array(FRAME_SIZE.px) - 1.0 - BORDER_PX
     return np.asarray(((pixels <= BORDER_PX) | (pixels >= high)).any(axis=1) & ~outside_image(pixels))
 
 
@@ -72,8 +72,9 @@ def swapped_columns(chart: Chart, limit_px: float) -> str | None:
     notes = []
     if _fits(chart, limit_px):
         outside = outside_image(pixels)
-        if outside.any() and (pixels[outside, 1] > IMAGE_PX[1]).all() and not outside_image(pixels[:, ::-1]).any():
-            notes.append(f"j reaches {pixels[:, 1].max():g}, expected at most {IMAGE_PX[1] - 1}: i and j are swapped")
+        if outside.any() and (pixels[outside, 1] > FRAME_SIZE.rows).all() and not outside_image(pixels[:, ::-1]).any():
+            most = FRAME_SIZE.rows - 1
+            notes.append(f"j reaches {pixels[:, 1].max():g}, expected at most {most}: i and j are swapped")
         millimetres = MILLIMETRES[chart.unit]
         if millimetres * z.min() < -GLASS_MM and millimetres * y.min() > -GLASS_MM:
             notes.append(f"z reaches {z.min():g} {chart.unit}, below the glass at 0, y does not: y and z are swapped")
@@ -149,7 +150,7 @@ def _view_mm(chart: Chart) -> float:
     apart = (in_mm > 0) & (in_px > 0)
     if not apart.any():
         return float(np.mean(VIEW_MM))
-    return float(IMAGE_PX[0] * np.median(in_mm[apart] / in_px[apart]))
+    return float(FRAME_SIZE.columns * np.median(in_mm[apart] / in_px[apart]))
 
 
 def _exchanged(chart: Chart) -> Chart:

@@ -10,13 +10,14 @@ from footscan.calibration.chart.chart import Chart
 from footscan.calibration.chart.quadratic import ORDER as QUADRATIC
 from footscan.calibration.chart.quadratic import QuadraticFit, fit_quadratic
 from footscan.calibration.models.fit import ModelFit
-from footscan.calibration.models.maps import IMAGE_PX, Model
+from footscan.calibration.models.maps import Model
 from footscan.calibration.models.observations import Observations, of_points
 from footscan.calibration.models.polynomial import PolynomialModel, terms
 from footscan.calibration.models.region import region_of
 from footscan.calibration.models.selection import ModelTrial, candidates, requested_models, rms, select, try_model
 from footscan.rows import distinct_rows
 from schemas.base.errors import RefusedInput
+from schemas.base.image_size import FRAME_SIZE
 from schemas.base.units import MILLIMETRES
 from schemas.calibration import Calibration, CameraCalibration, Residual, Source
 from schemas.parameters.calibration import CalibrationParameters
@@ -70,7 +71,7 @@ def compare_models(chart: Chart, source: str = "chart") -> list[ModelTrial]:
     """
     _refuse_poor(chart, source)
     observations = observe(chart)
-    tried = select(candidates(observations.pixels, IMAGE_PX), observations, chart.camera, robust=False)[1]
+    tried = select(candidates(observations.pixels, FRAME_SIZE.px), observations, chart.camera, robust=False)[1]
     return [_thesis_trial(chart, observations), *tried]
 
 
@@ -86,7 +87,7 @@ def _calibrate_camera(
     observations = observe(chart)
     if parameters.model == "quadratic":
         return _quadratic(chart, observations)
-    tried = requested_models(candidates(chart.pixels, IMAGE_PX), parameters)
+    tried = requested_models(candidates(chart.pixels, FRAME_SIZE.px), parameters)
     fitted, trials = select(tried, observations, chart.camera, robust=False)
     if fitted is None and len(tried) == 1:  # a single requested model is used even if its error is unknown
         fitted, _ = try_model(tried[0], observations, chart.camera, robust=False)
@@ -94,7 +95,7 @@ def _calibrate_camera(
         reasons = "; ".join(f"{trial.model}: {trial.remark or 'no point can be held out'}" for trial in trials[:1])
         raise RefusedInput(source, f"no model can be judged: {reasons}", field=f"camera {chart.camera}")
     chosen = next((trial for trial in trials if trial.status == "chosen"), trials[0])
-    return calibrated(fitted, observations, chosen, IMAGE_PX), trials
+    return calibrated(fitted, observations, chosen, FRAME_SIZE.px), trials
 
 
 def _refuse_poor(chart: Chart, source: str) -> None:
@@ -140,7 +141,7 @@ def _residuals(model: Model, parameters: NDArray[np.float64], observations: Obse
 def _quadratic(chart: Chart, observations: Observations) -> tuple[CameraCalibration, list[ModelTrial]]:
     """Calibrate by the model of the thesis; its held-out error is that of the normalised polynomial of second order."""
     second_order = CalibrationParameters(model="polynomial", order=QUADRATIC)
-    (normalised,) = requested_models(candidates(chart.pixels, IMAGE_PX), second_order)
+    (normalised,) = requested_models(candidates(chart.pixels, FRAME_SIZE.px), second_order)
     _, trial = try_model(normalised, observations, chart.camera, robust=False)
     result = fit_quadratic(chart)
     parameters = _in_mm(result)
@@ -157,7 +158,7 @@ def _quadratic(chart: Chart, observations: Observations) -> tuple[CameraCalibrat
     )
     camera = CameraCalibration(
         camera=chart.camera,
-        image_px=IMAGE_PX,
+        image_px=FRAME_SIZE.px,
         map=PLAIN_QUADRATIC.as_map(parameters),
         region_px=region_of(chart.pixels),
         points=len(chart.points),

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.models.maps import IMAGE_PX, is_supported, model_of, to_world
+from footscan.calibration.models.maps import is_supported, model_of, to_world
 from footscan.calibration.models.selection import rms
+from schemas.base.image_size import FRAME_SIZE
 from schemas.calibration import Calibration, CameraCalibration
 
 Floats = NDArray[np.float64]
@@ -110,7 +111,7 @@ def _shared_pixels(a: CameraCalibration, b: CameraCalibration) -> tuple[Floats, 
     """The pixels (N, 2) in both regions, and their share of those in either; None if a region is unknown."""
     corners = np.array([*a.region_px, *b.region_px], np.float64)
     if len(corners) == 0:
-        images = [image_px for image_px in (a.image_px, b.image_px) if image_px] or [IMAGE_PX]
+        images = [image_px for image_px in (a.image_px, b.image_px) if image_px] or [FRAME_SIZE.px]
         return _grid(np.zeros(2), np.min(images, axis=0) - 1.0), None
     grid = _grid(corners.min(axis=0), corners.max(axis=0))
     in_a, in_b = is_supported(a, grid), is_supported(b, grid)

@@ -12,8 +12,6 @@ from schemas.calibration import CameraCalibration, HomographyMap, PolynomialMap
 Floats = NDArray[np.float64]
 Model = PolynomialModel | HomographyModel
 
-IMAGE_PX = (640, 480)
-"""Default columns and rows of the images: those of the scanner's cameras."""
 STARTS = 12
 """Places a side of the region; Newton's method starts at the nearest. Chosen by hand."""
 STEPS = 30
@@ -74,7 +72,7 @@ def to_pixels(camera: CameraCalibration, world: NDArray[np.floating]) -> Floats:
     world = np.asarray(world, np.float64)
     pixels = np.full(world.shape, np.nan)
     finite = np.isfinite(world).all(axis=1)
-    pixels[finite] = _newton(model, parameters, world[finite], _grid(camera))
+    pixels[finite] = _newton(model, parameters, world[finite], grid_over(camera, STARTS))
     return pixels
 
 
@@ -134,11 +132,10 @@ def _newton(model: Model, parameters: Floats, world: Floats, starts: Floats) -> 
     return np.where((np.abs(step) <= CONVERGED_PX).all(axis=1, keepdims=True), pixels, np.nan)
 
 
-def _grid(camera: CameraCalibration) -> Floats:
-    """(M, 2) pixels over the camera's region, or over its image."""
+def grid_over(camera: CameraCalibration, count: int) -> Floats:
+    """(count^2, 2) pixels over the camera's region, or over its image."""
+    low, high = np.zeros(2), np.array(camera.image_size.px) - 1.0
     if camera.region_px:
         low, high = np.min(camera.region_px, axis=0), np.max(camera.region_px, axis=0)
-    else:
-        low, high = np.zeros(2), np.array(camera.image_px or IMAGE_PX) - 1.0
-    i, j = np.meshgrid(*(np.linspace(low[k], high[k], STARTS) for k in (0, 1)))
+    i, j = np.meshgrid(*(np.linspace(low[k], high[k], count) for k in (0, 1)))
     return np.column_stack([i.ravel(), j.ravel()])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.models.homography import project
-from footscan.calibration.models.maps import IMAGE_PX, model_of, to_world
+from footscan.calibration.models.maps import grid_over, model_of, to_world
 from schemas.calibration import CameraCalibration, HomographyMap
 from schemas.mounting import CaptureCamera, mounting_of
 
@@ -76,7 +76,7 @@ def camera_centre(camera: CameraCalibration) -> Floats | None:
     >>> print(camera_centre(CameraCalibration(camera=1, map=map_, region_px=[], points=0)).round(3) + 0.0)
     [300.   0.   0.]
     """
-    pixels = _samples(camera)
+    pixels = grid_over(camera, SAMPLES)
     plane = to_world(camera, pixels)
     if not np.isfinite(plane).all():
         return None
@@ -84,18 +84,9 @@ def camera_centre(camera: CameraCalibration) -> Floats | None:
     return centre if centre is not None else _by_foreshortening(camera, pixels, plane)
 
 
-def _samples(camera: CameraCalibration) -> Floats:
-    """(N, 2) pixels over the camera's region, or over its image."""
-    low, high = np.zeros(2), np.array(camera.image_px or IMAGE_PX) - 1.0
-    if camera.region_px:
-        low, high = np.min(camera.region_px, axis=0), np.max(camera.region_px, axis=0)
-    i, j = np.meshgrid(*(np.linspace(low[k], high[k], SAMPLES) for k in (0, 1)))
-    return np.column_stack([i.ravel(), j.ravel()])
-
-
 def _by_homography(camera: CameraCalibration, pixels: Floats, plane: Floats) -> Floats | None:
     """The camera's position from the homography of its map; None if the map is not that of a pinhole camera."""
-    middle, image_middle = plane.mean(axis=0), (np.array(camera.image_px or IMAGE_PX) - 1) / 2
+    middle, image_middle = plane.mean(axis=0), (np.array(camera.image_size.px) - 1) / 2
     if isinstance(camera.map, HomographyMap):
         image = _without_distortion(camera.map, plane) - image_middle
     else:

@@ -6,18 +6,20 @@ tell nobody. libjpeg-turbo runs through the Huffman codes and says what it misse
 
 import simplejpeg
 
+from schemas.base.image_size import ImageSize
+
 START, END = b"\xff\xd8", b"\xff\xd9"
 EIGHTH = {"fastdct": True, "fastupsample": True, "min_factor": 1}
 
 
-def torn_reason(jpeg: bytes, size: tuple[int, int] | None = None) -> str | None:
+def torn_reason(jpeg: bytes, size: ImageSize | None = None) -> str | None:
     """Why a frame is torn; None for a whole one.
 
     Parameters
     ----------
     jpeg : bytes
         As it came. Zeros behind its end are padding, and Huffman tables may be missing, as they do in Motion-JPEG.
-    size : (rows, columns), optional
+    size : ImageSize, optional
         That it must have.
 
     A piece that was lost is noticed when the codes of what follows do not end with the picture, which is so in 99 of
@@ -32,7 +34,7 @@ def torn_reason(jpeg: bytes, size: tuple[int, int] | None = None) -> str | None:
     try:
         rows, columns, _, _ = simplejpeg.decode_jpeg_header(jpeg, strict=False)
         if size is not None and (rows, columns) != size:
-            return f"{columns} x {rows} pixels instead of {size[1]} x {size[0]}"
+            return f"{columns} x {rows} pixels instead of {size}"
         simplejpeg.decode_jpeg(jpeg, "GRAY", min_height=rows // 8, min_width=columns // 8, **EIGHTH)
     except (ValueError, KeyError) as error:  # KeyError: a colour space or a subsampling that there is not
         # Webcams pad their entropy-coded data; every pixel is there nevertheless.

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from schemas.base.errors import Fault, RefusedInput
+from schemas.base.image_size import FRAME_SIZE, ImageSize
 
 if TYPE_CHECKING:
     from av import FFmpegError
@@ -31,8 +32,8 @@ class CameraSource:
 
     address: str
     """`/dev/v4l/by-path/...`, `/dev/v4l/by-id/...`, `/dev/video0`, or a URL (http, rtsp, ...) of Motion-JPEG."""
-    size: tuple[int, int] = (480, 640)
-    """(rows, columns): asked of a V4L2 device, expected of any other."""
+    size: ImageSize = FRAME_SIZE
+    """Asked of a V4L2 device, expected of any other."""
     frames_per_second: float | None = None
     """Asked of a V4L2 device, expected of any other; None: whatever it does."""
     open_s: float = 10.0
@@ -127,7 +128,7 @@ def driver_stamp(pts: int | None, time_base: Fraction | None, arrived: float) ->
 def _options(source: CameraSource) -> dict[str, str]:
     if source.is_device:
         rate = {"framerate": f"{source.frames_per_second:.6g}"} if source.frames_per_second else {}
-        size = f"{source.size[1]}x{source.size[0]}"
+        size = f"{source.size.columns}x{source.size.rows}"
         return {"input_format": "mjpeg", "video_size": size, "timestamps": "default", **rate}
     if source.address.startswith("rtsp"):
         return {"rtsp_transport": "tcp"}  # lost datagrams would tear frames

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.models.maps import IMAGE_PX, is_supported, model_of, prediction_covariance
+from footscan.calibration.models.maps import is_supported, model_of, prediction_covariance
 from schemas.calibration import CameraCalibration
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,7 @@ def deviation_of(camera: CameraCalibration, grid_px: int = GRID_PX) -> Floats | 
 
     It is NaN outside the region that data support. The grid has a spacing of `grid_px`.
     """
-    columns, rows = camera.image_px or IMAGE_PX
+    rows, columns = camera.image_size
     i, j = np.meshgrid(np.arange(0, columns, grid_px), np.arange(0, rows, grid_px))
     pixels = np.column_stack([i.ravel(), j.ravel()]).astype(np.float64)
     inside = is_supported(camera, pixels) & bool(camera.region_px)

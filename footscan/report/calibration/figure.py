@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.models.maps import IMAGE_PX, model_of
+from footscan.calibration.models.maps import model_of
 from footscan.report.calibration.facts import (
     LONG_PX,
     SHARE,
@@ -62,7 +62,7 @@ def calibration_figure(calibration: Calibration) -> bytes:
 def _draw_camera(
     panel: "Axes", camera: CameraCalibration, sigma: Floats | None, colours: "Normalize", unit_mm: float
 ) -> None:
-    columns, rows = camera.image_px or IMAGE_PX
+    rows, columns = camera.image_size
     panel.set_xlim(-0.5, columns - 0.5)
     panel.set_ylim(rows - 0.5, -0.5)
     panel.set_aspect("equal")

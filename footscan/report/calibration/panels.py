@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.models.maps import IMAGE_PX
 from footscan.report.calibration.facts import (
     LONG_PX,
     SHARE,
@@ -46,7 +45,7 @@ def calibration_panels(calibration: Calibration) -> str:
 
 
 def _figure(camera: CameraCalibration, sigma: Floats | None, most: float, unit_mm: float) -> str:
-    columns, rows = camera.image_px or IMAGE_PX
+    rows, columns = camera.image_size
     corners = " ".join(f"{i:.1f},{j:.1f}" for i, j in camera.region_px)
     picture = "" if sigma is None else _picture(sigma, most)
     # The picture begins half a step before the first place of its grid.

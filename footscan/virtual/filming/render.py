@@ -52,13 +52,13 @@ class CameraRenderer:
         return compress(self.picture(scene, x, frame), self._settings)
 
     def picture(self, scene: Scene, x: float, frame: int) -> NDArray[np.uint8]:
-        """Returns the picture before compression, (480, 640, 3) uint8 RGB."""
+        """Returns the picture before compression, (rows, columns, 3) uint8 RGB."""
         random = np.random.default_rng([self._settings.seed, self.camera.id, frame, 4])
         light = self.light(scene, x, random)
         return photograph(light, random, self._settings)
 
     def light(self, scene: Scene, x: float, random: np.random.Generator) -> Singles:
-        """Light on the sensor, (480, 640, 3) float32, 1 being its white."""
+        """Light on the sensor, (rows, columns, 3) float32, 1 being its white."""
         settings = self._settings
         stripe = stripe_picture(scene, x, self._lasers, self._straight, self._texture, settings)
         if settings.ghost > 0.0:
@@ -77,12 +77,12 @@ def light_on_sensor(
     settings: SimulationSettings,
     random: np.random.Generator,
 ) -> Singles:
-    """All light of a frame, (480, 640, 3) float32, 1 being the sensor's white.
+    """All light of a frame, (rows, columns, 3) float32, 1 being the sensor's white.
 
     Parameters
     ----------
-    stripe : (480, 640) laser light that the surface sends to each pixel, before speckle, halo and lens.
-    brightness, coverage : (240, 320) the object in the light of the room, and where it is; see `lit_object`.
+    stripe : (rows, columns) laser light that the surface sends to each pixel, before speckle, halo and lens.
+    brightness, coverage : (rows // 2, columns // 2) the object in the room's light, and where it is; see `lit_object`.
     """
     share = min(surface.halo * settings.halo, HALO_LIMIT)
     glow, veil = _glow(stripe, coverage, share, settings.halo)

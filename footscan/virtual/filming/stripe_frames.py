@@ -104,12 +104,12 @@ class StripeFilmer:
         return compress(self.picture(frame), self._settings)
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
-        """Returns the picture before compression, (480, 640, 3) uint8 RGB."""
+        """Returns the picture before compression, (rows, columns, 3) uint8 RGB."""
         random = np.random.default_rng([self._settings.seed, frame, 6])
         return photograph(self.light(frame, random), random, self._settings)
 
     def light(self, frame: int, random: np.random.Generator) -> Singles:
-        """Light on the sensor, (480, 640, 3) float32, 1 being its white."""
+        """Light on the sensor, (rows, columns, 3) float32, 1 being its white."""
         stripe = self._laser_light(frame)
         coverage = _object(self.curves(frame))
         lit = self._brightness * coverage
@@ -240,7 +240,7 @@ def _hardware(scanner: int, ambient: Literal["dark", "ambient", "bright"], glint
 
 
 def _shade(settings: SimulationSettings) -> Singles:
-    """(240, 320) room light on the object, apart from its level: darker downwards, with the skin's unevenness."""
+    """(rows // 2, columns // 2) room light on the object, without its level: darker downwards, uneven as skin is."""
     random = np.random.default_rng([settings.seed, 5])
     shape = (HEIGHT // COARSE, WIDTH // COARSE)
     unevenness = np.zeros(shape)
@@ -252,7 +252,7 @@ def _shade(settings: SimulationSettings) -> Singles:
 
 
 def _object(curves: Sequence[Curve]) -> Singles:
-    """(240, 320) where the object is: within the sections, and around the stripe."""
+    """(rows // 2, columns // 2) where the object is: within the sections, and around the stripe."""
     silhouette = Image.new("L", (WIDTH // COARSE, HEIGHT // COARSE), 1)
     draw = ImageDraw.Draw(silhouette)
     for curve in curves:

@@ -41,7 +41,7 @@ def stripe_picture(
 
     Returns
     -------
-    (480, 640) float64, in units of the sensor's white.
+    (rows, columns) float64, in units of the sensor's white.
     """
     picture = np.zeros(HEIGHT * WIDTH)
     reach = REACH_SIGMAS * float(np.sqrt(settings.laser_sigma_mm**2 + (DIVERGENCE * DEFOCUS_MM) ** 2))

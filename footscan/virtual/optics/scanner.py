@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from footscan.virtual.optics.glass import THICKNESS_MM, directions_from_below, exits_above
 from footscan.virtual.optics.lens import Lens
 from footscan.virtual.portable import product
+from schemas.base.image_size import FRAME_SIZE
 
 Floats = NDArray[np.float64]
 
-WIDTH, HEIGHT = 640, 480
+HEIGHT, WIDTH = FRAME_SIZE
 """Size of the pictures, px."""
 VOLUME_MM = ((-70.0, 70.0), (0.0, 114.0))
 """The scan volume in Y and Z."""

@@ -19,7 +19,7 @@ _CODES = 4096
 
 
 def photograph(light: Singles, random: np.random.Generator, settings: SimulationSettings) -> Bytes:
-    """Convert `light` (480, 640, 3) float32, 1 being the sensor's white, to a picture (480, 640, 3) uint8 RGB."""
+    """Convert `light`, float32 with 1 for the sensor's white, to a uint8 RGB picture; both (rows, columns, 3)."""
     normal = random.standard_normal(light.shape if not settings.bayer else light.shape[:2], dtype=np.float32)
     tone = _tone_curve()
     if not settings.bayer:
@@ -29,7 +29,7 @@ def photograph(light: Singles, random: np.random.Generator, settings: Simulation
 
 
 def compress(picture: Bytes, settings: SimulationSettings) -> bytes:
-    """Compress `picture` (480, 640, 3) uint8 RGB to JPEG."""
+    """Compress `picture` (rows, columns, 3) uint8 RGB to JPEG."""
     jpeg = simplejpeg.encode_jpeg(
         picture, quality=settings.jpeg_quality, colorspace="RGB", colorsubsampling=settings.jpeg_chroma
     )

@@ -28,11 +28,11 @@ class Backdrop(NamedTuple):
     """The static picture of hardware and room around one camera, as it travels along."""
 
     room: Singles
-    """(480, 640, 3) lit by the room."""
+    """(rows, columns, 3) lit by the room."""
     white_glints: Singles
-    """(480, 640) reflections of lamps."""
+    """(rows, columns) reflections of lamps."""
     red_glints: Singles
-    """(480, 640) reflections of laser light."""
+    """(rows, columns) reflections of laser light."""
 
 
 def backdrop(camera: Camera, scanner_seed: int, settings: SimulationSettings) -> Backdrop:
@@ -99,14 +99,14 @@ def _room_light(
 
 
 def _hardware(random: np.random.Generator) -> Floats:
-    """Rails, plates and a bright part of the room, out of focus; reflectance seen at each pixel, (480, 640, 3)."""
+    """Rails, plates and a bright part of the room, out of focus; reflectance seen at each pixel, (rows, columns, 3)."""
     rows, columns = np.mgrid[0:HEIGHT, 0:WIDTH]
     slope = random.normal(0.0, 0.1, 2)
     grey = 0.16 + slope[0] * (columns / WIDTH - 0.5) + slope[1] * (rows / HEIGHT - 0.5)
     for _ in range(7):
         angle, offset, breadth = random.uniform(0.0, np.pi), random.uniform(-260.0, 260.0), random.uniform(6.0, 50.0)
         cos, sin = cos_sin(np.degrees(angle))
-        across = cos * (columns - 320.0) + sin * (rows - 240.0) - offset
+        across = cos * (columns - WIDTH / 2) + sin * (rows - HEIGHT / 2) - offset
         grey = np.where(np.abs(across) < breadth / 2.0, random.uniform(0.02, 0.3), grey)
     side, length = random.integers(4), random.uniform(100.0, 220.0)
     start = random.uniform(0.0, (WIDTH if side < 2 else HEIGHT) - length)
@@ -119,7 +119,7 @@ def _hardware(random: np.random.Generator) -> Floats:
 
 
 def _glints(random: np.random.Generator) -> Floats:
-    """A few bright, mostly oblong spots, (480, 640), at most some times the sensor's white."""
+    """A few bright, mostly oblong spots, (rows, columns), at most some times the sensor's white."""
     rows, columns = np.mgrid[0:HEIGHT, 0:WIDTH]
     picture = np.zeros((HEIGHT, WIDTH))
     for _ in range(3):

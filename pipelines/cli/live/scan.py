@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from pipelines.live.light import ScanLight
-    from pipelines.live.scanner import LiveResult, LiveScanner
+    from pipelines.live.scan_order import LiveResult
+    from pipelines.live.scanner import LiveScanner
     from pipelines.live.virtual.world import World
     from schemas.rig import Rig
 
@@ -97,7 +98,8 @@ def scan(
     as_json: AsJson = False,
 ) -> int:
     """Scan a foot: home, film, store, reconstruct and measure."""
-    from pipelines.live.scanner import LiveScanner, ScanOrder
+    from pipelines.live.scan_order import ScanOrder
+    from pipelines.live.scanner import LiveScanner
     from pipelines.live.storing import ScanName, next_scan_name
     from schemas.base.model import pseudonym
 

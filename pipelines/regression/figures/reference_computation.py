@@ -13,6 +13,8 @@ import simplejpeg
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from schemas.base.image_size import FRAME_SIZE
+
 FRAMES = 4
 """Frames that are decoded; chosen by hand so that the computation is short against a step."""
 
@@ -32,8 +34,8 @@ def reference_seconds() -> float:
 def _material() -> tuple[bytes, NDArray[np.float64]]:
     """A frame and a cloud, (4000, 3), that are the same on every machine."""
     random = np.random.default_rng(0)
-    j, i = np.mgrid[0:480, 0:640]
-    stripe = 180 * np.exp(-0.5 * ((i - 320 - 60 * np.sin(j / 80)) / 4) ** 2)
-    noise = random.normal(30, 5, (480, 640, 3))
+    j, i = np.indices(FRAME_SIZE)
+    stripe = 180 * np.exp(-0.5 * ((i - FRAME_SIZE.columns / 2 - 60 * np.sin(j / 80)) / 4) ** 2)
+    noise = random.normal(30, 5, (*FRAME_SIZE, 3))
     frame = np.clip(noise + stripe[..., None] * [1.0, 0.2, 0.15], 0, 255).astype(np.uint8)
     return simplejpeg.encode_jpeg(frame, 85, "RGB", "420"), random.uniform(0, 100, (4000, 3))

@@ -21,9 +21,9 @@ import zarr
 
 from footscan.capture import recording as module
 from footscan.capture.recording import LEAST_FREE_BYTES, ScanRecording
-from footscan.frames.array import is_recorded, read_manifest
+from footscan.frames.array import StoredFrames, is_recorded, read_manifest
 from footscan.frames.ingest import FrameWriter, ingest_film
-from footscan.frames.reader import read_frames
+from footscan.frames.reader import pixel_frames
 from schemas.base.errors import Fault, RefusedInput
 from schemas.scan import Scan
 
@@ -100,7 +100,7 @@ def test_a_recording_is_its_own_film(place: Path) -> None:
     manifest = ingest_film(array, array)
     assert manifest == read_manifest(array)
     assert before == {path.name: path.stat().st_mtime_ns for path in array.iterdir()}
-    grey = [None if frame is None else int(frame.max()) for frame in read_frames(array, manifest)]
+    grey = [None if frame is None else int(frame.max()) for frame in pixel_frames(StoredFrames(array, manifest))]
     assert grey == [4, None, 7]
 
 
@@ -130,7 +130,7 @@ def test_a_damaged_recording_is_refused_with_the_frame_and_stays(place: Path, ha
     with pytest.raises(Fault, match="cam1: frame 1 is damaged, expected the frame that was recorded"):
         ingest_film(array, array)
     with pytest.raises(Fault, match="frame 1 is damaged, expected the frame that was recorded"):
-        list(read_frames(array, manifest))
+        list(pixel_frames(StoredFrames(array, manifest)))
     chunk.write_bytes(jpeg(7))
     assert ingest_film(array, array) == manifest
 

@@ -1,5 +1,8 @@
 """The Zarr codec whose chunks are images."""
 
+import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +14,26 @@ import zarr
 
 from footscan.frames.codec import ImageCodec
 from footscan.frames.image import decode_image
+from footscan.frames.ingest import ingest_background, ingest_film
+from schemas.base.image_size import ImageSize
+
+PAGE = Path(__file__).parents[3] / "docs/frames.md"
+BESIDE_FOOTSCAN, WITHOUT_FOOTSCAN = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+NO_FOOTSCAN = """
+import importlib.metadata, sys
+sys.modules["footscan"] = sys.modules["schemas"] = None
+importlib.metadata.entry_points = importlib.metadata.EntryPoints
+"""
+LIGHT = """
+import sys
+import numpy, simplejpeg, zarr
+before = set(sys.modules)
+from footscan.frames.codec import ImageCodec
+from footscan.frames.image import decode_image
+assert decode_image(open(sys.argv[1], "rb").read()).shape == (48, 64, 3)
+others = {name.partition(".")[0] for name in set(sys.modules) - before} - sys.stdlib_module_names
+assert others <= {"footscan", "schemas"}, others
+"""
 
 
 def create(path: Path) -> Any:
@@ -33,8 +56,9 @@ def test_writes_png_and_reads_it_back(tmp_path: Path, pixels: Callable[..., Any]
 
 def test_metadata_name_the_codec_and_nothing_else(tmp_path: Path) -> None:
     array = create(tmp_path / "a")
-    assert [codec.to_dict() for codec in array.metadata.codecs] == [{"name": "footscan.image"}]
-    assert ImageCodec.from_dict({"name": "footscan.image"}) == ImageCodec()
+    [codec] = array.metadata.codecs
+    assert codec.to_dict() == {"name": "https://footscan.invalid/zarr/image"}
+    assert re.fullmatch(r"https?:\/\/[^/?#]+[^?#]*", codec.to_dict()["name"]), "ZEP 9: names that are in no registry"
 
 
 def test_reads_a_jpeg_that_lies_there(tmp_path: Path, jpeg: Callable[..., bytes]) -> None:
@@ -46,3 +70,49 @@ def test_reads_a_jpeg_that_lies_there(tmp_path: Path, jpeg: Callable[..., bytes]
     chunk.write_bytes(jpeg(4, 32, 32))
     with pytest.raises(ValueError, match="reshape"):
         array[0]
+
+
+def test_an_array_under_the_former_name_is_read(tmp_path: Path, pixels: Callable[..., Any]) -> None:
+    create(tmp_path / "a")[1] = pixels(1)
+    metadata = tmp_path / "a/zarr.json"
+    metadata.write_text(metadata.read_text().replace("https://footscan.invalid/zarr/image", "footscan.image"))
+    np.testing.assert_array_equal(zarr.open_array(str(tmp_path / "a"), mode="r")[1], pixels(1))
+
+
+def test_decoding_takes_zarr_numpy_and_a_jpeg_decoder_alone(tmp_path: Path, jpeg: Callable[..., bytes]) -> None:
+    (tmp_path / "a.jpg").write_bytes(jpeg(1))
+    subprocess.run([sys.executable, "-c", LIGHT, str(tmp_path / "a.jpg")], check=True)
+
+
+@pytest.fixture
+def group(tmp_path: Path, jpeg: Callable[..., bytes], write_mjpeg: Callable[..., Path]) -> Path:
+    """Two films of twelve frames, one with a background of one frame and one with its own of twelve."""
+    films = [write_mjpeg(tmp_path / f"{length}.avi", [jpeg(k) for k in range(length)]) for length in (1, 12)]
+    place, size = tmp_path / "frames.zarr", ImageSize(rows=48, columns=64)
+    for camera, background in enumerate(films):
+        ingest_film(films[1], place / f"cam{camera}", size)
+        ingest_background(background, place / f"cam{camera}-background", 12, size)
+    return place
+
+
+@pytest.mark.parametrize(
+    "code", [BESIDE_FOOTSCAN, WITHOUT_FOOTSCAN, NO_FOOTSCAN + WITHOUT_FOOTSCAN], ids=["beside", "own", "without"]
+)
+def test_the_examples_of_the_page(group: Path, code: str, jpeg: Callable[..., bytes]) -> None:
+    shown = subprocess.run([sys.executable, "-c", code], cwd=group.parent, check=True, capture_output=True, text=True)
+    assert shown.stdout.startswith(str(decode_image(jpeg(10)).mean(axis=(0, 1))))
+
+
+def test_dimensions_of_one_name_have_one_length(group: Path) -> None:
+    lengths: dict[str, set[int]] = {}
+    for _, array in zarr.open_group(str(group), mode="r").arrays():
+        for name, length in zip(array.metadata.dimension_names, array.shape, strict=True):
+            lengths.setdefault(name, set()).add(length)
+    assert lengths == {"frame": {12}, "single_frame": {1}, "row": {48}, "column": {64}, "rgb": {3}}
+
+
+def test_xarray_opens_the_group(group: Path, jpeg: Callable[..., bytes]) -> None:
+    xarray = pytest.importorskip("xarray", reason="not among our own dependencies")
+    opened = xarray.open_zarr(str(group), consolidated=False)
+    np.testing.assert_array_equal(opened["cam0-background"][0], decode_image(jpeg(0)))
+    np.testing.assert_array_equal(opened["cam1"][3], decode_image(jpeg(3)))

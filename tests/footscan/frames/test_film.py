@@ -10,10 +10,14 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from footscan.frames.film import Film, encoded_frames, film_files, open_film, pixel_frames
-from footscan.frames.image import frame_digest
+from footscan.frames.film import film_files, open_film
+from footscan.frames.image import Rgb, frame_digest
 from footscan.frames.ingest import ingest_film
+from footscan.frames.reader import FrameReader, pixel_frames
 from schemas.base.errors import RefusedInput
+from schemas.base.image_size import FRAME_SIZE, ImageSize
+
+SIZE = ImageSize(rows=48, columns=64)
 
 MANIFEST = (
     b'{"attributes": {"film": null, "footscan": '
@@ -21,11 +25,15 @@ MANIFEST = (
 )
 
 
-def pictures_of(path: Path) -> list[bytes | None]:
-    return list(encoded_frames(open_film(path)))
+def holds(film: FrameReader) -> tuple[str, int, ImageSize]:
+    return film.encoding, film.count, film.size
 
 
-def refusal(path: Path, film: Path | None = None, size: tuple[int, int] | None = None) -> str:
+def pictures_of(path: Path) -> list[bytes | Rgb | None]:
+    return list(open_film(path).stored())
+
+
+def refusal(path: Path, film: Path | None = None, size: ImageSize | None = None) -> str:
     """What is said of `path`, when it, or the film that it is a part of, is opened."""
     with pytest.raises(RefusedInput) as caught:
         open_film(film or path, size)
@@ -41,7 +49,7 @@ def film(tmp_path: Path, jpeg: Callable[..., bytes], write_mjpeg: Callable[..., 
 
 
 def test_packets_are_taken_untouched(film: Path, jpeg: Callable[..., bytes]) -> None:
-    assert open_film(film) == Film(film, "mjpeg", 8, 48, 64)
+    assert holds(open_film(film)) == ("image", 8, SIZE)
     assert pictures_of(film) == [jpeg(number) for number in range(8)]
     for number, pixels in enumerate(pixel_frames(open_film(film))):
         assert pixels is not None
@@ -50,7 +58,7 @@ def test_packets_are_taken_untouched(film: Path, jpeg: Callable[..., bytes]) -> 
 
 def test_suffix_of_an_avi_may_be_any(film: Path) -> None:
     film.rename(film.with_name("CAM1.AVI"))
-    assert open_film(film.with_name("CAM1.AVI")).frames == 8
+    assert open_film(film.with_name("CAM1.AVI")).count == 8
 
 
 def test_raw_film_gives_its_pixels_exactly(
@@ -58,7 +66,7 @@ def test_raw_film_gives_its_pixels_exactly(
 ) -> None:
     frames = [pixels(number, 47, 63) for number in range(5)]  # rows of odd length are padded in the file
     path = write_raw(tmp_path / "raw.avi", frames)
-    assert open_film(path) == Film(path, "raw", 5, 47, 63)
+    assert holds(open_film(path)) == ("pixels", 5, (47, 63))
     for expected, found in zip(frames, pixel_frames(open_film(path)), strict=True):
         np.testing.assert_array_equal(found, expected)
 
@@ -105,13 +113,13 @@ def test_folder_of_images_in_name_order(tmp_path: Path, pixels: Callable[..., An
     (tmp_path / "notes.txt").write_text("not a frame")
     (tmp_path / "._000.png").write_text("not a frame either")
     film = open_film(tmp_path)
-    assert film == Film(tmp_path, "images", 4, 48, 64)
+    assert holds(film) == ("image", 4, SIZE)
     for number, found in enumerate(pixel_frames(film)):
         expected = simplejpeg.decode_jpeg(jpeg(number), "RGB") if number % 2 else pixels(number)
         np.testing.assert_array_equal(found, expected)
     assert pictures_of(tmp_path)[1] == jpeg(1)
     one = tmp_path / "002.png"
-    assert open_film(one) == Film(one, "images", 1, 48, 64)
+    assert holds(open_film(one)) == ("image", 1, SIZE)
     np.testing.assert_array_equal(next(pixel_frames(open_film(one))), pixels(2))
 
 
@@ -143,7 +151,7 @@ def test_every_cut_is_refused(
         path.write_bytes(whole[:cut])
         assert refusal(path)
     path.write_bytes(whole + bytes(100))  # padding, as card readers leave it
-    assert open_film(path).frames == 8
+    assert open_film(path).count == 8
 
 
 @pytest.mark.parametrize("header", ["main", "stream"])
@@ -156,7 +164,7 @@ def test_header_with_another_number_of_frames_is_refused(film: Path, header: str
         assert refusal(film) == "frames: truncated: expected the 9 frames that its header declares, found 8"
         whole[48:52] = (0).to_bytes(4, "little")  # left out by its recorder
         film.write_bytes(whole)
-        assert open_film(film).frames == 8
+        assert open_film(film).count == 8
     else:
         whole[136:140] = (5).to_bytes(4, "little")  # dwStart: every time stamp is late by five frames
         film.write_bytes(whole)
@@ -196,7 +204,7 @@ def test_changed_bytes_are_refused_or_cost_single_frames(film: Path, jpeg: Calla
         film.write_bytes(damaged)
         try:
             opened = open_film(film)
-            found = list(encoded_frames(opened)) if opened.kind == "mjpeg" else []
+            found = list(opened.stored()) if opened.encoding == "image" else []
             list(pixel_frames(opened))
         except RefusedInput as error:
             assert str(error).isprintable()  # noqa: PT017 (either is right)
@@ -205,9 +213,9 @@ def test_changed_bytes_are_refused_or_cost_single_frames(film: Path, jpeg: Calla
 
 
 def test_size_is_checked(film: Path) -> None:
-    assert open_film(film, (48, 64)).frames == 8
+    assert open_film(film, SIZE).count == 8
     expected = "frame size: expected frames of 640 x 480 pixels, found 64 x 48"
-    assert refusal(film, size=(480, 640)) == expected
+    assert refusal(film, size=FRAME_SIZE) == expected
 
 
 def test_other_codecs_are_refused(
@@ -278,10 +286,10 @@ def test_a_folder_among_frames_is_named(tmp_path: Path, jpeg: Callable[..., byte
 def test_an_array_is_a_film(tmp_path: Path, jpeg: Callable[..., bytes], write_mjpeg: Callable[..., Path]) -> None:
     film = write_mjpeg(tmp_path / "cam1.avi", [jpeg(number) for number in (0, 1, 3)], [0, 1, 3])
     array = tmp_path / "frames.zarr/cam1"
-    ingest_film(film, array, (48, 64))
-    opened = open_film(array, (48, 64))
-    assert (opened.kind, opened.frames, opened.height, opened.width) == ("array", 4, 48, 64)
-    assert list(encoded_frames(opened)) == [jpeg(0), jpeg(1), None, jpeg(3)]
+    ingest_film(film, array, SIZE)
+    opened = open_film(array, SIZE)
+    assert holds(opened) == ("image", 4, SIZE)
+    assert list(opened.stored()) == [jpeg(0), jpeg(1), None, jpeg(3)]
     assert [frame is None for frame in pixel_frames(opened)] == [False, False, True, False]
     assert film_files(array) == [array / "zarr.json"]
 

@@ -18,14 +18,15 @@ import pytest
 import simplejpeg
 import zarr
 
-from footscan.frames import ingest
-from footscan.frames.array import chunk_name, discard, is_complete
+from footscan.frames.array import StoredFrames, chunk_name, discard, is_complete
+from footscan.frames.avi import AviFilm
 from footscan.frames.ingest import ingest_film
-from footscan.frames.reader import read_frames
+from footscan.frames.reader import pixel_frames
 from schemas.base.errors import Fault, RefusedInput
+from schemas.base.image_size import ImageSize
 from schemas.frames import GROUP, FrameManifest
 
-SIZE = (48, 64)
+SIZE = ImageSize(rows=48, columns=64)
 
 
 @pytest.fixture
@@ -47,7 +48,7 @@ def array(scan: Path) -> Path:
 
 def assert_holds(array: Path, manifest: FrameManifest, jpeg: Callable[..., bytes]) -> None:
     """The film above, whole, and no parts beside it."""
-    for number, found in enumerate(read_frames(array, manifest)):
+    for number, found in enumerate(pixel_frames(StoredFrames(array, manifest))):
         assert (found is None) == (number == 2)
         if found is not None:
             np.testing.assert_array_equal(found, simplejpeg.decode_jpeg(jpeg(number), "RGB"))
@@ -57,7 +58,7 @@ def assert_holds(array: Path, manifest: FrameManifest, jpeg: Callable[..., bytes
 
 def test_bytes_of_the_camera_are_kept(film: Path, array: Path, jpeg: Callable[..., bytes]) -> None:
     manifest = ingest_film(film, array, SIZE)
-    assert (manifest.encoding, manifest.height, manifest.width) == ("image", 48, 64)
+    assert (manifest.encoding, manifest.size) == ("image", SIZE)
     assert [digest is None for digest in manifest.frames] == [False, False, True, False]
     for number in (0, 1, 3):
         assert (array / chunk_name(number)).read_bytes() == jpeg(number)
@@ -103,7 +104,7 @@ def test_raw_film_is_kept_without_loss(
     manifest = ingest_film(film, array, SIZE)
     assert manifest.encoding == "pixels"
     np.testing.assert_array_equal(np.asarray(zarr.open(str(array), mode="r")), smooth)
-    for found, expected in zip(read_frames(array, manifest), smooth, strict=True):
+    for found, expected in zip(pixel_frames(StoredFrames(array, manifest)), smooth, strict=True):
         np.testing.assert_array_equal(found, expected)
     assert sum(path.stat().st_size for path in array.iterdir()) < film.stat().st_size
 
@@ -115,7 +116,7 @@ def test_folder_of_png_keeps_its_bytes(scan: Path, array: Path, pixels: Callable
     for number in range(3):
         Image.fromarray(pixels(number)).save(scan / f"cam1/{number}.png")
     manifest = ingest_film(scan / "cam1", array, SIZE)
-    for number, found in enumerate(read_frames(array, manifest)):
+    for number, found in enumerate(pixel_frames(StoredFrames(array, manifest))):
         np.testing.assert_array_equal(found, pixels(number))
         assert (array / chunk_name(number)).read_bytes() == (scan / f"cam1/{number}.png").read_bytes()
 
@@ -153,7 +154,7 @@ def test_interrupted_ingest_leaves_what_was_there(
         raise error
 
     with monkeypatch.context() as patch:
-        patch.setattr(ingest, "encoded_frames", torn)
+        patch.setattr(AviFilm, "stored", torn)
         with pytest.raises(raised):
             ingest_film(film, array, SIZE)
     assert is_complete(array) == again
@@ -190,7 +191,7 @@ def test_killed_ingest_leaves_nothing_and_the_next_sweeps_up(
     write_raw(scan / "cam1.avi", [pixels(0, 480, 640)] * 2)
     manifest = ingest_film(film, array)
     assert list(scan.glob(".*")) == []
-    assert len(list(read_frames(array, manifest))) == 2
+    assert len(list(pixel_frames(StoredFrames(array, manifest)))) == 2
 
 
 def test_parts_of_living_processes_and_of_other_machines_are_left(film: Path, array: Path) -> None:

@@ -1,20 +1,23 @@
-"""Frames out of their array: the one that was ingested, or none at all."""
+"""Frames by the one protocol of all their sources; out of an array the one that was ingested, or none at all."""
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from footscan.frames.array import chunk_name
+from footscan.frames.array import IngestedFrames, StoredFrames, chunk_name, is_complete
+from footscan.frames.film import open_film
+from footscan.frames.image import encode_png
 from footscan.frames.ingest import ingest_film
-from footscan.frames.reader import read_frame, read_frames
+from footscan.frames.reader import FrameReader, backgrounds_of, pixel_frames
 from schemas.base.errors import DamagedError
+from schemas.base.image_size import ImageSize
 from schemas.frames import FrameManifest
 
-SIZE = (48, 64)
+SIZE = ImageSize(rows=48, columns=64)
 Ingested = tuple[Path, FrameManifest]
 
 
@@ -45,9 +48,9 @@ def flip(path: Path, at: int) -> None:
 
 
 def test_one_frame_is_as_all_give_it(ingested: Ingested) -> None:
-    for number, frame in enumerate(read_frames(*ingested)):
+    for number, frame in enumerate(pixel_frames(StoredFrames(*ingested))):
         assert frame is not None
-        np.testing.assert_array_equal(read_frame(*ingested, number), frame)
+        np.testing.assert_array_equal(next(pixel_frames(StoredFrames(*ingested), [number])), frame)
 
 
 @pytest.mark.parametrize("damage", ["first byte", "middle byte", "cut", "emptied", "removed", "exchanged"])
@@ -67,12 +70,12 @@ def test_damaged_frame_is_noticed(ingested: Ingested, damage: str) -> None:
             chunk.unlink()
         case "exchanged":
             shutil.copy(array / chunk_name(3), chunk)
-    frames = read_frames(array, manifest)
+    frames = pixel_frames(StoredFrames(array, manifest))
     assert next(frames) is not None
     assert next(frames) is not None
     with pytest.raises(DamagedError, match=r"cam1: frame 2 is damaged, expected the frame that was ingested$"):
         next(frames)
-    assert read_frame(array, manifest, 3) is not None
+    assert next(pixel_frames(StoredFrames(array, manifest), [3])) is not None
 
 
 @pytest.mark.parametrize("metadata", [None, b"", b"{}", b'{"zarr_format": 3, "node_type": "group"}', b"\xff", b"[1]"])
@@ -82,14 +85,71 @@ def test_damaged_metadata_are_noticed_where_they_are_needed(ingested: Ingested, 
     if metadata is not None:
         (array / "zarr.json").write_bytes(metadata)
     if manifest.encoding == "image":
-        assert len(list(read_frames(array, manifest))) == 4
+        assert len(list(pixel_frames(StoredFrames(array, manifest)))) == 4
     else:
         with pytest.raises(DamagedError, match=r"cam1: expected a Zarr array"):
-            list(read_frames(array, manifest))
+            list(pixel_frames(StoredFrames(array, manifest)))
 
 
 def test_array_that_is_gone_is_noticed(ingested: Ingested) -> None:
     array, manifest = ingested
     shutil.rmtree(array)
     with pytest.raises(DamagedError):
-        read_frame(array, manifest, 0)
+        next(pixel_frames(StoredFrames(array, manifest), [0]))
+
+
+def sources(folder: Path, pixels: Callable[..., Any], write_mjpeg: Any, write_raw: Any) -> Iterator[FrameReader]:
+    """The same eight frames, without loss where the source can; the fifth is lost where a source can lose one."""
+    pictures = [encode_png(pixels(number)) for number in range(8)]
+    kept = [number for number in range(8) if number != 4]
+    yield open_film(write_raw(folder / "raw.avi", [pixels(number) for number in range(8)]))
+    (folder / "images").mkdir()
+    for number, picture in enumerate(pictures):
+        (folder / f"images/{number}.png").write_bytes(picture)
+    yield open_film(folder / "images")
+    film = write_mjpeg(folder / "cam1.avi", [pictures[number] for number in kept], kept)
+    yield open_film(film)
+    for name in ("cam1", "raw"):
+        array = folder / f"frames.zarr/{name}"
+        manifest = ingest_film(film.with_stem(name), array, SIZE)
+        yield StoredFrames(array, manifest)
+        yield IngestedFrames(array, manifest)
+
+
+def test_every_source_gives_its_frames_alike(
+    tmp_path: Path, pixels: Callable[..., Any], write_mjpeg: Callable[..., Path], write_raw: Callable[..., Path]
+) -> None:
+    readers = list(sources(tmp_path, pixels, write_mjpeg, write_raw))
+    assert [reader.encoding for reader in readers] == ["pixels", *["image"] * 4, *["pixels"] * 2]
+    for reader in readers:
+        assert (reader.count, reader.size, reader.path.exists()) == (8, SIZE, True)
+        for numbers in (None, [], [0], [6], [1, 4, 5], range(0, 8, 3)):
+            asked = list(range(8) if numbers is None else numbers)
+            for number, frame, stored in zip(asked, pixel_frames(reader, numbers), reader.stored(numbers), strict=True):
+                assert stored is None or isinstance(stored, bytes) == (reader.encoding == "image")
+                assert (frame is None) == (stored is None)
+                if frame is None:
+                    assert (number, reader.path.stem) == (4, "cam1")
+                else:
+                    np.testing.assert_array_equal(frame, pixels(number))
+
+
+def test_a_damaged_array_is_discarded_where_a_step_has_ingested_it(ingested: Ingested) -> None:
+    array, manifest = ingested
+    flip(array / chunk_name(2), 9)
+    for reader, stays in ((StoredFrames(array, manifest), True), (IngestedFrames(array, manifest), False)):
+        with pytest.raises(DamagedError):
+            list(pixel_frames(reader))
+        assert is_complete(array) == stays
+
+
+def test_one_background_serves_every_frame(ingested: Ingested) -> None:
+    reader = StoredFrames(*ingested)
+    first, *_ = (frame.copy() for frame in pixel_frames(reader) if frame is not None)
+    for found, expected in zip(backgrounds_of(reader, 4), pixel_frames(reader), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    alone = StoredFrames(reader.path, reader.manifest.model_copy(update={"frames": reader.manifest.frames[:1]}))
+    served = list(backgrounds_of(alone, 3))
+    assert len(served) == 3
+    for found in served:
+        np.testing.assert_array_equal(found, first)

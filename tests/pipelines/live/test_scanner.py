@@ -15,14 +15,15 @@ import simplejpeg
 from waiting import wait_until
 
 from footscan.capture import frame_positions, latency
-from footscan.frames.film import encoded_frames, open_film
+from footscan.frames.film import open_film
 from footscan.frames.travel import read_positions
 from footscan.recordings.scans import read_scan
 from footscan.virtual.board.board import Board
 from footscan.virtual.filming.streams import VirtualStreams, free_running
 from pipelines.live import storing
 from pipelines.live.light import light_by_hand
-from pipelines.live.scanner import LiveScanner, ScanOrder
+from pipelines.live.scan_order import ScanOrder
+from pipelines.live.scanner import LiveScanner
 from pipelines.live.state import ScannerState
 from pipelines.live.storing import ScanName, next_scan_name
 from schemas.base.errors import Fault, Finding, RefusedInput
@@ -78,7 +79,7 @@ def open_bench(pristine: Path, home: Path) -> Iterator[Bench]:
     films = {}
     for camera in (1, 5):
         film = open_film(pristine / f"archive/P0001/S1/cam{camera}.avi")
-        films[camera] = [frame or b"" for frame in encoded_frames(film)]
+        films[camera] = [frame if isinstance(frame, bytes) else b"" for frame in film.stored()]
     with Board(heads_at=(-4.0, -4.0, -4.0)) as board:
 
         def picture(camera: int, seconds: float) -> bytes:
@@ -122,10 +123,10 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
         assert np.all(np.diff(x) > 0)
         assert x[0] < 4 * 3.0
         assert x[-1] > 190.0 - 4 * 3.0
-        assert open_film(scan.film(camera)).frames == len(x) == told.stored + len(told.lost)
+        assert open_film(scan.film(camera)).count == len(x) == told.stored + len(told.lost)
         background = scan.background(camera)
         assert background is not None
-        assert open_film(background).frames == 1
+        assert open_film(background).count == 1
     assert result.measured is not None
     assert result.measured.kind in {None, "finding"}
     assert result.measured.folder == results / "P7/2026-11-20-R"

@@ -5,9 +5,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from footscan.capture.cameras.jpeg_check import torn_reason
+from schemas.base.image_size import ImageSize
+
+SIZE = ImageSize(rows=120, columns=160)
 
 
-def picture(rows: int = 120, columns: int = 160) -> bytes:
+def picture(rows: int = SIZE.rows, columns: int = SIZE.columns) -> bytes:
     j, i = np.mgrid[0:rows, 0:columns]
     noise = np.random.default_rng(3).integers(0, 40, (rows, columns))
     red = (200 * np.exp(-0.5 * ((j - 60 - 10 * np.sin(i / 20)) / 2) ** 2) + noise).astype(np.uint8)
@@ -20,7 +23,7 @@ SCAN = JPEG.index(b"\xff\xda") + 14
 
 
 def test_a_whole_frame() -> None:
-    assert torn_reason(JPEG, (120, 160)) is None
+    assert torn_reason(JPEG, SIZE) is None
     assert torn_reason(JPEG) is None
 
 
@@ -33,7 +36,7 @@ def test_padding_within_the_codes_is_no_tear() -> None:
 
 
 def test_missing_huffman_tables_are_no_tear() -> None:
-    assert torn_reason(_without(JPEG, 0xC4), (120, 160)) is None
+    assert torn_reason(_without(JPEG, 0xC4), SIZE) is None
 
 
 @pytest.mark.parametrize(
@@ -49,7 +52,7 @@ def test_missing_huffman_tables_are_no_tear() -> None:
     ],
 )
 def test_a_torn_frame_says_what_is_wrong(jpeg: bytes, reason: str) -> None:
-    found = torn_reason(jpeg, (120, 160))
+    found = torn_reason(jpeg, SIZE)
     assert found is not None
     assert found.startswith(reason)
 

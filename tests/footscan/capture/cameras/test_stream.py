@@ -19,6 +19,7 @@ from footscan.capture.cameras.stream import CameraStream, CapturedFrame, StreamH
 from footscan.virtual.filming.stream_faults import StreamFault, random_faults
 from footscan.virtual.filming.streams import SentFrame, VirtualStreams, free_running
 from schemas.base.errors import Fault, RefusedInput
+from schemas.base.image_size import ImageSize
 
 pytestmark = pytest.mark.real_time  # frames are told by when they come over a socket
 
@@ -123,7 +124,7 @@ def film_together(cameras: Sequence[int]) -> dict[int, Filmed]:
 
 
 def source_of(url: str, read_s: float = 20.0) -> CameraSource:
-    return CameraSource(url, size=(48, 64), frames_per_second=RATE, read_s=read_s, reconnect_s=0.05)
+    return CameraSource(url, size=ImageSize(48, 64), frames_per_second=RATE, read_s=read_s, reconnect_s=0.05)
 
 
 def test_eight_streams_at_full_rate_lose_nothing() -> None:
@@ -227,7 +228,7 @@ def test_a_camera_that_falls_silent_is_told_and_given_up() -> None:
 def test_a_receiver_without_room_loses_frames_that_are_counted() -> None:
     inbox: queue.Queue[CapturedFrame] = queue.Queue(5)
     with VirtualStreams([1], lambda *_: SMALL, free_running(100)) as world:
-        with CameraStream(1, CameraSource(world.url(1), size=(48, 64)), inbox.put_nowait) as stream:
+        with CameraStream(1, CameraSource(world.url(1), size=ImageSize(48, 64)), inbox.put_nowait) as stream:
             stream.wait_for_frames(30, LIMIT_S)
         health = stream.health
         assert health.overflowed == health.received - 5

@@ -47,6 +47,18 @@ def test_unchanged_file_is_not_read_again(film: Path, tmp_path: Path, monkeypatc
 
 
 @pytest.mark.usefixtures("settled")
+def test_digests_keep_their_owners_seal_when_others_are_forgotten(film: Path, tmp_path: Path) -> None:
+    kept = tmp_path / "kept.avi"
+    kept.write_bytes(b"more frames")
+    digests = FileDigests.load(tmp_path / "files.json", b"secret")
+    for path in (film, kept):
+        digests.of(path)
+    digests.forget(lambda path, _: path == str(film))
+    again = FileDigests.load(tmp_path / "files.json", b"secret")
+    assert set(again._digests) == {str(kept)}
+
+
+@pytest.mark.usefixtures("settled")
 def test_changed_byte_with_its_time_put_back_is_noticed(film: Path, tmp_path: Path) -> None:
     digests = FileDigests(tmp_path / "files.json")
     before = film.stat()
