@@ -35,7 +35,7 @@ def read_positions(path: Path) -> NDArray[np.float64]:
     for line, cells in records:
         frame, x_mm = _position(path, line, header, cells)
         if frame in positions:
-            raise RefusedInput(path, f"frame {frame} stands twice", field=f"line {line}")
+            raise RefusedInput(path, f"frame {frame} is given twice", field=f"line {line}")
         positions[frame] = x_mm
     if not positions:
         raise RefusedInput(path, "expected a row for each frame, found none")

@@ -154,7 +154,7 @@ def test_no_scan_at_all(footscan: Footscan, mistake: Mistake, bench: Path) -> No
             "frame,x_mm\n" + "".join(f"{k},{STEP_MM * k}\n" for k in range(FRAMES - 2)),
             f"expected a position for each of {FRAMES} frames",
         ),
-        ("frame,x_mm\n0,0\n0,1\n", "line 3: frame 0 stands twice"),
+        ("frame,x_mm\n0,0\n0,1\n", "line 3: frame 0 is given twice"),
         ("frame,x_mm\n0,nan\n", "line 2: expected a frame number"),
         ("number,x\n0,0\n", "expected the columns frame,x_mm"),
         ("", "expected the columns frame,x_mm"),

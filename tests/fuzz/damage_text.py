@@ -110,7 +110,7 @@ def _line_twice(random: Random, content: bytes) -> tuple[bytes, str]:
     lines = content.splitlines(keepends=True) or [b"\n"]
     number = random.randrange(len(lines))
     lines.insert(random.randrange(len(lines) + 1), lines[number])
-    return b"".join(lines), f"line {number + 1} stands twice"
+    return b"".join(lines), f"line {number + 1} is given twice"
 
 
 def _line_lost(random: Random, content: bytes) -> tuple[bytes, str]:

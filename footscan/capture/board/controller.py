@@ -1,7 +1,7 @@
-"""One Grbl 1.1 board on a serial port: settings, homing, jogs, holds, streams of lines, its state, and the way out.
+"""Controls one Grbl 1.1 board on a serial port: settings, homing, jogs, holds, lines of G-code, state and termination.
 
-Every way out ends with the lasers off as far as a host can see to that; docs/scanner_controller.md says what the board
-sees to on its own. Positions here are the machine's; `heads` makes world coordinates of them.
+However the program ends, the host switches the lasers off as far as it can; docs/scanner_controller.md lists what the
+board does on its own. Positions are machine positions; `heads` converts them to world coordinates.
 """
 
 import atexit
@@ -15,7 +15,7 @@ from footscan.capture.board.emergency_stop import HOLD, LastStop, slows_down
 from footscan.capture.board.state import BoardState, state_from
 from footscan.capture.board.termination import BOARDS
 from footscan.capture.grbl.codes import alarm_in_words
-from footscan.capture.grbl.protocol import Conversation
+from footscan.capture.grbl.protocol import GrblProtocol
 from footscan.capture.grbl.report import Feedback, Message, Setting
 from footscan.capture.grbl.settings import SAME, BoardSettings, setting_line
 from footscan.capture.grbl.status_poll import TimedReport
@@ -25,7 +25,7 @@ RESUME, DOOR, JOG_CANCEL, RESET = b"~", b"\x84", b"\x85", b"\x18"
 OVERRIDES_AWAY = b"\x90\x95\x99"
 """Feed, rapids and power as programmed: a disturbed byte may have changed them."""
 CONNECT_SECONDS = 8.0
-"""A board that its port's opening restarts takes about two seconds to speak."""
+"""Limit of the wait for a board; one that restarts when its port is opened answers after about two seconds."""
 ASKS_EVERY_SECONDS = 1.0
 TRIES = 3
 DARK_BY_ITSELF = "light goes out at the end of the motion under way at latest; switch off the board's power to be sure"
@@ -35,27 +35,27 @@ class Controller:
     """The board behind a serial port. All methods may be called from any thread."""
 
     def __init__(self, port: str, settings: BoardSettings | None = None, *, patience_seconds: float = 2.0) -> None:
-        """Opens the port and resets the board, so that its lasers are off and its state is known.
+        """Open the port and reset the board, so that its lasers are off and its state is known.
 
         Parameters
         ----------
         port : name of the serial port, best a stable one (/dev/serial/by-id/...).
-        settings : what the board must be set to; None takes it as it is.
-        patience_seconds : how long the board may take to answer what takes it no time.
+        settings : settings that the board must have; None accepts any.
+        patience_seconds : limit of the wait for answers that take the board no time.
 
         Raises
         ------
         RefusedInput
-            No such port, no Grbl 1.1 behind it, or a setting that is not as it must be.
+            There is no such port, no Grbl 1.1 answers, or a setting is wrong.
         Fault
             The port is in use, the lid is open, or the line is disturbed.
         """
         self.port = port
         self.options = ""
-        """Letters of the firmware's build: V variable spindle, + an input for a lid or door."""
+        """Letters of the build options of the firmware: V for a variable spindle, + for an input of a lid or door."""
         self._closing = threading.Lock()
         self._closed = False
-        self._board = Conversation(port, patience_seconds)
+        self._board = GrblProtocol(port, patience_seconds)
         self._last_stop = LastStop(self._board)
         atexit.register(self.close)
         try:
@@ -77,7 +77,7 @@ class Controller:
 
     @property
     def state(self) -> BoardState:
-        """What is known now, at most a fifth of a second old."""
+        """The present state, at most 0.2 s old."""
         board = self._board
         with board.changed:
             latest = board.poll.latest
@@ -90,44 +90,44 @@ class Controller:
             if board.poll.rests:
                 return BoardState("homing", "the heads look for their home switches")
             if board.restarting or latest is None:
-                return BoardState("restarting", "the board begins anew")
+                return BoardState("restarting", "the board restarts")
             return state_from(latest.report, homed=board.homed, alarm=board.alarm)
 
     @property
     def version(self) -> str:
-        """Of the firmware."""
+        """Version of the firmware."""
         return self._board.version
 
     @property
     def homed(self) -> bool:
-        """Whether the firmware knows where the heads are, as far as it can know."""
+        """True if the firmware knows where the heads are."""
         return self._board.homed
 
     @property
     def garbled(self) -> int:
-        """How many lines came damaged: a sign of a bad cable."""
+        """Number of damaged lines that arrived: a sign of a bad cable."""
         return self._board.garbled
 
     @property
     def watches_door(self) -> bool:
-        """Whether the firmware has an input for a lid or door; where it has none, nothing stops when it is opened."""
+        """True if the firmware has an input for a lid or door; without one, nothing stops when it is opened."""
         return "+" in self.options
 
     @property
     def round_trip_seconds(self) -> float:
-        """Median time between query and answer lately; NaN before the first."""
+        """Median time between the latest queries and their answers; NaN before the first answer."""
         return self._board.poll.round_trip_seconds
 
-    def on_report(self, heard: Callable[[TimedReport], None]) -> None:
-        """Calls `heard` with each status report from now on, in the thread that reads the line."""
-        self._board.on_report = heard
+    def on_report(self, take: Callable[[TimedReport], None]) -> None:
+        """Call `take` with each status report from now on, in the thread that reads the line."""
+        self._board.on_report = take
 
     def settings(self) -> dict[int, float]:
-        """All settings of the board, by number."""
-        return {said.number: said.value for said in self.send("$$") if isinstance(said, Setting)}
+        """Read all settings of the board, by number."""
+        return {message.number: message.value for message in self.send("$$") if isinstance(message, Setting)}
 
     def check(self, settings: BoardSettings) -> None:
-        """Refuses a board whose settings are not these; names the first wrong one and the line to send."""
+        """Refuse a board with other settings; the error names the first wrong one and the line to send."""
         source = f"board at {self.port}"
         try:
             settings.check(self.settings(), source)
@@ -135,9 +135,9 @@ class Controller:
             settings.check(self.settings(), source)  # read again: a byte may have been lost on the line
 
     def apply(self, settings: BoardSettings) -> list[str]:
-        """Writes what differs, reads all back, and returns the lines that were sent. Heads must be homed afterwards."""
-        found = self.settings()
-        different = [line for line in settings.lines() if not _holds(line, found)]
+        """Write the settings that differ, read all back, and return the lines that were sent; then home the heads."""
+        present = self.settings()
+        different = [line for line in settings.lines() if not _holds(line, present)]
         for line in different:
             self._board.homed = False
             self.send(line)
@@ -145,18 +145,18 @@ class Controller:
         return different
 
     def change(self, number: int, value: float) -> None:
-        """Writes one setting into the board's memory, which bears about 100,000 writes."""
+        """Write one setting into the EEPROM of the board, which endures about 100,000 writes."""
         self.send(setting_line(number, value))
 
     def home(self, limit_seconds: float) -> None:
-        """Resets the board and runs the homing cycle; afterwards each head stands pulled off its home switch.
+        """Reset the board and run the homing cycle; each head then stands at the pull-off distance from its switch.
 
-        This is the way back from every alarm and every disturbance: the reset forgets what is left of damaged lines.
+        This recovers from every alarm and every disturbance: the reset discards what is left of damaged lines.
 
         Raises
         ------
         Fault
-            It failed: which alarm, and which end switches are pressed. Or it took longer than `limit_seconds`.
+            Homing failed, with the alarm and the end switches that are pressed; or it took longer than `limit_seconds`.
         """
         board = self._board
         self.reset()
@@ -172,34 +172,34 @@ class Controller:
         self.status()
 
     def doubt_home(self) -> None:
-        """From now on the heads count as not homed: something shows that they are not where the firmware believes."""
+        """Treat the heads as not homed, because they are not where the firmware counts them."""
         self._board.homed = False
 
     def unlock(self) -> None:
-        """Allows motion although the heads are not homed, for jogs: soft limits mean nothing then."""
+        """Allow jogs although the heads are not homed; soft limits have no meaning then."""
         if self._board.deaf:
             self.reset()
         self.send("$X")
 
     def send(self, line: str, *, limit_seconds: float = 0.0) -> list[Message]:
-        """Sends one line, waits for its answer, and returns what the board said before it.
+        """Send one line, wait for its answer, and return the messages that arrived before it.
 
         Parameters
         ----------
-        limit_seconds : how long it may take, beside patience. Time in which the heads are held does not count.
+        limit_seconds : time that the line may take, beside the patience; time while heads are held does not count.
 
         Raises
         ------
         Fault
-            The board did not take the line, gave no answer in time (it is reset then), or is lost.
+            The board rejected the line, did not answer in time (it is then reset), or is lost.
         """
         return self._board.send(line, limit_seconds)
 
     def stream(self, lines: Iterable[str], *, limit_seconds: float) -> None:
-        """Sends lines by counted characters and waits until all are answered.
+        """Send lines by character counting, as Grbl calls it, and wait for all answers.
 
-        The answers come in the order of the lines, so an error is told with its own line. What stands behind it in the
-        board's buffer would still be executed: everything is stopped before the error is raised, whatever it is.
+        Answers arrive in the order of the lines, so an error names its line. The board would still execute the lines
+        behind it in its buffer: heads and lasers are stopped before any error is raised.
         """
         try:
             self._board.stream(lines, limit_seconds)
@@ -208,11 +208,11 @@ class Controller:
             raise
 
     def status(self) -> TimedReport:
-        """A report that was asked for after this call."""
+        """Ask for a report and return it."""
         return self._board.status()
 
     def jog(self, by_mm: tuple[float, float, float], mm_per_s: float) -> None:
-        """Begins to move heads by so much along their axes, the farthest at that speed; jogs queue up."""
+        """Begin to move the heads by `by_mm` along their axes, the farthest one at `mm_per_s`; jogs are queued."""
         words = "".join(f"{axis}{by:.3f}" for axis, by in zip("XYZ", by_mm, strict=True) if by)
         length = sum(by * by for by in by_mm) ** 0.5
         if words:
@@ -220,31 +220,31 @@ class Controller:
             self.send(f"$J=G21G91{words}F{feed:.1f}")
 
     def cancel_jog(self) -> None:
-        """Ends all jogs, slowing down."""
+        """End all jogs; the heads slow down first."""
         self._board.write(JOG_CANCEL)
 
     def hold(self) -> None:
-        """Halts the heads, slowing down; the light goes out when they stand. `resume` goes on."""
+        """Slow the heads down to a halt; the light goes out when they stand. `resume` continues."""
         self._board.write(HOLD)
 
     def resume(self) -> None:
-        """Goes on after a hold, or after the lid was closed; an open lid holds on."""
+        """Continue after a hold, or after the lid was closed; while it is open, the heads stay held."""
         self._board.write(RESUME)
 
     def door(self) -> None:
-        """Does what an open lid does."""
+        """Act as when the lid is opened."""
         self._board.write(DOOR)
 
     def overrides_away(self) -> None:
-        """Speed and power as programmed, whatever was changed by hand or by a disturbed byte."""
+        """Reset overrides of speed and power, which a disturbed byte may have changed."""
         self._board.write(OVERRIDES_AWAY)
 
     def stop(self) -> None:
-        """Ends everything: heads slow down, the light goes out, all that was queued is forgotten.
+        """Stop heads and lasers: the heads slow down, the light goes out, and queued motion is discarded.
 
-        The position is kept where the heads can slow down in time; the board is reset in any case.
+        The position is kept if the heads can slow down in time; the board is reset in any case.
         """
-        homing = self._board.poll.rests  # it says nothing meanwhile, and has no position to be kept
+        homing = self._board.poll.rests  # while it homes, the board answers nothing and has no position to keep
         self._board.let_go()
         try:
             if not homing:
@@ -253,18 +253,18 @@ class Controller:
             self.reset()
 
     def reset(self) -> None:
-        """Restarts the firmware: light and motion end at once; a motion under way costs the position.
+        """Restart the firmware: light and motion end at once; during motion the position is lost.
 
         Raises
         ------
         Fault
-            The board does not answer. Nothing but its power switch can be relied on then.
+            The board does not answer. Only its power switch is reliable then.
         """
         self._board.reset()
         self.status()
 
     def close(self) -> None:
-        """Stops heads and lasers and closes the port; may be called again."""
+        """Stop heads and lasers and close the port; may be called again."""
         with self._closing:
             if self._closed:
                 return
@@ -278,9 +278,9 @@ class Controller:
                 self._board.close()
 
     def _connect(self) -> None:
-        """Resets until the board has said welcome, then asks what it is.
+        """Reset the board until it sends its welcome, then check its firmware.
 
-        A second welcome may follow the first, one for the restart that opening the port makes and one for our reset.
+        Two welcomes may arrive: one after the restart when the port is opened, and one after our reset.
         """
         deadline = time.monotonic() + CONNECT_SECONDS
         welcome = self._board.wait_for_welcome(0, 0.1)
@@ -295,11 +295,11 @@ class Controller:
         self._board.poll.start()
         if self.status().report.state == "Door":
             raise Fault(f"board at {self.port}: {self.state}")
-        said = self._build()
-        options = [one.text for one in said if isinstance(one, Feedback) and one.kind == "OPT"]
+        feedback = [message for message in self._build_info() if isinstance(message, Feedback)]
+        options = [message.text for message in feedback if message.kind == "OPT"]
         self.options = options[0].split(",")[0] if options else ""
 
-    def _build(self) -> list[Message]:
+    def _build_info(self) -> list[Message]:
         for _ in range(TRIES - 1):
             try:
                 return self.send("$I")
@@ -308,7 +308,7 @@ class Controller:
         return self.send("$I")
 
     def _switches(self) -> str:
-        """Which end switches are pressed, for who has to look at them."""
+        """Text with the end switches that are pressed; empty if the board does not report."""
         try:
             pins = self.status().report.pins
         except Fault:
@@ -317,7 +317,7 @@ class Controller:
         return f" (end switches pressed: {pressed or 'none'})"
 
     def _slow_down(self) -> None:
-        """Brings the heads to a halt, as far as that takes no longer than patience."""
+        """Slow the heads down to a halt, for as long as the patience allows."""
         report = self.status().report
         if report.state in ("Run", "Jog"):
             self.hold()
@@ -326,15 +326,15 @@ class Controller:
             report = self.status().report
 
     def _stop_quietly(self) -> None:
-        """Stops; where even that fails, the state tells it, and the error under way says more."""
+        """Stop; if this fails too, the state reports it, and the error under way is the more telling one."""
         try:
             self.stop()
         except Fault:
             return
 
 
-def _holds(line: str, found: dict[int, float]) -> bool:
-    """Whether the board has the setting that `line` would write."""
+def _holds(line: str, present: dict[int, float]) -> bool:
+    """True if the board already has the setting that `line` would write."""
     number, _, value = line[1:].partition("=")
-    is_there = found.get(int(number))
-    return is_there is not None and abs(is_there - float(value)) < SAME
+    present_value = present.get(int(number))
+    return present_value is not None and abs(present_value - float(value)) < SAME

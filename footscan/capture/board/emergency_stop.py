@@ -1,38 +1,38 @@
-"""The last stop of a board: feed hold and soft reset within 0.3 s, past all that waits, and nothing sent after it."""
+"""The last stop of a board: feed hold and soft reset within 0.3 s, ahead of queued lines; nothing is sent afterwards."""
 
 import threading
 import time
 from contextlib import suppress
 
-from footscan.capture.grbl.protocol import CLOSED, RESET, RESETS, Conversation
+from footscan.capture.grbl.protocol import CLOSED, RESET, RESETS, GrblProtocol
 from footscan.capture.grbl.report import Report
 from schemas.base.errors import Fault
 
 HOLD = b"!"
 HALT_SECONDS = 0.22
-"""Heads halt from 100 mm/s in 0.2 s. Those that still move then lose their position by the reset."""
+"""Wait before the reset: heads halt from 100 mm/s in 0.2 s. Heads that still move lose their position."""
 WELCOME_SECONDS = 0.1
-"""A board begins anew within a few ms of a reset; its byte may be lost."""
+"""A board restarts within a few ms of a reset; the byte of the reset may be lost."""
 LOOKS_SECONDS = 0.01
 
 
 class LastStop:
-    """Stops the board of a conversation from a thread that may wait for no other."""
+    """Stops a board, from a thread that waits for no other."""
 
-    def __init__(self, board: Conversation) -> None:
+    def __init__(self, board: GrblProtocol) -> None:
         self._board = board
         self._stopping = threading.Lock()
         self._confirmed: bool | None = None
-        """Whether the stop for good was confirmed; None before it."""
+        """True if the board confirmed the stop for good; None before it."""
 
     def __call__(self, *, for_good: bool) -> bool:
-        """Halts the heads, then resets the board, which ends light and all that was queued.
+        """Halt the heads, then reset the board, which ends the light and discards queued motion.
 
-        Nothing else goes out from the first byte on; after a stop for good, never again.
+        Nothing else is sent from the first byte on; after a stop for good, never again.
 
         Returns
         -------
-        confirmed : whether the board has begun anew, or told an alarm. One whose connection is lost has not.
+        confirmed : True if the board has restarted or reported an alarm; False if the connection is lost.
         """
         with self._stopping:
             if self._confirmed is not None:
@@ -50,7 +50,7 @@ class LastStop:
 
     def _halt_and_reset(self, why: str) -> bool:
         board = self._board
-        if board.poll.rests:  # a board that homes hears a reset only
+        if board.poll.rests:  # a board that homes accepts a reset only
             board.let_go(why, LOOKS_SECONDS)
         else:
             held = time.monotonic()
@@ -79,5 +79,5 @@ class LastStop:
 
 
 def slows_down(report: Report) -> bool:
-    """Whether heads move that are to come to a halt."""
+    """True if heads move that are to halt."""
     return report.state in ("Run", "Jog") or (report.state, report.substate) in (("Hold", 1), ("Door", 2))

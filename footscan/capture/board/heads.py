@@ -1,8 +1,8 @@
-"""The three range-sensor heads and their lasers, in world coordinates: homing, travels, light, and where they were.
+"""The three range-sensor heads and their lasers in world coordinates: homing, travels, light, and a log of positions.
 
-Light is tied to motion. `lasers` says how bright the next travels are; the board puts that out only while heads move
-(M4 in laser mode), so heads that stand are dark, whatever has become of the host. For a look at standing heads, `shine`
-lets them creep.
+Light is tied to motion. `lasers` sets the power of the next travels; the board emits it only while the heads move
+(M4 in laser mode), so that standing heads are dark, even if the host has failed. `shine` lights heads that stand, by
+letting them creep.
 """
 
 import math
@@ -22,52 +22,53 @@ from schemas.base.errors import Fault, RefusedInput
 
 HEADS = (1, 2, 3)
 SLACK_MM = 0.05
-"""How far a reported position may be from the one that was asked for: steps, and decimals of the report."""
+"""Largest distance of a reported position from its target: rounding to steps and to the decimals of the report."""
 STEPS_LOST_MM = 0.3
-"""From how far on a head's home switch is not where it was: a few times what a cheap switch repeats to."""
+"""Displacement of a home switch from which on steps count as lost: a few times the repeatability of a cheap switch.
+Chosen by hand."""
 FEELER_STEP_MM = 0.1
 SOFT_LIMITS, HARD_LIMITS = 20, 21
-"""The settings' numbers."""
+"""Numbers of these settings."""
 FEELER_MM = 1.5
-"""How far before and beyond where it should be a switch is looked for."""
+"""A switch is searched for this far before and beyond its nominal position. Chosen by hand."""
 WELL_TIMED_SECONDS = 0.1
-"""Reports whose time is less certain are not logged."""
+"""Reports whose time is less certain are not logged. Chosen by hand."""
 LONGEST_SHINE_SECONDS = 5.0
 CREEP_MM_PER_S = 0.5
-"""Of heads that are lit where they stand: within an exposure of 20 ms a hundredth of a mm."""
+"""Speed of heads that `shine` lights: 0.01 mm within an exposure of 20 ms."""
 DWELL = "G4P0.01"
-"""Answered when all motion before it is done."""
+"""A dwell; the board answers it when all motion before it has ended."""
 
 
 @dataclass(frozen=True)
 class Head:
-    """How a head's rail lies: world X of its laser plane = `offset_mm` + `direction` x machine position."""
+    """Rail of a head: world X of its laser plane = `offset_mm` + `direction` x machine position."""
 
     offset_mm: float = -20.0
-    """World X where its home switch trips: found by calibration, it aligns the heads."""
+    """World X at which its home switch trips; from the calibration, it aligns the heads."""
     direction: int = -1
-    """-1 where X grows away from the home switch, as machine positions fall there; 1 where it falls."""
+    """-1 if X increases away from the home switch, where machine positions decrease; 1 if X decreases."""
 
     def world(self, machine_mm: float) -> float:
-        """World X, mm."""
+        """Convert a machine position to world X, mm."""
         return self.offset_mm + self.direction * machine_mm
 
     def machine(self, world_mm: float) -> float:
-        """Machine position, mm."""
+        """Convert world X to a machine position, mm."""
         return (world_mm - self.offset_mm) * self.direction
 
 
 class Travel(NamedTuple):
-    """A travel that was made."""
+    """Begin and end of a travel."""
 
     begin_seconds: float
-    """`time.monotonic()` before it began."""
+    """`time.monotonic()` just before the heads moved."""
     end_seconds: float
-    """... and when the heads stood again."""
+    """`time.monotonic()` when the heads stood again."""
 
 
 class Heads:
-    """All heads of a scanner, moved together. Leaving the `with` block ends motion and light, whatever the reason."""
+    """All heads of a scanner, which move together. Leaving the `with` block always ends motion and light."""
 
     def __init__(
         self,
@@ -77,11 +78,11 @@ class Heads:
         *,
         patience_seconds: float = 2.0,
     ) -> None:
-        """Connects to the board at `port`, which must have these `settings`; errors as those of `Controller`."""
+        """Connect to the board at `port`, which must have these `settings`; raises the errors of `Controller`."""
         self.settings = settings or BoardSettings()
         self.heads = tuple(heads)
         self.log = PositionLog()
-        """Every report of where the heads were, while they are homed."""
+        """Positions of the heads from all reports while they are homed."""
         self._power = 0.0
         self._brightest = 0.0
         self._suspect: HeadPosition | None = None
@@ -103,17 +104,17 @@ class Heads:
         self.close()
 
     def close(self) -> None:
-        """Ends motion and light and lets the board go."""
+        """End motion and light and close the port."""
         self.board.close()
 
     @property
     def state(self) -> BoardState:
-        """What the board does, in words."""
+        """The state of the board."""
         return self.board.state
 
     @property
     def reach_mm(self) -> tuple[float, float]:
-        """Lowest and highest world X that all heads can stand at."""
+        """Lowest and highest world X that all heads can reach, mm."""
         ends = [
             sorted((head.world(-self.settings.pull_off_mm), head.world(-travel)))
             for head, travel in zip(self.heads, self.settings.travel_mm, strict=True)
@@ -121,12 +122,12 @@ class Heads:
         return max(low for low, _ in ends), min(high for _, high in ends)
 
     def position_mm(self) -> Triple:
-        """World X of heads 1, 2, 3 now, as the firmware counts them; Fault where they are not homed."""
+        """Return the present world X of heads 1, 2, 3 as the firmware counts it, mm; Fault if they are not homed."""
         self._need_home()
         return self._world(self.board.status().report)
 
     def home(self) -> None:
-        """Finds the home switches, then aligns all heads at one X next to them; Fault where a head fails to."""
+        """Find the home switches, then align all heads at one X next to them; Fault if a head fails."""
         self._suspect = None
         self.board.home(self._homing_limit())
         self._restore_limits()
@@ -135,23 +136,23 @@ class Heads:
         self.travel_to(low if abs(at[0] - low) < abs(at[0] - high) else high)
 
     def lasers(self, power: float) -> None:
-        """How bright the lasers are on travels from now on, 0 to 1. Nothing shines before heads travel."""
+        """Set the laser power of the next travels, 0 to 1. The lasers stay off until the heads travel."""
         if not 0.0 <= power <= 1.0:
             raise RefusedInput("lasers", f"expected a power from 0 to 1, found {power:g}", field="power")
         self._power = power
 
     def travel(self, start_mm: float, end_mm: float, mm_per_s: float) -> Travel:
-        """Moves all heads to `start_mm`, dark, and then on to `end_mm` at `mm_per_s` with the lasers on; waits for it.
+        """Move all heads to `start_mm` in the dark, then to `end_mm` at `mm_per_s` with the lasers on, and wait.
 
-        The run begins before the start and ends behind the end by as much as the heads need to gain and to lose their
-        speed, where the rails have room for that: between the two, speed and brightness are even.
+        The run begins before the start and ends behind the end by the distance that the heads need to accelerate, as
+        far as the rails allow: between start and end, speed and brightness are constant.
 
         Raises
         ------
         RefusedInput
-            A place out of reach, or a speed that is not positive or beyond the heads'. Nothing has moved.
+            A position is out of reach, or the speed is not positive or too high. Nothing has moved.
         Fault
-            Not homed; or something ended the travel, and heads and lasers are stopped.
+            The heads are not homed; or something ended the travel, and heads and lasers are stopped.
         """
         self._check_travel(start_mm, end_mm, mm_per_s)
         way = 1.0 if end_mm >= start_mm else -1.0
@@ -162,7 +163,7 @@ class Heads:
         return self._run(begin, end, mm_per_s, self._power)
 
     def travel_to(self, x_mm: float, mm_per_s: float | None = None) -> Travel:
-        """Moves all heads to `x_mm` with the lasers off, at full speed where none is given; waits for it."""
+        """Move all heads to `x_mm` with the lasers off, and wait; default speed: full speed."""
         speed = mm_per_s or min(self.settings.max_mm_per_s)
         self._check_travel(x_mm, x_mm, speed)
         at = self._world(self.board.status().report)
@@ -173,10 +174,10 @@ class Heads:
         return self._run(farthest, x_mm, speed, 0.0)
 
     def shine(self, power: float, seconds: float) -> Travel:
-        """Lights the heads where they stand, for as long, and waits until it is dark again.
+        """Light the standing heads for `seconds`, and wait until they are dark again.
 
-        They creep at 0.5 mm/s meanwhile and are taken back in the dark: the end of the motion is the end of the light,
-        whatever becomes of the host or of the line that should have switched it off.
+        Meanwhile they creep at 0.5 mm/s, and then return in the dark: the light ends with the motion, even if the host
+        fails or the line that switches the light off is lost.
         """
         if not (0.0 < power <= 1.0 and 0.0 < seconds <= LONGEST_SHINE_SECONDS):
             expected = f"expected a power up to 1 and up to {LONGEST_SHINE_SECONDS:g} s"
@@ -187,7 +188,7 @@ class Heads:
         assert at is not None
         by = CREEP_MM_PER_S * seconds
         way = by if max(x) + by <= self.reach_mm[1] else -by
-        target = [one + head.direction * way for one, head in zip(at, self.heads, strict=True)]
+        target = [start + head.direction * way for start, head in zip(at, self.heads, strict=True)]
         feed = CREEP_MM_PER_S * math.sqrt(3.0)
         begin = time.monotonic()
         self._go_machine(target, feed, power, seconds)
@@ -196,9 +197,9 @@ class Heads:
         return Travel(begin, end)
 
     def jog(self, by_mm: float, mm_per_s: float, head: int | None = None) -> None:
-        """Begins to move all heads, or one, by so much along X in the dark, as with a hand-held controller.
+        """Begin to move all heads, or one, by `by_mm` along X in the dark, as with a hand-held controller.
 
-        Heads that are homed are refused to leave their reach. `stop_jog` ends it.
+        A jog of homed heads beyond their reach is refused. `stop_jog` ends a jog.
         """
         self._check_speed(mm_per_s)
         moved = HEADS if head is None else (head,)
@@ -206,35 +207,38 @@ class Heads:
             raise RefusedInput("jog", f"expected 1, 2 or 3, found {head}", field="head")
         if self.board.homed:
             low, high = self.reach_mm
-            for one, at in zip(HEADS, self.position_mm(), strict=True):
-                if one in moved and not low - SLACK_MM <= at + by_mm <= high + SLACK_MM:
-                    raise RefusedInput("jog", _out_of_reach(at + by_mm, low, high), field=f"head {one}")
-        by = [frame.direction * by_mm if one in moved else 0.0 for one, frame in zip(HEADS, self.heads, strict=True)]
+            for number, at in zip(HEADS, self.position_mm(), strict=True):
+                if number in moved and not low - SLACK_MM <= at + by_mm <= high + SLACK_MM:
+                    raise RefusedInput("jog", _out_of_reach(at + by_mm, low, high), field=f"head {number}")
+        by = [
+            frame.direction * by_mm if number in moved else 0.0 for number, frame in zip(HEADS, self.heads, strict=True)
+        ]
         self.board.jog((by[0], by[1], by[2]), mm_per_s)
 
     def stop_jog(self) -> None:
-        """Ends all jogs."""
+        """End all jogs."""
         self.board.cancel_jog()
 
     def hold(self) -> None:
-        """Halts a travel; it goes on, with light, after `resume`."""
+        """Halt a travel; it continues with light after `resume`."""
         self.board.hold()
 
     def resume(self) -> None:
-        """Goes on after `hold`, or after the lid was closed."""
+        """Continue after `hold`, or after the lid was closed."""
         self.board.resume()
 
     def stop(self) -> None:
-        """Ends a travel for good, with the light off and the position kept; the call that made it raises Fault."""
+        """End a travel, with the light off and the position kept; the call that made the travel raises Fault."""
         self.board.stop()
 
     def lost_steps_mm(self) -> Triple:
-        """How far each head's home switch is from where it was at homing, mm along X; a `Fault` beyond the tolerance.
+        """Measure the displacement of each home switch since homing, mm along X; Fault beyond the tolerance.
 
-        The firmware counts the steps it gives and never learns of one that a motor did not make. This goes back to the
-        home switches, feels for them in steps of 0.1 mm, and compares. A head that never meets its switch is as bad.
-        Limits are off meanwhile ($20=0, $21=0), as the switches must be touched: four writes into the board's memory.
-        Whatever ends it before its time, heads must be homed again, and that switches them on.
+        The firmware counts the steps that it gives, and does not notice steps that a motor loses. The heads return to
+        their home switches, search for them in steps of 0.1 mm, and the positions are compared. A head that never
+        meets its switch is a Fault, too. The limits are off meanwhile ($20=0, $21=0), because the switches must be
+        touched: four writes into the EEPROM. If the search is interrupted, the heads must be homed again, which
+        switches the limits on.
         """
         low, high = self.reach_mm
         home = low if abs(self.heads[0].world(0.0) - low) < abs(self.heads[0].world(0.0) - high) else high
@@ -261,20 +265,20 @@ class Heads:
         return lost[0], lost[1], lost[2]
 
     def _restore_limits(self) -> None:
-        """Switches those on that feeling for the switches left off, as where the cable was pulled meanwhile."""
-        found = self.board.settings()
+        """Switch the limits on that an interrupted search for the switches left off."""
+        present = self.board.settings()
         for number in (SOFT_LIMITS, HARD_LIMITS):
-            if found.get(number) == 0:
+            if present.get(number) == 0:
                 self.board.change(number, 1)
 
     def _run(self, begin_mm: float, end_mm: float, mm_per_s: float, power: float) -> Travel:
-        """One straight run of all heads to `end_mm`; `mm_per_s` is that of a head that comes from `begin_mm`."""
+        """Move all heads straight to `end_mm`; `mm_per_s` is the speed of a head that starts at `begin_mm`."""
         self._need_home()
         at = self.board.status().report.machine_mm
         assert at is not None
         target = [head.machine(end_mm) for head in self.heads]
         along = [abs(b - a) for a, b in zip(at, target, strict=True)]
-        # The firmware's feed is that through the space of the three axes: of three equal ones sqrt(3) times theirs.
+        # The feed is the speed in the space of the three axes: for three equal ones, sqrt(3) times their speed.
         feed = mm_per_s * math.hypot(*along) / max(*along, 1e-9)
         seconds = abs(end_mm - begin_mm) / mm_per_s + 2.0 * mm_per_s / min(self.settings.mm_per_s2)
         began = time.monotonic()
@@ -285,10 +289,10 @@ class Heads:
         return Travel(began, ended)
 
     def _go_machine(self, target: Sequence[float], feed_mm_per_s: float, power: float, seconds: float = 5.0) -> None:
-        """Moves through the machine's space and sees that the heads arrived.
+        """Move to machine positions and check that the heads arrived.
 
-        The line that ends the light is in the board's buffer before the motion begins. It waits for the motion's end
-        only where there is light; the dwell behind it always does, so the last answer says that the heads stand.
+        The line that ends the light is in the buffer of the board before the motion begins. It waits for the end of
+        the motion only if there is light; the dwell behind it always does: its answer says that the heads stand.
         """
         self.board.overrides_away()
         words = "".join(f"{axis}{at:.3f}" for axis, at in zip("XYZ", target, strict=True))
@@ -306,17 +310,17 @@ class Heads:
             raise Fault(f"the heads did not go where they were sent ({wanted}), they stand at {stand}; try again")
 
     def _check_light(self, power: float, seconds: float) -> None:
-        """A travel of some length must have shown the power it was sent, and a dark one none."""
+        """Check that a travel of some length had the power that was sent, and a dark one none; Fault if not."""
         wanted = round(power * self.settings.full_power)
         if self._brightest > wanted + 1 or (seconds > 1.0 and self._brightest < wanted - 1):
-            told = f"sent S{wanted}, put out S{self._brightest:g}"
-            raise Fault(f"the lasers were not as bright as they should be on this travel ({told}); try again")
+            powers = f"sent S{wanted}, put out S{self._brightest:g}"
+            raise Fault(f"the lasers were not as bright as they should be on this travel ({powers}); try again")
 
     def _feel_switches(self) -> list[float | None]:
-        """Machine position at which each home switch trips, mm; None where it does not.
+        """Search for the machine position at which each home switch trips, mm; None if it does not trip.
 
-        No limit stops a head here, so each step is a short word of its own: a byte that is lost or doubled on the line
-        makes of it at most one of a millimetre.
+        No limit stops a head here, so each step is a short line of its own: a byte that is lost or doubled turns it
+        into a step of a millimetre at most.
         """
         tripped: list[float | None] = [None, None, None]
         feed = 60.0 * self.settings.homing_slow_mm_per_s * math.sqrt(3.0)
@@ -350,9 +354,9 @@ class Heads:
             raise Fault(f"the heads are not homed: {self.state}")
 
     def _homing_limit(self) -> float:
-        """The longest it can take: heads are homed one after the other, from the far end, and the last one fails.
+        """Longest time of a homing cycle, s: heads home one after the other from the far end, and the last one fails.
 
-        Grbl looks for a switch over 1.5 times the travel, and for it again over 5 times the pull-off.
+        Grbl searches for a switch over 1.5 times the travel, and again over 5 times the pull-off.
         """
         s = self.settings
         search = (len(HEADS) - 1 + 1.5) * max(s.travel_mm) / s.homing_mm_per_s
@@ -367,15 +371,15 @@ class Heads:
         x = [head.world(at) for head, at in zip(self.heads, report.machine_mm, strict=True)]
         return x[0], x[1], x[2]
 
-    def _log(self, told: TimedReport) -> None:
-        """Keeps a report, in the thread that reads the line."""
-        if told.report.state in ("Run", "Jog"):
-            self._brightest = max(self._brightest, told.report.power)
-        if not self.board.homed or told.report.machine_mm is None or told.uncertain_seconds > WELL_TIMED_SECONDS:
+    def _log(self, timed: TimedReport) -> None:
+        """Log a report, in the thread that reads the line."""
+        if timed.report.state in ("Run", "Jog"):
+            self._brightest = max(self._brightest, timed.report.power)
+        if not self.board.homed or timed.report.machine_mm is None or timed.uncertain_seconds > WELL_TIMED_SECONDS:
             return
-        moving = told.report.state in ("Run", "Jog") or (told.report.state, told.report.substate) == ("Hold", 1)
-        entry = HeadPosition(told.seconds, self._world(told.report), told.uncertain_seconds, moving)
-        # A byte lost on the line can leave a report that looks whole: a jump that no head can make must be told twice.
+        moving = timed.report.state in ("Run", "Jog") or (timed.report.state, timed.report.substate) == ("Hold", 1)
+        entry = HeadPosition(timed.seconds, self._world(timed.report), timed.uncertain_seconds, moving)
+        # A lost byte can leave a report that looks whole: a jump that no head can make counts only if it is repeated.
         if self._suspect is None or self._can_follow(self._suspect, entry):
             self.log.add(entry)
         self._suspect = entry

@@ -1,4 +1,4 @@
-"""Where the heads were, and when: the log that frames get their positions from."""
+"""The log of head positions over time, from which frames get their positions."""
 
 import bisect
 import math
@@ -13,35 +13,35 @@ Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 KEPT = 100_000
-"""Entries that are kept: more than an hour at 20 a second."""
+"""Number of entries that are kept: more than an hour at 20 a second. A bound of memory."""
 
 
 class HeadPosition(NamedTuple):
     """One report of the board."""
 
     seconds: float
-    """`time.monotonic()` of the host at which the heads were there: the middle of the time it can have been."""
+    """`time.monotonic()` of the host at this position: the middle of the possible interval."""
     x_mm: Triple
-    """World X of heads 1, 2, 3, as the firmware counts their steps."""
+    """World X of heads 1, 2, 3 from the step counts of the firmware."""
     uncertain_seconds: float
-    """It was at `seconds` give or take this: half the time between query and answer, less what the bytes took."""
+    """Half the width of that interval: half the time between query and answer, less the transmission of the bytes."""
     is_moving: bool
 
     @property
     def seconds_sd(self) -> float:
-        """Standard deviation of `seconds`: it was anywhere within its bounds, evenly."""
+        """Standard deviation of `seconds`, which is uniform within its bounds."""
         return self.uncertain_seconds / math.sqrt(3.0)
 
 
 class PositionLog:
-    """Reports in the order of time; may be read while it grows. Positions are of axes X, Y, Z: heads 1, 2, 3."""
+    """Reports in the order of time; may be read while it grows. Axes X, Y, Z are heads 1, 2, 3."""
 
     def __init__(self) -> None:
         self._entries: list[HeadPosition] = []
         self._lock = threading.Lock()
 
     def add(self, entry: HeadPosition) -> None:
-        """Appends a report."""
+        """Append a report."""
         with self._lock:
             self._entries.append(entry)
             if len(self._entries) > 2 * KEPT:
@@ -54,14 +54,14 @@ class PositionLog:
         return iter(self.between(-math.inf, math.inf))
 
     def between(self, begin: float, end: float) -> list[HeadPosition]:
-        """Entries with `begin` <= seconds <= `end`."""
+        """Return the entries with `begin` <= seconds <= `end`."""
         with self._lock:
             first = bisect.bisect_left(self._entries, begin, key=lambda entry: entry.seconds)
             last = bisect.bisect_right(self._entries, end, key=lambda entry: entry.seconds)
             return self._entries[first:last]
 
     def arrays(self, begin: float = -math.inf, end: float = math.inf) -> tuple[Floats, Floats, Floats]:
-        """Seconds (N,), X of the heads (N, 3) in mm, and standard deviations of the seconds (N,), of that time."""
+        """Return seconds (N,), X of the heads (N, 3) in mm, and standard deviations of seconds (N,) in an interval."""
         entries = self.between(begin, end)
         return (
             np.array([entry.seconds for entry in entries], dtype=np.float64),

@@ -1,4 +1,4 @@
-"""What state the board is in, as a person is told it."""
+"""States of the board, in words for its user."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -26,20 +26,20 @@ HOME = "home the heads"
 
 @dataclass(frozen=True)
 class BoardState:
-    """One state."""
+    """A state of the board."""
 
     name: StateName
     words: str
-    """What it is, and why."""
+    """Description and cause."""
     remedy: str = ""
-    """What to do; empty where nothing is needed."""
+    """What the user can do; empty if nothing is needed."""
 
     def __str__(self) -> str:
         return f"{self.words}; {self.remedy}" if self.remedy else self.words
 
 
 def state_from(report: Report, *, homed: bool, alarm: int | None) -> BoardState:
-    """The state that a status report tells; `alarm` is the latest that was said and not yet followed by a homing."""
+    """Return the state of a status report; `alarm` is the number of the latest alarm since homing."""
     other = BoardState("other", f"the board is in its state {report.state}", "reset it")
     lost = _not_homed(alarm)
     return {

@@ -78,7 +78,7 @@ ERRORS = {
     22: Meaning("a travel without a speed", OURS),
     23: Meaning("a command whose number must be whole", DISTURBED),
     24: Meaning("two commands that both use the axes in one line", DISTURBED),
-    25: Meaning("a word that stands twice in a line", DISTURBED),
+    25: Meaning("a word that is repeated in a line", DISTURBED),
     26: Meaning("a command that needs an axis and has none", DISTURBED),
     27: Meaning("a line number beyond 9,999,999", OURS),
     28: Meaning("a command without a value it needs", DISTURBED),

@@ -1,8 +1,8 @@
-"""Lines to the board and what comes back: answers in the order of the lines, alarms, restarts, silence, loss.
+"""Grbl's protocol: lines are sent, and answers, alarms, restarts, silence and loss of the line are handled.
 
-A line's answer is the next `ok` or `error:N` that belongs to no line before it. Where that order is broken - an answer
-too many, or one that never comes - lines and answers cannot be told apart any longer: the board is reset at once, which
-ends motion and light, and every line that waits fails.
+The board answers each line with `ok` or `error:N`, in the order of the lines. If an answer is missing or surplus, lines
+and answers can no longer be matched: the board is reset at once, which ends motion and light, and all lines that wait
+for an answer fail.
 """
 
 import threading
@@ -18,19 +18,19 @@ from footscan.capture.grbl.status_poll import LOST_QUERY_SECONDS, StatusPoll, Ti
 from schemas.base.errors import Fault, RefusedInput
 
 RX_BYTES = 127
-"""What the board's receive buffer of 128 bytes holds for certain."""
+"""Usable size of the receive buffer of 128 bytes of the board."""
 LONGEST_LINE = 79
 CLOSED = "closed"
-"""Why a connection is lost that we have ended."""
+"""Reason of the loss of a connection that this program closed."""
 RESET = b"\x18"
 RESETS = 3
-"""How often a reset is tried: its byte may be lost."""
+"""Attempts of a reset, whose byte may be lost. Chosen by hand."""
 LONGEST_HOLD_SECONDS = 600.0
-"""How long a travel may be held, or wait for the lid, until it is given up."""
+"""A travel that is held, or waits for the lid, is given up after this time. Chosen by hand."""
 DEAF = (1, 2)
-"""Alarms after which the board hears nothing but a reset."""
+"""Alarms after which the board accepts nothing but a reset."""
 NO_RESTART = (*DEAF, 4, 5)
-"""Alarms that the firmware does not follow with a restart of its own."""
+"""Alarms after which the firmware does not restart by itself."""
 LOCKED = "'$H'|'$X' to unlock"
 
 
@@ -43,73 +43,74 @@ class Sent:
     error: int | None = None
     """0 for `ok`; None before the answer."""
     failed: str | None = None
-    """Why there will be no answer."""
-    said: list[Message] = field(default_factory=list)
-    """What the board said while it worked at this line."""
+    """Reason why no answer will come."""
+    messages: list[Message] = field(default_factory=list)
+    """Messages of the board while it executed this line."""
 
 
-class Conversation:
+class GrblProtocol:
     """A serial line with a Grbl board behind it. All methods may be called from any thread."""
 
     def __init__(self, port: str, patience_seconds: float) -> None:
-        """Opens `port`; errors as those of `SerialLine`. Nothing can be sent before the first welcome."""
+        """Open `port`; raises the errors of `SerialLine`. Lines can be sent after the first welcome."""
         self.patience_seconds = patience_seconds
         self.on_report: Callable[[TimedReport], None] | None = None
         """Called with each status report, in the thread that reads the line."""
         self.version = ""
         self.garbled = 0
-        """Lines that came damaged."""
+        """Number of damaged lines that arrived."""
         self.homed = False
-        """Whether the firmware knows where the heads are; an alarm or a restart of the board ends that."""
+        """True if the firmware knows where the heads are; False after an alarm or a restart."""
         self.alarm: int | None = None
         """The latest alarm since the last homing."""
         self.deaf = False
-        """Whether the board hears nothing but a reset."""
+        """True if the board accepts nothing but a reset."""
         self.restarting = True
-        """Whether it is about to begin anew."""
+        """True while a restart is under way."""
         self.lost: str | None = None
-        """Why there is no connection any longer."""
+        """Reason why the connection is lost; None while it exists."""
         self.welcomes = 0
         self.standstills = 0
-        """How often it said welcome or told an alarm: motion and light had ended."""
+        """Number of welcomes and alarms: after each, motion and light have ended."""
         self.changed = threading.Condition()
-        """Told of everything that is heard."""
+        """Notified of every message of the board."""
         self._ending = False
-        """Whether answers mean nothing until the board has begun anew."""
+        """True if answers are ignored until the board has restarted."""
         self._pending: deque[Sent] = deque()
         self._line = SerialLine(port, self._hear, self.lose)
         self.poll = StatusPoll(self.write, self._fall_silent, patience_seconds)
         self._line.start()
 
     def close(self) -> None:
-        """Ends all threads; every line that waits fails."""
+        """End all threads; lines that wait for an answer fail."""
         self.poll.close()
         self.lose(CLOSED)
         self._line.close()
 
     def write(self, data: bytes) -> float:
-        """Sends bytes as they are: realtime commands. The time at which they went."""
+        """Send realtime commands; returns the time at which they were sent, `time.monotonic()` s."""
         return self._line.write(data)
 
     def send(self, line: str, limit_seconds: float) -> list[Message]:
-        """Sends one line, waits for its answer, and returns what the board said before that; Fault as in `stream`."""
+        """Send one line, wait for its answer, and return the messages before it; Fault as in `stream`."""
         [sent] = self._submit([line])
         return self._wait(sent, limit_seconds)
 
     def stream(self, lines: Iterable[str], limit_seconds: float) -> None:
-        """Sends lines as fast as the board's buffer takes them, counting characters, and waits until all are answered.
+        """Send lines as fast as the buffer of the board takes them, by counting characters, and wait for all answers.
 
-        Lines that fit go in one write: what belongs together, as light and its end, is not torn apart by our own end.
+        Lines that fit are sent in one write: lines that belong together, such as light and its end, are not separated
+        if this program ends.
 
         Parameters
         ----------
-        limit_seconds : how long a line may take, beside patience. Time in which the heads are held does not count.
+        limit_seconds : time that a line may take, beside the patience; time while heads are held does not count.
 
         Raises
         ------
         Fault
-            The board did not take a line, gave no answer (it is reset then), or is lost. Lines behind that one may be
-            in its buffer and would still be executed: the caller has to stop the board.
+            The board rejected a line, did not answer (it is then reset), or is lost. Lines behind that one may be in
+            its buffer and would still be executed: the caller must stop the board.
         """
         to_send = deque(lines)
         waiting: deque[Sent] = deque()
@@ -128,7 +129,7 @@ class Conversation:
                 raise Fault(f"line {number}: {fault}") from None
 
     def status(self) -> TimedReport:
-        """A report that was asked for after this call; Fault where none comes."""
+        """Ask for a report and return it; Fault if none arrives."""
         asked = self.poll.ask()
         patience = self.patience_seconds + LOST_QUERY_SECONDS
         with self.changed:
@@ -141,7 +142,7 @@ class Conversation:
         raise Fault("the board gave no status report")
 
     def reset(self) -> None:
-        """Restarts the firmware. Fault where it does not begin anew: the connection counts as lost then."""
+        """Restart the firmware; Fault if it does not restart: the connection then counts as lost."""
         for _ in range(RESETS):
             with self.changed:
                 self.refuse_lost()
@@ -155,24 +156,24 @@ class Conversation:
         self.refuse_lost()
 
     def wait_for_welcome(self, before: int, seconds: float) -> bool:
-        """Waits until the board has said welcome more often than `before`; whether it has."""
+        """Wait for a welcome beyond the number `before`; returns True if it arrived."""
         with self.changed:
             self.changed.wait_for(lambda: self.welcomes > before or self.lost is not None, seconds)
             self.refuse_lost()
             return self.welcomes > before
 
     def write_past_all(self, data: bytes) -> bool:
-        """Sends realtime commands although another thread's write hangs; whether they went."""
+        """Send realtime commands even if the write of another thread blocks; returns True if they were sent."""
         return self._line.write_past_all(data)
 
     def seal(self, why: str | None) -> None:
-        """From now on nothing goes out but queries, holds and resets, and all else fails with `why`; None ends that."""
+        """From now on, send only queries, holds and resets; all else fails with `why`. None ends this."""
         self._line.sealed = why
 
     def let_go(self, why: str = "stopped", wait_seconds: float = -1.0) -> None:
-        """Every line that waits fails and says `why`, and answers mean nothing until a reset, which must follow.
+        """Let all lines that wait for an answer fail with `why`, and ignore answers until a reset, which must follow.
 
-        Gives up where another thread holds on to the conversation for `wait_seconds`; without them it waits.
+        Does nothing if another thread holds the lock for `wait_seconds`; default: no limit.
         """
         if self.changed.acquire(timeout=wait_seconds):
             try:
@@ -182,19 +183,19 @@ class Conversation:
                 self.changed.release()
 
     def refuse_lost(self) -> None:
-        """Fault where there is no connection."""
+        """Raise a Fault if the connection is lost."""
         if self.lost is not None:
             raise Fault(f"the connection to the board is lost ({self.lost})")
 
     def lose(self, why: str) -> None:
-        """There is no connection any longer."""
+        """Mark the connection as lost."""
         with self.changed:
             self.lost = self.lost or why
             self.homed = False
             self._fail_pending(f"the connection to the board is lost ({self.lost})")
 
     def _submit(self, lines: list[str]) -> list[Sent]:
-        """Sends lines in one write, when the board has room for all of them."""
+        """Send lines in one write, once the board has room for all of them."""
         for line in lines:
             if len(line) > LONGEST_LINE or "\n" in line:
                 expected = f"expected one line of {LONGEST_LINE} characters at most"
@@ -212,7 +213,7 @@ class Conversation:
         return sent
 
     def _can_speak(self, lines: list[str]) -> bool:
-        """Whether waiting longer makes no difference for sending `lines`."""
+        """True if the board is ready for `lines`, or never will be."""
         ready = not (self.restarting or self._ending) and self._room_for(lines)
         return ready or self.deaf or self.lost is not None
 
@@ -238,12 +239,12 @@ class Conversation:
                 raise Fault(sent.failed)
             if sent.error:
                 raise Fault(f"the board did not take {sent.line}: {error_in_words(sent.error)}")
-            return sent.said
+            return sent.messages
 
     def _hear(self, text: str, seconds: float) -> None:
-        """One line from the board, in the thread that reads."""
+        """Handle a line from the board, in the thread that reads."""
         message = read_line(text)
-        told: TimedReport | None = None
+        timed: TimedReport | None = None
         with self.changed:
             match message:
                 case Answer():
@@ -253,21 +254,21 @@ class Conversation:
                 case Welcome():
                     self._take_welcome(message.version)
                 case Report():
-                    told = self.poll.take(message, seconds, len(text) + 2)
+                    timed = self.poll.take(message, seconds, len(text) + 2)
                     self.homed = self.homed and message.state != "Alarm"
                 case Feedback(kind="MSG", text=words):
                     self.homed = self.homed and words != LOCKED
                 case Garbled():
                     self.garbled += 1
                 case message if message is not None and self._pending:
-                    self._pending[0].said.append(message)
+                    self._pending[0].messages.append(message)
             self.changed.notify_all()
-        if told is not None and self.on_report is not None:
-            self.on_report(told)
+        if timed is not None and self.on_report is not None:
+            self.on_report(timed)
 
     def _take_answer(self, error: int) -> None:
         if self.restarting or self.deaf or self._ending:
-            return  # of a line that an alarm or a reset has ended
+            return  # belongs to a line that an alarm or a reset has ended
         if self._pending:
             self._pending.popleft().error = error
         else:
@@ -288,23 +289,23 @@ class Conversation:
         self.standstills += 1
         self.restarting = self.deaf = self._ending = False
         self.poll.forget()
-        self._fail_pending("the board has begun anew")
+        self._fail_pending("the board has restarted")
 
     def _distrust(self, why: str) -> None:
-        """Lines and answers no longer belong together: only a reset helps."""
+        """Reset the board, because lines and answers no longer match."""
         self._fail_pending(why)
         self.restarting = True
         self.poll.forget()
         self.write(RESET)
 
     def _fall_silent(self) -> None:
-        """No report came for too long, in the thread that asks."""
+        """Reset a board that sent no report for too long, in the thread of the poll."""
         if self.deaf:
-            return  # silent as it has to be
+            return  # it answers nothing but a reset
         try:
             self.reset()
         except Fault:
-            return  # the state tells it
+            return  # the state reports it
 
     def _fail_pending(self, why: str) -> None:
         with self.changed:

@@ -29,7 +29,7 @@ class Alarm:
 
 @dataclass(frozen=True)
 class Welcome:
-    """`Grbl 1.1h ['$' for help]`: the board has just begun anew."""
+    """`Grbl 1.1h ['$' for help]`: the board has just restarted."""
 
     version: str
 

@@ -99,7 +99,7 @@ class StatusPoll:
             self.rests = False
 
     def forget(self) -> None:
-        """Nothing is known, and no answer to be waited for: the board begins anew."""
+        """Discard the latest report and the query under way, because the board restarts."""
         with self._lock:
             self._asked = None
             self.latest = None

@@ -35,7 +35,7 @@ def read_feet(places: Sequence[Path], any_patient: bool) -> "list[Foot]":
     Raises
     ------
     RefusedInput
-        One is not there, is of somebody else, or stands twice.
+        One is missing, belongs to another patient, or is given twice.
     """
     from footscan.sizing.identity import refuse_other_patient
 
@@ -43,7 +43,7 @@ def read_feet(places: Sequence[Path], any_patient: bool) -> "list[Foot]":
     files = [_measures_file(place).resolve() for place in places]
     for index, place in enumerate(places):
         if files[index] in files[:index]:
-            raise RefusedInput(place, "stands twice, expected another measurement")
+            raise RefusedInput(place, "is given twice, expected another measurement")
     for other in [] if any_patient else feet[1:]:
         try:
             refuse_other_patient(feet[0], other)

@@ -39,7 +39,7 @@ def test_uneven_travel(tmp_path: Path, text: str) -> None:
         ("frame,x_mm,frame\n0,1,2\n", "expected the columns frame,x_mm, found 'frame,x_mm,frame'"),
         ("frame,x_cm\n0,1\n", "expected the columns frame,x_mm, found 'frame,x_cm'"),
         ("frame,x_mm\n", "expected a row for each frame, found none"),
-        ("frame,x_mm\n0,1\n1,2\n0,1\n", "line 4: frame 0 stands twice"),
+        ("frame,x_mm\n0,1\n1,2\n0,1\n", "line 4: frame 0 is given twice"),
         *[
             (f"frame,x_mm\n0,1\n{row}\n", "line 3: expected a frame number from 0 and x_mm in millimetres")
             for row in (

@@ -12,7 +12,7 @@ def test_corners_are_those_of_qhull(seed: int) -> None:
     random = np.random.default_rng(seed)
     turns = random.uniform(0, 2 * np.pi, 300)
     points = np.column_stack([80 * np.cos(turns), 40 * np.sin(turns)]) + random.normal(0, 3.0 * (seed % 3), (300, 2))
-    points = np.concatenate([points, points[::7]])  # some stand twice
+    points = np.concatenate([points, points[::7]])  # some are repeated
     found, expected = hull_corners(points), ConvexHull(points)
     assert {tuple(point) for point in points[found]} == {tuple(point) for point in points[expected.vertices]}
     sides = np.roll(points[found], -1, axis=0) - points[found]

@@ -122,8 +122,8 @@ def test_mixed_up_feet_are_refused(run: Run, results: Path) -> None:
     for arguments, said in (
         (("pair", right, left), f"{right}: is a right foot, expected the left one first"),
         (("pair", left, other, "--any-patient"), f"{other}: is a left foot, expected a right one"),
-        (("pair", left, left), f"{left}: stands twice, expected another measurement"),
-        (("change", right, right / "measures.json"), f"{right / 'measures.json'}: stands twice"),
+        (("pair", left, left), f"{left}: is given twice, expected another measurement"),
+        (("change", right, right / "measures.json"), f"{right / 'measures.json'}: is given twice"),
         (("change", right, left), f"{left}: is a left foot, expected a right one as {right} is"),
         (
             ("lasts", left, other, "--any-patient", "--lasts", results / "lasts"),
