@@ -1,4 +1,4 @@
-"""The last stop of a board: feed hold and soft reset within 0.3 s, ahead of queued lines; nothing is sent afterwards."""
+"""The last stop of a board: feed hold and soft reset within 0.3 s, ahead of queued lines; nothing is sent after it."""
 
 import threading
 import time
