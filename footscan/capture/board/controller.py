@@ -39,7 +39,7 @@ class Controller:
 
         Parameters
         ----------
-        port : name of the serial port, best a stable one (/dev/serial/by-id/...).
+        port : name of the serial port, preferably a stable one (/dev/serial/by-id/...).
         settings : settings that the board must have; None accepts any.
         patience_seconds : limit of the wait for answers that take the board no time.
 

@@ -1,1 +1,1 @@
-"""The USB cameras: where they are, their streams, and the times of their frames."""
+"""The USB cameras: their places on USB, their streams, and the times of their frames."""

@@ -1,4 +1,4 @@
-"""The cameras of a scanner together: those that a pass needs are open, and their frames go where they are wanted."""
+"""All cameras of a scanner: opens those of a pass and hands on their frames."""
 
 import threading
 import time
@@ -13,16 +13,16 @@ from footscan.capture.cameras.stream import CameraStream, CapturedFrame, StreamH
 from schemas.base.errors import Fault
 
 Sink = Callable[[CapturedFrame], None]
-"""Takes a frame at once, on its camera's thread; `queue.Full` where it has no room."""
+"""Takes a frame at once, on the thread of its camera; raises `queue.Full` if it has no room."""
 
 FIRST_FRAMES = 5
-"""Of a camera that was just opened, before it is relied on."""
+"""Frames of a newly opened camera that are awaited before it is used. Chosen by hand."""
 LONGEST_WAIT_SECONDS = 20.0
 STREAMING_LOOKS_SECONDS = 0.02
 
 
 class CameraDeck:
-    """Opens and closes cameras; a context manager, whose end closes all."""
+    """Opens and closes cameras; a context manager that closes all at its end."""
 
     def __init__(self, sources: Mapping[int, CameraSource]) -> None:
         self.sources = dict(sources)
@@ -41,11 +41,11 @@ class CameraDeck:
 
     @property
     def open_cameras(self) -> tuple[int, ...]:
-        """Those that film now."""
+        """Numbers of the cameras that film now."""
         return tuple(sorted(self._streams))
 
     def open_only(self, cameras: Collection[int], timeout_s: float = LONGEST_WAIT_SECONDS) -> dict[int, str]:
-        """Closes all others, opens these, and waits for their first frames.
+        """Close all other cameras, open these, and wait for their first frames.
 
         Returns
         -------
@@ -58,23 +58,24 @@ class CameraDeck:
         return self._wait_for(cameras, FIRST_FRAMES, timeout_s)
 
     def health(self) -> dict[int, StreamHealth]:
-        """Of the open cameras."""
+        """Health of the streams of the open cameras."""
         return {camera: stream.health for camera, stream in self._opened()}
 
     def latest(self, camera: int) -> CapturedFrame | None:
-        """The last frame of a camera, for a live picture."""
+        """Return the latest frame of a camera, for a live picture."""
         return self._latest.get(camera)
 
     def send_to(self, sink: Sink | None) -> None:
-        """Where the frames go from now on; None: nowhere."""
+        """Send frames to `take` from now on; None: nowhere."""
         self._sink = sink
 
     def times(self, camera: int) -> tuple[int, FrameTimes]:
-        """Arrival index of the first frame still known, and the times of all from there; see `CameraStream.times`."""
+        """Return the arrival index of the oldest frame that is kept, and the times of all from there; see
+        `CameraStream.times`."""
         return self._streams[camera].times()
 
     def wait_beyond(self, seconds: float, timeout_s: float) -> None:
-        """Returns when every open camera has sent a frame after `seconds`, or after `timeout_s`."""
+        """Wait until every open camera has sent a frame after `seconds`, or for `timeout_s`."""
         end = time.monotonic() + timeout_s
         while time.monotonic() < end:
             last = [self._latest.get(camera) for camera in self.open_cameras]
@@ -83,7 +84,7 @@ class CameraDeck:
             time.sleep(STREAMING_LOOKS_SECONDS)
 
     def close(self) -> None:
-        """Closes all cameras."""
+        """Close all cameras."""
         with self._changing:
             self._sink = None
             self._close(list(self._streams))
@@ -110,7 +111,7 @@ class CameraDeck:
         return problems
 
     def _close(self, cameras: list[int]) -> None:
-        """At once: a camera that does not answer takes seconds to let go."""
+        """Close cameras in parallel: one that does not answer takes seconds to close."""
         streams = [self._streams.pop(camera) for camera in cameras]
         for camera in cameras:
             self._latest.pop(camera, None)

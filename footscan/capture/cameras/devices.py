@@ -1,4 +1,4 @@
-"""Which cameras are plugged into this computer: what they are called, where, and what they film."""
+"""The cameras of this computer: their names, their ports and their formats."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,30 +13,30 @@ DEV = Path("/dev")
 
 @dataclass(frozen=True)
 class CameraDevice:
-    """A camera on this computer."""
+    """A camera of this computer."""
 
     name: str
-    """What it calls itself; eight of a kind have the same."""
+    """Name that the camera reports; cameras of one model share it."""
     node: Path
-    """`/dev/video0`: given anew at every start."""
+    """Device node, such as `/dev/video0`: assigned anew at every start of the computer."""
     by_path: Path | None
-    """Names the port it is plugged into: the stable name for cameras of a kind, as long as each keeps its port."""
+    """Name by the USB port: stable for cameras of one model, as long as each keeps its port."""
     by_id: Path | None
-    """Names maker, model and serial number; of cameras without one, only the last that was plugged in has it."""
+    """Name by maker, model and serial number; of cameras without one, only the last that was plugged in has it."""
     usb: UsbCamera
-    """Its place on USB; its `camera` is its place in the list, from 1."""
+    """Its place on USB; `camera` is its position in the list, from 1."""
     formats: tuple[VideoFormat, ...]
     problem: str | None
-    """Why it cannot be asked; None where it could."""
+    """Reason why the device cannot be queried; None if it can."""
 
     @property
     def stable_name(self) -> Path:
-        """What to write into a rig: by its port, else by its identity, else its node."""
+        """Name for a rig: by port, or else by identity, or else the node."""
         return self.by_path or self.by_id or self.node
 
 
 def list_cameras(dev: Path = DEV, sysfs: Path = SYSFS) -> list[CameraDevice]:
-    """All devices that take pictures, in the order of their ports. A camera's second node, for metadata, is none."""
+    """List all devices that take pictures, in the order of their ports, without the metadata nodes of cameras."""
     nodes = sorted(dev.glob("video*"), key=lambda node: (len(node.name), node.name))
     found = [camera for node in nodes if (camera := _camera(node, dev, sysfs)) is not None]
     found.sort(key=lambda camera: str(camera.stable_name))

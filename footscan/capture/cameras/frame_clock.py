@@ -20,11 +20,11 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 FIRST_FRAMES = 400
-"""Looked at first; the period they give is exact enough to number four times as many."""
+"""Number of frames in the first fit; its period is exact enough to number four times as many. Chosen by hand."""
 NEAR, FAR = 0.01, 0.2
-"""How far from the promised period the true one is sought, and how far from the middle interval, as shares of it."""
+"""Search ranges about the nominal period and about the median interval, as shares of them. Chosen by hand."""
 PROMISE_HOLDS = 0.5
-"""The promised period is kept unless another makes the stamps so much more alike."""
+"""The nominal period is kept unless another one increases the coherence of the stamps by this much. Chosen by hand."""
 LATE_PERIODS = 0.5
 WAKE_PERIODS = 0.1
 EARLY_SIGMAS = 4.0
@@ -40,16 +40,16 @@ class FrameTimes:
     number: Ints
     """Exposures since the first frame's. Increases; only a frame sent twice has the number of the one before."""
     seconds: Floats
-    """When the exposure was due, plus a latency that is the same for all frames of the camera."""
+    """Time at which the exposure was due, plus a latency that is constant for the camera."""
     sd_s: Floats
     """Standard deviation of `seconds`, if the camera exposes evenly: that of the fit, and of the number itself where
     frames were lost in a stall and nobody can tell which."""
     delay_s: Floats
-    """What the frame was stamped with, less `seconds`."""
+    """Time stamp of the frame minus `seconds`."""
     is_late: Bools
-    """Stamped half a period after `seconds` or later."""
+    """True for frames with a stamp half a period after `seconds` or later."""
     is_certain: Bools
-    """No other number is possible, delays being what they mostly are."""
+    """True if no other number is possible with usual delays."""
     missing: Ints
     """Numbers between the first and the last that no frame has, shape (M,)."""
     period_s: float
@@ -59,7 +59,7 @@ class FrameTimes:
 
 
 def number_frames(stamps: Floats, is_repeated: Bools | None = None, period_s: float | None = None) -> FrameTimes:
-    """Numbers the frames of a camera, and smooths their times.
+    """Number the frames of a camera, and smooth their times.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def number_frames(stamps: Floats, is_repeated: Bools | None = None, period_s: fl
 
 
 class RunningNumber:
-    """A number for each frame as it comes. Provisional: only what comes later tells a late frame from a lost one."""
+    """Numbers each frame as it arrives. Provisional: later frames show whether one was late or lost."""
 
     def __init__(self) -> None:
         self._intervals: deque[float] = deque(maxlen=RECENT)
@@ -115,7 +115,7 @@ class RunningNumber:
         self._number = -1
 
     def next(self, stamp: float) -> int:
-        """Number of the frame stamped with so many seconds."""
+        """Return the number of a frame with the stamp `seconds`."""
         if self._number < 0:
             self._number, self._due = 0, stamp
         else:
@@ -131,7 +131,7 @@ class RunningNumber:
 
 @dataclass(frozen=True)
 class _Line:
-    """Exposure n is due at phase + n * period; all in seconds, around the number `centre`."""
+    """A line: exposure n is due at phase + n * period, s, around the number `centre`."""
 
     phase: float
     period: float
@@ -147,7 +147,7 @@ class _Line:
         return np.asarray(np.hypot(self.phase_sd, self.period_sd * (number - self.centre)), np.float64)
 
     def position(self, stamps: Floats) -> Floats:
-        """In periods since exposure 0."""
+        """Convert stamps to periods since exposure 0."""
         return np.asarray((stamps - self.phase) / self.period + self.centre, np.float64)
 
 
@@ -189,7 +189,7 @@ def _evenness(stamps: Floats, around: float, share: float) -> tuple[float, _Line
 
 
 def _refined(stamps: Floats, line: _Line) -> _Line:
-    """`line` fitted to the frames that are on time, until their numbers stay."""
+    """Fit `line` to the frames that are on time, until their numbers no longer change."""
     numbers: Ints | None = None
     for _ in range(10):
         latest, is_late = _latest_numbers(stamps, line)
@@ -201,7 +201,7 @@ def _refined(stamps: Floats, line: _Line) -> _Line:
 
 
 def _latest_numbers(stamps: Floats, line: _Line) -> tuple[Ints, Bools]:
-    """The highest numbers that increase and are not in the future, and which frames are late for theirs."""
+    """Return the highest increasing numbers that are not in the future, and the frames that are late for them."""
     early = np.clip(EARLY_SIGMAS * line.jitter / line.period, *EARLY_PERIODS)
     position = line.position(stamps)
     rank = np.arange(len(stamps))
@@ -211,7 +211,7 @@ def _latest_numbers(stamps: Floats, line: _Line) -> tuple[Ints, Bools]:
 
 
 def _fitted(stamps: Floats, number: Ints, before: _Line) -> _Line:
-    """Least squares over the frames within three robust standard deviations of `before`."""
+    """Fit a line by least squares to the frames within three robust standard deviations of `before`."""
     residual = stamps - before.at(number)
     if len(stamps) < 3 or number[0] == number[-1]:
         return before
@@ -250,7 +250,7 @@ def _slack(stamps: Floats, latest: Ints, is_late: Bools, line: _Line) -> Ints:
 
 
 def _mean_square_error(slack: Ints) -> Floats:
-    """(N,) of the middle one of slack + 1 numbers, each as likely, in periods squared."""
+    """(N,) variance of the middle one of slack + 1 equally likely numbers, in periods squared."""
     below = slack - slack // 2
     lengths = np.stack([slack // 2, below]).astype(np.float64)
     squares = lengths * (lengths + 1) * (2 * lengths + 1) / 6

@@ -1,4 +1,4 @@
-"""Whether a camera's JPEG came whole.
+"""Checks whether the JPEG of a camera arrived whole.
 
 A cable or a full buffer tears a frame: its end is missing, or a piece inside. ffmpeg would decode what there is and
 tell nobody. libjpeg-turbo runs through the Huffman codes and says what it misses: 0.4 ms at an eighth of the size.
@@ -13,7 +13,7 @@ EIGHTH = {"fastdct": True, "fastupsample": True, "min_factor": 1}
 
 
 def torn_reason(jpeg: bytes, size: ImageSize | None = None) -> str | None:
-    """Why a frame is torn; None for a whole one.
+    """Return the reason why a frame is torn; None for a whole one.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where a camera's packets come from: a V4L2 device by its stable name, or a URL, opened by PyAV."""
+"""The source of a camera's packets: a V4L2 device by its stable name, or a URL, opened by PyAV."""
 
 import errno
 import os
@@ -20,48 +20,48 @@ if TYPE_CHECKING:
     from av.container import InputContainer
 
 OLDEST_STAMP_S = 5.0
-"""A stamp of the driver that is older than this, or in the future, is of another clock than ours."""
+"""A stamp of the driver that is older than this, or in the future, belongs to another clock. Chosen by hand."""
 POLL_S = 0.25
 IMMEDIATE_EXIT = 1414092869
-"""`AVERROR_EXIT`, what ffmpeg calls a time limit of ours that ran out."""
+"""`AVERROR_EXIT`, which ffmpeg returns when our time limit is over."""
 
 
 @dataclass(frozen=True)
 class CameraSource:
-    """A camera as it is opened."""
+    """A camera and the settings with which it is opened."""
 
     address: str
     """`/dev/v4l/by-path/...`, `/dev/v4l/by-id/...`, `/dev/video0`, or a URL (http, rtsp, ...) of Motion-JPEG."""
     size: ImageSize = FRAME_SIZE
-    """Asked of a V4L2 device, expected of any other."""
+    """Requested from a V4L2 device, expected of any other."""
     frames_per_second: float | None = None
-    """Asked of a V4L2 device, expected of any other; None: whatever it does."""
+    """Requested from a V4L2 device, expected of any other; None: any."""
     open_s: float = 10.0
     read_s: float = 3.0
     """Longest silence before the connection counts as lost."""
     reconnect_s: float = 0.5
-    """Between two attempts to connect."""
+    """Pause between two attempts to connect."""
 
     @property
     def is_device(self) -> bool:
-        """A V4L2 device, no URL."""
+        """True for a V4L2 device, False for a URL."""
         return self.address.startswith("/")
 
     @property
     def name(self) -> str:
-        """The address without a password that may be in it."""
+        """The address, without a password."""
         scheme, separator, rest = self.address.partition("://")
         return f"{scheme}://{rest.rpartition('@')[2]}" if separator else self.address
 
     @property
     def period_s(self) -> float | None:
-        """Of a frame; None where the rate is left to the camera."""
+        """Period of the frames; None if the camera chooses the rate."""
         return 1 / self.frames_per_second if self.frames_per_second else None
 
 
 @dataclass(frozen=True, slots=True)
 class StampedPacket:
-    """The bytes of a frame and when they were there, in seconds of `time.monotonic()`."""
+    """The bytes of a frame and their time, `time.monotonic()` s."""
 
     jpeg: bytes
     seconds: float
@@ -71,7 +71,7 @@ class StampedPacket:
 
 @contextmanager
 def opened(source: CameraSource) -> "Iterator[InputContainer]":
-    """The camera, opened.
+    """Open a camera.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def opened(source: CameraSource) -> "Iterator[InputContainer]":
 
 
 def packets(container: "InputContainer", source: CameraSource, stopping: threading.Event) -> Iterator[StampedPacket]:
-    """Its packets until it ends or `stopping` is set; to be read within `opened`, which tells of errors."""
+    """Yield packets until the camera ends or `stopping` is set; to be read within `opened`, which reports errors."""
     device = _descriptor_of(source.address) if source.is_device else None
     demuxed = container.demux(video=0)
     stamps: Literal["driver", "arrival"] | None = None
@@ -180,7 +180,7 @@ def _descriptor_of(address: str) -> int | None:
 
 
 def _device_has_frame(descriptor: int, source: CameraSource, stopping: threading.Event) -> bool:
-    """Waits for a frame; False where we are to end. Fault after the longest silence."""
+    """Wait for a frame; returns False if the stream is to end. Fault after the longest silence."""
     poll = select.poll()
     poll.register(descriptor, select.POLLIN)
     limit = time.monotonic() + source.read_s

@@ -1,4 +1,4 @@
-"""One camera, live: its JPEG packets as they come, each with its time and what is wrong with it.
+"""The stream of one camera: its JPEG packets as they arrive, each with its time and its problem.
 
 PyAV takes the packets out of a V4L2 device or of any URL that ffmpeg opens; none is decoded by ffmpeg. A thread of its
 own reads them, so that nothing waits in the camera, and connects again after a loss. That makes later frames usable for
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from av.container import InputContainer
 
 HISTORY = 8192
-"""Frames that `times` looks back on: seven minutes."""
+"""Number of frames that `times` keeps: seven minutes. A bound of memory."""
 CLOSE_SECONDS = 5.0
 
 State = Literal["connecting", "streaming", "silent", "lost", "closed"]
@@ -33,15 +33,15 @@ State = Literal["connecting", "streaming", "silent", "lost", "closed"]
 
 @dataclass(frozen=True, slots=True)
 class CapturedFrame:
-    """A frame as it came."""
+    """A frame as it arrived."""
 
     camera: int
     arrival: int
-    """Frames of this stream before it, delivered or not: the place of its exact number in `CameraStream.times`."""
+    """Number of earlier frames of this stream, delivered or not: its index in `CameraStream.times`."""
     number: int
-    """Exposures of the camera before it. Provisional: `CameraStream.times` knows better afterwards."""
+    """Number of earlier exposures of the camera. Provisional: `CameraStream.times` is exact afterwards."""
     seconds: float
-    """Of `time.monotonic()`: the driver's stamp where there is one, or else when its last byte had come."""
+    """`time.monotonic()` s: the stamp of the driver if there is one, or else the arrival of its last byte."""
     jpeg: bytes
     problem: str | None
     """`torn: ...`, `repeated: ...` or `reconnected: ...`; None for a sound frame. Late and lost ones: `times`."""
@@ -49,23 +49,24 @@ class CapturedFrame:
 
 @dataclass(frozen=True)
 class StreamHealth:
-    """What is true of a stream now."""
+    """The present health of a stream."""
 
     state: State
-    """`silent`: connected, and nothing came for longer than it may; `lost`: not connected, being tried again."""
+    """`silent`: connected, but without frames for too long; `lost`: not connected, with further attempts."""
     problem: str | None = None
-    """What is wrong now, in one line."""
+    """The present problem, in one line."""
     stamps: Literal["driver", "arrival"] | None = None
-    """Who stamps the frames: the driver as they come from the camera (to a ms), or we when they are here."""
+    """Origin of the time stamps: the driver, when frames leave the camera (to a ms), or this program, on arrival."""
     connections: int = 0
-    """More than one: it was lost in between, and a scan over that time is not whole."""
+    """Number of connections; more than one means that the camera was lost in between, and scans of that time are
+    incomplete."""
     received: int = 0
     torn: int = 0
     repeated: int = 0
     overflowed: int = 0
-    """Frames that the receiver had no room for. They are lost; their places in `times` are kept."""
+    """Number of frames for which the receiver had no room: lost, with their places in `times` kept."""
     last_seconds: float | None = None
-    """When the last frame came, of `time.monotonic()`."""
+    """Arrival of the last frame, `time.monotonic()` s."""
 
 
 class CameraStream:
@@ -98,7 +99,7 @@ class CameraStream:
 
     @property
     def health(self) -> StreamHealth:
-        """What is true now; also where the camera's driver does not return to us."""
+        """The present health, even if the driver of the camera does not return."""
         with self._lock:
             health, since = self._health, self._since
         quiet = time.monotonic() - max(since, health.last_seconds or since)
@@ -125,7 +126,7 @@ class CameraStream:
         raise Fault(f"camera {self.camera}: {received} of {frames} frames within {timeout_s:g} s ({problem})")
 
     def times(self) -> tuple[int, FrameTimes]:
-        """Arrival index of the first frame still known, and number and time of each frame from there.
+        """Return the arrival index of the oldest frame that is kept, and number and time of each frame from there.
 
         RefusedInput where no frame has come.
         """
@@ -137,7 +138,7 @@ class CameraStream:
             raise RefusedInput(f"camera {self.camera}", error.problem, field=error.field) from None
 
     def close(self) -> None:
-        """Ends the stream. Fault where the receiver has failed, or the driver does not let go of the thread."""
+        """End the stream. Fault if the receiver failed, or the driver does not release the thread."""
         self._stopping.set()
         self._thread.join(max(self.source.open_s, self.source.read_s) + CLOSE_SECONDS)
         if self._thread.is_alive():
@@ -164,7 +165,7 @@ class CameraStream:
             self._tell("closed", f"camera {self.camera}: the receiver failed: {error.__cause__!r}")
 
     def _film(self) -> None:
-        """One connection, from opening to its loss or our end."""
+        """Film over one connection, until it is lost or the stream ends."""
         try:
             with opened(self.source) as container:
                 self._take_all(container)
@@ -219,11 +220,11 @@ class CameraStream:
 
 
 class _ReceiverError(Exception):
-    """The receiver could not take a frame; its own error is the cause."""
+    """The receiver failed to take a frame; its error is the cause."""
 
 
 class _Log:
-    """When the latest frames came, and which were repeated."""
+    """Arrival times of the latest frames, and the repeated ones."""
 
     def __init__(self) -> None:
         self._frames: deque[tuple[float, bool]] = deque(maxlen=HISTORY)
@@ -231,7 +232,7 @@ class _Log:
         self._arrivals = 0
 
     def add(self, stamp: float, is_repeated: bool) -> tuple[int, int]:
-        """Its index, and its provisional number."""
+        """Return the index of a frame and its provisional number."""
         if self._frames:
             stamp = max(stamp, self._frames[-1][0])  # a clock that another connection has set back
         self._frames.append((stamp, is_repeated))

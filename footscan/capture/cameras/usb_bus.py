@@ -1,4 +1,4 @@
-"""How many passes a scan takes: which cameras a USB bus carries at the same time.
+"""Plans the passes of a scan: the cameras that a USB bus carries at the same time.
 
 An isochronous camera reserves time on its bus for the largest packet it may send, in every microframe, whatever it
 then sends. Many webcams ask for their largest setting at any size and rate: two of those do not go together on a USB 2
@@ -18,12 +18,12 @@ HIGH_SPEED_US = 0.8 * MICROFRAME_US
 SUPER_SPEED_US = 0.9 * MICROFRAME_US
 """Linux keeps 10 % for other transfers (`SS_BW_RESERVED` of its xHCI driver)."""
 MOST_CAMERAS = 16
-"""On one bus; the exact search takes a second for so many."""
+"""Largest number of cameras on one bus; the exact search takes a second for it."""
 
 
 @dataclass(frozen=True)
 class UsbCamera:
-    """What is known of a camera's place on the bus."""
+    """A camera's place on the bus, as far as known."""
 
     camera: int
     bus: str | None = None
@@ -34,15 +34,15 @@ class UsbCamera:
     speed_mbit: float | None = None
     """12, 480 or 5000; None: unknown."""
     payloads: tuple[int, ...] = ()
-    """Bytes a microframe of each isochronous setting, increasing. Empty: a bulk camera, or unknown."""
+    """Bytes per microframe of each isochronous setting, increasing. Empty: a bulk camera, or unknown."""
     is_bulk: bool = False
-    """Reserves nothing, and takes what is left."""
+    """A bulk camera reserves nothing, and takes the remaining bandwidth."""
     reserved: int | None = None
-    """Bytes a microframe that it has reserved while it filmed; None: not yet tried, so its largest setting counts."""
+    """Bytes per microframe that it reserved while it filmed; None: not yet tried, so its largest setting counts."""
 
     @property
     def payload(self) -> int | None:
-        """Bytes a microframe to reckon with; None: unknown."""
+        """Bytes per microframe to plan with; None: unknown."""
         if self.is_bulk:
             return 0
         return self.reserved or (self.payloads[-1] if self.payloads else None)
@@ -54,11 +54,11 @@ class Pass:
 
     cameras: tuple[int, ...]
     reason: str
-    """Why these, in a sentence."""
+    """Reason for this choice, in a sentence."""
 
 
 def plan_passes(cameras: Sequence[UsbCamera]) -> list[Pass]:
-    """The fewest passes in which every camera films once; exact.
+    """Find the fewest passes in which every camera films once; exact.
 
     A camera of which nothing is known counts as taking nothing, and the reason says so: the host will tell.
 
@@ -85,7 +85,7 @@ def plan_passes(cameras: Sequence[UsbCamera]) -> list[Pass]:
 
 
 def microframe_us(payload: int, speed_mbit: float) -> float:
-    """Time on the bus of an isochronous packet of so many bytes, with its overhead.
+    """Return the time on the bus of an isochronous packet, with its overhead.
 
     High speed by USB 2.0, 5.11.3, with the worst bit stuffing, as the hosts reckon: 38 bytes of protocol and 7 bits for
     6. SuperSpeed: 10 bits a byte, and 128 bytes of overhead for each packet of 1024, as Linux allows for.
@@ -176,7 +176,7 @@ def _reason(
 
 
 def _loads(filming: list[UsbCamera]) -> str:
-    """How full each bus is."""
+    """Load of each bus."""
     loads = []
     for bus, sharing in groupby(sorted(filming, key=lambda c: (c.bus or "", c.camera)), lambda c: c.bus):
         group = list(sharing)

@@ -1,4 +1,4 @@
-"""Where a V4L2 camera sits on USB, and what it may reserve there, as Linux tells it in sysfs."""
+"""The place of a V4L2 camera on USB and the bandwidth that it may reserve, from Linux's sysfs."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ ISOCHRONOUS, BULK = 1, 2
 
 
 def usb_place(camera: int, node: Path, sysfs: Path = SYSFS) -> UsbCamera:
-    """Place of the camera behind a device node.
+    """Return the place of the camera behind a device node.
 
     While the camera films, what it has reserved is known too: Linux shows the setting that is in use.
 
@@ -50,11 +50,11 @@ class StreamingSetting:
     alternate: int
     transfer: int
     payload: int
-    """Bytes a microframe."""
+    """Bytes per microframe."""
 
 
 def streaming_settings(descriptors: bytes) -> Iterator[StreamingSetting]:
-    """The settings by which a camera sends pictures, from its USB descriptors (USB 2.0, 9.6; USB 3.2, 9.6.7)."""
+    """Read the settings with which a camera sends pictures from its USB descriptors (USB 2.0, 9.6; USB 3.2, 9.6.7)."""
     interface = alternate = -1
     is_video = False
     pending: StreamingSetting | None = None

@@ -1,4 +1,4 @@
-"""What Video4Linux2 tells of a camera and lets be set, by the ioctls of the kernel's `linux/videodev2.h`.
+"""Queries and settings of a camera by Video4Linux2, with the ioctls of the kernel's `linux/videodev2.h`.
 
 As much of it as the scanner needs: the library that wraps all of it is under the GPL, and this project is not.
 """
@@ -22,7 +22,7 @@ DEVICE_CAPS = 0x8000_0000
 DISABLED, READ_ONLY, INACTIVE = 0x01, 0x04, 0x10
 DISCRETE = 1
 MOST_ENTRIES = 256
-"""Of any list: a driver that never ends one must not hang us."""
+"""Longest list of a driver that is read: an endless one must not block the program."""
 
 _CAPABILITY = struct.Struct("=16s32s32s6I")
 _FORMAT = struct.Struct("=3I32s5I")
@@ -33,7 +33,7 @@ _CONTROL = struct.Struct("=Ii")
 
 
 def _request(direction: int, number: int, layout: struct.Struct) -> int:
-    """As `_IOC` of the kernel's headers makes it."""
+    """Compute a request number as the macro `_IOC` of the kernel's headers does."""
     return direction << 30 | layout.size << 16 | ord("V") << 8 | number
 
 
@@ -48,31 +48,31 @@ QUERY_CONTROL = _request(READ | WRITE, 36, _CONTROL_RANGE)
 
 @dataclass(frozen=True)
 class VideoFormat:
-    """A size of picture that a camera films in one encoding, and its rates."""
+    """An image size of a camera in one encoding, and its frame rates."""
 
     encoding: str
     """Four characters: `MJPG`, `YUYV`."""
     rows: int
     columns: int
     frames_per_second: tuple[float, ...]
-    """Empty where the camera takes any."""
+    """Empty if the camera accepts any."""
 
 
 @dataclass(frozen=True)
 class ControlRange:
-    """What a control can be set to."""
+    """Range of a control."""
 
     name: str
     least: int
     most: int
     step: int
     is_inactive: bool
-    """Another control overrules it, as automatic exposure does the exposure."""
+    """True if another control overrides it, as automatic exposure overrides the exposure."""
 
 
 @contextmanager
 def open_device(node: Path) -> Iterator[int]:
-    """Descriptor of a device, open for questions and settings; Fault where it cannot be opened, or has gone."""
+    """Open a device for queries and settings; Fault if it cannot be opened, or is gone."""
     try:
         descriptor = os.open(node, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
@@ -84,7 +84,7 @@ def open_device(node: Path) -> Iterator[int]:
 
 
 def camera_name(descriptor: int) -> str | None:
-    """What the camera calls itself; None for a device that takes no pictures."""
+    """Return the name that the camera reports; None for a device that takes no pictures."""
     reply = _asked(descriptor, QUERY_CAPABILITY, _CAPABILITY, b"", b"", b"", *[0] * 6)
     if reply is None:
         return None
@@ -94,7 +94,7 @@ def camera_name(descriptor: int) -> str | None:
 
 
 def video_formats(descriptor: int) -> list[VideoFormat]:
-    """All encodings, sizes and rates."""
+    """List all encodings, sizes and rates."""
     formats = []
     for _, _, _, _, pixel_format, *_ in _listed(descriptor, LIST_FORMATS, _FORMAT, CAPTURE, 0, b"", *[0] * 5):
         encoding = struct.pack("=I", pixel_format).decode("ascii", "replace").strip()
@@ -114,7 +114,7 @@ def video_formats(descriptor: int) -> list[VideoFormat]:
 
 
 def control_range(descriptor: int, control: int) -> ControlRange | None:
-    """None where the camera lacks the control."""
+    """Return the range of a control; None if the camera lacks it."""
     reply = _asked(descriptor, QUERY_CONTROL, _CONTROL_RANGE, control, 0, b"", *[0] * 7)
     if reply is None:
         return None
@@ -125,18 +125,18 @@ def control_range(descriptor: int, control: int) -> ControlRange | None:
 
 
 def get_control(descriptor: int, control: int) -> int | None:
-    """Its value; None where the camera does not tell."""
+    """Return the value of a control; None if the camera does not report it."""
     reply = _asked(descriptor, GET_CONTROL, _CONTROL, control, 0)
     return None if reply is None else int(reply[1])
 
 
 def set_control(descriptor: int, control: int, value: int) -> bool:
-    """Whether the camera took it; what it made of it, `get_control` tells."""
+    """Set a control; returns True if the camera accepted it. `get_control` returns the value that it chose."""
     return _asked(descriptor, SET_CONTROL, _CONTROL, control, value) is not None
 
 
 REFUSALS = {errno.EINVAL, errno.ENOTTY, errno.ERANGE, errno.EACCES, errno.EBUSY, errno.EIO, errno.EPIPE}
-"""A request that a camera does not know or take; any other error is of the device itself."""
+"""Error numbers of a request that a camera does not know or accept; any other error is one of the device."""
 
 
 def _asked(descriptor: int, request: int, layout: struct.Struct, *fields: int | bytes) -> tuple[Any, ...] | None:

@@ -33,48 +33,48 @@ EXPOSURE_UNIT_MS = 0.1
 
 @dataclass(frozen=True)
 class ControlValues:
-    """What is to be fixed; None: as it is."""
+    """Values to fix; None: unchanged."""
 
     exposure_ms: float | None = None
-    """No longer than a frame: a longer one slows the camera down."""
+    """Exposure, no longer than a frame: a longer one reduces the frame rate."""
     gain: float | None = None
     """Share of the camera's range, 0 to 1: its unit is the maker's own."""
     white_balance_k: float | None = None
     focus: float | None = None
     """Share of the camera's range, 0 to 1."""
     mains_hz: Literal[0, 50, 60] | None = None
-    """Of the lamps, against flicker; 0: no correction."""
+    """Mains frequency of the lamps, against flicker; 0: no correction."""
 
 
 @dataclass(frozen=True)
 class FixedControl:
-    """One control after it was set."""
+    """A control after it was set."""
 
     name: str
     """As in `ControlValues`."""
     asked: float
     found: float | None
-    """What the camera says it is now; None where it does not say."""
+    """Value that the camera reports; None if it reports none."""
     problem: str | None
-    """Why it is not as asked; None where it is, to the camera's own step."""
+    """Reason why it differs from the request; None if it agrees to the step of the camera."""
 
 
 class CameraControls(Protocol):
-    """How a camera is set."""
+    """Sets the controls of a camera."""
 
     def fix(self, values: ControlValues) -> list[FixedControl]:
-        """Sets what `values` names, with all that is automatic off; Fault where the camera does not answer."""
+        """Set the controls named in `values`, with all automatics off; Fault if the camera does not answer."""
 
 
 def controls_of(source: CameraSource, control_url: str | None = None) -> CameraControls:
-    """The controls of a camera: of its driver, of a page of its own, or none."""
+    """Return the controls of a camera: those of its driver, those of its web page, or none."""
     if source.is_device:
         return V4l2Controls(Path(source.address))
     return NoControls() if control_url is None else HttpControls(control_url)
 
 
 def asked_of(values: ControlValues) -> dict[str, float]:
-    """Name and value of what is to be fixed; RefusedInput where one cannot be."""
+    """Yield name and value of each control to fix; RefusedInput for an impossible value."""
     asked = {name: float(value) for name, value in asdict(values).items() if value is not None}
     for name, value in asked.items():
         if name in {"gain", "focus"} and not 0 <= value <= 1:
@@ -87,16 +87,16 @@ def asked_of(values: ControlValues) -> dict[str, float]:
 
 
 class NoControls:
-    """A camera that cannot be set from here: a network camera is set on its own page."""
+    """A camera that cannot be set by footscan: a network camera is set on its own web page."""
 
     def fix(self, values: ControlValues) -> list[FixedControl]:
-        """Nothing, and says so of each."""
+        """Set nothing, and report this for each control."""
         problem = "this camera cannot be set from here: set it on its own page"
         return [FixedControl(name, value, None, problem) for name, value in asked_of(values).items()]
 
 
 class HttpControls:
-    """A camera that takes `GET URL?exposure=MS&gain=SHARE` and answers with what it has set, as JSON."""
+    """A camera that accepts `GET URL?exposure=MS&gain=SHARE` and answers with the values that it has set, as JSON."""
 
     def __init__(self, url: str) -> None:
         if urllib.parse.urlsplit(url).scheme not in {"http", "https"}:
@@ -129,7 +129,7 @@ class HttpControls:
 
 
 class V4l2Controls:
-    """A camera on this computer, by its driver."""
+    """A camera of this computer, set by its driver."""
 
     def __init__(self, node: Path) -> None:
         self._node = node
@@ -143,7 +143,7 @@ class V4l2Controls:
 
 @dataclass(frozen=True)
 class _Control:
-    """A control of V4L2 and what is to be switched before it takes effect."""
+    """A control of V4L2 and the automatics that must be switched off first."""
 
     control: int
     automatics: tuple[tuple[int, int], ...] = ()
@@ -161,7 +161,7 @@ _CONTROLS = {
     "mains_hz": _Control(MAINS, unit=1.0),
 }
 MAINS_HZ = (0, 50, 60)
-"""By the numbers of `enum v4l2_power_line_frequency`; 3, automatic, is none of these."""
+"""Mains frequencies by the numbers of `enum v4l2_power_line_frequency`, without 3, automatic."""
 
 
 def _fixed(device: int, name: str, asked: float) -> FixedControl:
@@ -188,7 +188,7 @@ def _fixed(device: int, name: str, asked: float) -> FixedControl:
 
 
 def _switched_off(device: int, known: _Control) -> Iterator[str]:
-    """What is automatic about a control, off; says what stays on. A camera without the automatic is as good."""
+    """Switch off the automatics of a control, and yield those that stay on; a camera may have none."""
     for control, value in known.automatics:
         limits = control_range(device, control)
         if limits is None:
@@ -199,7 +199,7 @@ def _switched_off(device: int, known: _Control) -> Iterator[str]:
 
 
 def _number_of(name: str, asked: float, limits: ControlRange) -> int:
-    """What the driver calls `asked`: the nearest that it takes."""
+    """Convert `asked` to the nearest number that the driver accepts."""
     if name == "mains_hz":
         return MAINS_HZ.index(int(asked))
     known = _CONTROLS[name]
@@ -209,7 +209,7 @@ def _number_of(name: str, asked: float, limits: ControlRange) -> int:
 
 
 def _value_of(name: str, number: int, limits: ControlRange) -> float | None:
-    """The inverse of `_number_of`; None for a number that has none."""
+    """Invert `_number_of`; None for a number without a value."""
     if name == "mains_hz":
         return float(MAINS_HZ[number]) if 0 <= number < len(MAINS_HZ) else None
     known = _CONTROLS[name]

@@ -1,4 +1,4 @@
-"""The serial line to the board: bytes out, lines in with the time they came at, and its loss told once."""
+"""The serial line to the board: bytes out, lines in with their time of arrival, and one report of its loss."""
 
 import errno
 import os
@@ -14,29 +14,29 @@ from schemas.base.errors import Fault, RefusedInput
 BAUD = 115_200
 BYTES_PER_SECOND = BAUD / 10
 LOOKS_EVERY_SECONDS = 0.2
-"""How long a read waits for bytes; a line that is closed ends within this."""
+"""Limit of a read; the thread of a closed line ends within this time."""
 WRITE_SECONDS = 1.0
 PAST_ALL_SECONDS = 0.02
-"""How long the last stop waits for another thread's write, which takes no time where the system takes the bytes."""
+"""Limit of the wait of the last stop for the write of another thread, which usually takes no time."""
 HARMLESS = (b"?", b"!", b"\x18")
 """Query, feed hold and reset: they move and light nothing."""
 GONE = (errno.EIO, errno.ENODEV, errno.ENXIO, errno.EBADF)
-"""What the system says of a port whose cable was pulled."""
+"""Error numbers of a port whose cable was pulled."""
 LONGEST_LINE = 400
-"""Longer than anything Grbl says: what has no line end until then is noise."""
+"""Longer than all lines of Grbl: a longer one is noise."""
 
 
 class SerialLine:
     """An open port with a thread that reads it, from `start` to `close`."""
 
     def __init__(self, port: str, on_line: Callable[[str, float], None], on_lost: Callable[[str], None]) -> None:
-        """Opens `port`.
+        """Open `port`.
 
         Parameters
         ----------
-        port : name of the serial port, best a stable one (/dev/serial/by-id/...).
-        on_line : called in the reading thread with each line, without its end, and the time its last byte was there.
-        on_lost : called once, in any thread, with the reason why nothing more will come.
+        port : name of the serial port, preferably a stable one (/dev/serial/by-id/...).
+        on_line : called in the reading thread with each line, without its end, and the time of its last byte.
+        on_lost : called once, in any thread, with the reason of the loss.
 
         Raises
         ------
@@ -49,18 +49,18 @@ class SerialLine:
         self._on_lost = on_lost
         self._open = True
         self.sealed: str | None = None
-        """Why nothing goes out but what stops the board; None where all does."""
+        """Reason why only commands that stop the board are sent; None if all are."""
         self._writing = threading.Lock()
         self._losing = threading.Lock()
         self._port = _opened(port)
         self._thread = threading.Thread(target=self._read, name=f"serial line {port}", daemon=True)
 
     def start(self) -> None:
-        """Begins to read."""
+        """Start reading."""
         self._thread.start()
 
     def write(self, data: bytes) -> float:
-        """Sends all of `data`; the time when it was on its way, `time.monotonic()` s. Fault where the line is lost."""
+        """Send `data`; returns the time of sending, `time.monotonic()` s. Fault if the line is lost."""
         try:
             with self._writing:
                 if not self._open:
@@ -75,7 +75,10 @@ class SerialLine:
             raise Fault(f"the connection to the board is lost ({_reason(error)})") from None
 
     def write_past_all(self, data: bytes) -> bool:
-        """Sends a realtime command although another thread's write hangs; whether it went. It may stand amid a line."""
+        """Send a realtime command even if the write of another thread blocks; returns True if it was sent.
+
+        It may go between the bytes of a line.
+        """
         waited = self._writing.acquire(timeout=PAST_ALL_SECONDS)
         try:
             return self._open and os.write(self._port.fileno(), data) == len(data)
@@ -86,7 +89,7 @@ class SerialLine:
                 self._writing.release()
 
     def close(self) -> None:
-        """Ends the thread and closes the port."""
+        """End the thread and close the port."""
         self._open = False
         if hasattr(self._port, "cancel_read"):  # where the system has it, a read need not time out first
             self._port.cancel_read()

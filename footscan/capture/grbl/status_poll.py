@@ -1,4 +1,4 @@
-"""Asking the board where it is: often while it moves, seldom while it stands, and when each answer was true."""
+"""Polls the board for status reports, often while it moves and seldom while it stands, and times each answer."""
 
 import statistics
 import threading
@@ -14,46 +14,47 @@ from schemas.base.errors import Fault
 
 QUERY = b"?"
 MOVING_SECONDS, STANDING_SECONDS = 0.05, 0.2
-"""Between two queries; the firmware's documentation advises 5 to 20 a second."""
+"""Intervals of queries; Grbl's documentation advises 5 to 20 a second."""
 AGAIN_SECONDS = 0.25
-"""When a query is repeated that has no answer: a byte may be lost."""
+"""A query without an answer is repeated after this time: a byte may be lost. Chosen by hand."""
 QUIET_SECONDS = 0.2
-"""How long nothing is asked after the answer to a repeated query is due: it must not pass for that of the next one."""
+"""Pause after the answer to a repeated query is due: that answer must not be taken for one of the next query. Chosen
+by hand."""
 LOST_QUERY_SECONDS = 2.0 * AGAIN_SECONDS + QUIET_SECONDS
-"""How much longer a report takes where a byte was lost."""
+"""Extra time of a report if a byte was lost."""
 KEPT_ROUND_TRIPS = 200
 
 
 @dataclass(frozen=True)
 class TimedReport:
-    """A status report and when it was true."""
+    """A status report and the time at which it was true."""
 
     report: Report
     asked: float
     """`time.monotonic()` s of the oldest query that it may answer."""
     seconds: float
-    """The middle of the time at which the board can have looked."""
+    """Middle of the interval in which the board can have read its position."""
     uncertain_seconds: float
-    """It was at `seconds` give or take this."""
+    """Half the width of that interval."""
 
 
 class StatusPoll:
-    """A thread that asks; answers are handed to `take`."""
+    """A thread that sends queries; `take` receives the answers."""
 
     def __init__(
         self, write: Callable[[bytes], float], on_silence: Callable[[], None], patience_seconds: float
     ) -> None:
-        """Asks by `write`, and calls `on_silence` where nothing came for `patience_seconds`."""
+        """Send queries by `write`, and call `on_silence` if no report arrives for `patience_seconds`."""
         self.latest: TimedReport | None = None
         self.rests = False
-        """Whether nothing is asked."""
+        """True while no queries are sent."""
         self.quiet_until = 0.0
-        """Before that nothing is asked either."""
+        """No queries are sent before this time, `time.monotonic()` s."""
         self._write = write
         self._on_silence = on_silence
         self._patience = patience_seconds
         self._asked: float | None = None
-        """The oldest query without an answer."""
+        """Time of the oldest query without an answer."""
         self._asked_again = 0.0
         self._round_trips: deque[float] = deque(maxlen=KEPT_ROUND_TRIPS)
         self._wanted = threading.Event()
@@ -63,22 +64,22 @@ class StatusPoll:
 
     @property
     def round_trip_seconds(self) -> float:
-        """Median of lately."""
+        """Median of the latest times between query and answer; NaN before the first."""
         return statistics.median(self._round_trips) if self._round_trips else float("nan")
 
     def start(self) -> None:
-        """Begins to ask."""
+        """Start the thread."""
         self._thread.start()
 
     def close(self) -> None:
-        """Ends the thread."""
+        """End the thread."""
         self._ends = True
         self._wanted.set()
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
             self._thread.join()
 
     def ask(self) -> float:
-        """Asks at once; a report with `asked` at or after the returned time is an answer to this."""
+        """Send a query at once; a report whose `asked` is at or after the returned time answers it."""
         now = time.monotonic()
         if not self._thread.is_alive():
             self._query()
@@ -87,13 +88,13 @@ class StatusPoll:
 
     @contextmanager
     def resting(self) -> Iterator[None]:
-        """Nothing is asked, while the board homes: it would answer all queries by one report at the end of that."""
+        """Send no queries while the board homes: it would answer all of them by one report at the end."""
         self.rests = True
         try:
             yield
         finally:
             with self._lock:
-                if self._asked is not None:  # it came too late to be answered before, and is answered now
+                if self._asked is not None:  # a query that arrived too late for an answer before is answered now
                     self._asked = None
                     self.quiet_until = time.monotonic() + QUIET_SECONDS
             self.rests = False
@@ -105,14 +106,14 @@ class StatusPoll:
             self.latest = None
 
     def take(self, report: Report, arrived: float, length: int) -> TimedReport | None:
-        """A report of `length` bytes whose last byte came at `arrived`; None where nobody asked for it.
+        """Time a report of `length` bytes whose last byte arrived at `arrived`; None if there was no query.
 
-        The board looks at its position between the query and the first byte of the answer. Through a UART the bytes
-        take their time at the baud rate, which is taken off; where all came faster than that, there is no UART.
+        The board reads its position between the query and the first byte of the answer. The transmission time of the
+        bytes at the baud rate is subtracted; if all arrived faster than that, there is no UART.
         """
         with self._lock:
             asked, self._asked = self._asked, None
-            if asked is not None and self._asked_again != asked:  # its own answer may take as long as this one took
+            if asked is not None and self._asked_again != asked:  # the answer to the repeated query may take as long
                 self.quiet_until = self._asked_again + (arrived - asked) + QUIET_SECONDS
         if asked is None:
             return None
@@ -133,7 +134,7 @@ class StatusPoll:
             try:
                 self._ask_or_complain()
             except Fault:
-                return  # the line is lost, and has told so
+                return  # the line is lost, and has reported it
 
     def _ask_or_complain(self) -> None:
         now = time.monotonic()
