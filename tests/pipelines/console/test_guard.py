@@ -55,6 +55,21 @@ def test_its_own_page_follows_the_state(site: str | None) -> None:
     assert told == []
 
 
+@pytest.mark.parametrize(
+    ("host", "origin", "status"),
+    [
+        ("127.0.0.1:8761", "http://127.0.0.1:8760", None),
+        ("evil.example:8761", "http://evil.example:8760", 421),  # a name that was bound to this computer afterwards
+        ("127.0.0.1:8761", "http://evil.example:8760", 403),
+    ],
+)
+def test_stop_on_its_own_port_is_for_this_servers_pages(host: str, origin: str, status: int | None) -> None:
+    sent = [(b"host", host.encode()), (b"origin", origin.encode()), (b"content-length", b"0")]
+    scope = {"type": "http", "method": "POST", "path": "/do/stop", "query_string": b"", "headers": sent}
+    refused = Rules("127.0.0.1", None, lambda _: None, (8760, 8761)).answer_aside(scope)
+    assert (None if refused is None else refused.status_code) == status
+
+
 @pytest.mark.parametrize("path", ["/cameras/1.jpg", "/results/P1/S1/foot.stl", "/static/link.js", EVENTS])
 def test_another_site_links_to_pages_alone(stranger: TestClient, path: str) -> None:
     assert stranger.get(path, headers=LINK).status_code == 403
