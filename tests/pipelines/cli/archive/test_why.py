@@ -96,7 +96,7 @@ def test_code(done: Any, why: Why, monkeypatch: pytest.MonkeyPatch) -> None:
     from pipelines.engine.actions import code
 
     original = code._text
-    monkeypatch.setattr(code, "_text", lambda name: original(name).replace("def fuse(", "def fuse_all("))
+    monkeypatch.setattr(code, "_text", lambda name, state: original(name, state).replace("def fuse(", "def fuse_all("))
     monkeypatch.setattr(code, "_remembered", dict)
     monkeypatch.setattr(code, "_save_memory", lambda: None)
     for known in (code._IDENTITIES.clear, code._source.cache_clear):
