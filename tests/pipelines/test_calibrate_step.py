@@ -31,12 +31,14 @@ from schemas.parameters.extraction import ExtractionParameters
 from schemas.parameters.simulation import SimulationSettings
 
 Calibrated = tuple[dict[str, Outcome], list[str]]
+PARAMETERS = CaptureCalibrationParameters(model="homography")
+"""One model: the others are fitted and compared in the tests of the models."""
 JOINT = ["all-recognise", "calibrate", "own-side", "place"]
 
 
 def steps_of(capture: Path, cache: Path) -> list[Step]:
     inputs = recorded_inputs(read_capture(capture), FileDigests.load(cache / "files.json"))
-    return calibration_steps("scanner", inputs, CaptureCalibrationParameters())
+    return calibration_steps("scanner", inputs, PARAMETERS)
 
 
 def run(capture: Path, cache: Path) -> Calibrated:
@@ -56,7 +58,7 @@ def test_only_what_rests_on_a_changed_film_runs_again(capture: Path, tmp_path: P
     assert not isinstance(result, Failure)
     calibration = Calibration.model_validate_json(open_store(tmp_path / "cache").get(result.digest) or b"")
     assert [camera.camera for camera in calibration.cameras] == [1, 2, 5]
-    made = calibrate_capture(read_capture(capture), CaptureCalibrationParameters(), 2, tmp_path / "other")
+    made = calibrate_capture(read_capture(capture), PARAMETERS, 2, tmp_path / "other")
     assert made.calibration == calibration
     assert run(capture, tmp_path / "cache")[1] == []
 
@@ -77,7 +79,7 @@ def test_another_picture_in_a_film_runs_its_camera_and_what_all_share(capture: P
     assert isinstance(failure, Failure)
     assert failure.kind == "refused"
     with pytest.raises(RefusedInput) as refused:
-        calibrate_capture(read_capture(capture), CaptureCalibrationParameters(), 2)
+        calibrate_capture(read_capture(capture), PARAMETERS, 2)
     assert failure.problem == str(refused.value)
     assert failure.problem.startswith(f"{capture / 'capture.yaml'}: camera 5: sees the object from")
 

@@ -30,7 +30,7 @@ FEET, TEMPLATES = (3, 2) if ASKED is None else (int(ASKED), int(ASKED))
 FURTHEST_MM = 100.0
 SAME_MM = 0.02
 NO_FACES = np.zeros((0, 3), np.int32)
-QUICK = RegistrationParameters(points=3000)
+QUICK = RegistrationParameters(points=1500)
 
 
 @pytest.fixture(scope="module")
