@@ -21,7 +21,7 @@ test: lint    ## lint, then the tests, in the end those that keep time; pages in
 test-slow: lint  ## the tests that repeat whole runs or draw many samples
 	@scripts/browser.sh
 	$(BIN)/pytest -n 2 --dist worksteal -m "slow and not real_time"
-	$(BIN)/pytest -n 4 --dist worksteal -m "slow and real_time" --reruns 2 -r fER
+	$(BIN)/pytest -n 2 --dist worksteal -m "slow and real_time" --reruns 2 -r fER
 
 lint: setup   ## style, layout and types
 	$(BIN)/ruff check

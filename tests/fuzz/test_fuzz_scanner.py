@@ -28,7 +28,7 @@ from pipelines.live.scan_order import LiveResult
 from pipelines.live.scanner import STOPPED
 from schemas.base.errors import Fault, Finding, FootscanError
 
-pytestmark = pytest.mark.real_time  # cameras stream while heads move
+pytestmark = [pytest.mark.real_time, pytest.mark.slow]  # cameras stream while heads move
 
 CASES = int(os.environ.get("FOOTSCAN_FUZZ", "6"))
 FIRST = int(os.environ.get("FOOTSCAN_FUZZ_FIRST", "0"))
