@@ -111,7 +111,8 @@ class ExtractionParameters(Document):
         default=60.0,
         ge=0.0,
         le=1000.0,
-        description="extent in px below which a piece is dropped if most of it has no stripe near in the frame before or after",
+        description="extent in px below which a piece is dropped if most of it has no stripe near in the frame before "
+        "or after",
     )
     largest_blur: float = Field(
         default=1.5,
