@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.capture.head_motion import HeadMotion
-from footscan.capture.pass_agreement import Agreement, Prior, Seen, agree
+from footscan.capture.pass_agreement import Agreement, PassFrames, Prior, agree
 from footscan.stripe.points import StripePoints
 from schemas.base.errors import Finding
 from schemas.base.image_size import FRAME_SIZE
@@ -47,7 +47,7 @@ AROUND = 2
 WAVES = 4
 """Cosines of 0 to 3 half waves over the picture's columns and rows."""
 COMPONENTS = 6
-"""Principal components of the sums: most of what changes is the stripe's length."""
+"""Number of principal components of the sums; most of the variance is that of the stripe's length. Chosen by hand."""
 ROUNDS = 15
 LARGEST_STEP = np.array([0.02, 0.2, 0.5])
 
@@ -93,20 +93,20 @@ def estimate_latency(camera: int, passes: Sequence[Pass]) -> Latency:
         Too little is seen of the object, all passes go one way at one speed, passes contradict each other, or the
         latency cannot be told well enough.
     """
-    seen = _observe(camera, passes)
-    wavers = float(np.std(seen.delay_s)) > LEAST_DELAY_S
+    frames = _observe(camera, passes)
+    wavers = float(np.std(frames.delay_s)) > LEAST_DELAY_S
     start = np.array([0.0, 0.0, SHARE[0] if wavers else 0.0])
     # Where delays say nothing the share stays where it is.
     prior = Prior(start, np.array([0.0, PLAY_MM**-2, SHARE[1] ** -2 if wavers else 1e12]))
-    scale = np.ones(seen.figures.shape[1])
-    tried = [agree(seen, start + np.array([latency, 0.0, 0.0]), scale) for latency in LATENCIES]
+    scale = np.ones(frames.figures.shape[1])
+    tried = [agree(frames, start + np.array([latency, 0.0, 0.0]), scale) for latency in LATENCIES]
     fit = min(tried, key=lambda each: each.cost)
     for _ in range(ROUNDS):
-        fit = agree(seen, fit.unknown, scale, fit.local_weights())
+        fit = agree(frames, fit.unknown, scale, fit.local_weights())
         scale = scale * fit.scale()
-        fit = agree(seen, fit.unknown, scale, fit.weights)
+        fit = agree(frames, fit.unknown, scale, fit.weights)
         step = np.clip(fit.step(prior), -LARGEST_STEP, LARGEST_STEP)
-        fit = agree(seen, fit.unknown + step, scale, fit.weights)
+        fit = agree(frames, fit.unknown + step, scale, fit.weights)
         if abs(step[0]) < 1e-6:
             break
     covariance = fit.covariance(prior)
@@ -121,8 +121,8 @@ def estimate_latency(camera: int, passes: Sequence[Pass]) -> Latency:
     )
 
 
-def _observe(camera: int, passes: Sequence[Pass]) -> Seen:
-    """The frames in which the object is seen, and those around them."""
+def _observe(camera: int, passes: Sequence[Pass]) -> PassFrames:
+    """Select the frames that show the object, and those around them."""
     sums, kept, speeds = [], [], []
     for each in passes:
         count = len(each.seconds)
@@ -141,7 +141,7 @@ def _observe(camera: int, passes: Sequence[Pass]) -> Seen:
             f"camera {camera}: all passes go at {np.median(speeds):.0f} mm/s, expected passes in both directions: "
             "a latency shows in their difference alone"
         )
-    return Seen(
+    return PassFrames(
         figures=_principal(np.concatenate(sums)),
         seconds=np.concatenate([each.seconds[frames] for each, frames in zip(passes, kept, strict=True)]),
         delay_s=np.concatenate([each.delay_s[frames] for each, frames in zip(passes, kept, strict=True)]),
@@ -161,7 +161,7 @@ def _cosine_sums(stripe: StripePoints, frames: int) -> Floats:
 
 
 def _principal(sums: Floats) -> Floats:
-    """(N, COMPONENTS) the largest principal components, each with a standard deviation of 1."""
+    """Return the largest principal components (N, COMPONENTS), each with a standard deviation of 1."""
     centred = sums - sums.mean(axis=0)
     components, _, _ = np.linalg.svd(centred, full_matrices=False)
     return np.asarray(components[:, :COMPONENTS] * np.sqrt(len(sums)))

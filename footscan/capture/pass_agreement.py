@@ -21,35 +21,35 @@ from footscan.robust import MAD_TO_SD
 Floats = NDArray[np.float64]
 
 DEGREE = 3
-"""Of the splines. No two of their basis functions overlap that are farther apart: the normal equations are banded."""
+"""Degree of the splines; basis functions farther apart do not overlap, so that the normal equations are banded."""
 FRAMES_A_KNOT = 3.0
 """Mean number of frames between two knots of a curve. Chosen by hand."""
 CLUSTER_S = 0.5
-"""Within such a time errors may be alike: a report of the controller that is off takes several frames with it."""
+"""Errors within this time may be correlated: a wrong report of the controller affects several frames."""
 AROUND = 9
-"""Frames, by their X, that tell how well a curve follows."""
+"""Number of frames, in the order of X, over which residuals are averaged for the weights. Chosen by hand."""
 RIDGE = 1e-9
 LEAST_FREEDOM = 0.05
 """Lower bound of 1 - leverage: it limits the weight of frames that determine the curve alone. Chosen by hand."""
 
 
 @dataclass(frozen=True)
-class Seen:
+class PassFrames:
     """The frames of all passes."""
 
     figures: Floats
-    """(N, M), each of about unit size."""
+    """(N, M) figures of the stripe, each with about unit variance."""
     seconds: Floats
-    """(N,) the camera's times."""
+    """(N,) times of the frames by the camera's clock, s."""
     delay_s: Floats
-    """(N,)"""
+    """(N,) delays of the frames."""
     of_pass: NDArray[np.intp]
-    """(N,)"""
+    """(N,) number of the pass of each frame."""
     motions: Sequence[HeadMotion]
-    """Of each pass."""
+    """Motion of the head in each pass."""
 
     def places(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """(N,) X of each frame, and (N, 3) how it changes with the unknowns: latency (s), play (mm) and share."""
+        """Return X of each frame (N,), and its derivatives (N, 3) by the unknowns: latency (s), play (mm) and share."""
         taken = self.seconds + unknown[2] * self.delay_s - unknown[0]
         x, speed = np.empty(len(taken)), np.empty(len(taken))
         for k, motion in enumerate(self.motions):
@@ -65,27 +65,27 @@ class Prior:
 
     expected: Floats
     information: Floats
-    """One over the variance; 0 where nothing is known."""
+    """One over the variance; 0 without prior knowledge."""
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """The fit for one set of unknowns."""
+    """The fit of the curves for one set of unknowns."""
 
-    seen: Seen
+    frames: PassFrames
     unknown: Floats
     x: Floats
-    """(N,) mm"""
+    """(N,) X of the frames, mm."""
     weights: Floats
-    """(N,)"""
+    """(N,) weights of the frames."""
     residuals: Floats
     """(N, M) in units of `scale`."""
     held_out: Floats
-    """(N, M) the same, had the curves been fitted without that frame."""
+    """(N, M) residuals under curves that were fitted without the frame, in the same unit."""
     slopes: Floats
-    """(N, M) of the curves, a mm, in the same."""
+    """(N, M) slopes of the curves, in the same unit per mm."""
     jacobian: Floats
-    """(N, M, 3) of what the curves foretell, of which they themselves have taken their part."""
+    """(N, M, 3) derivatives of the predicted figures by the unknowns, projected onto what the curves cannot explain."""
 
     @property
     def cost(self) -> float:
@@ -93,31 +93,31 @@ class Agreement:
         return float(np.sum(self.weights[:, None] * self.residuals**2))
 
     def step(self, prior: Prior) -> Floats:
-        """Of Gauss and Newton, (3,)."""
+        """Return the Gauss-Newton step of the unknowns, (3,)."""
         pull = np.einsum("n,nma,nm->a", self.weights, self.jacobian, self.residuals)
         pull += prior.information * (prior.expected - self.unknown)
         return np.asarray(np.linalg.solve(self._information(prior), pull))
 
     def covariance(self, prior: Prior) -> Floats:
-        """(3, 3) of the unknowns; errors of frames taken at about one time may be anything.
+        """Return the covariance (3, 3) of the unknowns; errors of frames within `CLUSTER_S` may be correlated.
 
         The sandwich estimator with residuals as of frames held out (HC3: J. G. MacKinnon and H. White, Journal of
         Econometrics 29 (1985) 305-325), summed over clusters.
         """
         bread = np.linalg.inv(self._information(prior))
         scores = np.einsum("n,nma,nm->na", self.weights, self.jacobian, self.held_out)
-        at = np.floor(self.seen.seconds / CLUSTER_S).astype(np.int64) * 1000 + self.seen.of_pass
+        at = np.floor(self.frames.seconds / CLUSTER_S).astype(np.int64) * 1000 + self.frames.of_pass
         _, cluster = np.unique(at, return_inverse=True)
         summed = np.stack([np.bincount(cluster, column) for column in scores.T], axis=1)
-        # Few clusters that count make the estimate too small: by (G - 1) / G, G of them being equal.
+        # With few effective clusters, G of equal size, the estimate is too small by (G - 1) / G.
         effective = np.sum(summed**2, axis=0) ** 2 / np.maximum(np.sum(summed**4, axis=0), 1e-300)
         summed *= np.sqrt(effective / np.maximum(effective - 1.0, 0.5))
         return np.asarray(bread @ (summed.T @ summed + np.diag(prior.information)) @ bread)
 
     def local_weights(self) -> Floats:
-        """(N,) one over how far off frames around are, in X, as mean square; of mean 1.
+        """Return weights (N,) of mean 1: the inverse of the mean square residual of the neighbours in X.
 
-        Where a stripe appears at once, along an upright edge, no smooth curve follows: such places must not count.
+        Where the stripe appears suddenly, at an upright edge, no smooth curve follows: such places must not count.
         """
         order = np.argsort(self.x, kind="stable")
         squares = np.mean(self.held_out**2, axis=1)[order]
@@ -127,26 +127,25 @@ class Agreement:
         return np.asarray(weights / weights.mean())
 
     def scale(self) -> Floats:
-        """(M,) root mean square of each figure's residuals, in units of the figures' own; those that fit to nothing
-        count as 0.01."""
+        """Return the root mean square residual of each figure (M,), in its own unit; 0.01 at least."""
         return np.asarray(np.sqrt(np.average(self.residuals**2, axis=0, weights=self.weights)).clip(0.01))
 
     def frame_sd_s(self) -> float:
-        """How far off the time of a frame alone would have to be, for its figures to be off as they are."""
+        """Return the robust standard deviation of the time of a single frame that its residuals imply, s."""
         times = self.jacobian[:, :, 0]
-        told = np.sum(times**2, axis=1)
-        clear = told >= np.quantile(told, 0.8)
-        errors = np.sum(times * self.residuals, axis=1)[clear] / told[clear]
+        information = np.sum(times**2, axis=1)
+        clear = information >= np.quantile(information, 0.8)
+        errors = np.sum(times * self.residuals, axis=1)[clear] / information[clear]
         return float(MAD_TO_SD * np.median(np.abs(errors)))
 
     def _information(self, prior: Prior) -> Floats:
-        told = np.einsum("n,nma,nmb->ab", self.weights, self.jacobian, self.jacobian)
-        return np.asarray(told + np.diag(prior.information))
+        information = np.einsum("n,nma,nmb->ab", self.weights, self.jacobian, self.jacobian)
+        return np.asarray(information + np.diag(prior.information))
 
 
-def agree(seen: Seen, unknown: Floats, scale: Floats, weights: Floats | None = None) -> Agreement:
-    """How well passes agree for `unknown` (latency, play, share), figures being counted in units of `scale` (M,)."""
-    x, changes = seen.places(unknown)
+def agree(frames: PassFrames, unknown: Floats, scale: Floats, weights: Floats | None = None) -> Agreement:
+    """Fit the curves for `unknown` (latency, play, share), with figures in units of `scale` (M,)."""
+    x, changes = frames.places(unknown)
     weights = np.ones(len(x)) if weights is None else weights
     low, high = float(x.min()), float(x.max())
     knots = np.pad(np.linspace(low, high, max(int(len(x) / FRAMES_A_KNOT), 4)), DEGREE, mode="edge")
@@ -159,7 +158,7 @@ def agree(seen: Seen, unknown: Floats, scale: Floats, weights: Floats | None = N
     def fitted(values: Floats) -> Floats:
         return np.asarray(cho_solve_banded(factor, np.asarray(basis.T @ (weights[:, None] * values))))
 
-    figures = seen.figures / scale
+    figures = frames.figures / scale
     curves = fitted(figures)
     slopes = np.asarray(BSpline(knots, curves, DEGREE).derivative()(x))
     ahead = (slopes[:, :, None] * changes[:, None, :]).reshape(len(x), -1)
@@ -168,4 +167,4 @@ def agree(seen: Seen, unknown: Floats, scale: Floats, weights: Floats | None = N
     rows = basis.T.toarray()
     leverage = weights * np.einsum("kn,kn->n", cho_solve_banded(factor, rows), rows)
     held_out = residuals / np.maximum(1.0 - leverage, LEAST_FREEDOM)[:, None]
-    return Agreement(seen, unknown, x, weights, residuals, held_out, slopes, jacobian)
+    return Agreement(frames, unknown, x, weights, residuals, held_out, slopes, jacobian)
