@@ -16,7 +16,7 @@ demo: setup   ## films, calibrates, scans and measures a foot; the result is in 
 test: lint    ## lint, then the tests, in the end those that keep time; pages in Debian's Chromium; films are kept in .pytest_cache
 	@scripts/browser.sh
 	$(BIN)/pytest -n 2 --dist worksteal -m "not real_time and not slow"
-	$(BIN)/pytest -n 4 --dist worksteal -m "real_time and not slow" --reruns 2 -r fER
+	$(BIN)/pytest -n 2 --dist worksteal -m "real_time and not slow" --reruns 2 -r fER
 
 test-slow: lint  ## the tests that repeat whole runs or draw many samples
 	@scripts/browser.sh
