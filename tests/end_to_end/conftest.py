@@ -7,20 +7,18 @@ in Zarr once it has run) and `results/`.
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from bench_scan import film_bench, laser_off_of
+from bench_scan import film_bench, laser_off_of, run_footscan
 from chromium import launched
 from shared_folders import MadeOnce
 
 from pipelines.cli.main import run_command
 
 Footscan = Callable[..., subprocess.CompletedProcess[str]]
-FOOTSCAN = Path(sys.executable).with_name("footscan")
 WORKFLOW = """\
 format: footscan.workflow/1
 archive: archive
@@ -29,15 +27,10 @@ results: results
 """
 
 
-def _command(*arguments: object, timeout: float = 300, **options: Any) -> subprocess.CompletedProcess[str]:
-    line = [str(part) for part in (FOOTSCAN, *arguments)]
-    return subprocess.run(line, capture_output=True, text=True, timeout=timeout, check=False, **options)
-
-
 @pytest.fixture(scope="session")
 def command() -> Footscan:
     """`footscan ARGUMENTS` as a process of its own."""
-    return _command
+    return run_footscan
 
 
 @pytest.fixture
@@ -82,14 +75,14 @@ def measured(recorded: Path, made_once: MadeOnce) -> Path:
 
 def _calibrate(filmed: Path, bench: Path) -> None:
     shutil.copytree(filmed, bench)
-    done = _command("calibrate", "chart", bench / "capture" / "chart.csv", "--out", bench / "calibration.json")
+    done = run_footscan("calibrate", "chart", bench / "capture" / "chart.csv", "--out", bench / "calibration.json")
     assert done.returncode == 0, done.stderr
     (bench / "workflow.yaml").write_text(WORKFLOW)
 
 
 def _measure(recorded: Path, bench: Path) -> None:
     shutil.copytree(recorded, bench)
-    done = _command("run", bench / "workflow.yaml")
+    done = run_footscan("run", bench / "workflow.yaml")
     assert done.returncode == 0, done.stderr
     assert done.stderr.splitlines()[0] == "35 of 35 steps to run"
     assert done.stdout == f"P0001/small: {bench / 'results' / 'P0001' / 'small'}\n"

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from footscan.mesh.formats.files import read_mesh
 from footscan.virtual.filming.renderers import Shot, shoot
@@ -17,6 +18,12 @@ FILMING_SECONDS = 1200
 FOOTSCAN = Path(sys.executable).with_name("footscan")
 
 
+def run_footscan(*arguments: object, timeout: float = 300, **options: Any) -> subprocess.CompletedProcess[str]:
+    """`footscan ARGUMENTS` as a process of its own."""
+    line = [str(part) for part in (FOOTSCAN, *arguments)]
+    return subprocess.run(line, capture_output=True, text=True, timeout=timeout, check=False, **options)
+
+
 def film_bench(bench: Path) -> None:
     """Film a capture, and the right foot as a scan."""
     scan = bench / "archive" / "P0001" / "small"
@@ -24,8 +31,7 @@ def film_bench(bench: Path) -> None:
         ("capture", "--out", bench / "capture"),
         ("scan", "--foot", "right", "--out", scan, "--frames", FRAMES, "--step-mm", STEP_MM),
     ):
-        line = [str(part) for part in (FOOTSCAN, "simulate", *arguments)]
-        done = subprocess.run(line, capture_output=True, text=True, timeout=FILMING_SECONDS, check=False)
+        done = run_footscan("simulate", *arguments, timeout=FILMING_SECONDS)
         assert done.returncode == 0, done.stderr
 
 
