@@ -48,6 +48,8 @@ class AviFilm:
             if number in wanted:
                 yield frame
             next_number = number + 1
+            if numbers is not None and next_number > max(wanted, default=-1):
+                return  # nothing behind the last one is read
 
 
 def open_avi(path: Path) -> AviFilm:
