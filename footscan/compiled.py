@@ -77,11 +77,11 @@ class _ModuleLocator:
         return str(self._line)
 
 
-class _ModuleImplementation(FunctionCache._impl_class):  # type: ignore[misc]
+class _ModuleImplementation(FunctionCache._impl_class):  # type: ignore[misc]  # numba has no types
     _locator_classes = (_ModuleLocator,)
 
 
-class _ModuleCache(FunctionCache):  # type: ignore[misc]
+class _ModuleCache(FunctionCache):  # type: ignore[misc]  # as above
     _impl_class = _ModuleImplementation
 
 

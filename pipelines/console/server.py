@@ -105,7 +105,7 @@ class ConsoleServer(uvicorn.Server):
         await super().shutdown(sockets)
 
     def _protocol(self) -> asyncio.Protocol:
-        protocol = self.config.http_protocol_class(  # type: ignore[call-arg]
+        protocol = self.config.http_protocol_class(  # type: ignore[call-arg]  # a class by configuration
             config=self.config, server_state=self.server_state, app_state=self.lifespan.state
         )
         assert isinstance(protocol, asyncio.Protocol)

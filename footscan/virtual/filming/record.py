@@ -54,7 +54,7 @@ def record_scan(
     name: ScanName,
     settings: SimulationSettings,
     *,
-    extras: ScanExtras = ScanExtras(),  # noqa: B008
+    extras: ScanExtras = ScanExtras(),  # noqa: B008 (immutable: all calls may share it)
     surface: Surface = SKIN,
     progress: Progress | None = None,
     workers: int = 2,

@@ -87,7 +87,7 @@ def guarded(source: Path, make: Callable[[], _Made]) -> _Made:
             return make()
     except FootscanError:
         raise
-    except Exception as error:
+    except Exception as error:  # damaged results can make any of the readers raise anything
         log.debug("results that cannot be shown", exc_info=True)
         problem = f"{type(error).__name__}: {error}"[:LONGEST_PROBLEM]
         raise RefusedInput(source, f"cannot be shown ({problem}), expected results of 'footscan run'") from None
