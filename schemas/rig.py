@@ -10,6 +10,7 @@ HeadNumber = Annotated[int, Field(ge=1, le=3)]
 Millimetres = Annotated[float, Field(ge=-1e4, le=1e4)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Milliseconds = Annotated[float, Field(gt=0, le=1000)]
+Positive = Annotated[float, Field(gt=0, le=1e5)]
 Port = Annotated[str, Field(min_length=1, max_length=1000)]
 
 USUAL_HEADS: dict[int, int] = {1: 1, 2: 1, 3: 2, 4: 2, 5: 3, 6: 3, 7: 3, 8: 3}
@@ -34,6 +35,30 @@ class RigHead(Document):
     """X at which its home switch trips; it aligns the heads."""
     direction: Annotated[int, _one_of(-1, 1)] = -1
     """-1 where X grows away from the home switch."""
+
+
+PerHead = Annotated[tuple[Positive, Positive, Positive], Field()]
+"""One value for each of the heads 1, 2, 3: axes X, Y, Z of the board."""
+
+
+class RigBoard(Document):
+    """The mechanics that the controller drives; a board with other settings is refused."""
+
+    steps_per_mm: PerHead = (80.0, 80.0, 80.0)
+    """Belt with 2 mm teeth, pulley with 20, 1/16 steps of 1.8 degrees: 3200 / 40."""
+    max_mm_per_s: PerHead = (100.0, 100.0, 100.0)
+    """Highest speed of each head; 36.4 mm/s take 40 cm in 11 s."""
+    mm_per_s2: PerHead = (500.0, 500.0, 500.0)
+    """Acceleration."""
+    travel_mm: PerHead = (430.0, 430.0, 430.0)
+    """Longest way of a head from its home switch: less than the distance of the two switches."""
+    homing_mm_per_s: Positive = 40.0
+    homing_slow_mm_per_s: Positive = 2.0
+    """Speed at which the switch is approached for the second time, which gives the position."""
+    pull_off_mm: Positive = 2.0
+    """Distance of a head from its home switch after homing."""
+    full_power: Positive = 1000.0
+    """S at which the laser is at full power."""
 
 
 class RigLatency(Document):
@@ -123,6 +148,7 @@ class Rig(Document):
     """Serial port of the board, best a stable name: /dev/serial/by-id/..."""
     heads: Annotated[tuple[RigHead, RigHead, RigHead], Field()] = (RigHead(), RigHead(), RigHead())
     """Of axes X, Y and Z: head 1 above on the +Y side, head 2 above on the -Y side, head 3 below."""
+    board: RigBoard = RigBoard()
     cameras: Annotated[list[RigCamera], Field(min_length=1, max_length=8), AfterValidator(_each_once)]
     travel: RigTravel = RigTravel()
     frames_per_second: Annotated[float, Field(gt=0, le=240)] = 200.0 / 11.0

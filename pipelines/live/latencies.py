@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from footscan.capture.film_frames import is_on_time, motion_of_head
-from footscan.capture.grbl.settings import BoardSettings
 from footscan.capture.latency import Latency, estimate_latency
 from footscan.capture.latency import Pass as LatencyPass
 from footscan.capture.passes import FilmedPass, PassPlan, film_name
@@ -58,7 +57,7 @@ def measure_latencies(
         As `LiveScanner.scan`.
     """
     rig = scanner.rig
-    fastest = FASTEST_SHARE * min(BoardSettings().max_mm_per_s)
+    fastest = FASTEST_SHARE * min(rig.board.max_mm_per_s)
     plans = [
         PassPlan(*ends, min(factor * rig.travel.mm_per_s, fastest), light.power)
         for factor in FASTER

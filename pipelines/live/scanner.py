@@ -304,7 +304,7 @@ class LiveScanner:
             self._heads.close()
             self._heads = None
         if self._heads is None:
-            self._heads = Heads(self.rig.port, heads=heads_of(self.rig))
+            self._heads = Heads(self.rig.port, self.rig.board, heads=heads_of(self.rig))
 
     def _home_if_needed(self) -> None:
         self._refuse_stopped()

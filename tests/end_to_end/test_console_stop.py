@@ -91,8 +91,15 @@ def test_stop_is_behind_nothing(scanner: Scanner, held: str) -> None:
     assert len(said) < 2000, said
 
 
-@pytest.mark.parametrize("stage", ["homing", "travelling"])
-def test_stop_waits_for_nothing_that_the_heads_do(scanner: Scanner, stage: str) -> None:
+@pytest.fixture
+def far(tmp_path: Path) -> Iterator[Scanner]:
+    """Its heads need two seconds to their home switches."""
+    yield from scanners(tmp_path, (-200.0, -200.0, -200.0))
+
+
+@pytest.mark.parametrize(("stage", "heads"), [("homing", "far"), ("travelling", "scanner")])
+def test_stop_waits_for_nothing_that_the_heads_do(stage: str, heads: str, request: pytest.FixtureRequest) -> None:
+    scanner: Scanner = request.getfixturevalue(heads)
     process = scanner.start("console")
     assert process.stdout is not None
     address = str(process.stdout.readline()).strip()

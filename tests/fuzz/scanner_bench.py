@@ -17,7 +17,7 @@ import simplejpeg
 from numpy.typing import NDArray
 
 from footscan.capture.film_frames import FilmFrames
-from footscan.capture.grbl.settings import BoardSettings
+from footscan.capture.grbl.settings import required_settings
 from footscan.frames.film import open_film
 from footscan.frames.travel import read_positions
 from footscan.recordings.scans import read_scan
@@ -29,20 +29,20 @@ from pipelines.live.scanner import LiveScanner
 from pipelines.live.storing import ScanName, next_scan_name
 from schemas.base.json_files import read_json
 from schemas.recording import RecordedCamera, Recording
-from schemas.rig import Rig, RigCamera, RigLatency, RigTravel
+from schemas.rig import Rig, RigBoard, RigCamera, RigLatency, RigTravel
 
 CAMERAS = range(1, 9)
 RATE = 10.0
 LATENCY_S = 0.04
 START_MM, LENGTH_MM, MM_PER_S = 0.0, 20.0, 10.0
 STEP_MM = MM_PER_S / RATE
-SETTINGS = BoardSettings(
+SETTINGS = RigBoard(
     max_mm_per_s=(400.0, 400.0, 400.0),
     mm_per_s2=(8000.0, 8000.0, 8000.0),
     homing_mm_per_s=400.0,
     homing_slow_mm_per_s=80.0,
 )
-QUICK = {**SETTINGS.wanted(), 26: 2}
+QUICK = {**required_settings(SETTINGS), 26: 2}
 """A board that takes no time to speed up and to home."""
 DAY = datetime.date(2026, 11, 20)
 NUMBER = re.compile(rb"\xff\xfe..exposure (\d+)", re.DOTALL)

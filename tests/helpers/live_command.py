@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import quick_rig
 import simplejpeg
 from waiting import LONG_SECONDS, wait_until
 
@@ -23,6 +24,7 @@ RIG = """\
 format: footscan.rig/1
 scanner: S1
 port: {port}
+{board}
 cameras:
   - {{id: 1, device: "{camera}", latency: {{seconds: 0.04, sd_s: 0.001, frame_sd_s: 0.002}}}}
 frames_per_second: 20
@@ -107,10 +109,10 @@ def order(address: str, name: str, body: bytes = b"{}", *, when_idle: bool = Fal
 
 def scanners(folder: Path, heads_at: tuple[float, float, float]) -> Iterator[Scanner]:
     with (
-        Board(heads_at=heads_at) as board,
+        Board(heads_at=heads_at, settings=quick_rig.SETTINGS) as board,
         VirtualStreams((1,), lambda *_: GREY, free_running(20.0), latency_s=0.04) as streams,
     ):
-        (folder / "rig.yaml").write_text(RIG.format(port=board.port, camera=streams.url(1)))
+        (folder / "rig.yaml").write_text(RIG.format(port=board.port, board=quick_rig.YAML, camera=streams.url(1)))
         one = Scanner(board, folder)
         yield one
         for process in one.running:

@@ -42,6 +42,8 @@ def test_a_short_rig_has_the_thesis_travel(tmp_path: Path) -> None:
         ("20:81", "21:81", "cameras: device http://192.168.1.21:81/stream is listed twice, expected each once"),
         ("id: 5", "id: 9", "cameras.1.id: "),
         ("head: 2", "head: 4", "cameras.2.head: "),
+        ("port:", "board: {travel_mm: [430, 430, 0]}\nport:", "board.travel_mm.2: "),
+        ("port:", "board: {travel_mm: [430, 430]}\nport:", "board.travel_mm.2: "),
         ("port:", "light: {shortest_ms: 30}\nport:", "shortest_ms: expected at most longest_ms, 20, found 30"),
         ("port:", "travel: {mm_per_s: 0}\nport:", "travel.mm_per_s: "),
         ("port:", "serial:", "serial: unknown field"),

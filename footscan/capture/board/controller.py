@@ -17,9 +17,10 @@ from footscan.capture.board.termination import BOARDS
 from footscan.capture.grbl.codes import alarm_in_words
 from footscan.capture.grbl.protocol import GrblProtocol
 from footscan.capture.grbl.report import Feedback, Message, Setting
-from footscan.capture.grbl.settings import SAME, BoardSettings, setting_line
+from footscan.capture.grbl.settings import SAME, check_settings, setting_line, setup_lines
 from footscan.capture.grbl.status_poll import TimedReport
 from schemas.base.errors import Fault, RefusedInput
+from schemas.rig import RigBoard
 
 RESUME, DOOR, JOG_CANCEL, RESET = b"~", b"\x84", b"\x85", b"\x18"
 OVERRIDES_AWAY = b"\x90\x95\x99"
@@ -34,13 +35,13 @@ DARK_BY_ITSELF = "light goes out at the end of the motion under way at latest; s
 class Controller:
     """The board behind a serial port. All methods may be called from any thread."""
 
-    def __init__(self, port: str, settings: BoardSettings | None = None, *, patience_seconds: float = 2.0) -> None:
+    def __init__(self, port: str, setup: RigBoard | None = None, *, patience_seconds: float = 2.0) -> None:
         """Open the port and reset the board, so that its lasers are off and its state is known.
 
         Parameters
         ----------
         port : name of the serial port, preferably a stable one (/dev/serial/by-id/...).
-        settings : settings that the board must have; None accepts any.
+        setup : settings that the board must have; None accepts any.
         patience_seconds : limit of the wait for answers that take the board no time.
 
         Raises
@@ -61,8 +62,8 @@ class Controller:
         try:
             BOARDS.enlist(self._last_stop)
             self._connect()
-            if settings is not None:
-                self.check(settings)
+            if setup is not None:
+                self.check(setup)
         except BaseException:
             self.close()
             raise
@@ -126,22 +127,22 @@ class Controller:
         """Read all settings of the board, by number."""
         return {message.number: message.value for message in self.send("$$") if isinstance(message, Setting)}
 
-    def check(self, settings: BoardSettings) -> None:
+    def check(self, setup: RigBoard) -> None:
         """Refuse a board with other settings; the error names the first wrong one and the line to send."""
         source = f"board at {self.port}"
         try:
-            settings.check(self.settings(), source)
+            check_settings(self.settings(), setup, source)
         except RefusedInput:
-            settings.check(self.settings(), source)  # read again: a byte may have been lost on the line
+            check_settings(self.settings(), setup, source)  # read again: a byte may have been lost on the line
 
-    def apply(self, settings: BoardSettings) -> list[str]:
+    def apply(self, setup: RigBoard) -> list[str]:
         """Write the settings that differ, read all back, and return the lines that were sent; then home the heads."""
         present = self.settings()
-        different = [line for line in settings.lines() if not _holds(line, present)]
+        different = [line for line in setup_lines(setup) if not _holds(line, present)]
         for line in different:
             self._board.homed = False
             self.send(line)
-        self.check(settings)
+        self.check(setup)
         return different
 
     def change(self, number: int, value: float) -> None:

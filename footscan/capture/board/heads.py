@@ -16,9 +16,9 @@ from footscan.capture.board.controller import Controller
 from footscan.capture.board.position_log import HeadPosition, PositionLog, Triple
 from footscan.capture.board.state import BoardState
 from footscan.capture.grbl.report import Report
-from footscan.capture.grbl.settings import BoardSettings
 from footscan.capture.grbl.status_poll import TimedReport
 from schemas.base.errors import Fault, RefusedInput
+from schemas.rig import RigBoard
 
 HEADS = (1, 2, 3)
 SLACK_MM = 0.05
@@ -73,13 +73,13 @@ class Heads:
     def __init__(
         self,
         port: str,
-        settings: BoardSettings | None = None,
+        setup: RigBoard | None = None,
         heads: Sequence[Head] = (Head(), Head(), Head()),
         *,
         patience_seconds: float = 2.0,
     ) -> None:
-        """Connect to the board at `port`, which must have these `settings`; raises the errors of `Controller`."""
-        self.settings = settings or BoardSettings()
+        """Connect to the board at `port`, which must be set up as `setup`; raises the errors of `Controller`."""
+        self.setup = setup or RigBoard()
         self.heads = tuple(heads)
         self.log = PositionLog()
         """Positions of the heads from all reports while they are homed."""
@@ -89,7 +89,7 @@ class Heads:
         self.board = Controller(port, patience_seconds=patience_seconds)
         try:
             self._restore_limits()
-            self.board.check(self.settings)
+            self.board.check(self.setup)
         except BaseException:
             self.board.close()
             raise
@@ -116,8 +116,8 @@ class Heads:
     def reach_mm(self) -> tuple[float, float]:
         """Lowest and highest world X that all heads can reach, mm."""
         ends = [
-            sorted((head.world(-self.settings.pull_off_mm), head.world(-travel)))
-            for head, travel in zip(self.heads, self.settings.travel_mm, strict=True)
+            sorted((head.world(-self.setup.pull_off_mm), head.world(-travel)))
+            for head, travel in zip(self.heads, self.setup.travel_mm, strict=True)
         ]
         return max(low for low, _ in ends), min(high for _, high in ends)
 
@@ -156,7 +156,7 @@ class Heads:
         """
         self._check_travel(start_mm, end_mm, mm_per_s)
         way = 1.0 if end_mm >= start_mm else -1.0
-        run_up = mm_per_s**2 / (2.0 * min(self.settings.mm_per_s2))
+        run_up = mm_per_s**2 / (2.0 * min(self.setup.mm_per_s2))
         low, high = self.reach_mm
         begin, end = (min(max(x, low), high) for x in (start_mm - way * run_up, end_mm + way * run_up))
         self.travel_to(begin)
@@ -164,7 +164,7 @@ class Heads:
 
     def travel_to(self, x_mm: float, mm_per_s: float | None = None) -> Travel:
         """Move all heads to `x_mm` with the lasers off, and wait; default speed: full speed."""
-        speed = mm_per_s or min(self.settings.max_mm_per_s)
+        speed = mm_per_s or min(self.setup.max_mm_per_s)
         self._check_travel(x_mm, x_mm, speed)
         at = self._world(self.board.status().report)
         farthest = max(at, key=lambda x: abs(x - x_mm))
@@ -242,7 +242,7 @@ class Heads:
         """
         low, high = self.reach_mm
         home = low if abs(self.heads[0].world(0.0) - low) < abs(self.heads[0].world(0.0) - high) else high
-        slow = self.settings.homing_slow_mm_per_s
+        slow = self.setup.homing_slow_mm_per_s
         try:
             self.travel_to(home)
             self._go_machine([-FEELER_MM] * 3, slow, 0.0)
@@ -250,7 +250,7 @@ class Heads:
             self.board.change(HARD_LIMITS, 0)
             tripped = self._feel_switches()
             self.board.change(SOFT_LIMITS, 1)  # before the way back, hard ones behind it: leaving a switch trips them
-            self._go_machine([-self.settings.pull_off_mm] * 3, slow, 0.0)
+            self._go_machine([-self.setup.pull_off_mm] * 3, slow, 0.0)
             self.board.change(HARD_LIMITS, 1)
             self.travel_to(home)
         except BaseException:
@@ -280,7 +280,7 @@ class Heads:
         along = [abs(b - a) for a, b in zip(at, target, strict=True)]
         # The feed is the speed in the space of the three axes: for three equal ones, sqrt(3) times their speed.
         feed = mm_per_s * math.hypot(*along) / max(*along, 1e-9)
-        seconds = abs(end_mm - begin_mm) / mm_per_s + 2.0 * mm_per_s / min(self.settings.mm_per_s2)
+        seconds = abs(end_mm - begin_mm) / mm_per_s + 2.0 * mm_per_s / min(self.setup.mm_per_s2)
         began = time.monotonic()
         self._brightest = 0.0
         self._go_machine(target, feed, power, seconds)
@@ -311,7 +311,7 @@ class Heads:
 
     def _check_light(self, power: float, seconds: float) -> None:
         """Check that a travel of some length had the power that was sent, and a dark one none; Fault if not."""
-        wanted = round(power * self.settings.full_power)
+        wanted = round(power * self.setup.full_power)
         if self._brightest > wanted + 1 or (seconds > 1.0 and self._brightest < wanted - 1):
             powers = f"sent S{wanted}, put out S{self._brightest:g}"
             raise Fault(f"the lasers were not as bright as they should be on this travel ({powers}); try again")
@@ -323,7 +323,7 @@ class Heads:
         into a step of a millimetre at most.
         """
         tripped: list[float | None] = [None, None, None]
-        feed = 60.0 * self.settings.homing_slow_mm_per_s * math.sqrt(3.0)
+        feed = 60.0 * self.setup.homing_slow_mm_per_s * math.sqrt(3.0)
         step = "".join(f"{axis}{FEELER_STEP_MM:g}".replace("0.", ".") for axis in "XYZ")
         for _ in range(round(2.0 * FEELER_MM / FEELER_STEP_MM)):
             self.board.send(f"G91G1{step}F{feed:.0f}")
@@ -345,7 +345,7 @@ class Heads:
                 raise RefusedInput("travel", _out_of_reach(x, low, high), field=name)
 
     def _check_speed(self, mm_per_s: float) -> None:
-        most = min(self.settings.max_mm_per_s)
+        most = min(self.setup.max_mm_per_s)
         if not 0.0 < mm_per_s <= most:
             raise RefusedInput("travel", f"expected up to {most:g} mm/s, found {mm_per_s:g}", field="speed")
 
@@ -358,12 +358,12 @@ class Heads:
 
         Grbl searches for a switch over 1.5 times the travel, and again over 5 times the pull-off.
         """
-        s = self.settings
+        s = self.setup
         search = (len(HEADS) - 1 + 1.5) * max(s.travel_mm) / s.homing_mm_per_s
         return search + len(HEADS) * (5.0 * s.pull_off_mm / s.homing_slow_mm_per_s + 2.0)
 
     def _s_word(self, power: float) -> str:
-        return f"S{round(power * self.settings.full_power)}"
+        return f"S{round(power * self.setup.full_power)}"
 
     def _world(self, report: Report) -> Triple:
         if report.machine_mm is None:
@@ -386,7 +386,7 @@ class Heads:
 
     def _can_follow(self, before: HeadPosition, entry: HeadPosition) -> bool:
         passed = entry.seconds - before.seconds + entry.uncertain_seconds + before.uncertain_seconds
-        reach = 2.0 * max(self.settings.max_mm_per_s) * passed + SLACK_MM
+        reach = 2.0 * max(self.setup.max_mm_per_s) * passed + SLACK_MM
         return all(abs(b - a) <= reach for a, b in zip(before.x_mm, entry.x_mm, strict=True))
 
 

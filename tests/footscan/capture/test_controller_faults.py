@@ -20,9 +20,10 @@ import pytest
 from waiting import wait_until
 
 from footscan.capture.board.heads import Heads
-from footscan.capture.grbl.settings import BoardSettings
+from footscan.capture.grbl.settings import required_settings
 from footscan.virtual.board.board import Board
 from schemas.base.errors import FootscanError
+from schemas.rig import RigBoard
 
 pytestmark = pytest.mark.real_time  # the board answers on a terminal of the system
 
@@ -31,7 +32,7 @@ FIRST = int(os.environ.get("FOOTSCAN_FUZZ_FIRST", "0"))
 RECORD = os.environ.get("FOOTSCAN_FUZZ_RECORD")
 AT_A_TIME = 5
 PATIENCE_SECONDS = 0.5
-SETTINGS = BoardSettings(
+SETTINGS = RigBoard(
     max_mm_per_s=(400.0, 400.0, 400.0),
     mm_per_s2=(8000.0, 8000.0, 8000.0),
     homing_mm_per_s=400.0,
@@ -65,7 +66,7 @@ def test_fault(number: int, cases: dict[int, "Future[None]"]) -> None:
 
 def try_case(number: int) -> None:
     random = Random(f"serial {number}")
-    with Board(settings={**SETTINGS.wanted(), 26: 2}, heads_at=(-6.0, -4.0, -8.0)) as board:
+    with Board(settings={**required_settings(SETTINGS), 26: 2}, heads_at=(-6.0, -4.0, -8.0)) as board:
         heads = Heads(board.port, SETTINGS, patience_seconds=PATIENCE_SECONDS)
         try:
             heads.home()

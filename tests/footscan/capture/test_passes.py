@@ -20,18 +20,18 @@ from footscan.capture.cameras.source import CameraSource
 from footscan.capture.cameras.stream import CapturedFrame
 from footscan.capture.film_frames import CameraTiming, FilmFrames, motion_of_head, place_frames, standing_frame
 from footscan.capture.frame_positions import Timed
-from footscan.capture.grbl.settings import BoardSettings
 from footscan.capture.passes import FilmedPass, PassPlan, film_name, film_pass
 from footscan.capture.recording import ScanRecording
 from footscan.virtual.board.board import Board
 from footscan.virtual.filming.stream_faults import StreamFault
 from footscan.virtual.filming.streams import SentFrame, VirtualStreams, free_running
 from schemas.base.errors import Fault
+from schemas.rig import RigBoard
 
 pytestmark = pytest.mark.real_time  # cameras stream while heads move
 
 QUICK = {24: 1200, 25: 12000, 26: 5, 110: 12000, 111: 12000, 112: 12000, 120: 2000, 121: 2000, 122: 2000}
-SETTINGS = BoardSettings(
+SETTINGS = RigBoard(
     homing_mm_per_s=200.0, homing_slow_mm_per_s=20.0, max_mm_per_s=(200.0,) * 3, mm_per_s2=(2000.0,) * 3
 )
 CAMERAS = (1, 3, 5)

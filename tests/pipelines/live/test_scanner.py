@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import quick_rig
 import simplejpeg
 from waiting import wait_until
 
@@ -37,6 +38,9 @@ DARK = bytes(simplejpeg.encode_jpeg(np.full((480, 640, 3), 20, np.uint8), 90, "R
 DAY = datetime.date(2026, 11, 20)
 RATE = 20.0
 LATENCY_S = 0.04
+LENGTH_MM = 110.0
+"""Of the travel: part of a foot, but where it is measured."""
+FOOT_MM = 190.0
 STEP_MM = 10.0
 """Spacing of the pictures of the made-up foot."""
 
@@ -80,7 +84,7 @@ def open_bench(pristine: Path, home: Path) -> Iterator[Bench]:
     for camera in (1, 5):
         film = open_film(pristine / f"archive/P0001/S1/cam{camera}.avi")
         films[camera] = [frame if isinstance(frame, bytes) else b"" for frame in film.stored()]
-    with Board(heads_at=(-4.0, -4.0, -4.0)) as board:
+    with Board(heads_at=(-4.0, -4.0, -4.0), settings=quick_rig.SETTINGS) as board:
 
         def picture(camera: int, seconds: float) -> bytes:
             if not board.laser_at(seconds):
@@ -94,8 +98,9 @@ def open_bench(pristine: Path, home: Path) -> Iterator[Bench]:
                 format="footscan.rig/1",
                 scanner="bench",
                 port=board.port,
+                board=quick_rig.QUICK,
                 cameras=[RigCamera(id=c, device=streams.url(c), latency=latency) for c in (1, 5)],
-                travel=RigTravel(start_mm=0.0, length_mm=190.0, mm_per_s=60.0),
+                travel=RigTravel(start_mm=0.0, length_mm=LENGTH_MM, mm_per_s=60.0),
                 frames_per_second=RATE,
             )
             states: list[str] = []
@@ -107,6 +112,8 @@ def open_bench(pristine: Path, home: Path) -> Iterator[Bench]:
 
 def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
     calibration, results = pristine / "calibration.json", bench.home / "results"
+    travel = bench.scanner.rig.travel.model_copy(update={"length_mm": FOOT_MM})
+    bench.scanner.rig = bench.scanner.rig.model_copy(update={"travel": travel})
     result = bench.scanner.scan(bench.order(calibration=calibration, results=results))
     assert bench.scanner.state.name == "done"
     begun = [name for name, before in zip(bench.states, ["", *bench.states], strict=False) if name != before]
@@ -122,7 +129,7 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
         x = read_positions(scan.folder / str(camera.positions))
         assert np.all(np.diff(x) > 0)
         assert x[0] < 4 * 3.0
-        assert x[-1] > 190.0 - 4 * 3.0
+        assert x[-1] > FOOT_MM - 4 * 3.0
         assert open_film(scan.film(camera)).count == len(x) == told.stored + len(told.lost)
         background = scan.background(camera)
         assert background is not None

@@ -10,21 +10,22 @@ import pytest
 from waiting import LONG_SECONDS, fault_of, wait_until
 
 from footscan.capture.board.controller import Controller
-from footscan.capture.grbl.settings import BoardSettings
+from footscan.capture.grbl.settings import required_settings
 from footscan.virtual.board.board import Board
 from footscan.virtual.board.memory import FACTORY, Build
 from schemas.base.errors import Fault, RefusedInput
+from schemas.rig import RigBoard
 
 pytestmark = pytest.mark.real_time  # the board answers on a terminal of the system
 
 HOMING_SECONDS = 60.0
-SETTINGS = BoardSettings(
+SETTINGS = RigBoard(
     max_mm_per_s=(400.0, 400.0, 400.0),
     mm_per_s2=(16000.0, 16000.0, 16000.0),
     homing_mm_per_s=400.0,
     homing_slow_mm_per_s=100.0,
 )
-QUICK = {**SETTINGS.wanted(), 26: 5}
+QUICK = {**required_settings(SETTINGS), 26: 5}
 
 
 @pytest.fixture

@@ -13,20 +13,21 @@ from waiting import LONG_SECONDS, fault_of, wait_until
 
 from footscan.capture.board.heads import Head, Heads
 from footscan.capture.board.position_log import HeadPosition, PositionLog
-from footscan.capture.grbl.settings import BoardSettings
+from footscan.capture.grbl.settings import required_settings
 from footscan.virtual.board.board import Board
 from footscan.virtual.board.rails import Gait, Mount
 from schemas.base.errors import Fault, RefusedInput
+from schemas.rig import RigBoard
 
 pytestmark = pytest.mark.real_time  # the board answers on a terminal of the system
 
-SETTINGS = BoardSettings(
+SETTINGS = RigBoard(
     max_mm_per_s=(400.0, 400.0, 400.0),
     mm_per_s2=(4000.0, 4000.0, 4000.0),
     homing_mm_per_s=400.0,
     homing_slow_mm_per_s=100.0,
 )
-QUICK = {**SETTINGS.wanted(), 26: 5}
+QUICK = {**required_settings(SETTINGS), 26: 5}
 NEAR = (-12.0, -8.0, -20.0)
 
 
@@ -145,7 +146,7 @@ def test_what_is_out_of_reach_is_refused_before_anything_moves(shared: tuple[Boa
 def test_forty_centimetres_in_eleven_seconds_are_within_reach() -> None:
     low, high = -18.0, 410.0
     assert high - low >= 400.0
-    assert min(BoardSettings().max_mm_per_s) > 400.0 / 11.0
+    assert min(RigBoard().max_mm_per_s) > 400.0 / 11.0
 
 
 def test_heads_that_are_not_homed_do_not_travel(board: Board) -> None:
@@ -312,11 +313,12 @@ def test_a_pulled_cable_leaves_light_for_the_motion_under_way_alone(board: Board
 
 PROGRAM = """
 import sys
-from footscan.capture.grbl.settings import BoardSettings
+from footscan.capture.grbl.settings import required_settings
+from schemas.rig import RigBoard
 from footscan.capture.board.heads import Heads
 from footscan.capture.board.termination import signals_end_the_program
 
-quick = BoardSettings((80.0,) * 3, (400.0,) * 3, (4000.0,) * 3, homing_mm_per_s=400.0, homing_slow_mm_per_s=100.0)
+quick = RigBoard((80.0,) * 3, (400.0,) * 3, (4000.0,) * 3, homing_mm_per_s=400.0, homing_slow_mm_per_s=100.0)
 with signals_end_the_program(), Heads(sys.argv[1], quick) as heads:
     heads.home()
     heads.lasers(0.5)

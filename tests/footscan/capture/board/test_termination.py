@@ -14,24 +14,26 @@ import pytest
 from waiting import LONG_SECONDS, fault_of, wait_until
 
 from footscan.capture.board.heads import Heads
-from footscan.capture.grbl.settings import BoardSettings
+from footscan.capture.grbl.settings import required_settings
 from footscan.virtual.board.board import Board
 from schemas.base.errors import Fault
+from schemas.rig import RigBoard
 
 pytestmark = pytest.mark.real_time  # a process is to stop the board within a moment of a signal
 
 ROOT = Path(__file__).parents[4]
 WITHIN_SECONDS = 0.3
-SETTINGS = BoardSettings(
+SETTINGS = RigBoard(
     max_mm_per_s=(400.0,) * 3, mm_per_s2=(4000.0,) * 3, homing_mm_per_s=400.0, homing_slow_mm_per_s=100.0
 )
 BEGIN = """
 import hashlib, signal, sys, threading, time
-from footscan.capture.grbl.settings import BoardSettings
+from footscan.capture.grbl.settings import required_settings
+from schemas.rig import RigBoard
 from footscan.capture.board.heads import Heads
 from footscan.capture.board.termination import signals_end_the_program
 
-quick = BoardSettings(
+quick = RigBoard(
     max_mm_per_s=(400.0,) * 3, mm_per_s2=(4000.0,) * 3, homing_mm_per_s=400.0, homing_slow_mm_per_s=100.0
 )
 
@@ -84,7 +86,7 @@ time.sleep(float(sys.argv[3]))
 
 @pytest.fixture
 def board() -> Iterator[Board]:
-    with Board(settings={**SETTINGS.wanted(), 26: 5}, heads_at=(-12.0, -8.0, -20.0)) as one:
+    with Board(settings={**required_settings(SETTINGS), 26: 5}, heads_at=(-12.0, -8.0, -20.0)) as one:
         yield one
 
 

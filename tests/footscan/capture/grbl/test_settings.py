@@ -2,17 +2,17 @@
 
 import pytest
 
-from footscan.capture.grbl.settings import BoardSettings, setting_line
+from footscan.capture.grbl.settings import check_settings, required_settings, setting_line, setup_lines
 from schemas.base.errors import RefusedInput
+from schemas.rig import RigBoard
 
 
 def test_a_board_that_is_set_up_is_taken() -> None:
-    settings = BoardSettings()
-    settings.check({**settings.wanted(), 11: 0.01, 12: 0.002}, "board")
+    check_settings({**required_settings(RigBoard()), 11: 0.01, 12: 0.002}, RigBoard(), "board")
 
 
 def test_speeds_are_per_minute_on_the_board() -> None:
-    wanted = BoardSettings(max_mm_per_s=(50.0, 60.0, 70.0), homing_mm_per_s=40.0).wanted()
+    wanted = required_settings(RigBoard(max_mm_per_s=(50.0, 60.0, 70.0), homing_mm_per_s=40.0))
     assert (wanted[110], wanted[111], wanted[112], wanted[25]) == (3000.0, 3600.0, 4200.0, 2400.0)
 
 
@@ -28,18 +28,18 @@ def test_speeds_are_per_minute_on_the_board() -> None:
     ],
 )
 def test_a_wrong_setting_is_named_with_the_line_to_send(number: int, value: float | None, words: str) -> None:
-    found = BoardSettings().wanted()
+    found = required_settings(RigBoard())
     if value is None:
         del found[number]
     else:
         found[number] = value
     with pytest.raises(RefusedInput) as refused:
-        BoardSettings().check(found, "board at COM3")
+        check_settings(found, RigBoard(), "board at COM3")
     assert str(refused.value) == f"board at COM3: {words}"
 
 
 def test_homing_is_switched_on_before_soft_limits() -> None:
-    lines = BoardSettings().lines()
+    lines = setup_lines(RigBoard())
     assert lines.index("$22=1") < lines.index("$20=1")
 
 
