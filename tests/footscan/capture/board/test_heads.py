@@ -318,7 +318,7 @@ from schemas.rig import RigBoard
 from footscan.capture.board.heads import Heads
 from footscan.capture.board.termination import signals_end_the_program
 
-quick = RigBoard((80.0,) * 3, (400.0,) * 3, (4000.0,) * 3, homing_mm_per_s=400.0, homing_slow_mm_per_s=100.0)
+quick = RigBoard(max_mm_per_s=(400.0,) * 3, mm_per_s2=(4000.0,) * 3, homing_mm_per_s=400.0, homing_slow_mm_per_s=100.0)
 with signals_end_the_program(), Heads(sys.argv[1], quick) as heads:
     heads.home()
     heads.lasers(0.5)
