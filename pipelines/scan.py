@@ -2,11 +2,11 @@
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from footscan.frames.film import film_files
 from footscan.frames.travel import read_positions
@@ -15,7 +15,7 @@ from pipelines.engine.actions.key import parameters_text
 from pipelines.engine.actions.step import Input, Output, SourceFile, Step, Value
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
-from schemas.base.model import Document, canonical_json
+from schemas.base.model import Document, Side, canonical_json
 from schemas.calibration import Calibration, Source
 from schemas.parameters.foot import FootParameters
 from schemas.parameters.scan import ScanParameters
@@ -101,13 +101,8 @@ def scan_steps(
     colours = {f"colours-{camera.id}": camera.colours for camera in cameras if camera.colours is not None}
     maps = calibration.cameras(frozenset(camera.id for camera in scan.document.cameras))
     foot = FootParameters(side=scan.document.side)
-    mapped: dict[str, Input] = {**points, "calibration": maps}
-    cleaned = add(Step(scan.name, "clean", f"{STEPS}.clean", parameters.outliers, mapped))
-    fused = add(Step(scan.name, "fuse", f"{STEPS}.fuse", parameters.fusion, {"clean": cleaned}))
-    fused_inputs: dict[str, Input] = {"fused": fused, "calibration": maps}
-    oriented = add(Step(scan.name, "orient", f"{STEPS}.orient", parameters.normals, fused_inputs))
-    mesh = add(Step(scan.name, "surface", f"{STEPS}.surface", parameters.surface, {"oriented": oriented}))
-    measures = add(Step(scan.name, "measure", f"{STEPS}.measure", foot, {"surface": mesh}))
+    made = reconstruction_steps(scan.name, points, maps, parameters, scan.document.side, steps)
+    cleaned, fused, oriented, mesh, measures = made
     verified: dict[str, Output] = {}
     if (truth := scan.truth) is not None:
         pair: dict[str, Input] = {"surface": mesh, "truth": source_files(truth, digests)}
@@ -139,6 +134,36 @@ def scan_steps(
         )
     )
     return steps
+
+
+class Reconstruction(NamedTuple):
+    """The results of the steps from world points to measures."""
+
+    cleaned: Output
+    fused: Output
+    oriented: Output
+    surface: Output
+    measures: Output
+
+
+def reconstruction_steps(
+    name: str, points: Mapping[str, Input], maps: Input, parameters: ScanParameters, side: Side, steps: list[Step]
+) -> Reconstruction:
+    """Add to `steps` those from the world points of all cameras, `points-N`, to measures.
+
+    `name` is the name of the graph's scan, `maps` the calibration of its cameras.
+    """
+
+    def add(kind: str, own: Document, inputs: Mapping[str, Input]) -> Output:
+        steps.append(Step(name, kind, f"{STEPS}.{kind}", own, inputs))
+        return Output(steps[-1].name)
+
+    cleaned = add("clean", parameters.outliers, {**points, "calibration": maps})
+    fused = add("fuse", parameters.fusion, {"clean": cleaned})
+    oriented = add("orient", parameters.normals, {"fused": fused, "calibration": maps})
+    surface = add("surface", parameters.surface, {"oriented": oriented})
+    measures = add("measure", FootParameters(side=side), {"surface": surface})
+    return Reconstruction(cleaned, fused, oriented, surface, measures)
 
 
 @dataclass(frozen=True)

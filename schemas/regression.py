@@ -6,7 +6,11 @@ from pydantic import AfterValidator, AwareDatetime, BeforeValidator, Field, mode
 
 from schemas.base.model import Document, Pseudonym
 from schemas.parameters.scan import ScanParameters
+from schemas.parameters.simulation import Seed
 from schemas.parameters.virtual_scan import VirtualScan
+
+WORLDS = "worlds"
+"""Name under which the sums of all worlds are judged, as those of a set."""
 
 Name = Annotated[str, Field(min_length=1)]
 FigureName = Annotated[str, Field(pattern=r"^[a-z0-9_.-]{1,80}$")]
@@ -60,6 +64,27 @@ def _as_tolerance(value: Any) -> Any:
 AnyTolerance = Annotated[Tolerance, BeforeValidator(_as_tolerance)]
 
 
+class Seeds(Document):
+    """Worlds that are drawn from consecutive seeds."""
+
+    first: Seed = 1
+    count: Annotated[int, Field(ge=1, le=100_000)]
+
+    @property
+    def seeds(self) -> list[int]:
+        """All of them."""
+        return list(range(self.first, self.first + self.count))
+
+
+class SuiteWorlds(Document):
+    """Worlds that are drawn at random, see docs/worlds.md."""
+
+    points: Seeds
+    """Worlds without pictures: the same every night."""
+    fresh_points: Annotated[int, Field(ge=0, le=100)] = 0
+    """Worlds that are drawn anew each night, by its date; those that fail are run every night from then on."""
+
+
 class Suite(Document):
     """The scans that are run every night; its paths are relative to it."""
 
@@ -76,7 +101,16 @@ class Suite(Document):
     tolerances: dict[Name, AnyTolerance] = Field(default_factory=dict)
     """By figure, with `*` as in a shell, before it `SET:` for one set alone; the last that fits wins, then those of the
     project."""
-    sets: Annotated[dict[Pseudonym, DataSet], Field(min_length=1)]
+    sets: dict[Pseudonym, DataSet] = Field(default_factory=dict)
+    worlds: SuiteWorlds | None = None
+
+    @model_validator(mode="after")
+    def _not_empty(self) -> Self:
+        if not self.sets and self.worlds is None:
+            raise ValueError("expected sets, worlds or both")
+        if WORLDS in self.sets:
+            raise ValueError(f"sets.{WORLDS}: this name is that of the worlds, expected another one")
+        return self
 
 
 def _reason(text: str) -> str:

@@ -112,6 +112,19 @@ def simulate_capture(
     message(f"{out}: filmed the reference object in {placed}, chart in {out / 'chart.csv'}")
 
 
+@simulate.command("world")
+def simulate_world(
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Random seed of the whole world.")],
+    out: Out,
+) -> None:
+    """Draw a world, and write its description, its true surface, its chart and the stripe points of its cameras."""
+    from pipelines.worlds.export import write_world
+
+    _check_empty(out)
+    stripes = write_world(seed, out)
+    message(f"{out}: world {seed}, stripe points of {len(stripes)} cameras")
+
+
 def ingest(
     folders: Annotated[list[Path], typer.Argument(help="Scan folders, or an archive of them.")],
     as_json: AsJson = False,

@@ -55,7 +55,7 @@ def regress(
     acceptance = None if accept is None else _acceptance(accept, accepted_by)
     keep_inputs([junit], regression.path, regression.baseline)
     with _progress() as on_step_end:
-        night = run_night(regression, on_step_end, _tell, acceptance)
+        night = run_night(regression, on_step_end, _tell, acceptance, _tell_world)
     if junit is not None:
         from pipelines.engine.files.atomic import write_atomically
         from pipelines.regression.report.junit import junit_xml
@@ -116,6 +116,12 @@ def _tell(one: "JudgedSet") -> None:
 
     counts = ", ".join(f"{one.count(verdict)} {verdict}" for verdict in VERDICTS if one.count(verdict))
     message(f"{one.name}: {counts or 'no figures'}" + (f"; {one_line(one.problem)}" if one.problem else ""))
+
+
+def _tell_world(done: int, total: int) -> None:
+    """Print a line for every tenth of the worlds."""
+    if done * 10 // total > (done - 1) * 10 // total:
+        message(f"worlds: {done} of {total}")
 
 
 def _show(night: "Night") -> None:

@@ -29,7 +29,16 @@ from pipelines.regression.sets import parameters_of, prepare, workspace_of
 from pipelines.version import SOFTWARE
 from schemas.base.errors import Fault, FootscanError, RefusedInput
 from schemas.base.yaml_files import read_yaml
-from schemas.regression import Acceptance, AcceptedStep, Baseline, NightBegun, NightEnded, Suite
+from schemas.regression import (
+    WORLDS,
+    Acceptance,
+    AcceptedStep,
+    Baseline,
+    NightBegun,
+    NightEnded,
+    Suite,
+    SuiteWorlds,
+)
 
 PAGE = "index.html"
 SHOWN_NIGHTS = 120
@@ -44,6 +53,8 @@ BAD: tuple[Verdict, ...] = ("worse", "missing")
 
 Status = Literal[0, 1, 3]
 OnSet = Callable[[JudgedSet], None]
+OnWorld = Callable[[int, int], None]
+"""Takes the number of worlds that are done, and of all."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +107,13 @@ def read_suite(path: Path, out: Path | None = None) -> Regression:
     return Regression(path, suite, folder, base / suite.baseline)
 
 
-def run_night(regression: Regression, on_step_end: OnStepEnd, on_set: OnSet, accept: Acceptance | None = None) -> Night:
+def run_night(
+    regression: Regression,
+    on_step_end: OnStepEnd,
+    on_set: OnSet,
+    accept: Acceptance | None = None,
+    on_world: OnWorld = lambda _done, _total: None,
+) -> Night:
     """Run all sets of a suite; with `accept`, make their figures the baseline.
 
     The history records begin and end of the night, even if sets fail.
@@ -127,6 +144,10 @@ def run_night(regression: Regression, on_step_end: OnStepEnd, on_set: OnSet, acc
                 )  # fmt: skip
                 on_set(judged_set)
                 judged.append(judged_set)
+            if suite.worlds is not None:
+                accepted = {} if baseline is None else baseline.sets.get(WORLDS, {})
+                judged.append(_judge_worlds(suite.worlds, regression, accepted, history, gathered, on_world))
+                on_set(judged[-1])
         judged += _gone(suite, baseline, history)
         accepted_now = None if gathered.problems else accept
         if accepted_now is not None:
@@ -204,6 +225,32 @@ def _judge_set(
     return replace(judged, first=first, otherwise=changed_steps, pictures=pictures, note=note)
 
 
+def _judge_worlds(
+    worlds: SuiteWorlds,
+    regression: Regression,
+    accepted: Mapping[str, float | None],
+    history: History,
+    gathered: _Gathered,
+    on_world: OnWorld,
+) -> JudgedSet:
+    """Run the worlds of a suite and judge their sums."""
+    from pipelines.worlds.night import run_night_of_worlds  # late: a suite without worlds needs no virtual scanner
+
+    suite, problem = regression.suite, None
+    figures: dict[str, float | None] = {}
+    try:
+        today = _now().date()
+        figures = run_night_of_worlds(
+            worlds, suite.parameters, regression.out, today, regression.name, on_world
+        ).figures
+    except FootscanError as error:
+        gathered.has_fault |= isinstance(error, Fault)
+        problem = gathered.problems[WORLDS] = str(error)
+    gathered.figures[WORLDS], gathered.steps[WORLDS] = figures, []
+    nights = history.ended[-SHOWN_NIGHTS + 1 :]
+    return JudgedSet(WORLDS, problem, judge_figures(WORLDS, figures, accepted, {}, suite, nights))
+
+
 def _gone(suite: Suite, baseline: Baseline | None, history: History) -> list[JudgedSet]:
     """Sets of the baseline that the suite no longer has: all of their figures are missing."""
     sets = {} if baseline is None else baseline.sets
@@ -214,7 +261,7 @@ def _gone(suite: Suite, baseline: Baseline | None, history: History) -> list[Jud
             judge_figures(name, {}, figures, {}, suite, history.ended[-SHOWN_NIGHTS + 1 :]),
         )
         for name, figures in sets.items()
-        if name not in suite.sets
+        if name not in suite.sets and not (name == WORLDS and suite.worlds is not None)
     ]
 
 

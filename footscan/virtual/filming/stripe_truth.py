@@ -84,8 +84,8 @@ def is_seen(scene: Scene, camera: Camera, x: float, points: Floats, normals: Flo
     points, normals : (N, 3) float64, mm, frame of the heads.
     """
     if camera.below_glass:
-        directions = directions_from_below(camera.position, points)
-        eyes, towards = exits_above(camera.position, directions), -directions
+        directions = directions_from_below(camera.position, points, thickness=camera.plate_mm)
+        eyes, towards = exits_above(camera.position, directions, thickness=camera.plate_mm), -directions
     else:
         eyes = np.broadcast_to(camera.position, points.shape)
         towards = (eyes - points) / np.linalg.norm(eyes - points, axis=1, keepdims=True)

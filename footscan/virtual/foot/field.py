@@ -29,6 +29,8 @@ LEG_BLEND_MM = (4.0, 30.0)
 LEG_BLEND_RISE_MM = 35.0
 MALLEOLUS_BLEND_MM = 16.0
 FLOOR_BLEND_MM = 5.0
+CUT_BLEND_MM = 16.0
+"""Of the end of an amputated forefoot."""
 """The radii of all blends are chosen by hand."""
 
 CAP_POWER = 2.5
@@ -59,6 +61,8 @@ class Field(NamedTuple):
     """Beyond this X the leg is too far away to blend with the body."""
     malleoli: Floats
     """(2, 6): centre and half axes of two ellipsoids."""
+    cut_x: float
+    """X at which the forefoot ends; infinite for a whole foot."""
 
 
 def without_toes(field: Field) -> Field:
@@ -83,6 +87,8 @@ def field_at(x: float, y: float, z: float, field: Field) -> float:
         low, high = LEG_BLEND_MM
         rise = _smooth_step((z - field.leg_knots[4]) / LEG_BLEND_RISE_MM)
         foot = _union(foot, leg, low + (high - low) * rise)
+    if field.cut_x < np.inf:
+        foot = -_union(-foot, field.cut_x - x, CUT_BLEND_MM)
     value: float = -_union(-foot, z, FLOOR_BLEND_MM)
     return value
 

@@ -6,8 +6,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from footscan.virtual.foot.form import pternion, toe_tips
-from footscan.virtual.foot.measures import known_landmarks, known_measures
+from footscan.virtual.foot.form import deformed, present_tips, pternion
+from footscan.virtual.foot.measures import foremost_x, known_landmarks, known_measures
 from footscan.virtual.foot.mesh import mesh_field
 from footscan.virtual.foot.shape import FootShape, sample_pair, sample_shape
 from footscan.virtual.foot.solve import solved_field
@@ -47,14 +47,15 @@ def make_foot(shape: FootShape = MEAN_MAN, *, side: Side = "right", resolution_m
     RefusedInput
         No foot has these measures together.
     """
-    field = solved_field(shape)
-    tips = toe_tips(shape)
-    landmarks = known_landmarks(field, shape.foot_length)
-    measures = known_measures(field, shape.foot_length, tips[0], landmarks)
+    field = deformed(solved_field(shape), shape)
+    tips = present_tips(shape)
+    length = max((tip[0] for tip in tips.values()), default=None) or foremost_x(field, shape.foot_length + 10.0)
+    landmarks = known_landmarks(field, length)
+    measures = known_measures(field, length, tips.get(1), landmarks)
     measures["scan_height"] = shape.scan_height
     landmarks["pternion"] = pternion(shape)
-    landmarks |= {f"toe_{toe}_tip": tip for toe, tip in enumerate(tips, start=1)}
-    vertices, faces = mesh_field(field, shape.foot_length, shape.scan_height, resolution_mm)
+    landmarks |= {f"toe_{toe}_tip": tip for toe, tip in tips.items()}
+    vertices, faces = mesh_field(field, length, shape.scan_height, resolution_mm)
     mirror = np.array([1.0, 1.0 if side == "right" else -1.0, 1.0])
     return Foot(
         vertices=vertices * mirror,

@@ -82,7 +82,23 @@ def build_field(shape: FootShape, controls: Controls) -> Field:
         leg_knots=np.array([leg_start, leg_step, 0.084 * length, 0.172 * length, _heel_level(shape)]),
         leg_reach=0.58 * length,
         malleoli=_malleoli(shape),
+        cut_x=np.inf,
     )
+
+
+def deformed(field: Field, shape: FootShape) -> Field:
+    """The foot of `field` without what `shape` lacks: toes, or the forefoot."""
+    caps = field.caps.copy()
+    caps[list(shape.missing_toes), 0] = np.inf
+    cut_x = np.inf if shape.amputated_at is None else shape.amputated_at * shape.foot_length
+    return field._replace(caps=caps, cut_x=cut_x)
+
+
+def present_tips(shape: FootShape) -> dict[int, tuple[float, float, float]]:
+    """The foremost points of the toes that `shape` has, by number."""
+    if shape.amputated_at is not None:
+        return {}
+    return {toe: tip for toe, tip in enumerate(toe_tips(shape), start=1) if toe not in shape.missing_toes}
 
 
 def toe_tips(shape: FootShape) -> list[tuple[float, float, float]]:
@@ -182,7 +198,7 @@ def _toe(shape: FootShape, controls: Controls, toe: int) -> Tube:
     tip = shape.toe_lengths[toe] * length
     root = (0.73, 0.735, 0.72, 0.69, 0.66)[toe] * length
     tall = controls.hallux_height if toe == 0 else TOE_HEIGHTS[toe] * length * 1.15
-    knuckle = (1.02, 1.25, 1.28, 1.27, 1.2)[toe]
+    knuckle = (1.02, 1.25, 1.28, 1.27, 1.2)[toe] * (1.0 + 0.5 * shape.hammer_toes * (toe > 0))
     knots = np.linspace(root, tip, INTERVALS + 1)
     back = tip - knots  # distance behind the tip
     span = tip - root
@@ -219,8 +235,10 @@ def _leg(shape: FootShape) -> tuple[float, float, Floats]:
 
 def _malleoli(shape: FootShape) -> Floats:
     length, half = shape.foot_length, shape.ankle_breadth / 2
-    medial = (0.245 * length, half - 9.5, shape.malleolus_height + 0.03 * length, 21.0, 9.5, 23.0)
-    lateral = (0.205 * length, -half + 8.5, shape.malleolus_height, 17.0, 8.5, 22.0)
+    more = shape.ankle_swelling
+    medial_axes, lateral_axes = (21.0 + more, 9.5 + more, 23.0 + more), (17.0 + more, 8.5 + more, 22.0 + more)
+    medial = (0.245 * length, half - 9.5, shape.malleolus_height + 0.03 * length, *medial_axes)
+    lateral = (0.205 * length, -half + 8.5, shape.malleolus_height, *lateral_axes)
     return np.array([medial, lateral])
 
 

@@ -54,8 +54,13 @@ def known_landmarks(field: Field, length: float) -> dict[str, Point]:
     }
 
 
-def known_measures(field: Field, length: float, toe1_tip: Point, landmarks: dict[str, Point]) -> dict[str, float]:
-    """The table's measures but scan_height, mm: lengths and heights to 0.001, girths to 0.01, arch index to 0.001."""
+def known_measures(
+    field: Field, length: float, toe1_tip: Point | None, landmarks: dict[str, Point]
+) -> dict[str, float]:
+    """The table's measures but scan_height, mm: lengths and heights to 0.001, girths to 0.01, arch index to 0.001.
+
+    Without toe 1 there is no `toe_height`.
+    """
     tibiale, fibulare = landmarks["metatarsale_tibiale"], landmarks["metatarsale_fibulare"]
     waist_x = 0.5 * (0.5 * length + 0.5 * (tibiale[0] + fibulare[0]))
     return {
@@ -65,7 +70,7 @@ def known_measures(field: Field, length: float, toe1_tip: Point, landmarks: dict
         "foot_breadth": tibiale[1] - fibulare[1],
         "heel_breadth": heel_breadth(field, length),
         "instep_height": instep_height(field, length),
-        "toe_height": toe_height(field, toe1_tip),
+        **({} if toe1_tip is None else {"toe_height": toe_height(field, toe1_tip)}),
         "arch_height": arch_height(field, length),
         "ball_girth": ball_girth(field, tibiale, fibulare),
         "instep_girth": girth(field, (0.5 * length, 0.0, 25.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
@@ -96,6 +101,24 @@ def most_medial(field: Field, x_range: tuple[float, float], z_max: float) -> Poi
 def most_lateral(field: Field, x_range: tuple[float, float], z_max: float) -> Point:
     """The surface point of smallest Y, likewise."""
     return _extreme_side(field, x_range, z_max, -1.0)
+
+
+def foremost_x(field: Field, beyond: float) -> float:
+    """The largest X of the surface with 2 mm <= Z <= 60 mm; `beyond` lies in front of all of it."""
+    y_low, y_high, z_low, z_high, largest = -70.0, 70.0, 2.0, 60.0, 0.0
+    for zoom in range(8):
+        nodes = 41 if zoom == 0 else 9
+        y, z = (
+            grid.ravel() for grid in np.meshgrid(np.linspace(y_low, y_high, nodes), np.linspace(z_low, z_high, nodes))
+        )
+        origins = np.column_stack([np.full(len(y), beyond), y, z])
+        x = beyond - first_hits(origins, np.tile([-1.0, 0.0, 0.0], (len(y), 1)), beyond, field)
+        best = int(np.argmax(x))
+        largest = float(x[best])
+        y_step, z_step = 1.2 * (y_high - y_low) / (nodes - 1), 1.2 * (z_high - z_low) / (nodes - 1)
+        y_low, y_high = y[best] - y_step, y[best] + y_step
+        z_low, z_high = max(z[best] - z_step, 2.0), min(z[best] + z_step, 60.0)
+    return largest
 
 
 def heel_breadth(field: Field, length: float) -> float:

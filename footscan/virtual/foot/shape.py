@@ -43,6 +43,14 @@ class FootShape:
     """Z of the lateral malleolus; the medial one is 0.03 of the foot length higher."""
     scan_height: float = 108.0
     """Where the leg is cut flat; the scan volume is 114 mm high."""
+    ankle_swelling: float = 0.0
+    """How far the malleoli stand out more than usual."""
+    hammer_toes: float = 0.0
+    """Rise of the small toes' knuckles, as a part of twice their height."""
+    missing_toes: tuple[int, ...] = ()
+    """Numbers of the toes, 1 to 5, that are missing."""
+    amputated_at: float | None = None
+    """Part of the length at which the forefoot ends."""
 
 
 DRAWN = (

@@ -16,7 +16,7 @@ _NEWTON_STEPS = 8
 """Chosen by hand."""
 
 
-def sine_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
+def sine_from_below(source: Floats, points: Floats, passes: int = 1, thickness: float = THICKNESS_MM) -> Floats:
     """Sine of the angle to the vertical at which light runs in air between `source` below the plate and `points` above.
 
     With s that sine, h the heights in air and t the path in glass, the horizontal distance is
@@ -28,6 +28,7 @@ def sine_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
     source : (3,) float64, mm; below the plate.
     points : (N, 3) float64, mm; Z below 0 is taken as 0.
     passes : number of crossings of the plate; 3 with one reflection at each of its faces.
+    thickness : of the plate, mm.
 
     Returns
     -------
@@ -35,8 +36,8 @@ def sine_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
     """
     offset = points[:, :2] - source[:2]
     distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
-    air = np.maximum(points[:, 2], 0.0) - THICKNESS_MM - source[2]
-    glass = passes * THICKNESS_MM
+    air = np.maximum(points[:, 2], 0.0) - thickness - source[2]
+    glass = passes * thickness
     n2 = REFRACTIVE_INDEX**2
     tangent = distance / (air + glass)
     for _ in range(_NEWTON_STEPS):
@@ -47,15 +48,15 @@ def sine_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
     return np.asarray(tangent / np.sqrt(1.0 + tangent**2))
 
 
-def directions_from_below(source: Floats, points: Floats, passes: int = 1) -> Floats:
+def directions_from_below(source: Floats, points: Floats, passes: int = 1, thickness: float = THICKNESS_MM) -> Floats:
     """Returns unit directions (N, 3) in which light leaves `source` below the plate to arrive at `points` above it."""
-    sine = sine_from_below(source, points, passes)
+    sine = sine_from_below(source, points, passes, thickness)
     offset = points[:, :2] - source[:2]
     distance = np.maximum(np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2), 1e-12)
     return np.column_stack([offset * (sine / distance)[:, None], np.sqrt(1.0 - sine**2)])
 
 
-def exits_above(source: Floats, directions: Floats, passes: int = 1) -> Floats:
+def exits_above(source: Floats, directions: Floats, passes: int = 1, thickness: float = THICKNESS_MM) -> Floats:
     """Returns the points (N, 3), mm, Z = 0, where rays from `source` below the plate leave its upper face.
 
     A plane-parallel plate does not change the directions of rays.
@@ -63,7 +64,7 @@ def exits_above(source: Floats, directions: Floats, passes: int = 1) -> Floats:
     sine = np.sqrt(directions[:, 0] ** 2 + directions[:, 1] ** 2)
     rise = directions[:, 2]
     # Horizontal way for each unit of sine: in air h / cos, in glass t / (n cos') with n cos' = sqrt(n^2 - s^2).
-    way = (-THICKNESS_MM - source[2]) / rise + passes * THICKNESS_MM / np.sqrt(REFRACTIVE_INDEX**2 - sine**2)
+    way = (-thickness - source[2]) / rise + passes * thickness / np.sqrt(REFRACTIVE_INDEX**2 - sine**2)
     exits = np.zeros_like(directions)
     exits[:, :2] = source[:2] + directions[:, :2] * way[:, None]
     return exits

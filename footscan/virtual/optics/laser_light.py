@@ -91,7 +91,7 @@ def laser_light(
     travel = np.array([x, 0.0, 0.0])
     total = np.zeros(len(points))
     for laser in lasers:
-        beams = _beams(laser, points)
+        beams = beams_of(laser, points)
         light = _sheet(points, beams, hits.normals, hits.facet_normals, spread, laser, settings.laser_sigma_mm)
         lit = np.flatnonzero(light * settings.laser_exposure > DARK)
         hidden = scene.hidden(points[lit] + travel, hits.facet_normals[lit], beams.sources[lit] + travel)
@@ -99,7 +99,9 @@ def laser_light(
     return total * settings.laser_exposure
 
 
-class _Beams(NamedTuple):
+class Beams(NamedTuple):
+    """The light of a laser that arrives at points."""
+
     sources: Floats
     """(N, 3) mm: where the light comes from above the glass: the laser, or where its light leaves the glass."""
     towards: Floats
@@ -108,19 +110,20 @@ class _Beams(NamedTuple):
     """(N,) share that the glass lets through."""
 
 
-def _beams(laser: Laser, points: Floats) -> _Beams:
+def beams_of(laser: Laser, points: Floats) -> Beams:
+    """Follow the light of a laser to `points` (N, 3), mm, above the glass plate at Z = 0."""
     position = np.asarray(laser.position)
     if not laser.below_glass:
         way = position - points
         towards = way / np.linalg.norm(way, axis=1, keepdims=True)
-        return _Beams(np.broadcast_to(position, points.shape), towards, np.ones(len(points)))
-    directions = directions_from_below(position, points)
+        return Beams(np.broadcast_to(position, points.shape), towards, np.ones(len(points)))
+    directions = directions_from_below(position, points, thickness=laser.plate_mm)
     transmitted = (1.0 - reflectance(directions[:, 2])) ** 2
-    return _Beams(exits_above(position, directions), -directions, transmitted)
+    return Beams(exits_above(position, directions, thickness=laser.plate_mm), -directions, transmitted)
 
 
 def _sheet(
-    points: Floats, beams: _Beams, normals: Floats, facet_normals: Floats, spread: Floats, laser: Laser, sigma_mm: float
+    points: Floats, beams: Beams, normals: Floats, facet_normals: Floats, spread: Floats, laser: Laser, sigma_mm: float
 ) -> Floats:
     """Brightness of a Gaussian light sheet on a surface, in units of its middle at the focus, met at right angles."""
     facing = np.einsum("ij,ij->i", facet_normals, beams.towards) > 0.0

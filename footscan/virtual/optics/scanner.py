@@ -36,11 +36,13 @@ class Laser:
     position: tuple[float, float, float]
     axis: tuple[float, float, float]
     """Unit vector along the middle of the fan."""
+    plate_mm: float = THICKNESS_MM
+    """Thickness of the glass plate."""
 
     @property
     def below_glass(self) -> bool:
         """True if its light reaches the foot through the plate."""
-        return self.position[2] < -THICKNESS_MM
+        return self.position[2] < -self.plate_mm
 
 
 @dataclass(frozen=True)
@@ -53,11 +55,13 @@ class Camera:
     rotation: Floats
     """(3, 3) rows: the image's right, the image's down, the optical axis."""
     lens: Lens
+    plate_mm: float = THICKNESS_MM
+    """Thickness of the glass plate."""
 
     @property
     def below_glass(self) -> bool:
         """True if it looks through the plate."""
-        return bool(self.position[2] < -THICKNESS_MM)
+        return bool(self.position[2] < -self.plate_mm)
 
     def project(self, points: Floats, passes: int = 1) -> Floats:
         """Project `points` (N, 3), mm, to pixels (i, j), (N, 2) float64; exact, with refraction by the plate.
@@ -65,7 +69,11 @@ class Camera:
         `passes` = 3 gives the ghost that a camera below sees: light that was reflected once at each face of the plate.
         """
         through_glass = self.below_glass
-        rays = directions_from_below(self.position, points, passes) if through_glass else points - self.position
+        rays = (
+            directions_from_below(self.position, points, passes, self.plate_mm)
+            if through_glass
+            else points - self.position
+        )
         return self.lens.pixels(product(rays, self.rotation.T))
 
     def project_plane(self, y: Floats, z: Floats) -> Floats:
@@ -79,7 +87,7 @@ class Camera:
         """
         directions = self.directions(pixels)
         if self.below_glass:
-            return exits_above(self.position, directions), directions
+            return exits_above(self.position, directions, thickness=self.plate_mm), directions
         return np.broadcast_to(self.position, directions.shape), directions
 
     def directions(self, pixels: Floats) -> Floats:

@@ -15,6 +15,10 @@ Goal = Literal["less", "more", "nearer", "same"]
 """`nearer`: to the true value of the foot; `same`: any value that differs from the accepted one is worse."""
 
 GOALS: dict[str, Goal] = {
+    "worlds.worlds": "same",
+    "worlds.measured": "more",
+    "worlds.refused_rightly": "same",
+    "worlds.*": "less",
     "accuracy.within_1mm": "more",
     "accuracy.*": "less",
     "cameras.filmed": "more",

@@ -1,0 +1,1 @@
+"""Whole worlds of the virtual scanner, drawn at random: their subjects, machines and stripes."""

@@ -1,0 +1,266 @@
+"""The stripe points that a world's cameras give, without pictures: exact places, and the errors of real ones.
+
+Geometry is exact: the section of the subject by the laser sheet at the moment of each row's exposure, lit by the lasers
+and seen by the camera. The errors of a point follow from its light: noise of the sensor and speckle move it across
+the stripe, and a point whose light drowns in the room or in noise is not found. Signal, noise and width are those of
+physics (shot noise, subjective speckle, point spread), not those of any extraction.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.virtual.optics.glass import directions_from_below, exits_above
+from footscan.virtual.optics.laser_light import FAN_EDGE_DEGREES, FOCUS_MM, beams_of
+from footscan.virtual.optics.scanner import FAN_DEGREES, Camera, Laser
+from footscan.virtual.optics.scene import SKIN, Scene
+from footscan.virtual.portable import cos_sin
+from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Machine, moved_camera, moved_laser
+from footscan.virtual.worlds.section import Cut, CutMesh
+from footscan.virtual.worlds.subject import Subject
+from schemas.world import World
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+STRIPE_DTYPE = np.dtype(
+    [("frame", "<i4"), ("i", "<f8"), ("j", "<f8"), ("width", "<f4"), ("peak", "<f4"), ("score", "<f4"),
+     ("saturation", "<f4"), ("sigma", "<f4"), ("place", "<f4", 3)]
+)  # fmt: skip
+"""Columns of stripe points as `footscan extract` has them, two more of the pipeline, and the true `place`: mm, plate
+frame, NaN for clutter."""
+
+GRAZING = 0.05
+"""Least cosine between sight and normal of a surface that counts as seen. Chosen by hand."""
+READ_NOISE, SHOT_NOISE = 0.008, 0.02
+"""Standard deviation of a webcam's pixel in the dark, and at its white, 1 being the white; of an 8-bit sensor."""
+FAINTEST_SNR = 4.0
+"""Ratio of a stripe's peak to the noise at which half of its points are found (A. Rose's criterion, 1948)."""
+FAINTEST = 0.01
+"""Smallest peak that 8 bits show, in units of the white."""
+SLICE_MM = 0.15
+"""Travel within one exposure row by row up to which rows count as one moment. Chosen by hand."""
+MOST_SLICES = 3
+"""A bound of time."""
+SEEN_HEADS_MM = 60.0
+"""Stripes of other heads that are farther away are out of the picture."""
+TEXTURE_SD = 0.15
+"""Relative standard deviation of the surface's albedo from place to place. Chosen by hand."""
+
+
+class _Seen(NamedTuple):
+    """Points of stripes in one frame of a camera, in their order."""
+
+    pixels: Floats
+    """(N, 2)"""
+    light: Floats
+    """(N,) peak of the stripe, 1 being the sensor's white."""
+    width_mm: Floats
+    """(N,) standard deviation of the stripe across X as the camera sees it."""
+    room: Floats
+    """(N,) light of the room there."""
+    places: Floats
+    """(N, 3) mm, plate frame."""
+
+
+class _Lit(NamedTuple):
+    """The lit part of a head's stripe on the subject."""
+
+    cut: Cut
+    light: Floats
+    """(N,) relative to the sheet on a white surface that faces it at its focus."""
+    texture: Floats
+    """(N,) albedo relative to the mean."""
+
+
+def world_stripes(machine: Machine, subject: Subject) -> dict[int, NDArray[np.void]]:
+    """Return the stripe points of each camera, (N,) of `STRIPE_DTYPE`, by frame and along the stripe."""
+    cut_mesh, scene = CutMesh(subject.mesh), Scene(subject.mesh, SKIN)
+    parts: dict[int, list[NDArray[np.void]]] = {camera: [] for camera in machine.cameras}
+    random = {camera: np.random.default_rng([machine.world.seed, 300 + camera]) for camera in machine.cameras}
+    for frame in range(max(machine.frames(head) for head in range(3))):
+        lit: dict[tuple[int, float], _Lit] = {}
+        for camera in machine.cameras:
+            if frame < machine.frames(HEAD_OF_CAMERA[camera]):
+                seen = _seen_in_frame(machine, camera, frame, cut_mesh, scene, lit)
+                if len(seen.light):
+                    parts[camera].append(_measured(seen, frame, machine.world, machine, random[camera]))
+    stripes = {}
+    for camera, frames in parts.items():
+        points = np.concatenate([*frames, *_clutter(machine, camera, random[camera]), np.empty(0, STRIPE_DTYPE)])
+        stripes[camera] = points[np.argsort(points["frame"], kind="stable")]
+    return stripes
+
+
+def _seen_in_frame(
+    machine: Machine, camera_id: int, frame: int, cut_mesh: CutMesh, scene: Scene, lit: dict[tuple[int, float], _Lit]
+) -> _Seen:
+    """All stripes in one frame; rows that are exposed later see heads that have travelled on.
+
+    `lit` keeps the stripes of each head and moment for the other cameras.
+    """
+    head, rows = HEAD_OF_CAMERA[camera_id], machine.size[0]
+    readout = machine.world.cameras.rolling_shutter_ms / 1000.0
+    speed = machine.step_mm(head) * machine.world.cameras.frames_per_second
+    slices = min(int(readout * speed / SLICE_MM) + 1, MOST_SLICES)
+    parts = []
+    for part in range(slices):
+        seconds = machine.seconds(frame) + (part + 0.5) / slices * readout
+        camera = moved_camera(machine.cameras[camera_id], machine.pose(head, seconds))
+        for other in range(3):
+            if abs(machine.reported_x(other, seconds) - machine.reported_x(head, seconds)) > SEEN_HEADS_MM:
+                continue
+            if (other, seconds) not in lit:
+                lit[other, seconds] = _lit_stripe(machine, other, seconds, cut_mesh, scene)
+            seen = _seen_by(machine, camera, lit[other, seconds], scene)
+            within = (seen.pixels[:, 1] >= rows * part / slices) & (seen.pixels[:, 1] < rows * (part + 1) / slices)
+            parts.append(_Seen(*(values[within] for values in seen)))
+    return _Seen(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+
+
+def _lit_stripe(machine: Machine, head: int, seconds: float, cut_mesh: CutMesh, scene: Scene) -> _Lit:
+    """The stripe of a head on the subject at a moment."""
+    pose = machine.pose(head, seconds)
+    cut = cut_mesh.cut(machine.sheet_distance(cut_mesh.mesh.vertices, pose))
+    light = np.zeros(len(cut.points))
+    for laser in machine.lasers[head]:
+        light += _irradiance(moved_laser(laser, pose), cut, scene)
+    lit = light > 0.0
+    cut = Cut(cut.points[lit], cut.normals[lit])
+    return _Lit(cut, light[lit], _texture(cut.points, machine.world))
+
+
+def _seen_by(machine: Machine, camera: Camera, lit: _Lit, scene: Scene) -> _Seen:
+    """A stripe as a camera sees it, in the plate frame."""
+    world = machine.world
+    pixels, facing = _view(lit.cut, camera, machine.size, scene)
+    seen = facing > 0.0
+    normals = lit.cut.normals[seen]
+    brightness = world.subject.albedo * world.cameras.gain * lit.texture[seen]
+    up = np.clip(0.5 + 0.5 * normals[:, 2], 0.0, 1.0)
+    slope = np.sqrt(1.0 - np.clip(normals[:, 0] ** 2, 0.0, 0.96))  # a surface that faces X is crossed at a slant
+    width_mm = np.hypot(world.laser.sigma_mm, 0.3 * world.subject.scatter_mm) / slope
+    peak = world.laser.power * lit.light[seen] * brightness
+    return _Seen(pixels[seen], peak, width_mm, world.room.light * brightness * up, lit.cut.points[seen])
+
+
+def _irradiance(laser: Laser, cut: Cut, scene: Scene) -> Floats:
+    """Light of a laser on the surface, (N,), 1 being that of the sheet on a surface that faces it at its focus."""
+    beams = beams_of(laser, cut.points)
+    cosine = np.einsum("ij,ij->i", cut.normals, beams.towards)
+    outer, inner = cos_sin(FAN_DEGREES / 2.0)[0], cos_sin(FAN_DEGREES / 2.0 - FAN_EDGE_DEGREES)[0]
+    fan = np.clip((-beams.towards @ np.asarray(laser.axis) - outer) / (inner - outer), 0.0, 1.0)
+    distance = np.linalg.norm(cut.points - np.asarray(laser.position), axis=1)
+    light = np.maximum(cosine, 0.0) * fan * beams.transmitted * FOCUS_MM / distance
+    lit = np.flatnonzero(light > 0.0)
+    light[lit[scene.hidden(cut.points[lit], cut.normals[lit], beams.sources[lit])]] = 0.0
+    return np.asarray(light)
+
+
+def _view(cut: Cut, camera: Camera, size: tuple[int, int], scene: Scene) -> tuple[Floats, Floats]:
+    """Pixels (N, 2) of points, and the cosine (N,) of the sight; 0 where the camera does not see the point."""
+    points = cut.points
+    if camera.below_glass:
+        directions = directions_from_below(camera.position, points, thickness=camera.plate_mm)
+        eyes, towards = exits_above(camera.position, directions, thickness=camera.plate_mm), -directions
+    else:
+        eyes = np.broadcast_to(camera.position, points.shape)
+        towards = (eyes - points) / np.linalg.norm(eyes - points, axis=1, keepdims=True)
+    pixels = camera.project(points)
+    rows, columns = size
+    facing = np.einsum("ij,ij->i", cut.normals, towards)
+    inside = (pixels > -0.5).all(axis=1) & (pixels[:, 0] < columns - 0.5) & (pixels[:, 1] < rows - 0.5)
+    seen = np.flatnonzero(inside & (facing > GRAZING))
+    hidden = scene.hidden(points[seen], cut.normals[seen], eyes[seen])
+    cosine = np.zeros(len(points))
+    cosine[seen[~hidden]] = facing[seen[~hidden]]
+    return pixels, cosine
+
+
+def _texture(points: Floats, world: World) -> Floats:
+    """Albedo relative to the mean, (N,): a smooth random field, and dark tattoos or patterns of a sock."""
+    random = np.random.default_rng([world.seed, 310])
+    waves = random.normal(0.0, 2.0 * np.pi / 25.0, (8, 3))
+    phases = random.uniform(0.0, 2.0 * np.pi, 8)
+    field = np.cos(points @ waves.T + phases).sum(axis=1) / 2.0
+    factor = np.maximum(1.0 + TEXTURE_SD * field, 0.2)
+    if world.subject.covering == "patterned sock":
+        factor = factor * np.where(np.sin(points[:, 0] * 0.6) > 0.0, 1.6, 0.3)
+    for _ in range(world.subject.tattoos):
+        centre = points.mean(axis=0) + random.normal(0.0, 30.0, 3) if len(points) else np.zeros(3)
+        factor = np.where(np.linalg.norm(points - centre, axis=1) < 15.0, 0.25 * factor, factor)
+    return np.asarray(factor)
+
+
+def _measured(seen: _Seen, frame: int, world: World, machine: Machine, random: np.random.Generator) -> NDArray[np.void]:
+    """The points of one frame that are found, with the errors of their centres."""
+    cameras = world.cameras
+    middle = np.array([machine.size[1] / 2.0, machine.size[0] / 2.0])
+    scale = machine.size[1] / 640.0
+    px_per_mm = 3.8 * scale
+    off_focus = np.minimum(np.linalg.norm(seen.pixels - middle, axis=1) / (60.0 * px_per_mm), 1.0)
+    blur = np.hypot(cameras.blur_px * scale, cameras.defocus_px * scale * off_focus)
+    width_px = np.hypot(seen.width_mm * 0.67 * px_per_mm, blur)  # sin 42 degrees: sheet and sight
+    peak = seen.light * seen.width_mm * 0.67 * px_per_mm / width_px  # blur spreads the light
+    clipped = np.minimum(peak + seen.room, 1.0)
+    contrast = np.maximum(clipped - np.minimum(seen.room, 1.0), 0.0)
+    noise = cameras.noise * np.sqrt(READ_NOISE**2 * cameras.gain + SHOT_NOISE**2 * clipped)
+    snr = contrast / noise
+    found = (contrast > FAINTEST) & (random.normal(size=len(snr)) < 2.0 * (snr - FAINTEST_SNR))
+    # Centre of a Gaussian in white noise, and of a line of speckle grains a pixel wide.
+    of_noise = np.sqrt(width_px) * 1.2 / np.maximum(snr, 1.0)
+    of_speckle = 0.4 * world.laser.speckle * np.sqrt(width_px)
+    sigma = np.hypot(of_noise, of_speckle)
+    across = _across(seen.pixels)
+    moved = seen.pixels + across * (sigma * random.normal(size=len(sigma)))[:, None]
+    points = np.zeros(len(sigma), STRIPE_DTYPE)
+    points["frame"], points["i"], points["j"] = frame, moved[:, 0], moved[:, 1]
+    points["place"] = seen.places
+    saturation = np.clip((peak + seen.room - 1.0) / np.maximum(peak, 1e-9), 0.0, 1.0)
+    points["width"] = 2.355 * width_px * (1.0 + saturation)
+    points["peak"] = 255.0 * clipped
+    points["score"] = contrast / (contrast + 0.05)
+    points["saturation"] = saturation
+    points["sigma"] = sigma * np.exp(random.normal(0.0, 0.2, len(sigma)))
+    return points[found]
+
+
+def _across(pixels: Floats) -> Floats:
+    """Unit vectors (N, 2) across a line of points in their order."""
+    along = np.gradient(pixels, axis=0) if len(pixels) > 1 else np.tile([1.0, 0.0], (len(pixels), 1))
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    return np.column_stack([-along[:, 1], along[:, 0]])
+
+
+def _clutter(machine: Machine, camera_id: int, random: np.random.Generator) -> list[NDArray[np.void]]:
+    """Points that are no stripe of the subject: glints of three kinds, and things of the room that drift past."""
+    world, rows, columns = machine.world, *machine.size
+    head = HEAD_OF_CAMERA[camera_id]
+    frames = machine.frames(head)
+    drift_px = 3.8 * columns / 640.0 * machine.step_mm(head) * 0.7  # a thing as far away as the foot
+    pieces = []
+    kinds = [("head", world.room.head_glints), ("stripe", world.room.stripe_glints), ("room", world.room.room_glints)]
+    kinds += [("room", world.room.line_things + world.room.red_things)]
+    for kind, count in kinds:
+        for _ in range(count):
+            start = random.uniform([0.0, 0.0], [columns, rows])
+            angle, length = random.uniform(0.0, np.pi), random.uniform(4.0, 60.0)
+            line = np.arange(length)[:, None] * np.array([np.cos(angle), np.sin(angle)])
+            way = np.array([np.cos(way_angle := random.uniform(0.0, 2.0 * np.pi)), np.sin(way_angle)])
+            speed = {"head": 0.0, "stripe": 0.5, "room": random.uniform(0.1, 1.0)}[kind] * drift_px
+            first = int(random.integers(frames))
+            shown = range(frames) if kind == "head" else range(first, min(first + int(random.integers(8, 60)), frames))
+            strength = random.uniform(0.1, 1.0)
+            for frame in shown:
+                if random.random() < 0.3:  # flicker
+                    continue
+                pixels = start + line + way * speed * (frame - shown[0]) + random.normal(0.0, 0.2, line.shape)
+                inside = (pixels > 0.0).all(axis=1) & (pixels < [columns - 1, rows - 1]).all(axis=1)
+                points = np.zeros(int(inside.sum()), STRIPE_DTYPE)
+                points["frame"], points["i"], points["j"] = frame, *pixels[inside].T
+                points["width"], points["peak"] = random.uniform(3.0, 12.0), 255.0 * strength
+                points["score"], points["sigma"] = strength * 0.8, 0.3
+                points["place"] = np.nan
+                pieces.append(points)
+    return pieces

@@ -1,0 +1,85 @@
+"""What stands on the glass in a world: its surface, and its true measures."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from footscan.virtual.foot.foot import Foot, FootShape, make_foot, placed, sample_shape
+from footscan.virtual.optics.scene import Mesh
+from footscan.virtual.worlds.draw import TRAVEL_MM
+from schemas.base.errors import RefusedInput
+from schemas.world import WorldSubject
+
+TRIES = 40
+"""Shapes that are drawn until one can have the arch and the toes of the world. Chosen by hand."""
+WHOLE_LENGTH_MM = 262.0
+"""Length of the foot that is scaled to the length of the subject: the mean one, as no child's shape is at hand."""
+OF_A_STUMP = ("foot_length", "heel_breadth")
+"""Measures that a foot without a forefoot or toes still has by definition."""
+SCAN_HEIGHT = "scan_height"
+"""Height at which a scan ends, which is no measure of the foot."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """An object in the frame of the glass plate: Z = 0 is its upper face."""
+
+    mesh: Mesh
+    measures: dict[str, float | None]
+    """True measures, mm; None for those that the object does not have."""
+
+
+def make_subject(subject: WorldSubject, resolution_mm: float = 2.0) -> Subject:
+    """Make the subject of a world in the middle of the travel.
+
+    resolution_mm : edge length of the mesh.
+    """
+    foot = _foot(subject, resolution_mm)
+    scale = subject.length_mm / WHOLE_LENGTH_MM
+    is_stump = subject.deformity.amputated_at is not None or subject.kind == "last"
+    measures = {
+        name: None if is_stump and name not in OF_A_STUMP else value * (1.0 if name == "arch_index" else scale)
+        for name, value in foot.measures.items()
+        if name != SCAN_HEIGHT
+    }
+    if subject.deformity.missing_toes:
+        measures.setdefault("toe_height", None)
+    middle = np.array([subject.length_mm / 2.0, 0.0, 0.0])
+    standing = placed(
+        replace(foot, vertices=foot.vertices * scale - middle), TRAVEL_MM / 2.0, subject.y_mm, subject.turn_deg
+    )
+    return Subject(Mesh(standing.vertices, standing.faces.astype(np.int64)), measures)
+
+
+def _foot(subject: WorldSubject, resolution_mm: float) -> Foot:
+    deformity = subject.deformity
+    scale = subject.length_mm / WHOLE_LENGTH_MM
+    refused: RefusedInput | None = None
+    for attempt in range(TRIES):
+        random = np.random.default_rng([subject.shape_seed, attempt])
+        shape = sample_shape(random, "male" if random.random() < 0.5 else "female")
+        wanted = replace(
+            _scaled(shape, WHOLE_LENGTH_MM / shape.foot_length),
+            arch_height=subject.arch_mm,
+            toe_gap=subject.toe_gap_mm,
+            scan_height=subject.leg_mm / scale,
+            ankle_swelling=deformity.ankle_swelling_mm,
+            hammer_toes=deformity.hammer_toes,
+            missing_toes=(1, 2, 3, 4, 5) if subject.kind == "last" else tuple(deformity.missing_toes),
+            amputated_at=deformity.amputated_at,
+        )
+        try:
+            side = "left" if subject.side == "left" else "right"
+            return make_foot(wanted, side=side, resolution_mm=resolution_mm / scale)
+        except RefusedInput as error:
+            refused = error
+    raise refused or AssertionError("at least one shape is tried")
+
+
+def _scaled(shape: FootShape, factor: float) -> FootShape:
+    """A foot of the same form and another size; toe gap, arch and leg are set apart from it."""
+    lengths = (
+        "foot_length", "ball_length", "lateral_ball_length", "foot_breadth", "ball_girth", "heel_breadth",
+        "instep_height", "hallux_height", "ankle_breadth", "ankle_girth", "malleolus_height",
+    )  # fmt: skip
+    return replace(shape, **{name: factor * getattr(shape, name) for name in lengths})

@@ -1,0 +1,61 @@
+"""What a reconstruction made of a world, beside the truth."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.cloud.points import coordinates
+from footscan.virtual.optics.scene import Mesh
+from footscan.virtual.worlds.judge import Truth
+from pipelines.arrays import unpack
+from schemas.campaign import ShapeError, WorldMeasure, WorldOutcome
+from schemas.measures import Measures
+from schemas.world import World
+
+
+def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Path]) -> bytes:
+    """Compare cloud, surface and measures with the truth.
+
+    `inputs`: the `world` with its truth, `oriented`, `surface` and `measures`.
+    """
+    del places
+    world = unpack(inputs["world"])
+    truth = Truth(Mesh(world["vertices"], world["faces"]))
+    surface, oriented = unpack(inputs["surface"]), unpack(inputs["oriented"])
+    measured = surface["vertices"][~surface["filled"]].astype(np.float64)
+    turn, shift = truth.registered(measured)
+
+    def error(points: NDArray[np.float64]) -> ShapeError:
+        return _shape_error(truth.distances(points @ turn.T + shift))
+
+    measures = Measures.model_validate_json(inputs["measures"])
+    known: dict[str, float | None] = json.loads(world["measures"].tobytes())
+    outcome = WorldOutcome(
+        seed=parameters.seed,
+        kind="points",
+        problem=measures.finding,
+        covered=float(world["covered"]),
+        shift_mm=float(np.linalg.norm((turn - np.eye(3)) @ measured.mean(axis=0) + shift)),
+        cloud=error(coordinates(oriented["cloud"])),
+        surface=error(measured),
+        measures={
+            name: WorldMeasure(value=measure.value, truth=known[name], sigma=measure.uncertainty, status=measure.status)
+            for name, measure in measures.measures.items()
+            if name in known
+        },
+    )
+    return (outcome.model_dump_json(indent=2) + "\n").encode()
+
+
+def _shape_error(distances: NDArray[np.float64]) -> ShapeError:
+    return ShapeError(
+        mean=float(distances.mean()),
+        p95=float(np.quantile(distances, 0.95)),
+        p99=float(np.quantile(distances, 0.99)),
+        largest=float(distances.max()),
+        beyond_1mm=float(np.mean(distances > 1.0)),
+        beyond_2mm=float(np.mean(distances > 2.0)),
+    )
