@@ -9,10 +9,6 @@ from numpy.typing import NDArray
 METADATA_KEYS = ("patient", "scan", "side", "frame", "unit", "software")
 """Keys of metadata that are read back from files."""
 
-FARTHEST_MM = 1e7
-"""Largest coordinate that is accepted. A mesh in micrometres stays below, powers of coordinates stay finite, and double
-precision resolves 0.000002 mm there."""
-
 VERTEX_ARRAYS = ("normals", "colours", "camera", "filled")
 
 

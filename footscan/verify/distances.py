@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.mesh.formats.files import Shape
-from footscan.mesh.mesh import FARTHEST_MM
 from footscan.verify.pseudonormals import Sides, sides
 from schemas.base.errors import RefusedInput
 
@@ -16,6 +15,8 @@ BLOCK = 100_000
 ON_MM = 1e-4
 """A place nearer than this to an edge or a vertex lies on it: queries in single precision are off by up to 0.00002
 mm."""
+FARTHEST_MM = 1e7
+"""Largest coordinate that is accepted as mm; double precision resolves 0.000002 mm there."""
 
 Floats = NDArray[np.floating]
 Distances32 = NDArray[np.float32]

@@ -13,13 +13,15 @@ from footscan.mesh.formats.ply import parse_ply, ply_of
 from footscan.mesh.formats.stl import parse_stl, stl_of
 from footscan.mesh.formats.threemf import threemf_of
 from footscan.mesh.formats.vrml import vrml_of
-from footscan.mesh.mesh import FARTHEST_MM, Mesh
+from footscan.mesh.mesh import Mesh
 from schemas.base.errors import RefusedInput
 from schemas.base.limits import BeyondLimitError, read_bounded
 
 Shape = tuple[NDArray[np.float64], NDArray[np.int32]]
 """(V, 3) vertices in mm and (F, 3) faces; a cloud is a shape without faces."""
 
+FARTHEST_MM = 1e9
+"""Largest coordinate that is accepted; a mesh in micrometres stays below, and powers of coordinates stay finite."""
 PARSERS = {".stl": parse_stl, ".ply": parse_ply, ".obj": parse_obj}
 WRITERS: dict[str, Callable[[Mesh], bytes]] = {
     ".stl": stl_of,

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.mesh.formats.files import PARSERS
-from footscan.mesh.mesh import FARTHEST_MM, Mesh
+from footscan.mesh.formats.files import FARTHEST_MM, PARSERS
+from footscan.mesh.mesh import Mesh
 from footscan.report.filled import CUT, filled_colours, filled_key
 from footscan.report.markup import UNITS, key, number, section, table, text, words
 from footscan.report.quality_lights import Level, TrafficLight, quality_lights, worst
