@@ -37,11 +37,11 @@ def run_plan(plan: Plan, store: Store, *, pool: Pool, on_step_end: OnStepEnd) ->
     outcomes = {planned.step.name: planned.outcome for planned in plan.steps if planned.outcome is not None}
 
     def on_end(end: StepEnd) -> None:
-        if end.otherwise is not None:
+        if end.earlier_outcome is not None:
             log.warning(
                 "%s: differs from the earlier result (%s) of the same inputs, parameters and code: "
                 "the step is not deterministic, see 'footscan cache verify --recompute'",
-                end.step.name, end.otherwise,
+                end.step.name, end.earlier_outcome,
             )  # fmt: skip
         on_step_end(end)
 
