@@ -29,7 +29,7 @@ class DemoResult:
 
     results: Path
     """Folder of the scan's results."""
-    known: dict[str, float]
+    true_measures: dict[str, float]
     """The foot's true measures by name."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Time taken by each part."""
@@ -69,8 +69,8 @@ def run_demo(folder: Path, foot: FilmedFoot, watch: Watch) -> DemoResult:
     for end in ends:
         if end.problem is not None:
             raise Fault(f"{end.scan}: {end.problem}")
-    known = json.loads((folder / "known.json").read_bytes())
-    return DemoResult(results / foot.patient / foot.scan, known, seconds)
+    true_measures = json.loads((folder / "known.json").read_bytes())
+    return DemoResult(results / foot.patient / foot.scan, true_measures, seconds)
 
 
 def _filming(folder: Path, foot: FilmedFoot) -> list[Step]:

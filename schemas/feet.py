@@ -58,11 +58,12 @@ class Foot(Document):
     @model_validator(mode="before")
     @classmethod
     def _is_measures(cls, value: Any) -> Any:
-        told = value.get("format", "") if isinstance(value, dict) else ""
-        if not re.fullmatch(r"footscan\.measures/\d+", str(told)):
-            raise ValueError(f"expected the format footscan.measures/1, found {str(told)[:80]!r}")
-        if told != "footscan.measures/1":
-            raise ValueError(f"expected the format footscan.measures/1, found {told[:80]!r}: a newer footscan wrote it")
+        found = value.get("format", "") if isinstance(value, dict) else ""
+        expected = "expected the format footscan.measures/1"
+        if not re.fullmatch(r"footscan\.measures/\d+", str(found)):
+            raise ValueError(f"{expected}, found {str(found)[:80]!r}")
+        if found != "footscan.measures/1":
+            raise ValueError(f"{expected}, found {found[:80]!r}: a newer footscan wrote it")
         measures = value.get("measures")
         if isinstance(measures, dict) and len(measures) > limit("measures"):
             raise ValueError(beyond("measures", len(measures)))

@@ -16,7 +16,7 @@ Basis = Literal["faces", "stripes", "floor"]
 
 
 class CuboidParameters(Document):
-    """What the fit of a cuboid is told."""
+    """The parameters of the fit of a cuboid."""
 
     edge_mm: Annotated[float, Field(ge=0, le=20)] = 3.0
     """Points nearer than this to an edge belong to no face: edges are rounded, and points there are of two faces."""

@@ -125,7 +125,7 @@ class Asymmetry(Sourced):
 
     sd_mm: dict[str, Positive]
     unusual_beyond: Positive
-    """Differences of more standard deviations are told."""
+    """Differences of more standard deviations are reported."""
 
 
 class SizeTable(Document):

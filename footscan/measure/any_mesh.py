@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.measure.measures import measure_foot
-from footscan.measure.raw_mesh import take_in
+from footscan.measure.raw_mesh import prepare_mesh
 from footscan.mesh.formats.files import read_mesh
 from footscan.mesh.mesh import Mesh
 from schemas.base.model import Side
@@ -48,5 +48,5 @@ def measure(
         vertices, faces = np.asarray(mesh[0], np.float64), np.asarray(mesh[1], np.int32)
     else:
         vertices, faces = read_mesh(Path(mesh))
-    whole = take_in(vertices, faces, None)
+    whole = prepare_mesh(vertices, faces, None)
     return measure_foot(whole.vertices, whole.faces, side, axis=axis)

@@ -62,7 +62,7 @@ class RawMesh(NamedTuple):
     """Remarks for the user, each a sentence without a full stop"""
 
 
-def take_in(vertices: NDArray[np.floating], faces: NDArray[np.integer], unit: MeshUnit | None = None) -> RawMesh:
+def prepare_mesh(vertices: NDArray[np.floating], faces: NDArray[np.integer], unit: MeshUnit | None = None) -> RawMesh:
     """Prepare a mesh from elsewhere for `foot_frame`.
 
     Repeated vertices are merged, triangles without area and small stray parts are left out, triangles are turned to

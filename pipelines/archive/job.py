@@ -139,7 +139,7 @@ class ScanEnd:
     """`refused`, `finding`, `fault` or `damaged`, as in `Failure`."""
     digests: Mapping[str, str] = field(default_factory=dict)
     """Digests of the files in its results, by file name."""
-    known: bool = False
+    was_cached: bool = False
     """True if all its steps were hits."""
     document: Scan | None = None
     """Content of its scan.yaml; None if that was refused."""
@@ -333,8 +333,8 @@ def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planne
         return ScanEnd(scan.name, scan.folder, None, problem, kind, document=scan.document)
     finding = Measures.model_validate_json((target / "measures.json").read_bytes()).finding
     kind_of_end = None if finding is None else "finding"
-    is_known = not planned_scan.to_run
-    return ScanEnd(scan.name, scan.folder, target, finding, kind_of_end, digests, is_known, scan.document)
+    was_cached = not planned_scan.to_run
+    return ScanEnd(scan.name, scan.folder, target, finding, kind_of_end, digests, was_cached, scan.document)
 
 
 def _older_results(target: Path) -> str:

@@ -55,7 +55,7 @@ def write_archive_page(ends: Sequence[ScanEnd], folder: Path) -> None:
 
 
 def _mark(ends: Sequence[ScanEnd]) -> str:
-    """Digest of all data that the page shows; it does not depend on `ScanEnd.known`."""
+    """Digest of all data that the page shows; it does not depend on `ScanEnd.was_cached`."""
     shown = [
         [end.scan, end.kind, end.problem, dict(end.digests), _date(end), end.document and end.document.side]
         for end in ends

@@ -81,8 +81,8 @@ def compare(
     if csv_file is not None:
         write_atomically(csv_file, comparison_csv(comparison).encode())
     if as_json:
-        told = {} if registration is None else {"registration": registration.model_dump(mode="json")}
-        print_json(comparison.model_dump(mode="json") | told)
+        registered = {} if registration is None else {"registration": registration.model_dump(mode="json")}
+        print_json(comparison.model_dump(mode="json") | registered)
     else:
         _print(comparison, registration, result.name, reference.name)
 

@@ -32,7 +32,7 @@ def demo(
     for part, seconds in result.seconds.items():
         message(f"{part}: {seconds:.1f} s")
     measures = Measures.model_validate_json((result.results / "measures.json").read_bytes())
-    print_measures(measures, result.known)
+    print_measures(measures, result.true_measures)
     quality = Quality.model_validate_json((result.results / "quality.json").read_bytes())
     if quality.truth is not None:
         figures = quality.truth.model_dump(include={"mean", "p50", "p95", "p99", "max"})

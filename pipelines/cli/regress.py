@@ -159,7 +159,7 @@ def _json(night: "Night") -> dict[str, Any]:
                     {"steps": list(first.steps), "why": first.why, "changes": [change.text for change in first.changes]}
                     for first in one.first
                 ],
-                "steps_otherwise": one.otherwise,
+                "steps_otherwise": one.changed_steps,
                 "figures": [_figure_json(figure) for figure in one.figures],
             }
             for one in night.result.sets

@@ -89,12 +89,12 @@ def verify(store: Store) -> Audit:
 
 
 def seal_store(store: Store, *, every: bool = False) -> Sealing:
-    """Seal the sound rows and last actions of a store: all of them if the store had no secret yet or `every` is set."""
+    """Seal the sound rows, last actions and pins of a store: all if the store had no secret yet or `every` is set."""
     secret = store.secret
     if secret is None:
         secret, every = make_secret(store.files), True
     sealed_count = unsealed_count = 0
-    for name in [name for folder in ("actions", "latest") for name, _ in store.files.sizes(folder)]:
+    for name in [name for folder in ("actions", "latest", PINS) for name, _ in store.files.sizes(folder)]:
         data = _read(name, store)
         if data is None or not _is_sealed(data) or _is_sealed(data, secret):
             continue

@@ -37,7 +37,7 @@ class StepEnd:
     ran: bool
     """False if the cache had a result for the step's inputs."""
     seconds: float
-    otherwise: str | None = None
+    earlier_outcome: str | None = None
     """Digest or failure of an earlier run of the same action, if it differs."""
 
 

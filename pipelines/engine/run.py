@@ -37,11 +37,11 @@ def run_plan(plan: Plan, store: Store, *, pool: Pool, on_step_end: OnStepEnd) ->
     outcomes = {planned.step.name: planned.outcome for planned in plan.steps if planned.outcome is not None}
 
     def on_end(end: StepEnd) -> None:
-        if end.otherwise is not None:
+        if end.earlier_outcome is not None:
             log.warning(
                 "%s: differs from the earlier result (%s) of the same inputs, parameters and code: "
                 "the step is not deterministic, see 'footscan cache verify --recompute'",
-                end.step.name, end.otherwise,
+                end.step.name, end.earlier_outcome,
             )  # fmt: skip
         on_step_end(end)
 
@@ -186,12 +186,15 @@ def _sources(step: Step) -> dict[str, str]:
 
 
 def _keep_code(identity: CodeIdentity, store: Store) -> None:
-    """Store the texts of a step's code if they are missing or damaged; checked once in a process."""
+    """Store the texts of a step's code if they are missing or damaged; each is checked once in a process."""
     if (store.files, identity.digest) in _STORED_CODE and store.has(identity.digest):
         return
     for module, digest in identity.modules.items():
+        if (store.files, digest) in _STORED_CODE and store.has(digest):
+            continue
         if store.get(digest) is None:
             store.put(code_text(module))
+        _STORED_CODE.add((store.files, digest))
     store.put(identity.document)
     _STORED_CODE.add((store.files, identity.digest))
 

@@ -38,7 +38,7 @@ class Erasure:
     shares: Shares
     texts: list[Path]
     nights: list[Nights]
-    was_cut_off: bool
+    was_interrupted: bool
     remains: list[str] = field(default_factory=list)
     """Places where data of the subject were found after the erasure."""
 
@@ -51,7 +51,7 @@ class Erasure:
     def is_empty(self) -> bool:
         """True if no data of the subject were erasure."""
         has_any = self.belongings.folders or self.belongings.scans or self.shares.scans or self.texts or self.nights
-        return not (has_any or self.was_cut_off)
+        return not (has_any or self.was_interrupted)
 
     @property
     def scans(self) -> list[str]:
@@ -82,15 +82,15 @@ def find_erasure(
     files = (file for name in DELIVERED for file in job.results.glob(f"*/*/{name}") if file.is_file())
     delivered = {workspace.digests.of(file)[0] for file in files if not subject.has("/".join(file.parts[-3:-1]))}
     shares = find_shares(subject, store, delivered)
-    was_cut_off = store.files.state(note_name(subject.name)) is not None
-    if was_cut_off:
+    was_interrupted = store.files.state(note_name(subject.name)) is not None
+    if was_interrupted:
         name = note_name(subject.name)
         note = parse_json(store.files.path(name), store.files.read(name).decode())
         belongings.digests |= set(note["digests"])
         belongings.sizes |= set(note["sizes"])
     texts = texts_that_name(subject, [job.results, *([workspace.local] if workspace.local.is_dir() else [])], logs)
     nights = find_nights(subject, suites, belongings.folders)
-    return Erasure(subject, job, workspace, belongings, shares, texts, nights, was_cut_off)
+    return Erasure(subject, job, workspace, belongings, shares, texts, nights, was_interrupted)
 
 
 def erase(erasure: Erasure) -> list[Lease]:

@@ -222,7 +222,7 @@ def _judge_set(
     results = {step.name: step.result for step in run.steps}
     changed_steps = sum(results.get(step.step) != step.result for step in earlier.accepted)
     pictures, note = difference_pictures(earlier, results, run.store)
-    return replace(judged, first=first, otherwise=changed_steps, pictures=pictures, note=note)
+    return replace(judged, first=first, changed_steps=changed_steps, pictures=pictures, note=note)
 
 
 def _judge_worlds(

@@ -1,14 +1,13 @@
 """Shares the frames of all cameras among processes; the pictures do not depend on how they are shared."""
 
-import os
-import threading
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from itertools import islice
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
 from typing import NamedTuple
 
+from footscan.child_process import end_with_parent
 from footscan.virtual.filming.render import CameraRenderer
 from footscan.virtual.optics.scanner import standard_scanner
 from footscan.virtual.optics.scene import Mesh, Scene, Surface
@@ -83,16 +82,8 @@ _studios: list[Studio] = []
 
 
 def _open_studio(meshes: list[Mesh], surface: Surface, settings: SimulationSettings) -> None:
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     _studios[:] = [Studio(meshes, surface, settings)]
-
-
-def _end_with_parent() -> None:
-    """End this process with its parent: a pool that is killed cannot end its processes, which would wait forever."""
-    parent = parent_process()
-    assert parent is not None, "runs in a process of a pool"
-    parent.join()
-    os._exit(1)
 
 
 def _shoot(camera: int, shots: list[Shot]) -> list[bytes]:

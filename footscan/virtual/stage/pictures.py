@@ -11,13 +11,14 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import lru_cache
 from hashlib import sha256
 from math import log2
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import simplejpeg
 
+from footscan.child_process import end_with_parent
 from footscan.virtual.filming.render import CameraRenderer
 from footscan.virtual.optics.scanner import standard_scanner
 from footscan.virtual.optics.scene import MATT_GREY, Mesh, Scene, Surface
@@ -213,16 +214,8 @@ _studios: list[_Studio] = []
 
 
 def _open_studio(job: _Job) -> None:
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     _studios[:] = [_Studio(job)]
-
-
-def _end_with_parent() -> None:
-    """End this process with its parent: a pool that is killed cannot end its processes, which would wait forever."""
-    parent = parent_process()
-    assert parent is not None, "runs in a process of a pool"
-    parent.join()
-    os._exit(1)
 
 
 def _render(camera: int, light: StageLight, indices: list[int], folder: Path) -> None:

@@ -87,7 +87,7 @@ def _confirm(name: str, yes: bool) -> None:
 
 
 def _print_found(found: "Erasure") -> None:
-    if found.was_cut_off:
+    if found.was_interrupted:
         message(f"footscan: the erasure of {found.subject.name} was cut off, and goes on")
     for place in (*found.belongings.folders, *found.texts):
         print_line(str(place))

@@ -137,7 +137,8 @@ def _explain(planned: "PlannedStep", plan: "Plan", store: "Store") -> Explanatio
 
     step = planned.step
     digests = input_digests(step, {one.step.name: one.outcome for one in plan.steps})
-    state, reason, found = planned.state.value, planned.reason, []
+    state, reason = planned.state.value, planned.reason
+    known_changes: Sequence[Change] = ()
     is_complete = digests.keys() == step.inputs.keys()
     if state == "hit" and is_complete:
         key = key_of(image_text(step, digests))
@@ -148,11 +149,13 @@ def _explain(planned: "PlannedStep", plan: "Plan", store: "Store") -> Explanatio
     if state == "hit":
         reason = "would not run" if is_complete else "fails with a step before it"
     elif last is not None:
-        # What is still to be made is taken for what it was: all else can be told already.
-        was = {name: digest for name, (_, digest) in inputs_of(last.image).items()}
-        present = {name: digests.get(name, was.get(name, "")) for name in step.inputs}
-        found = changes(step, last.image, json.loads(image_text(step, present)), store)
-    return Explanation(step, state, reason, tuple(found), last, store.files.written(row_name(key)) if last else None)
+        # An input that is still to be made counts as unchanged: the changes of all others can be shown already.
+        before = {name: digest for name, (_, digest) in inputs_of(last.image).items()}
+        present = {name: digests.get(name, before.get(name, "")) for name in step.inputs}
+        known_changes = changes(step, last.image, json.loads(image_text(step, present)), store)
+    return Explanation(
+        step, state, reason, tuple(known_changes), last, store.files.written(row_name(key)) if last else None
+    )
 
 
 def _newest(every: Sequence[Explanation]) -> Explanation:

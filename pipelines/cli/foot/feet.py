@@ -98,11 +98,11 @@ def read_foot(place: Path) -> "Foot":
         names = ", ".join(scan.name for scan in _scans(place))
         raise RefusedInput(place, f"is the folder of a patient, expected one of its scans: {names}")
     foot = read_json(file, Foot)
-    told = {"source": str(place)}
+    origin = {"source": str(place)}
     if file.name == MEASURES_FILE:
         folder = file.resolve().parent
-        told |= {"patient": foot.patient or folder.parent.name, "scan": foot.scan or folder.name}
-    return foot.model_copy(update=told)
+        origin |= {"patient": foot.patient or folder.parent.name, "scan": foot.scan or folder.name}
+    return foot.model_copy(update=origin)
 
 
 def _measures_file(place: Path) -> Path:

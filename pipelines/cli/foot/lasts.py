@@ -64,8 +64,8 @@ def _print(ranking: "Ranking", feet: str, most: int) -> None:
     out = [last for last in ranking.lasts if last.rank is None]
     print_line(f"{len(fitting)} of {len(ranking.lasts)} lasts can be worn; out: {len(out)}")
     for last in out[:most]:
-        told = "; ".join(f"{side} {reason}" for side, fit in last.feet.items() for reason in fit.rejected)
-        print_line(one_line(f"{last.name}: {told}"))
+        reasons = "; ".join(f"{side} {reason}" for side, fit in last.feet.items() for reason in fit.rejected)
+        print_line(one_line(f"{last.name}: {reasons}"))
     if len(out) > most:
         print_line(f"and {len(out) - most} more")
     for missing in ranking.missing:

@@ -46,7 +46,7 @@ def measure(
     """Measure the mesh of a foot, from this scanner or another."""
     from footscan.measure.foot_landmarks import check_manual
     from footscan.measure.measures import measure_foot
-    from footscan.measure.raw_mesh import take_in
+    from footscan.measure.raw_mesh import prepare_mesh
     from footscan.mesh.formats.files import read_mesh
     from pipelines.engine.files.atomic import write_atomically
 
@@ -56,7 +56,7 @@ def measure(
     manual = {} if landmarks is None else _manual_landmarks(landmarks)
     vertices, faces = read_mesh(file)
     try:
-        mesh = take_in(vertices, faces, unit)
+        mesh = prepare_mesh(vertices, faces, unit)
         if landmarks is not None:
             try:
                 check_manual(manual, mesh.vertices)

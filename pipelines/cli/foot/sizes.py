@@ -85,10 +85,10 @@ def print_sizes(title: str, found: "Sizes") -> None:
     print_line(f"Sizes and widths are {found.caution}.")
 
 
-def print_notes(told: Iterable[tuple[str, str | None]]) -> None:
+def print_notes(notes: Iterable[tuple[str, str | None]]) -> None:
     """One line per note, with the entries that it applies to."""
     of: dict[str, list[str]] = {}
-    for label, note in told:
+    for label, note in notes:
         if note:
             of.setdefault(note, []).append(label)
     for note, labels in of.items():

@@ -43,7 +43,7 @@ class StepProgress:
         """Steps that ran, without those whose result was found in the store."""
         self.seconds: dict[str, float] = {}
         """Seconds taken by each kind of step, summed over cameras and scans."""
-        self._scans, self._done, self._failed, self._known = scans, 0, 0, 0
+        self._scans, self._done, self._failed, self._cached = scans, 0, 0, 0
         self._frames, self._start = 0, time.monotonic()
         self._log = log
         self._lock = threading.Lock()
@@ -78,7 +78,7 @@ class StepProgress:
             self._bar.update(self._task, advance=1, description=self._line(end.step.name.rpartition("/")[2]))
             self._write(
                 "step", scan=end.step.scan, step=end.step.kind, camera=end.step.camera, ran=end.ran,
-                seconds=round(end.seconds, 6), problem=failure, otherwise=end.otherwise,
+                seconds=round(end.seconds, 6), problem=failure, otherwise=end.earlier_outcome,
             )  # fmt: skip
 
     def on_scan_end(self, end: "ScanEnd") -> None:
@@ -86,10 +86,15 @@ class StepProgress:
         with self._lock:
             self._done += end.problem is None
             self._failed += end.problem is not None
-            self._known += end.known
+            self._cached += end.was_cached
             folder = None if end.folder is None else str(end.folder)
             self._write(
-                "scan", scan=end.scan, status=end.kind or "done", known=end.known, results=folder, problem=end.problem
+                "scan",
+                scan=end.scan,
+                status=end.kind or "done",
+                known=end.was_cached,
+                results=folder,
+                problem=end.problem,
             )
 
     def _line(self, step: str) -> str:
@@ -98,7 +103,7 @@ class StepProgress:
         rate = self._frames / max(time.monotonic() - self._start, 1e-3)
         ended = self._done + self._failed
         return (
-            f"{ended} of {self._scans} scans ({self._failed} failed, {self._known} known), {rate:.0f} frames/s: {step}"
+            f"{ended} of {self._scans} scans ({self._failed} failed, {self._cached} known), {rate:.0f} frames/s: {step}"
         )
 
     def _write(self, event: str, **facts: Any) -> None:

@@ -24,7 +24,7 @@ from pipelines.engine.files.seal import UNSEALING_ERRORS, sealed, unsealed
 from schemas.base.errors import Fault
 from schemas.base.model import canonical_json
 
-OWN = ROOMS = ("schemas", "footscan", "pipelines")
+ROOMS = ("schemas", "footscan", "pipelines")
 """The packages of this project."""
 MEMORY = Path(__file__).parent / "__pycache__" / f"code.{sys.implementation.cache_tag}.json"
 """File that remembers the digests and imports of modules between processes."""
@@ -119,7 +119,7 @@ def _source(name: str) -> _Source:
     if remembered is not None and remembered[0] == list(state):
         return _Source(remembered[1], frozenset(remembered[2]))
     source = _Source(sha256(_text(name, state).encode()), frozenset(_imports(_tree(name))))
-    if name.split(".", maxsplit=1)[0] in OWN and is_settled(state):
+    if name.split(".", maxsplit=1)[0] in ROOMS and is_settled(state):
         _remembered()[name] = [list(state), source.digest, sorted(source.imports)]
         _CHANGED.add(name)
     return source

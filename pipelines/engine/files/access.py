@@ -56,8 +56,11 @@ def share(folders: Iterable[Path], group: int | None) -> None:
     for folder in folders:
         try:
             if not folder.exists():
-                os.umask(PRIVATE)
-                folder.mkdir(parents=True)
+                before = os.umask(PRIVATE)
+                try:
+                    folder.mkdir(parents=True)
+                finally:
+                    os.umask(before)
             if not _is_shared(folder, group):
                 for path in _below(folder):
                     _hand_over(path, group)

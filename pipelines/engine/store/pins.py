@@ -1,11 +1,9 @@
 """Pins: scans whose present results are kept, whatever is computed for them later."""
 
-import json
-
-from pipelines.engine.files.digest import sha256
+from pipelines.engine.files.seal import UNSEALING_ERRORS, sealed, unsealed
 from pipelines.engine.store.store import Store, plain_hex
 from schemas.base.errors import DamagedError, RefusedInput
-from schemas.base.model import canonical_json, pseudonym
+from schemas.base.model import pseudonym
 
 FOLDER = "pins"
 """Folder of the pins in a store."""
@@ -24,7 +22,7 @@ def pin(scan: str, store: Store) -> int:
     keys = {last.step: last.key for last in latest if last is not None and last.step.rpartition("/")[0] == scan}
     if not keys:
         raise RefusedInput(scan, f"has no results in {store.files.path('').rstrip('/')}, expected a scan that was run")
-    store.files.write(name, _sealed(scan, keys))
+    store.files.write(name, sealed({"scan": scan, "keys": keys}, store.secret))
     return len(keys)
 
 
@@ -46,16 +44,15 @@ def read_pins(store: Store) -> dict[str, dict[str, str]]:
 def read_pin(name: str, store: Store) -> dict[str, str] | None:
     """Read a pin by its file name: keys by step name; None if the file is missing, DamagedError if it is damaged."""
     try:
-        value = json.loads(store.files.read(name))
-        keys = {step: plain_hex(key) for step, key in value["keys"].items()}
-        if value != json.loads(_sealed(_scan(name), keys)):
-            raise ValueError("broken seal")
+        value = unsealed(store.files.read(name), store.secret)
+        if value["scan"] != _scan(name):
+            raise ValueError("another scan's pin")
+        return {step: plain_hex(key) for step, key in value["keys"].items()}
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (OSError, *UNSEALING_ERRORS):
         problem = f"damaged, expected the pin of a scan; 'footscan cache pin {_scan(name)}' makes it anew"
         raise DamagedError(f"{store.files.path(name)}: {problem}") from None
-    return keys
 
 
 def pin_names(store: Store) -> list[str]:
@@ -71,8 +68,3 @@ def _name(scan: str) -> str:
 
 def _scan(name: str) -> str:
     return name.removeprefix(f"{FOLDER}/").removesuffix(".json")
-
-
-def _sealed(scan: str, keys: dict[str, str]) -> bytes:
-    value = {"scan": scan, "keys": keys}
-    return canonical_json({**value, "seal": sha256(canonical_json(value).encode())}).encode()

@@ -8,17 +8,17 @@ several passes counts: the first pass also imports libraries and compiles, and o
 import gc
 import os
 import shutil
-import threading
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
 from pathlib import Path
 from statistics import fmean
 from tempfile import TemporaryDirectory
 
+from footscan.child_process import end_with_parent
 from footscan.recordings.scans import RecordedScan, read_scan
 from pipelines.archive.job import Job, PlannedJob, draw_steps
 from pipelines.engine.actions.step import Success
@@ -98,7 +98,7 @@ def _one_thread() -> Iterator[None]:
 
 def _passes(job: Job, passes: int) -> list[Pass]:
     """Run the passes, in the new process."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     reference_seconds()  # makes its material and loads its libraries
     job.results.mkdir(parents=True, exist_ok=True)
     for remnant in job.results.glob(f"{TEMPORARY}*"):  # of a killed night; only one night runs at a time
@@ -108,14 +108,6 @@ def _passes(job: Job, passes: int) -> list[Pass]:
         with TemporaryDirectory(prefix=TEMPORARY, dir=job.results) as empty:
             timed.append(_one_pass(job, Path(empty)))
     return timed
-
-
-def _end_with_parent() -> None:
-    """Exit with the parent: a process whose parent was killed would wait for work forever."""
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _one_pass(job: Job, empty: Path) -> Pass:

@@ -68,7 +68,7 @@ def _set(judged_set: JudgedSet) -> str:
     noted = [figure for figure in judged_set.figures if figure.verdict != "same"]
     noted.sort(key=lambda figure: VERDICTS.index(figure.verdict))
     parts = [f'<p class="problem">{text(judged_set.problem)}</p>'] if judged_set.problem else []
-    if judged_set.first or judged_set.otherwise:
+    if judged_set.first or judged_set.changed_steps:
         parts.append(_first(judged_set))
     if noted:
         parts.append(_figures(noted))
@@ -86,8 +86,8 @@ def _set(judged_set: JudgedSet) -> str:
 def _first(judged_set: JudgedSet) -> str:
     steps = "".join(_first_step(first) for first in judged_set.first)
     counted = ""
-    if judged_set.otherwise:
-        counted = f'<p class="note">Steps whose result differs from the accepted one: {judged_set.otherwise}.</p>'
+    if judged_set.changed_steps:
+        counted = f'<p class="note">Steps whose result differs from the accepted one: {judged_set.changed_steps}.</p>'
     return f"<h3>Where it begins</h3>{counted}<ul>{steps}</ul>" if steps else counted
 
 

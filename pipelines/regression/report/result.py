@@ -60,7 +60,7 @@ class JudgedSet:
     """Why the set could not be run to its end."""
     figures: Sequence[JudgedFigure]
     first: Sequence[FirstStep] = ()
-    otherwise: int = 0
+    changed_steps: int = 0
     """Number of steps whose result differs from the accepted one."""
     pictures: Mapping[str, bytes] = field(default_factory=dict)
     """PNG by caption: distances of the present shape to the accepted one, or to that of the last good night."""

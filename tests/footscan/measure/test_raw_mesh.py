@@ -7,7 +7,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from footscan.measure.frame import foot_frame
-from footscan.measure.raw_mesh import MeshUnit, RawMesh, take_in
+from footscan.measure.raw_mesh import MeshUnit, RawMesh, prepare_mesh
 from footscan.virtual.foot.foot import Foot, make_foot
 from schemas.base.errors import Finding
 
@@ -20,7 +20,7 @@ def known_foot() -> Foot:
 
 
 def taken(vertices: np.ndarray, faces: np.ndarray, unit: MeshUnit | None = None) -> RawMesh:
-    return take_in(Rotation.random(random_state=2).apply(vertices), faces, unit)
+    return prepare_mesh(Rotation.random(random_state=2).apply(vertices), faces, unit)
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("in", 25.4)])
@@ -130,7 +130,7 @@ def test_coordinates_that_are_no_numbers_are_a_finding() -> None:
     broken = foot.vertices.copy()
     broken[7, 1] = np.nan
     with pytest.raises(Finding, match="no numbers"):
-        take_in(broken, foot.faces)
+        prepare_mesh(broken, foot.faces)
 
 
 def turned_hallux(vertices: np.ndarray) -> np.ndarray:

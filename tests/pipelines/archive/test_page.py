@@ -42,7 +42,7 @@ def test_what_it_shows_already_is_not_written_again(ends: list[ScanEnd], tmp_pat
     [picture] = (tmp_path / FILES).iterdir()
     for file in (tmp_path / PAGE, picture):
         os.utime(file, (0, 0))
-    write_archive_page([replace(end, known=not end.known) for end in ends], tmp_path)
+    write_archive_page([replace(end, was_cached=not end.was_cached) for end in ends], tmp_path)
     assert (tmp_path / PAGE).stat().st_mtime == 0
     write_archive_page(ends[:1], tmp_path)
     assert len(rows(tmp_path)) == 1

@@ -1,11 +1,13 @@
 """Pins keep the results of scans."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from pipelines.engine.actions.step import Step, Value
+from pipelines.engine.audit import seal_store
 from pipelines.engine.store.pins import pin, read_pins, unpin
 from pipelines.engine.store.store import Store
 from schemas.base.errors import DamagedError, RefusedInput
@@ -43,6 +45,20 @@ def test_a_name_leads_nowhere_else(store: Store, scan: str) -> None:
 def test_a_scan_that_has_not_run(store: Store) -> None:
     with pytest.raises(RefusedInput, match=r"P/T: has no results in .*, expected a scan that was run"):
         pin("P/T", store)
+
+
+@pytest.mark.usefixtures("ran")
+def test_a_pin_of_a_sealed_store_bears_its_owners_seal(store: Store) -> None:
+    owners = replace(store, secret=b"owner")
+    pin("P/S", store)
+    forged = store.files.read("pins/P/S.json")
+    with pytest.raises(DamagedError):
+        read_pins(owners)
+    seal_store(owners, every=True)
+    assert read_pins(owners) == {"P/S": {**read_pins(store)["P/S"]}}
+    store.files.write("pins/P/S.json", forged)
+    with pytest.raises(DamagedError):
+        read_pins(owners)
 
 
 @pytest.mark.usefixtures("ran")

@@ -50,7 +50,7 @@ BAD = JudgedSet(
     None,
     [figure("accuracy.mean_mm", 0.41, "worse", history=[0.2]), figure("points.cloud", None, "missing")],
     [FirstStep(["extract-1", "extract-2"], "its result differs", [Change("code of a changed", [("x = 1", "x = 2")])])],
-    otherwise=7,
+    changed_steps=7,
     pictures={"surface: distance to the accepted one": PNG},
 )
 
