@@ -37,7 +37,7 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
         seed=parameters.seed,
         kind="points",
         problem=measures.finding,
-        covered=float(world["covered"]),
+        covered=world["covered"].item(),
         shift_mm=float(np.linalg.norm((turn - np.eye(3)) @ measured.mean(axis=0) + shift)),
         cloud=error(coordinates(oriented["cloud"])),
         surface=error(measured),

@@ -88,7 +88,7 @@ def _refused(seed: int, problem: str, workspace: Workspace, drawn: Outcome) -> W
     measures: dict[str, WorldMeasure] = {}
     if isinstance(drawn, Success):
         world = unpack(workspace.store.get(drawn.digest) or b"")
-        covered = float(world["covered"])
+        covered = world["covered"].item()
         known: dict[str, float | None] = json.loads(world["measures"].tobytes())
         measures = {
             name: WorldMeasure(value=None, truth=truth, sigma=None, status="incomplete")

@@ -61,7 +61,7 @@ class Field(NamedTuple):
     """Beyond this X the leg is too far away to blend with the body."""
     malleoli: Floats
     """(2, 6): centre and half axes of two ellipsoids."""
-    cut_x: float
+    cut_x: float = np.inf
     """X at which the forefoot ends; infinite for a whole foot."""
 
 

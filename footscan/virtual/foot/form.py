@@ -82,7 +82,6 @@ def build_field(shape: FootShape, controls: Controls) -> Field:
         leg_knots=np.array([leg_start, leg_step, 0.084 * length, 0.172 * length, _heel_level(shape)]),
         leg_reach=0.58 * length,
         malleoli=_malleoli(shape),
-        cut_x=np.inf,
     )
 
 

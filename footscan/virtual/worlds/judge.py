@@ -10,10 +10,14 @@ Floats = NDArray[np.float64]
 
 SAMPLE = 4000
 """Points that the pose is estimated from. Chosen by hand."""
-ROUNDS = 30
+ROUNDS = 40
 """Steps of the registration; it converges in fewer. Chosen by hand."""
-KEPT = 0.8
-"""Share of the nearest points that the pose is estimated from: what is wrong must not pull the rest."""
+ROUNDS_WITH_ALL = 12
+"""First steps, in which all points count: trimmed at once, the ends of a foot that is off along X would be left out.
+Chosen by hand."""
+OUTLIER_MEDIANS, OUTLIER_MM = 3.0, 0.5
+"""Then points count that are nearer than so many median distances, or than this: what is wrong must not pull the rest.
+Chosen by hand."""
 COVERED_MM = 5.0
 """A part of the surface is covered where a stripe point is nearer than this: travels have steps of up to 5 mm."""
 LOWEST_MM, HIGHEST_MM = 2.0, 100.0
@@ -49,11 +53,12 @@ class Truth:
         chosen = np.linspace(0, len(points) - 1, min(SAMPLE, len(points))).astype(np.int64)
         sample = points[chosen]
         turn, shift = np.eye(3), np.zeros(3)
-        for _ in range(ROUNDS):
+        for number in range(ROUNDS):
             moved = sample @ turn.T + shift
             target = self.nearest(moved)
             distance = np.linalg.norm(target - moved, axis=1)
-            kept = distance <= np.quantile(distance, KEPT)
+            limit = max(OUTLIER_MEDIANS * float(np.median(distance)), OUTLIER_MM)
+            kept = distance <= (np.inf if number < ROUNDS_WITH_ALL else limit)
             turn, shift = _rigid(sample[kept], target[kept])
         return turn, shift
 

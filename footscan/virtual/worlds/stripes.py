@@ -45,6 +45,8 @@ MOST_SLICES = 3
 """A bound of time."""
 SEEN_HEADS_MM = 60.0
 """Stripes of other heads that are farther away are out of the picture."""
+LEAST_ROOM_LIGHT = 0.1
+"""Share of the room's light that reaches a surface that faces down. Chosen by hand."""
 TEXTURE_SD = 0.15
 """Relative standard deviation of the surface's albedo from place to place. Chosen by hand."""
 
@@ -138,7 +140,7 @@ def _seen_by(machine: Machine, camera: Camera, lit: _Lit, scene: Scene) -> _Seen
     seen = facing > 0.0
     normals = lit.cut.normals[seen]
     brightness = world.subject.albedo * world.cameras.gain * lit.texture[seen]
-    up = np.clip(0.5 + 0.5 * normals[:, 2], 0.0, 1.0)
+    up = np.clip(0.5 + 0.5 * normals[:, 2], LEAST_ROOM_LIGHT, 1.0)
     slope = np.sqrt(1.0 - np.clip(normals[:, 0] ** 2, 0.0, 0.96))  # a surface that faces X is crossed at a slant
     width_mm = np.hypot(world.laser.sigma_mm, 0.3 * world.subject.scatter_mm) / slope
     peak = world.laser.power * lit.light[seen] * brightness

@@ -1,0 +1,105 @@
+"""Worlds from their seeds to what came of them."""
+
+from pathlib import Path
+
+import pytest
+
+from footscan.virtual.worlds.draw import draw_world
+from pipelines.engine.pool import Threads
+from pipelines.worlds import campaign
+from pipelines.worlds.campaign import graph_key, run_worlds
+from pipelines.worlds.graph import world_steps
+from pipelines.worlds.night import fresh_seeds, read_kept
+from schemas.base.errors import RefusedInput
+from schemas.campaign import WorldOutcome
+from schemas.parameters.scan import ScanParameters
+from schemas.world import World, WorldCameras, WorldLaser, WorldSubject
+
+COARSE = WorldCameras(frames=50, step_mm=8.0)
+WORLDS = {
+    1: World(seed=1, cameras=COARSE),
+    2: World(seed=2, cameras=COARSE, laser=WorldLaser(power=0.01)),
+    3: World(seed=3, cameras=COARSE, subject=WorldSubject(kind="last", toe_gap_mm=-1.0, leg_mm=90.0)),
+}
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("worlds")
+
+
+@pytest.fixture(scope="module")
+def outcomes(out: Path) -> dict[int, WorldOutcome]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(campaign, "draw_world", WORLDS.__getitem__)
+        ran = run_worlds(list(WORLDS), ScanParameters(), out, Threads(2), lambda _: None)
+    return {outcome.seed: outcome for outcome in ran}
+
+
+def test_a_world_without_errors_is_measured_as_it_is(outcomes: dict[int, WorldOutcome]) -> None:
+    nominal = outcomes[1]
+    assert nominal.problem is None
+    assert nominal.covered > 0.95
+    assert nominal.shift_mm < 0.2
+    assert nominal.surface is not None
+    assert nominal.surface.mean < 0.15
+    errors = {name: measure.error for name, measure in nominal.measures.items()}
+    assert errors["foot_length"] == pytest.approx(0.0, abs=1.0)
+    assert errors["instep_girth"] == pytest.approx(0.0, abs=1.0)
+
+
+def test_a_world_without_light_is_refused_rightly(outcomes: dict[int, WorldOutcome]) -> None:
+    dark = outcomes[2]
+    assert dark.problem is not None
+    assert dark.covered < 0.1
+    assert not dark.is_measured
+    assert not dark.can_be_measured
+    assert dark.silent_errors == []
+
+
+def test_a_last_has_no_ball(outcomes: dict[int, WorldOutcome]) -> None:
+    assert outcomes[3].measures["ball_girth"].truth is None
+    assert not outcomes[3].can_be_measured
+
+
+def test_nothing_runs_again_and_no_intermediate_result_stays(
+    outcomes: dict[int, WorldOutcome], out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(campaign, "draw_world", WORLDS.__getitem__)
+    monkeypatch.setattr(campaign, "_run_window", None)
+    again = run_worlds([2, 1], ScanParameters(), out, Threads(1), lambda _: None)
+    assert again == [outcomes[2], outcomes[1]]
+    assert [path.name for path in out.iterdir()] == ["outcomes"]
+    assert sum(file.stat().st_size for file in (out / "outcomes").iterdir()) < 50_000
+
+
+def test_a_key_holds_the_world_and_the_parameters() -> None:
+    usual = ScanParameters()
+    other = usual.model_copy(update={"fusion": usual.fusion.model_copy(update={"spacing_mm": 0.5})})
+    keys = {
+        graph_key(world_steps(draw_world(1), usual)),
+        graph_key(world_steps(draw_world(2), usual)),
+        graph_key(world_steps(draw_world(1), other)),
+    }
+    assert len(keys) == 3
+    assert graph_key(world_steps(draw_world(1), usual)) in keys
+
+
+def test_seeds_of_days_differ() -> None:
+    import datetime
+
+    days = [datetime.date(2026, 11, 23), datetime.date(2026, 11, 24), datetime.date(2027, 1, 1)]
+    seeds = [seed for day in days for seed in fresh_seeds(day, 20)]
+    assert len(set(seeds)) == 60
+    assert max(seeds) < 2**32
+
+
+def test_kept_seeds_are_read_back(tmp_path: Path) -> None:
+    assert read_kept(tmp_path) == []
+    (tmp_path / "worlds").mkdir()
+    file = tmp_path / "worlds" / "kept.json"
+    file.write_text("[3, 5]")
+    assert read_kept(tmp_path) == [3, 5]
+    file.write_text("{")
+    with pytest.raises(RefusedInput, match="expected a list of seeds"):
+        read_kept(tmp_path)
