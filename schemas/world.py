@@ -17,6 +17,8 @@ Positive = Annotated[float, Field(gt=0, le=1e4)]
 NotNegative = Annotated[float, Field(ge=0, le=1e4)]
 Signed = Annotated[float, Field(ge=-1e3, le=1e3)]
 CameraId = Annotated[int, Field(ge=1, le=8)]
+Kind = Literal["foot", "cast", "last"]
+Covering = Literal["none", "white sock", "black sock", "patterned sock"]
 Toe = Annotated[int, Field(ge=1, le=5)]
 
 
@@ -156,7 +158,7 @@ class Deformity(Document):
 class WorldSubject(Document):
     """What stands on the glass."""
 
-    kind: Literal["foot", "cast", "last"] = "foot"
+    kind: Kind = "foot"
     side: Side = "right"
     shape_seed: Seed = 1
     length_mm: Annotated[float, Field(ge=80, le=400)] = 262.0
@@ -169,7 +171,7 @@ class WorldSubject(Document):
     y_mm: Signed = 0.0
     """Place and turn on the glass."""
     turn_deg: Signed = 0.0
-    covering: Literal["none", "white sock", "black sock", "patterned sock"] = "none"
+    covering: Covering = "none"
     albedo: Share = 0.6
     """Share of laser light that the surface scatters back."""
     scatter_mm: NotNegative = 1.0

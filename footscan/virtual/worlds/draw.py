@@ -8,7 +8,9 @@ a world has a generator of its own: a new quantity in one part changes no other 
 import numpy as np
 
 from schemas.world import (
+    Covering,
     Deformity,
+    Kind,
     Knock,
     World,
     WorldCameras,
@@ -25,6 +27,8 @@ HEAD_COUNT = 3
 TRAVEL_MM = 400.0
 """The thesis's travel."""
 LOWER_CAMERAS = (5, 6, 7, 8)
+KINDS: tuple[Kind, ...] = ("foot", "cast", "last")
+COVERINGS: tuple[Covering, ...] = ("none", "white sock", "black sock", "patterned sock")
 
 
 def draw_world(seed: int) -> World:
@@ -148,8 +152,8 @@ def _glass(random: np.random.Generator) -> WorldGlass:
 
 
 def _subject(random: np.random.Generator) -> WorldSubject:
-    kind = ("foot", "cast", "last")[int(random.choice(3, p=(0.9, 0.05, 0.05)))]
-    covering = ("none", "white sock", "black sock", "patterned sock")[int(random.choice(4, p=(0.7, 0.1, 0.1, 0.1)))]
+    kind = KINDS[int(random.choice(3, p=(0.9, 0.05, 0.05)))]
+    covering = COVERINGS[int(random.choice(4, p=(0.7, 0.1, 0.1, 0.1)))]
     skin = _log(random, 0.08, 0.75)
     albedo = {"none": skin, "white sock": 0.8, "black sock": 0.04, "patterned sock": 0.4}[covering]
     length_mm = (

@@ -31,12 +31,13 @@ class Truth:
         self._mesh = mesh
         self._scene = o3d.t.geometry.RaycastingScene()
         self._scene.add_triangles(
-            o3d.core.Tensor(mesh.vertices.astype(np.float32)), o3d.core.Tensor(mesh.faces.astype(np.uint32))
+            o3d.core.Tensor.from_numpy(mesh.vertices.astype(np.float32)),
+            o3d.core.Tensor.from_numpy(mesh.faces.astype(np.uint32)),
         )
 
     def nearest(self, points: Floats) -> Floats:
         """Return the nearest places on the surface, (N, 3), mm."""
-        query = o3d.core.Tensor(points.astype(np.float32))
+        query = o3d.core.Tensor.from_numpy(points.astype(np.float32))
         return np.asarray(self._scene.compute_closest_points(query)["points"].numpy(), np.float64)
 
     def distances(self, points: Floats) -> Floats:

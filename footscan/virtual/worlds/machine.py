@@ -27,7 +27,6 @@ PLATE_CENTRE = np.array([TRAVEL_MM / 2.0, 0.0, 0.0])
 """Point about which the plate is tilted, scanner frame."""
 BEND_HALF_MM = 70.0
 """The sagitta of a bent sheet is measured over twice this length."""
-SIZES = {"640x480": (480, 640), "1280x720": (720, 1280)}
 TREMOR_HZ, SWAY_HZ = (8.0, 12.0), (0.2, 0.8)
 """Physiological tremor (R. J. Elble, 1996) and postural sway; frequencies in between are rare."""
 
@@ -129,7 +128,7 @@ class Machine:
 def machine_of(world: World) -> Machine:
     """Build the scanner of a world. Its mounting and its lenses follow from the world's seed."""
     standard = standard_scanner(world.seed)
-    rows, columns = SIZES[world.cameras.size]
+    columns, rows = map(int, world.cameras.size.split("x"))
     thickness = world.glass.thickness_mm
     present = [camera for camera in standard.cameras if camera.id not in world.cameras.missing]
     calibrated = {camera.id: _resized(replace(camera, plate_mm=thickness), rows, columns) for camera in present}

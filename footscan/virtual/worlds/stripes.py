@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from footscan.virtual.optics.glass import directions_from_below, exits_above
 from footscan.virtual.optics.laser_light import FAN_EDGE_DEGREES, FOCUS_MM, beams_of
-from footscan.virtual.optics.scanner import FAN_DEGREES, Camera, Laser
+from footscan.virtual.optics.scanner import FAN_DEGREES, WIDTH, Camera, Laser
 from footscan.virtual.optics.scene import SKIN, Scene
 from footscan.virtual.portable import cos_sin
 from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Machine, moved_camera, moved_laser
@@ -199,7 +199,7 @@ def _measured(seen: _Seen, frame: int, world: World, machine: Machine, random: n
     """The points of one frame that are found, with the errors of their centres."""
     cameras = world.cameras
     middle = np.array([machine.size[1] / 2.0, machine.size[0] / 2.0])
-    scale = machine.size[1] / 640.0
+    scale = machine.size[1] / WIDTH
     px_per_mm = 3.8 * scale
     off_focus = np.minimum(np.linalg.norm(seen.pixels - middle, axis=1) / (60.0 * px_per_mm), 1.0)
     blur = np.hypot(cameras.blur_px * scale, cameras.defocus_px * scale * off_focus)
@@ -225,7 +225,7 @@ def _measured(seen: _Seen, frame: int, world: World, machine: Machine, random: n
     points["score"] = contrast / (contrast + 0.05)
     points["saturation"] = saturation
     points["sigma"] = sigma * np.exp(random.normal(0.0, 0.2, len(sigma)))
-    return points[found]
+    return np.asarray(points[found])
 
 
 def _across(pixels: Floats) -> Floats:
@@ -240,7 +240,7 @@ def _clutter(machine: Machine, camera_id: int, random: np.random.Generator) -> l
     world, rows, columns = machine.world, *machine.size
     head = HEAD_OF_CAMERA[camera_id]
     frames = machine.frames(head)
-    drift_px = 3.8 * columns / 640.0 * machine.step_mm(head) * 0.7  # a thing as far away as the foot
+    drift_px = 3.8 * columns / WIDTH * machine.step_mm(head) * 0.7  # a thing as far away as the foot
     pieces = []
     kinds = [("head", world.room.head_glints), ("stripe", world.room.stripe_glints), ("room", world.room.room_glints)]
     kinds += [("room", world.room.line_things + world.room.red_things)]
@@ -260,7 +260,7 @@ def _clutter(machine: Machine, camera_id: int, random: np.random.Generator) -> l
                 pixels = start + line + way * speed * (frame - shown[0]) + random.normal(0.0, 0.2, line.shape)
                 inside = (pixels > 0.0).all(axis=1) & (pixels < [columns - 1, rows - 1]).all(axis=1)
                 points = np.zeros(int(inside.sum()), STRIPE_DTYPE)
-                points["frame"], points["i"], points["j"] = frame, *pixels[inside].T
+                points["frame"], points["i"], points["j"] = frame, pixels[inside, 0], pixels[inside, 1]
                 points["width"], points["peak"] = random.uniform(3.0, 12.0), 255.0 * strength
                 points["score"], points["sigma"] = strength * 0.8, 0.3
                 points["place"] = np.nan

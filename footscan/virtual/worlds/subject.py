@@ -69,8 +69,9 @@ def _foot(subject: WorldSubject, resolution_mm: float) -> Foot:
             amputated_at=deformity.amputated_at,
         )
         try:
-            side = "left" if subject.side == "left" else "right"
-            return make_foot(wanted, side=side, resolution_mm=resolution_mm / scale)
+            return make_foot(
+                wanted, side="left" if subject.side == "left" else "right", resolution_mm=resolution_mm / scale
+            )
         except RefusedInput as error:
             refused = error
     raise refused or AssertionError("at least one shape is tried")

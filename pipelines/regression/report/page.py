@@ -14,6 +14,7 @@ from pipelines.regression.report.result import (
     NightResult,
     Verdict,
 )
+from schemas.regression import WORLDS
 
 NOTICE = "<!-- notice -->"
 """Marks the line on which `with_notice` puts its notice."""
@@ -68,6 +69,8 @@ def _set(judged_set: JudgedSet) -> str:
     noted = [figure for figure in judged_set.figures if figure.verdict != "same"]
     noted.sort(key=lambda figure: VERDICTS.index(figure.verdict))
     parts = [f'<p class="problem">{text(judged_set.problem)}</p>'] if judged_set.problem else []
+    if judged_set.name == WORLDS:
+        parts.append('<p><a href="worlds.html">All worlds, what drives their errors, and the worst ones</a></p>')
     if judged_set.first or judged_set.changed_steps:
         parts.append(_first(judged_set))
     if noted:
