@@ -14,7 +14,7 @@ FULL_WELL_ELECTRONS = 6000.0
 """Electrons of a pixel at the sensor's white; their shot noise is the root of their number. Chosen by hand."""
 READ_NOISE = 0.0012
 """Standard deviation, in units of the sensor's white. Chosen by hand."""
-_CODES = 4096
+CODES = 4096
 """Of a converter with 12 bits."""
 
 
@@ -24,8 +24,8 @@ def photograph(light: Singles, random: np.random.Generator, settings: Simulation
     tone = _tone_curve()
     if not settings.bayer:
         return np.asarray(tone[_codes(_expose(light, normal, settings.noise))])
-    mosaic = _expose_mosaic(light, normal, np.float32(settings.noise))
-    return np.asarray(_develop(mosaic, tone))
+    mosaic = expose_mosaic(light, normal, np.float32(settings.noise))
+    return np.asarray(develop(mosaic, tone))
 
 
 def compress(picture: Bytes, settings: SimulationSettings) -> bytes:
@@ -41,7 +41,7 @@ def _tone_curve() -> Bytes:
 
     The shares of the blend are chosen by hand.
     """
-    linear = np.linspace(0.0, 1.0, _CODES)
+    linear = np.linspace(0.0, 1.0, CODES)
     curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
     contrast = 0.75 * curve + 0.25 * curve**2 * (3.0 - 2.0 * curve)
     return np.rint(255.0 * contrast).astype(np.uint8)
@@ -53,11 +53,11 @@ def _expose(light: Singles, normal: Singles, noise: float) -> Singles:
 
 
 def _codes(signal: Singles) -> NDArray[np.int64]:
-    return np.rint(signal * (_CODES - 1)).astype(np.int64)
+    return np.rint(signal * (CODES - 1)).astype(np.int64)
 
 
 @compiled
-def _expose_mosaic(light: Singles, normal: Singles, noise: np.float32) -> Singles:
+def expose_mosaic(light: Singles, normal: Singles, noise: np.float32) -> Singles:
     """The sensor's readings: one colour a pixel, RG over GB, with shot and read noise, clipped at its white."""
     height, width, _ = light.shape
     mosaic = np.empty((height, width), dtype=np.float32)
@@ -70,11 +70,11 @@ def _expose_mosaic(light: Singles, normal: Singles, noise: np.float32) -> Single
 
 
 @compiled
-def _develop(mosaic: Singles, tone: Bytes) -> Bytes:
+def develop(mosaic: Singles, tone: Bytes) -> Bytes:
     """Bilinear interpolation of the mosaic's missing colours, mirrored at the borders, and the tone curve."""
     height, width = mosaic.shape
     picture = np.empty((height, width, 3), dtype=np.uint8)
-    scale = np.float32(_CODES - 1)
+    scale = np.float32(CODES - 1)
     half, quarter = np.float32(0.5), np.float32(0.25)
     for j in range(height):
         up, down = abs(j - 1), height - 1 - abs(height - 2 - j)

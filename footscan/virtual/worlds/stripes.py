@@ -41,6 +41,9 @@ FAINTEST = 0.01
 """Smallest peak that 8 bits show, in units of the white."""
 SLICE_MM = 0.15
 """Travel within one exposure row by row up to which rows count as one moment. Chosen by hand."""
+TATTOO_PLACE, TATTOO_SPREAD = np.array([200.0, 0.0, 60.0]), np.array([50.0, 25.0, 20.0])
+"""Mean place of tattoos, mm, plate frame, and its standard deviation. Chosen by hand."""
+TATTOO_MM = 18.0
 MOST_SLICES = 3
 """A bound of time."""
 SEEN_HEADS_MM = 60.0
@@ -130,7 +133,7 @@ def _lit_stripe(machine: Machine, head: int, seconds: float, cut_mesh: CutMesh, 
         light += _irradiance(moved_laser(laser, pose), cut, scene)
     lit = light > 0.0
     cut = Cut(cut.points[lit], cut.normals[lit])
-    return _Lit(cut, light[lit], _texture(cut.points, machine.world))
+    return _Lit(cut, light[lit], vertex_albedo(cut.points, machine.world))
 
 
 def _seen_by(machine: Machine, camera: Camera, lit: _Lit, scene: Scene) -> _Seen:
@@ -180,8 +183,8 @@ def _view(cut: Cut, camera: Camera, size: tuple[int, int], scene: Scene) -> tupl
     return pixels, cosine
 
 
-def _texture(points: Floats, world: World) -> Floats:
-    """Albedo relative to the mean, (N,): a smooth random field, and dark tattoos or patterns of a sock."""
+def vertex_albedo(points: Floats, world: World) -> Floats:
+    """Albedo (N,) at `points` (N, 3), plate frame, relative to its mean: a smooth field, tattoos, patterns of a sock."""
     random = np.random.default_rng([world.seed, 310])
     waves = random.normal(0.0, 2.0 * np.pi / 25.0, (8, 3))
     phases = random.uniform(0.0, 2.0 * np.pi, 8)
@@ -190,8 +193,8 @@ def _texture(points: Floats, world: World) -> Floats:
     if world.subject.covering == "patterned sock":
         factor = factor * np.where(np.sin(points[:, 0] * 0.6) > 0.0, 1.6, 0.3)
     for _ in range(world.subject.tattoos):
-        centre = points.mean(axis=0) + random.normal(0.0, 30.0, 3) if len(points) else np.zeros(3)
-        factor = np.where(np.linalg.norm(points - centre, axis=1) < 15.0, 0.25 * factor, factor)
+        centre = TATTOO_PLACE + random.normal(0.0, 1.0, 3) * TATTOO_SPREAD
+        factor = np.where(np.linalg.norm(points - centre, axis=1) < TATTOO_MM, 0.25 * factor, factor)
     return np.asarray(factor)
 
 

@@ -1,0 +1,326 @@
+"""Films of one camera of a world: all light on its sensor, row by row as it is exposed, and the JPEG that it sends."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import simplejpeg
+from numpy.typing import NDArray
+
+from footscan.compiled import compiled
+from footscan.virtual.optics.laser_light import DIVERGENCE, FAN_EDGE_DEGREES, FOCUS_MM, beams_of
+from footscan.virtual.optics.scanner import FAN_DEGREES, WIDTH, Camera
+from footscan.virtual.optics.scene import SKIN, Scene
+from footscan.virtual.optics.sensor import CODES, develop, expose_mosaic
+from footscan.virtual.portable import cos_sin, gaussian_blur, gaussian_kernel
+from footscan.virtual.worlds.draw import TRAVEL_MM
+from footscan.virtual.worlds.film.raster import NOTHING, Raster, project, rasterise
+from footscan.virtual.worlds.film.scenery import draw_things, hardware, things_of
+from footscan.virtual.worlds.machine import BEND_HALF_MM, HEAD_OF_CAMERA, Machine, Pose, moved_camera, moved_laser
+from footscan.virtual.worlds.stripes import SEEN_HEADS_MM, vertex_albedo
+from footscan.virtual.worlds.subject import Subject
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+Ints = NDArray[np.int64]
+
+LASER_COLOURS = {"red": (1.0, 0.12, 0.09), "green": (0.10, 1.0, 0.14), "blue": (0.06, 0.20, 1.0)}
+"""Responses of red, green and blue pixels to lasers of 650, 520 and 450 nm, with the leaks of their filters. Chosen by
+hand after data sheets of webcam sensors."""
+SKIN_COLOUR = (1.0, 0.68, 0.52)
+"""Albedo of skin for red, green and blue light, relative to red."""
+LAMPS = (0.28, 0.18, 0.54)
+"""Room light on a surface: from all sides, from above, from the lamps. Chosen by hand."""
+REACH_SIGMAS = 4.6
+"""Half width of a sheet in standard deviations."""
+GLOW_BLOCK = 4
+"""Light scattered below the skin is computed for blocks of 4 x 4 pixels: a bound of time."""
+GLOW_SHARE = 0.2
+"""Share of the laser's light that skin scatters sideways. Chosen by hand."""
+GLINT_SHARE = 0.05
+"""Light of a glint as a share of the laser's power. Chosen by hand."""
+PX_PER_MM = 3.8
+"""Scale in the middle of a picture of 640 columns."""
+AUTO_MEAN = 0.22
+"""Mean brightness that automatic exposure aims at, 1 being white. Chosen by hand."""
+AUTO_RANGE = (0.25, 4.0)
+"""Range of automatic exposure and of the gains of automatic white balance."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The exposure of one frame: rows follow each other from `pose` to `pose` + `way`."""
+
+    seconds: float
+    pose: Pose
+    """Head frame to plate frame when the first row is exposed."""
+    way: Floats
+    """(3,) mm that the head travels until the last row, plate frame."""
+
+
+class _Pixels(NamedTuple):
+    """The pixels that show the subject."""
+
+    index: Ints
+    """(K,) rows by columns."""
+    points: Floats
+    """(K, 3) mm, plate frame."""
+    normals: Floats
+    """(K, 3) unit."""
+    albedo: Floats
+    """(K,) relative to the mean."""
+
+
+class CameraFilm:
+    """One camera of a world, ready to film; equal worlds give equal bytes."""
+
+    def __init__(self, machine: Machine, subject: Subject, camera_id: int, scene: Scene | None = None) -> None:
+        self._machine, self._subject, self._id = machine, subject, camera_id
+        self._camera = machine.cameras[camera_id]
+        self._scene = scene or Scene(subject.mesh, SKIN)
+        mesh = subject.mesh
+        corners = mesh.vertices[mesh.faces]
+        crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = np.zeros_like(mesh.vertices)
+        for corner in range(3):
+            np.add.at(normals, mesh.faces[:, corner], crossed)
+        self._normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+        self._albedo = vertex_albedo(mesh.vertices, machine.world)
+        self._hardware, self._glints = hardware(machine, camera_id)
+        self._things = things_of(machine, camera_id, TRAVEL_MM)
+        world = machine.world
+        relative = np.array(
+            SKIN_COLOUR if world.subject.covering == "none" and world.subject.kind == "foot" else (1.0,) * 3
+        )
+        warmth = np.array([1.0 + world.room.warmth, 1.0, 1.0 - world.room.warmth])
+        self._room_colour = (world.room.light * warmth).astype(np.float32)
+        self._object_colour = (world.subject.albedo * relative * self._room_colour).astype(np.float32)
+        self._laser_colour = np.array(LASER_COLOURS[world.laser.colour], np.float32)
+        lamp = np.random.default_rng([world.seed, 540]).normal(0.0, 1.0, 3)
+        lamp[2] = abs(lamp[2]) + 0.5
+        self._lamp = lamp / np.sqrt((lamp**2).sum())
+
+    def jpeg(self, frame: int) -> bytes:
+        """Returns the JPEG of a frame."""
+        cameras = self._machine.world.cameras
+        picture = self.picture(frame)
+        return bytes(
+            simplejpeg.encode_jpeg(
+                picture, quality=cameras.jpeg_quality, colorspace="RGB", colorsubsampling=cameras.jpeg_chroma
+            )
+        )
+
+    def picture(self, frame: int) -> NDArray[np.uint8]:
+        """Returns the picture before compression, (rows, columns, 3) uint8 RGB."""
+        world = self._machine.world
+        random = np.random.default_rng([world.seed, 560 + self._id, frame])
+        light = self.light(frame, random)
+        scale = world.cameras.gain
+        if world.cameras.auto_exposure:
+            mean = float(np.minimum(light * np.float32(scale), 1.0).mean())
+            scale *= float(np.clip(AUTO_MEAN / max(mean, 1e-6), *AUTO_RANGE))
+        gains = np.full(3, scale, np.float32)
+        if world.cameras.auto_white_balance:
+            means = light.mean(axis=(0, 1)) + 1e-6
+            gains *= np.clip(means[1] / means, *AUTO_RANGE).astype(np.float32)
+        normal = random.standard_normal(light.shape[:2], dtype=np.float32)
+        noise = np.float32(world.cameras.noise * np.sqrt(max(scale, 1.0)))
+        linear = np.linspace(0.0, 1.0, CODES)
+        tone = np.rint(255.0 * linear ** (1.0 / world.cameras.gamma)).astype(np.uint8)
+        return np.asarray(develop(expose_mosaic(light * gains, normal, noise), tone))
+
+    def light(self, frame: int, random: np.random.Generator) -> Singles:
+        """Light on the sensor at gain 1, (rows, columns, 3) float32, 1 being its white."""
+        machine, world = self._machine, self._machine.world
+        moment = self._moment(frame)
+        camera = moved_camera(self._camera, moment.pose)
+        raster = self._raster(camera, moment)
+        pixels = self._pixels(raster)
+        stripe = self._stripes(camera, moment, pixels)
+        light = self._hardware * self._room_colour
+        laser = world.laser.power * float(random.uniform(0.6, 1.2))
+        draw_things(
+            self._things, self._camera, moment.pose, machine.plate, moment.seconds,
+            (world.room.light, laser * GLINT_SHARE), light,
+        )  # fmt: skip
+        light += (self._glints * laser * GLINT_SHARE)[:, :, None] * self._laser_colour
+        self._light_object(light, pixels)
+        glow = self._glow(stripe, raster.face != NOTHING)
+        light += (self._speckled(stripe, random) + glow)[:, :, None] * self._laser_colour
+        self._flicker(light, moment)
+        scale = machine.size[1] / WIDTH
+        blur = scale * float(np.hypot(world.cameras.blur_px, 0.5 * world.cameras.defocus_px))
+        return _blurred(light, gaussian_kernel(blur, int(3.0 * blur + 1.0)).astype(np.float32))
+
+    def _moment(self, frame: int) -> Moment:
+        head, machine = HEAD_OF_CAMERA[self._id], self._machine
+        seconds = machine.seconds(frame)
+        first = machine.pose(head, seconds)
+        last = machine.pose(head, seconds + machine.world.cameras.rolling_shutter_ms / 1000.0)
+        return Moment(seconds, first, last.shift - first.shift)
+
+    def _raster(self, camera: Camera, moment: Moment) -> Raster:
+        """Scan conversion of the subject; a vertex is seen when the row is exposed in which it lies then."""
+        vertices, faces = self._subject.mesh.vertices, self._subject.mesh.faces
+        projected = project(vertices, camera)
+        if moment.way.any():
+            rows = self._machine.size[0]
+            share = np.clip(np.nan_to_num(projected.pixels[:, 1]) / rows, 0.0, 1.0)
+            projected = project(vertices - share[:, None] * moment.way, camera)
+        return rasterise(projected, faces, self._machine.size)
+
+    def _pixels(self, raster: Raster) -> _Pixels:
+        index = np.flatnonzero(raster.face.ravel() != NOTHING)
+        face, shares = raster.face.ravel()[index], raster.shares.reshape(-1, 2)[index]
+        mesh = self._subject.mesh
+        return _Pixels(index, *_interpolated(face, shares, mesh.faces, mesh.vertices, self._normals, self._albedo))
+
+    def _stripes(self, camera: Camera, moment: Moment, pixels: _Pixels) -> Floats:
+        """Laser light of all heads that each pixel receives, (rows, columns)."""
+        machine, world = self._machine, self._machine.world
+        rows, columns = machine.size
+        own = HEAD_OF_CAMERA[self._id]
+        picture = np.zeros(rows * columns)
+        row_share = (pixels.index // columns) / rows
+        reach = REACH_SIGMAS * float(np.hypot(world.laser.sigma_mm, 0.3)) + 1.0
+        for head in range(3):
+            if abs(machine.reported_x(head, moment.seconds) - machine.reported_x(own, moment.seconds)) > SEEN_HEADS_MM:
+                continue
+            readout = world.cameras.rolling_shutter_ms / 1000.0
+            pose = machine.pose(head, moment.seconds)
+            way = machine.pose(head, moment.seconds + readout).shift - pose.shift
+            distance = _sheet_distance(
+                pixels.points, row_share, pose.turn, pose.shift, way, world.laser.bend_mm / BEND_HALF_MM**2
+            )
+            near = np.flatnonzero(np.abs(distance) < reach)
+            if len(near):
+                light = self._sheet_light(head, pose, way * row_share[near, None], pixels, near, distance[near], camera)
+                picture[pixels.index[near]] += light
+        return picture.reshape(rows, columns)
+
+    def _sheet_light(
+        self, head: int, pose: Pose, moved: Floats, pixels: _Pixels, near: Ints, distance: Floats, camera: Camera
+    ) -> Floats:
+        """Light of a head's lasers on the pixels `near` its sheet, at `distance` (N,) mm from its middle."""
+        world = self._machine.world
+        points, normals = pixels.points[near] - moved, pixels.normals[near]
+        sight = camera.position - points
+        sight /= np.linalg.norm(sight, axis=1, keepdims=True)
+        footprint = 1.0 / (PX_PER_MM * np.clip(np.einsum("ij,ij->i", normals, sight), 0.1, 1.0))
+        total = np.zeros(len(near))
+        for laser in self._machine.lasers[head]:
+            moved_one = moved_laser(laser, pose)
+            beams = beams_of(moved_one, points)
+            cosine = np.maximum(np.einsum("ij,ij->i", normals, beams.towards), 0.0)
+            outer, inner = cos_sin(FAN_DEGREES / 2.0)[0], cos_sin(FAN_DEGREES / 2.0 - FAN_EDGE_DEGREES)[0]
+            fan = np.clip((-beams.towards @ np.asarray(moved_one.axis) - outer) / (inner - outer), 0.0, 1.0)
+            away = np.linalg.norm(points - np.asarray(moved_one.position), axis=1)
+            variance = world.laser.sigma_mm**2 + (DIVERGENCE * (away - FOCUS_MM)) ** 2 + footprint**2 / 12.0
+            profile = np.exp(-0.5 * distance**2 / variance) * world.laser.sigma_mm / np.sqrt(variance)
+            light = profile * cosine * fan * beams.transmitted * FOCUS_MM / away
+            lit = np.flatnonzero(light * world.laser.power > 1e-4)
+            hidden = self._scene.hidden(points[lit] + moved[lit], normals[lit], beams.sources[lit] + moved[lit])
+            total[lit[~hidden]] += light[lit[~hidden]]
+        return total * world.laser.power * world.subject.albedo * pixels.albedo[near]
+
+    def _light_object(self, light: Singles, pixels: _Pixels) -> None:
+        """Put the subject in the light of the room over what is behind it."""
+        n = pixels.normals
+        lamps = np.maximum(n @ self._lamp, 0.0)
+        shade = (LAMPS[0] + LAMPS[1] * n[:, 2] + LAMPS[2] * lamps) * pixels.albedo
+        light.reshape(-1, 3)[pixels.index] = shade.astype(np.float32)[:, None] * self._object_colour
+
+    def _glow(self, stripe: Floats, is_object: NDArray[np.bool_]) -> Singles:
+        """Laser light that was scattered below the surface, (rows, columns), on the subject alone."""
+        rows, columns = stripe.shape
+        reach = self._machine.world.subject.scatter_mm * PX_PER_MM * columns / WIDTH / GLOW_BLOCK
+        blocks = stripe.reshape(rows // GLOW_BLOCK, GLOW_BLOCK, columns // GLOW_BLOCK, GLOW_BLOCK).mean(axis=(1, 3))
+        wide = gaussian_blur(blocks.astype(np.float32), reach + 0.3, truncate=3.0)
+        spread = np.repeat(np.repeat(wide, GLOW_BLOCK, axis=0), GLOW_BLOCK, axis=1)
+        return np.asarray(GLOW_SHARE * spread * is_object, dtype=np.float32)
+
+    def _speckled(self, stripe: Floats, random: np.random.Generator) -> Singles:
+        speckle = self._machine.world.laser.speckle
+        rows, columns = np.nonzero(stripe)
+        line = stripe.astype(np.float32)
+        if len(rows) and speckle > 0.0:
+            grain = np.maximum(1.0 + 1.6 * speckle * random.standard_normal(len(rows), dtype=np.float32), 0.0)
+            line[rows, columns] *= grain
+        return line
+
+    def _flicker(self, light: Singles, moment: Moment) -> None:
+        """Lamps at the mains: rows that are exposed at other times are brighter or darker."""
+        room, cameras = self._machine.world.room, self._machine.world.cameras
+        if room.flicker > 0.0:
+            rows = light.shape[0]
+            seconds = moment.seconds + np.arange(rows) / rows * cameras.rolling_shutter_ms / 1000.0
+            light *= (1.0 + room.flicker * np.sin(4.0 * np.pi * room.mains_hz * seconds)).astype(np.float32)[
+                :, None, None
+            ]
+
+
+@compiled
+def _interpolated(
+    face: NDArray[np.int32],
+    shares: Singles,
+    faces: Ints,
+    vertices: Floats,
+    vertex_normals: Floats,
+    vertex_albedo: Floats,
+) -> tuple[Floats, Floats, Floats]:
+    count = len(face)
+    points, normals, albedo = np.empty((count, 3)), np.empty((count, 3)), np.empty(count)
+    for k in range(count):
+        a, b, c = faces[face[k], 0], faces[face[k], 1], faces[face[k], 2]
+        u, v = float(shares[k, 0]), float(shares[k, 1])
+        w = 1.0 - u - v
+        length = 0.0
+        for d in range(3):
+            points[k, d] = w * vertices[a, d] + u * vertices[b, d] + v * vertices[c, d]
+            normals[k, d] = w * vertex_normals[a, d] + u * vertex_normals[b, d] + v * vertex_normals[c, d]
+            length += normals[k, d] * normals[k, d]
+        length = max(np.sqrt(length), 1e-12)
+        for d in range(3):
+            normals[k, d] /= length
+        albedo[k] = w * vertex_albedo[a] + u * vertex_albedo[b] + v * vertex_albedo[c]
+    return points, normals, albedo
+
+
+@compiled
+def _sheet_distance(points: Floats, share: Floats, turn: Floats, shift: Floats, way: Floats, bend: float) -> Floats:
+    """Signed distance in X of points from the sheet of a head that moves by `share` of `way`."""
+    distance = np.empty(len(points))
+    for k in range(len(points)):
+        x, y = 0.0, 0.0
+        for d in range(3):
+            from_head = points[k, d] - shift[d] - share[k] * way[d]
+            x += from_head * turn[d, 0]
+            y += from_head * turn[d, 1]
+        distance[k] = x - bend * y * y
+    return distance
+
+
+@compiled
+def _blurred(light: Singles, kernel: Singles) -> Singles:
+    """Convolve each row and each column with a symmetric kernel; the border pixels go on beyond the border."""
+    rows, columns, colours = light.shape
+    half = len(kernel) // 2
+    along = np.empty_like(light)
+    for j in range(rows):
+        for i in range(columns):
+            for c in range(colours):
+                total = np.float32(0.0)
+                for k in range(-half, half + 1):
+                    total += kernel[k + half] * light[j, min(max(i + k, 0), columns - 1), c]
+                along[j, i, c] = total
+    blurred = np.empty_like(light)
+    for j in range(rows):
+        for i in range(columns):
+            for c in range(colours):
+                blurred[j, i, c] = np.float32(0.0)
+        for k in range(-half, half + 1):
+            row, weight = min(max(j + k, 0), rows - 1), kernel[k + half]
+            for i in range(columns):
+                for c in range(colours):
+                    blurred[j, i, c] += weight * along[row, i, c]
+    return blurred

@@ -1,0 +1,113 @@
+"""Records the scan of a world: films, scan.yaml, the true surface, the chart of its scanner, its description."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from itertools import islice
+from multiprocessing import get_context
+from pathlib import Path
+
+import yaml
+
+from footscan.child_process import end_with_parent
+from footscan.virtual.filming.film import write_film
+from footscan.virtual.filming.record import film_name, write_stl, write_yaml
+from footscan.virtual.optics.scene import SKIN, Scene
+from footscan.virtual.worlds.chart import world_chart
+from footscan.virtual.worlds.film.camera_film import CameraFilm
+from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Machine, machine_of
+from footscan.virtual.worlds.subject import Subject, make_subject
+from schemas.world import World
+
+FRAMES_A_TASK = 16
+"""Frames that a process renders at a time; no byte depends on it. Chosen by hand."""
+PATIENT = "world"
+
+
+def record_world(
+    world: World, folder: Path, *, progress: Callable[[int, int], None] | None = None, workers: int = 2
+) -> None:
+    """Film a world into `folder`, which is created; scan.yaml is written last.
+
+    progress : called with the number of frames done and in total. workers : number of processes.
+    """
+    machine, subject = machine_of(world), make_subject(world.subject)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_world(machine, subject, folder)
+    counts = {camera: machine.frames(HEAD_OF_CAMERA[camera]) for camera in machine.cameras}
+    done, total = 0, sum(counts.values())
+    pictures: list[bytes] = []
+    rows, columns = machine.size
+    for camera, part in _frames(world, counts, workers):
+        pictures += part
+        done += len(part)
+        if len(pictures) == counts[camera]:
+            rate = round(world.cameras.frames_per_second)
+            write_film(folder / film_name(camera), pictures, columns, rows, rate)
+            pictures = []
+        if progress is not None:
+            progress(done, total)
+    cameras = [
+        {"id": camera, "file": film_name(camera), "travel": {"start_mm": 0.0, "step_mm": machine.step_mm(head)}}
+        for camera, head in ((camera, HEAD_OF_CAMERA[camera]) for camera in machine.cameras)
+    ]
+    scan = {
+        "format": "footscan.scan/1", "patient": PATIENT, "scan": f"{world.seed}", "side": world.subject.side,
+        "truth": "truth.stl", "cameras": cameras,
+    }  # fmt: skip
+    write_yaml(folder / "scan.yaml", scan)
+
+
+def write_world(machine: Machine, subject: Subject, folder: Path) -> None:
+    """Write `world.json`, `measures.yaml` (true measures), `truth.stl` and `chart.csv` into a folder."""
+    (folder / "world.json").write_text(machine.world.model_dump_json(indent=2) + "\n", encoding="utf-8")
+    (folder / "measures.yaml").write_text(yaml.safe_dump(subject.measures, sort_keys=False), encoding="utf-8")
+    write_stl(folder / "truth.stl", machine.plate.apply(subject.mesh.vertices), subject.mesh.faces)
+    (folder / "chart.csv").write_text(world_chart(machine), encoding="utf-8")
+
+
+def _frames(world: World, counts: dict[int, int], workers: int) -> Iterator[tuple[int, list[bytes]]]:
+    """Pictures of consecutive frames, camera by camera."""
+    tasks = iter(
+        [
+            (camera, range(first, min(first + FRAMES_A_TASK, count)))
+            for camera, count in counts.items()
+            for first in range(0, count, FRAMES_A_TASK)
+        ]
+    )
+    with ProcessPoolExecutor(workers, get_context("spawn"), _open, (world,)) as pool:
+        running: deque[tuple[int, Future[list[bytes]]]] = deque()
+        for camera, frames in islice(tasks, 2 * workers):
+            running.append((camera, pool.submit(_render, camera, frames)))
+        while running:
+            camera, future = running.popleft()
+            pictures = future.result()
+            for next_camera, frames in islice(tasks, 1):
+                running.append((next_camera, pool.submit(_render, next_camera, frames)))
+            yield camera, pictures
+
+
+class _Studio:
+    """The world that a process films; its camera is kept until another one is requested."""
+
+    def __init__(self, world: World) -> None:
+        self._machine, self._subject = machine_of(world), make_subject(world.subject)
+        self._scene = Scene(self._subject.mesh, SKIN)
+        self._film: tuple[int, CameraFilm] | None = None
+
+    def jpegs(self, camera: int, frames: range) -> list[bytes]:
+        if self._film is None or self._film[0] != camera:
+            self._film = camera, CameraFilm(self._machine, self._subject, camera, self._scene)
+        return [self._film[1].jpeg(frame) for frame in frames]
+
+
+_studios: list[_Studio] = []
+
+
+def _open(world: World) -> None:
+    end_with_parent()
+    _studios[:] = [_Studio(world)]
+
+
+def _render(camera: int, frames: range) -> list[bytes]:
+    return _studios[0].jpegs(camera, frames)
