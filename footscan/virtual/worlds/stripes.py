@@ -184,7 +184,7 @@ def _view(cut: Cut, camera: Camera, size: tuple[int, int], scene: Scene) -> tupl
 
 
 def vertex_albedo(points: Floats, world: World) -> Floats:
-    """Albedo (N,) at `points` (N, 3), plate frame, relative to its mean: a smooth field, tattoos, patterns of a sock."""
+    """Albedo (N,) at `points` (N, 3), plate frame, relative to its mean: a smooth field, tattoos, a sock's pattern."""
     random = np.random.default_rng([world.seed, 310])
     waves = random.normal(0.0, 2.0 * np.pi / 25.0, (8, 3))
     phases = random.uniform(0.0, 2.0 * np.pi, 8)
