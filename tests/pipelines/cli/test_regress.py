@@ -100,7 +100,7 @@ def test_wrong_use(root: Path, regress: Regress, arguments: tuple[str, ...], tol
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("format: footscan.suite/1\n", "sets: is missing, expected a value"),
+        ("format: footscan.suite/1\n", "expected sets, worlds or both"),
         (SUITE.replace("scan:", "scn:"), "sets.foot.scn: unknown field, did you mean 'scan'? (line 4, column 10)"),
         (SUITE.replace("timed_passes: 0", "tolerances: {'time.*': lots}"), "tolerances.time.*"),
         (SUITE.replace("scan: archive/P0001/S1, ", ""), "sets.foot: expected either scan or virtual"),
