@@ -61,8 +61,8 @@ class Moment:
 class _Pixels(NamedTuple):
     """The pixels that show the subject."""
 
-    index: Ints
-    """(K,) rows by columns."""
+    flat: Ints
+    """(K,) indices in a flattened picture."""
     points: Floats
     """(K, 3) mm, plate frame."""
     normals: Floats
@@ -181,7 +181,7 @@ class CameraFilm:
         rows, columns = machine.size
         own = HEAD_OF_CAMERA[self._id]
         picture = np.zeros(rows * columns)
-        row_share = (pixels.index // columns) / rows
+        row_share = (pixels.flat // columns) / rows
         reach = REACH_SIGMAS * float(np.hypot(world.laser.sigma_mm, 0.3)) + 1.0
         for head in range(3):
             if abs(machine.reported_x(head, moment.seconds) - machine.reported_x(own, moment.seconds)) > SEEN_HEADS_MM:
@@ -195,7 +195,7 @@ class CameraFilm:
             near = np.flatnonzero(np.abs(distance) < reach)
             if len(near):
                 light = self._sheet_light(head, pose, way * row_share[near, None], pixels, near, distance[near], camera)
-                picture[pixels.index[near]] += light
+                picture[pixels.flat[near]] += light
         return picture.reshape(rows, columns)
 
     def _sheet_light(
@@ -228,7 +228,7 @@ class CameraFilm:
         n = pixels.normals
         lamps = np.maximum(n @ self._lamp, 0.0)
         shade = (LAMPS[0] + LAMPS[1] * n[:, 2] + LAMPS[2] * lamps) * pixels.albedo
-        light.reshape(-1, 3)[pixels.index] = shade.astype(np.float32)[:, None] * self._object_colour
+        light.reshape(-1, 3)[pixels.flat] = shade.astype(np.float32)[:, None] * self._object_colour
 
     def _glow(self, stripe: Floats, is_object: NDArray[np.bool_]) -> Singles:
         """Laser light that was scattered below the surface, (rows, columns), on the subject alone."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from footscan.compiled import compiled
 from footscan.virtual.optics.scanner import Camera
+from footscan.virtual.portable import dot
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -35,12 +36,12 @@ class Projected(NamedTuple):
     pixels: Floats
     """(V, 2) columns and rows; NaN behind the camera."""
     depth: Floats
-    """(V,) mm: grows with the distance along the sight."""
+    """(V,) mm along the optical axis."""
 
 
 def project(vertices: Floats, camera: Camera, passes: int = 1) -> Projected:
     """Project vertices (V, 3), plate frame, with refraction for a camera below the plate."""
-    return Projected(camera.project(vertices, passes), np.linalg.norm(vertices - camera.position, axis=1))
+    return Projected(camera.project(vertices, passes), dot(vertices - camera.position, camera.rotation[2]))
 
 
 def rasterise(projected: Projected, faces: Ints, shape: tuple[int, int], *, mirrored: bool = False) -> Raster:
@@ -86,7 +87,10 @@ def _fill(
                 v = ((bi - ai) * (j - aj) - (i - ai) * (bj - aj)) / area
                 if u < -EDGE_PX or v < -EDGE_PX or u + v > 1.0 + EDGE_PX:
                     continue
-                z = distance[a] * (1.0 - u - v) + distance[b] * u + distance[c] * v
+                # Shares on the triangle, not in the picture: what is farther away is shown smaller.
+                u, v, w = u / distance[b], v / distance[c], (1.0 - u - v) / distance[a]
+                z = 1.0 / (u + v + w)
+                u, v = u * z, v * z
                 if z < depth[j, i]:
                     depth[j, i] = z
                     face[j, i] = m
