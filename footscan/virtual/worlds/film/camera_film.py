@@ -14,7 +14,7 @@ from footscan.virtual.optics.scene import SKIN, Scene
 from footscan.virtual.optics.sensor import CODES, develop, expose_mosaic
 from footscan.virtual.portable import cos_sin, gaussian_blur, gaussian_kernel
 from footscan.virtual.worlds.draw import TRAVEL_MM
-from footscan.virtual.worlds.film.raster import NOTHING, Raster, project, rasterise
+from footscan.virtual.worlds.film.raster import NOTHING, Projected, Raster, project, rasterise
 from footscan.virtual.worlds.film.scenery import draw_things, hardware, things_of
 from footscan.virtual.worlds.machine import BEND_HALF_MM, HEAD_OF_CAMERA, Machine, Pose, moved_camera, moved_laser
 from footscan.virtual.worlds.stripes import SEEN_HEADS_MM, vertex_albedo
@@ -31,6 +31,8 @@ SKIN_COLOUR = (1.0, 0.68, 0.52)
 """Albedo of skin for red, green and blue light, relative to red."""
 LAMPS = (0.28, 0.18, 0.54)
 """Room light on a surface: from all sides, from above, from the lamps. Chosen by hand."""
+SEEN_MM = 140.0
+"""Distance in X from the laser plane beyond which no camera of a head sees anything of a subject on the glass."""
 REACH_SIGMAS = 4.6
 """Half width of a sheet in standard deviations."""
 GLOW_BLOCK = 4
@@ -86,7 +88,7 @@ class CameraFilm:
             np.add.at(normals, mesh.faces[:, corner], crossed)
         self._normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
         self._albedo = vertex_albedo(mesh.vertices, machine.world)
-        self._hardware, self._glints = hardware(machine, camera_id)
+        plates, self._glints = hardware(machine, camera_id)
         self._things = things_of(machine, camera_id, TRAVEL_MM)
         world = machine.world
         relative = np.array(
@@ -94,6 +96,7 @@ class CameraFilm:
         )
         warmth = np.array([1.0 + world.room.warmth, 1.0, 1.0 - world.room.warmth])
         self._room_colour = (world.room.light * warmth).astype(np.float32)
+        self._behind = plates * self._room_colour
         self._object_colour = (world.subject.albedo * relative * self._room_colour).astype(np.float32)
         self._laser_colour = np.array(LASER_COLOURS[world.laser.colour], np.float32)
         lamp = np.random.default_rng([world.seed, 540]).normal(0.0, 1.0, 3)
@@ -123,11 +126,12 @@ class CameraFilm:
         if world.cameras.auto_white_balance:
             means = light.mean(axis=(0, 1)) + 1e-6
             gains *= np.clip(means[1] / means, *AUTO_RANGE).astype(np.float32)
+        light *= gains
         normal = random.standard_normal(light.shape[:2], dtype=np.float32)
         noise = np.float32(world.cameras.noise * np.sqrt(max(scale, 1.0)))
         linear = np.linspace(0.0, 1.0, CODES)
         tone = np.rint(255.0 * linear ** (1.0 / world.cameras.gamma)).astype(np.uint8)
-        return np.asarray(develop(expose_mosaic(light * gains, normal, noise), tone))
+        return np.asarray(develop(expose_mosaic(light, normal, noise), tone))
 
     def light(self, frame: int, random: np.random.Generator) -> Singles:
         """Light on the sensor at gain 1, (rows, columns, 3) float32, 1 being its white."""
@@ -137,16 +141,16 @@ class CameraFilm:
         raster = self._raster(camera, moment)
         pixels = self._pixels(raster)
         stripe = self._stripes(camera, moment, pixels)
-        light = self._hardware * self._room_colour
+        light = self._behind.copy()
         laser = world.laser.power * float(random.uniform(0.6, 1.2))
         draw_things(
             self._things, self._camera, moment.pose, machine.plate, moment.seconds,
             (world.room.light, laser * GLINT_SHARE), light,
         )  # fmt: skip
-        light += (self._glints * laser * GLINT_SHARE)[:, :, None] * self._laser_colour
-        self._light_object(light, pixels)
+        _add(light, self._glints, self._laser_colour * np.float32(laser * GLINT_SHARE))
+        _put_object(light, pixels.flat, pixels.normals, pixels.albedo, self._lamp, np.array(LAMPS), self._object_colour)
         glow = self._glow(stripe, raster.face != NOTHING)
-        light += (self._speckled(stripe, random) + glow)[:, :, None] * self._laser_colour
+        _add(light, self._speckled(stripe, random) + glow, self._laser_colour)
         self._flicker(light, moment)
         scale = machine.size[1] / WIDTH
         blur = scale * float(np.hypot(world.cameras.blur_px, 0.5 * world.cameras.defocus_px))
@@ -161,13 +165,16 @@ class CameraFilm:
 
     def _raster(self, camera: Camera, moment: Moment) -> Raster:
         """Scan conversion of the subject; a vertex is seen when the row is exposed in which it lies then."""
-        vertices, faces = self._subject.mesh.vertices, self._subject.mesh.faces
-        projected = project(vertices, camera)
+        mesh, rows = self._subject.mesh, self._machine.size[0]
+        near = np.flatnonzero(np.abs(mesh.vertices[:, 0] - moment.pose.shift[0]) < SEEN_MM)
+        vertices = mesh.vertices[near]
+        seen = project(vertices, camera)
         if moment.way.any():
-            rows = self._machine.size[0]
-            share = np.clip(np.nan_to_num(projected.pixels[:, 1]) / rows, 0.0, 1.0)
-            projected = project(vertices - share[:, None] * moment.way, camera)
-        return rasterise(projected, faces, self._machine.size)
+            share = np.clip(np.nan_to_num(seen.pixels[:, 1]) / rows, 0.0, 1.0)
+            seen = project(vertices - share[:, None] * moment.way, camera)
+        projected = Projected(np.full((len(mesh.vertices), 2), np.nan), np.ones(len(mesh.vertices)))
+        projected.pixels[near], projected.depth[near] = seen
+        return rasterise(projected, mesh.faces, self._machine.size)
 
     def _pixels(self, raster: Raster) -> _Pixels:
         index = np.flatnonzero(raster.face.ravel() != NOTHING)
@@ -222,13 +229,6 @@ class CameraFilm:
             hidden = self._scene.hidden(points[lit] + moved[lit], normals[lit], beams.sources[lit] + moved[lit])
             total[lit[~hidden]] += light[lit[~hidden]]
         return total * world.laser.power * world.subject.albedo * pixels.albedo[near]
-
-    def _light_object(self, light: Singles, pixels: _Pixels) -> None:
-        """Put the subject in the light of the room over what is behind it."""
-        n = pixels.normals
-        lamps = np.maximum(n @ self._lamp, 0.0)
-        shade = (LAMPS[0] + LAMPS[1] * n[:, 2] + LAMPS[2] * lamps) * pixels.albedo
-        light.reshape(-1, 3)[pixels.flat] = shade.astype(np.float32)[:, None] * self._object_colour
 
     def _glow(self, stripe: Floats, is_object: NDArray[np.bool_]) -> Singles:
         """Laser light that was scattered below the surface, (rows, columns), on the subject alone."""
@@ -301,26 +301,47 @@ def _sheet_distance(points: Floats, share: Floats, turn: Floats, shift: Floats, 
 
 
 @compiled
+def _add(light: Singles, grey: Singles, colour: Singles) -> None:
+    """Add light (R, C) of one colour to a picture."""
+    rows, columns = grey.shape
+    for j in range(rows):
+        for i in range(columns):
+            if grey[j, i] != np.float32(0.0):
+                for c in range(3):
+                    light[j, i, c] += grey[j, i] * colour[c]
+
+
+@compiled
+def _put_object(
+    light: Singles, flat: Ints, normals: Floats, albedo: Floats, lamp: Floats, parts: Floats, colour: Singles
+) -> None:
+    """Put the subject in the light of the room over what is behind it."""
+    pixels = light.reshape(-1, 3)
+    for k in range(len(flat)):
+        facing = normals[k, 0] * lamp[0] + normals[k, 1] * lamp[1] + normals[k, 2] * lamp[2]
+        shade = np.float32((parts[0] + parts[1] * normals[k, 2] + parts[2] * max(facing, 0.0)) * albedo[k])
+        for c in range(3):
+            pixels[flat[k], c] = shade * colour[c]
+
+
+@compiled
 def _blurred(light: Singles, kernel: Singles) -> Singles:
     """Convolve each row and each column with a symmetric kernel; the border pixels go on beyond the border."""
     rows, columns, colours = light.shape
-    half = len(kernel) // 2
-    along = np.empty_like(light)
+    half, width = len(kernel) // 2, columns * colours
+    along, blurred = np.zeros((rows, width), np.float32), np.zeros((rows, width), np.float32)
+    padded = np.empty(width + 2 * half * colours, np.float32)
     for j in range(rows):
-        for i in range(columns):
-            for c in range(colours):
-                total = np.float32(0.0)
-                for k in range(-half, half + 1):
-                    total += kernel[k + half] * light[j, min(max(i + k, 0), columns - 1), c]
-                along[j, i, c] = total
-    blurred = np.empty_like(light)
+        for n in range(len(padded)):
+            column = min(max(n // colours - half, 0), columns - 1)
+            padded[n] = light[j, column, n % colours]
+        for k in range(len(kernel)):
+            weight, first = kernel[k], k * colours
+            for n in range(width):
+                along[j, n] += weight * padded[n + first]
     for j in range(rows):
-        for i in range(columns):
-            for c in range(colours):
-                blurred[j, i, c] = np.float32(0.0)
         for k in range(-half, half + 1):
             row, weight = min(max(j + k, 0), rows - 1), kernel[k + half]
-            for i in range(columns):
-                for c in range(colours):
-                    blurred[j, i, c] += weight * along[row, i, c]
-    return blurred
+            for n in range(width):
+                blurred[j, n] += weight * along[row, n]
+    return blurred.reshape(rows, columns, colours)
