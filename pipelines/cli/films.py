@@ -114,15 +114,26 @@ def simulate_capture(
 
 @simulate.command("world")
 def simulate_world(
-    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Random seed of the whole world.")],
     out: Out,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Random seed of the whole world.")],
+    points: Annotated[
+        bool, typer.Option("--points", help="Write the stripe points of each camera (CSV) instead of films.")
+    ] = False,
 ) -> None:
-    """Draw a world, and write its description, its true surface, its chart and the stripe points of its cameras."""
-    from pipelines.worlds.export import write_world
+    """Draw a whole world, and film it: a scan folder with the chart, the true surface and the true measures."""
+    from footscan.virtual.worlds.draw import draw_world
+    from footscan.virtual.worlds.film.record import record_world
+    from pipelines.cli.terminal.progress import frame_progress
+    from pipelines.worlds.export import write_points
 
     _check_empty(out)
-    stripes = write_world(seed, out)
-    message(f"{out}: world {seed}, stripe points of {len(stripes)} cameras")
+    world = draw_world(seed)
+    if points:
+        write_points(world, out)
+    else:
+        with frame_progress("filming") as progress:
+            record_world(world, out, progress=progress)
+    message(f"{out}: world {seed}")
 
 
 def ingest(
