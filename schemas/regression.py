@@ -82,7 +82,10 @@ class SuiteWorlds(Document):
     points: Seeds
     """Worlds without pictures: the same every night."""
     fresh_points: Annotated[int, Field(ge=0, le=100)] = 0
-    """Worlds that are drawn anew each night, by its date; those that fail are run every night from then on."""
+    """Worlds without pictures that are drawn anew each night, by its date; those that fail are run every night from
+    then on."""
+    films: Seeds | None = None
+    """Worlds that are filmed: the same every night."""
 
 
 class Suite(Document):

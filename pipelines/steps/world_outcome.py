@@ -19,7 +19,7 @@ from schemas.world import World
 def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Path]) -> bytes:
     """Compare cloud, surface and measures with the truth.
 
-    `inputs`: the `world` with its truth, `oriented`, `surface` and `measures`.
+    `inputs`: the `world` with its truth, the `kind` of the world, `oriented`, `surface` and `measures`.
     """
     del places
     world = unpack(inputs["world"])
@@ -35,7 +35,7 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
     known: dict[str, float | None] = json.loads(world["measures"].tobytes())
     outcome = WorldOutcome(
         seed=parameters.seed,
-        kind="points",
+        kind=json.loads(inputs["kind"]),
         problem=measures.finding,
         covered=world["covered"].item(),
         shift_mm=float(np.linalg.norm((turn - np.eye(3)) @ measured.mean(axis=0) + shift)),

@@ -1,4 +1,4 @@
-"""Runs worlds and keeps what came of each; intermediate results of hundreds of worlds are not kept."""
+"""Runs worlds and keeps what came of each; films and intermediate results of hundreds of worlds are not kept."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -6,31 +6,39 @@ from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from footscan.recordings.scans import read_scan
 from footscan.virtual.worlds.draw import draw_world
 from pipelines.arrays import unpack
-from pipelines.engine.actions.key import image_text, key_of
-from pipelines.engine.actions.step import Outcome, Output, SourceFile, Step, Success
+from pipelines.engine.actions.code import code_identity
+from pipelines.engine.actions.key import image_text, key_of, parameters_text
+from pipelines.engine.actions.step import Failure, Outcome, Output, SourceFile, Step, Success
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.pool import Pool
 from pipelines.engine.workspace import Workspace
-from pipelines.worlds.graph import world_steps
+from pipelines.scan import STEPS
+from pipelines.worlds.graph import film_step, filmed_steps, point_steps
 from schemas.base.errors import Fault, RefusedInput
 from schemas.base.json_files import read_json
-from schemas.campaign import WorldMeasure, WorldOutcome
+from schemas.base.model import canonical_json
+from schemas.campaign import WorldKind, WorldMeasure, WorldOutcome
 from schemas.parameters.scan import ScanParameters
+from schemas.world import World
 
 OUTCOMES = "outcomes"
-"""Folder of what came of each world, by the key of its graph."""
+"""Folder of what came of each world, by its key."""
 WORLDS_AT_ONCE = 2
-"""Worlds per worker whose intermediate results lie on the disk at once, about 0.1 GB each: a bound of space."""
+"""Worlds per worker whose films and intermediate results lie on the disk at once, about 0.2 GB each: a bound of
+space."""
+OF_FILMS = ("ingest", "extract")
+"""Steps of films that a world without pictures does not have."""
 
 OnWorld = Callable[[WorldOutcome], None]
 
 
 def run_worlds(
-    seeds: Sequence[int], parameters: ScanParameters, out: Path, pool: Pool, on_world: OnWorld
+    seeds: Sequence[int], kind: WorldKind, parameters: ScanParameters, out: Path, pool: Pool, on_world: OnWorld
 ) -> list[WorldOutcome]:
-    """Run the worlds of `seeds` without pictures, and return what came of each, in their order.
+    """Run the worlds of `seeds`, and return what came of each, in their order.
 
     A world whose code, parameters and description are those of an earlier run is not run again.
 
@@ -39,9 +47,8 @@ def run_worlds(
     Fault
         A step failed for a reason that is not the world's: the disk, the memory, or a mistake in the program.
     """
-    folder = out / OUTCOMES
-    graphs = {seed: world_steps(draw_world(seed), parameters) for seed in seeds}
-    files = {seed: folder / f"{graph_key(steps)}.json" for seed, steps in graphs.items()}
+    worlds = {seed: draw_world(seed) for seed in seeds}
+    files = {seed: out / OUTCOMES / f"{world_key(world, kind, parameters)}.json" for seed, world in worlds.items()}
     outcomes: dict[int, WorldOutcome] = {}
     for seed, file in files.items():
         if (outcome := _read(file)) is not None:
@@ -49,11 +56,22 @@ def run_worlds(
             on_world(outcome)
     missing = iter([seed for seed in seeds if seed not in outcomes])
     while window := list(islice(missing, WORLDS_AT_ONCE * pool.count)):
-        for seed, outcome in _run_window({seed: graphs[seed] for seed in window}, out, pool):
+        for seed, outcome in _run_window([worlds[seed] for seed in window], kind, parameters, out, pool):
             write_atomically(files[seed], outcome.model_dump_json().encode())
             outcomes[seed] = outcome
             on_world(outcome)
     return [outcomes[seed] for seed in seeds]
+
+
+def world_key(world: World, kind: WorldKind, parameters: ScanParameters) -> str:
+    """The key of what comes of a world: its description, the parameters, and the code of all steps."""
+    steps = point_steps(world, parameters)
+    if kind == "points":
+        return graph_key(steps)
+    codes = {name: code_identity(f"{STEPS}.{name}").digest for name in OF_FILMS}
+    filmed = graph_key([film_step(world, Path())])
+    values = {"points": graph_key(steps), "film": filmed, "codes": codes, "parameters": parameters_text(parameters)}
+    return key_of(canonical_json(values))
 
 
 def graph_key(steps: Sequence[Step]) -> str:
@@ -68,33 +86,47 @@ def graph_key(steps: Sequence[Step]) -> str:
     return keys[steps[-1].name]
 
 
-def _run_window(graphs: dict[int, list[Step]], out: Path, pool: Pool) -> Iterator[tuple[int, WorldOutcome]]:
+def _run_window(
+    worlds: Sequence[World], kind: WorldKind, parameters: ScanParameters, out: Path, pool: Pool
+) -> Iterator[tuple[int, WorldOutcome]]:
     out.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(prefix="worlds-", dir=out) as folder, Workspace(Path(folder)) as workspace:
-        steps = [step for graph in graphs.values() for step in graph]
-        ends = workspace.run(steps, pool, lambda _: None)
+    with TemporaryDirectory(prefix="worlds-", dir=out) as folder, Workspace(Path(folder) / "cache") as workspace:
+        graphs: dict[int, list[Step]] = {}
+        if kind == "points":
+            graphs = {world.seed: point_steps(world, parameters) for world in worlds}
+        else:
+            films = [film_step(world, Path(folder) / str(world.seed)) for world in worlds]
+            _check(workspace.run(films, pool, lambda _: None))
+            for world, film in zip(worlds, films, strict=True):
+                scan = read_scan(film.places["folder"])
+                graphs[world.seed] = filmed_steps(world, scan, parameters, workspace.digests)
+        ends = workspace.run([step for graph in graphs.values() for step in graph], pool, lambda _: None)
+        _check(ends)
         for seed, graph in graphs.items():
             end = ends[graph[-1].name]
             if isinstance(end, Success):
                 yield seed, WorldOutcome.model_validate_json(workspace.store.get(end.digest) or b"")
-            elif end.kind in {"refused", "finding"}:
-                yield seed, _refused(seed, end.problem, workspace, ends[graph[0].name])
             else:
-                raise Fault(end.problem)
+                yield seed, _refused(seed, kind, end.problem, workspace, ends[graph[0].name])
 
 
-def _refused(seed: int, problem: str, workspace: Workspace, drawn: Outcome) -> WorldOutcome:
+def _check(ends: dict[str, Outcome]) -> None:
+    """Raise the first failure that is not a refusal or a finding."""
+    for end in ends.values():
+        if isinstance(end, Failure) and end.kind not in {"refused", "finding"}:
+            raise Fault(end.problem)
+
+
+def _refused(seed: int, kind: WorldKind, problem: str, workspace: Workspace, drawn: Outcome) -> WorldOutcome:
     covered: float = 0.0
     measures: dict[str, WorldMeasure] = {}
     if isinstance(drawn, Success):
         world = unpack(workspace.store.get(drawn.digest) or b"")
         covered = world["covered"].item()
         known: dict[str, float | None] = json.loads(world["measures"].tobytes())
-        measures = {
-            name: WorldMeasure(value=None, truth=truth, sigma=None, status="incomplete")
-            for name, truth in known.items()
-        }
-    return WorldOutcome(seed=seed, kind="points", problem=problem, covered=covered, measures=measures)
+        nothing = WorldMeasure(value=None, truth=None, sigma=None, status="incomplete")
+        measures = {name: nothing.model_copy(update={"truth": truth}) for name, truth in known.items()}
+    return WorldOutcome(seed=seed, kind=kind, problem=problem, covered=covered, measures=measures)
 
 
 def _read(file: Path) -> WorldOutcome | None:

@@ -57,18 +57,21 @@ def run_night_of_worlds(
     kept = read_kept(out)
     fresh = fresh_seeds(day, worlds.fresh_points)
     seeds = list(dict.fromkeys([*fixed, *kept, *fresh]))
+    filmed = [] if worlds.films is None else worlds.films.seeds
     done: list[WorldOutcome] = []
 
     def count(outcome: WorldOutcome) -> None:
         done.append(outcome)
-        on_world(len(done), len(seeds))
+        on_world(len(done), len(seeds) + len(filmed))
 
     with local_cluster(cores()) as pool:
-        outcomes = {o.seed: o for o in run_worlds(seeds, parameters, out / PAGES, pool, count)}
-    failed = [seed for seed in fresh if outcomes[seed].silent_errors]
+        points = {o.seed: o for o in run_worlds(seeds, "points", parameters, out / PAGES, pool, count)}
+        films = run_worlds(filmed, "films", parameters, out / PAGES, pool, count)
+    failed = [seed for seed in fresh if points[seed].silent_errors]
     write_atomically(out / PAGES / KEPT, json.dumps(sorted({*kept, *failed})).encode())
-    page = write_pages(list(outcomes.values()), out, name)
-    return WorldsNight(sum_up([outcomes[seed] for seed in fixed]).figures, page)
+    page = write_pages([*points.values(), *films], out, name)
+    figures = sum_up([points[seed] for seed in fixed]).figures("points")
+    return WorldsNight(figures | (sum_up(films).figures("films") if films else {}), page)
 
 
 def write_pages(outcomes: list[WorldOutcome], out: Path, name: str) -> Path:

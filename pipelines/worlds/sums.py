@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import spearmanr
 
-from schemas.campaign import WorldOutcome
+from schemas.campaign import WorldKind, WorldOutcome
 from schemas.world import World
 
 FEWEST_WORLDS = 20
@@ -26,10 +26,9 @@ class Sums(NamedTuple):
     """Nothing is reported as good, and the stripes do not cover a foot."""
     refused_needlessly: int
 
-    @property
-    def figures(self) -> dict[str, float | None]:
-        """The sums as figures of a suite."""
-        return {f"worlds.{name}": float(value) for name, value in self._asdict().items()}
+    def figures(self, kind: WorldKind) -> dict[str, float | None]:
+        """Return the sums as figures of a suite."""
+        return {f"{kind}.{name}": float(value) for name, value in self._asdict().items()}
 
 
 def sum_up(outcomes: Sequence[WorldOutcome]) -> Sums:

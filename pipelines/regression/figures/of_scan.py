@@ -15,10 +15,11 @@ Goal = Literal["less", "more", "nearer", "same"]
 """`nearer`: to the true value of the foot; `same`: any value that differs from the accepted one is worse."""
 
 GOALS: dict[str, Goal] = {
-    "worlds.worlds": "same",
-    "worlds.measured": "more",
-    "worlds.refused_rightly": "same",
-    "worlds.*": "less",
+    "*.worlds": "same",
+    "*.measured": "more",
+    "*.refused_rightly": "same",
+    "*.silent_*": "less",
+    "*.refused_needlessly": "less",
     "accuracy.within_1mm": "more",
     "accuracy.*": "less",
     "cameras.filmed": "more",

@@ -75,5 +75,5 @@ def in_order(figure: str) -> tuple[int, str]:
     return (_GROUPS.index(group) if group in _GROUPS else len(_GROUPS)), figure
 
 
-_GROUPS = ("worlds", "accuracy", "measures", "cameras", "points", "surface", "steps", "time", "memory")
+_GROUPS = ("films", "accuracy", "measures", "cameras", "points", "surface", "steps", "time", "memory")
 _UNITS = ("mm", "mm2", "mm3", "deg", "1")

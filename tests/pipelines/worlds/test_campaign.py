@@ -7,8 +7,7 @@ import pytest
 from footscan.virtual.worlds.draw import draw_world
 from pipelines.engine.pool import Threads
 from pipelines.worlds import campaign
-from pipelines.worlds.campaign import graph_key, run_worlds
-from pipelines.worlds.graph import world_steps
+from pipelines.worlds.campaign import run_worlds, world_key
 from pipelines.worlds.night import fresh_seeds, read_kept
 from schemas.base.errors import RefusedInput
 from schemas.campaign import WorldOutcome
@@ -32,7 +31,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def outcomes(out: Path) -> dict[int, WorldOutcome]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(campaign, "draw_world", WORLDS.__getitem__)
-        ran = run_worlds(list(WORLDS), ScanParameters(), out, Threads(2), lambda _: None)
+        ran = run_worlds(list(WORLDS), "points", ScanParameters(), out, Threads(2), lambda _: None)
     return {outcome.seed: outcome for outcome in ran}
 
 
@@ -67,7 +66,7 @@ def test_nothing_runs_again_and_no_intermediate_result_stays(
 ) -> None:
     monkeypatch.setattr(campaign, "draw_world", WORLDS.__getitem__)
     monkeypatch.setattr(campaign, "_run_window", None)
-    again = run_worlds([2, 1], ScanParameters(), out, Threads(1), lambda _: None)
+    again = run_worlds([2, 1], "points", ScanParameters(), out, Threads(1), lambda _: None)
     assert again == [outcomes[2], outcomes[1]]
     assert [path.name for path in out.iterdir()] == ["outcomes"]
     assert sum(file.stat().st_size for file in (out / "outcomes").iterdir()) < 50_000
@@ -77,12 +76,13 @@ def test_a_key_holds_the_world_and_the_parameters() -> None:
     usual = ScanParameters()
     other = usual.model_copy(update={"fusion": usual.fusion.model_copy(update={"spacing_mm": 0.5})})
     keys = {
-        graph_key(world_steps(draw_world(1), usual)),
-        graph_key(world_steps(draw_world(2), usual)),
-        graph_key(world_steps(draw_world(1), other)),
+        world_key(draw_world(1), "points", usual),
+        world_key(draw_world(2), "points", usual),
+        world_key(draw_world(1), "points", other),
+        world_key(draw_world(1), "films", usual),
     }
-    assert len(keys) == 3
-    assert graph_key(world_steps(draw_world(1), usual)) in keys
+    assert len(keys) == 4
+    assert world_key(draw_world(1), "points", usual) in keys
 
 
 def test_seeds_of_days_differ() -> None:

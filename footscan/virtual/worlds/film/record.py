@@ -21,7 +21,8 @@ from schemas.world import World
 
 FRAMES_A_TASK = 16
 """Frames that a process renders at a time; no byte depends on it. Chosen by hand."""
-PATIENT = "world"
+PATIENT = "worlds"
+"""Pseudonym in scan.yaml."""
 
 
 def record_world(
@@ -29,7 +30,7 @@ def record_world(
 ) -> None:
     """Film a world into `folder`, which is created; scan.yaml is written last.
 
-    progress : called with the number of frames done and in total. workers : number of processes.
+    progress : called with the number of frames done and in total. workers : number of processes; 1 is this one alone.
     """
     machine, subject = machine_of(world), make_subject(world.subject)
     folder.mkdir(parents=True, exist_ok=True)
@@ -75,6 +76,11 @@ def _frames(world: World, counts: dict[int, int], workers: int) -> Iterator[tupl
             for first in range(0, count, FRAMES_A_TASK)
         ]
     )
+    if workers <= 1:
+        studio = _Studio(world)
+        for camera, frames in tasks:
+            yield camera, studio.jpegs(camera, frames)
+        return
     with ProcessPoolExecutor(workers, get_context("spawn"), _open, (world,)) as pool:
         running: deque[tuple[int, Future[list[bytes]]]] = deque()
         for camera, frames in islice(tasks, 2 * workers):
