@@ -22,6 +22,10 @@ log = logging.getLogger("footscan.run")
 
 ANSWER_S = 10.0
 """Time to wait for the answer of a scheduler; chosen by hand."""
+TRIM_BYTES, MMAP_BYTES = 2**28, 2**25
+"""Thresholds of glibc's malloc in worker processes: free memory above the first is returned to the system, arrays above
+the second are mapped one by one. Dask's default of 64 kB makes the kernel clear the pages of every array anew: a quarter
+of the time of a world. The second is the largest that glibc takes."""
 LOOPBACK = "127.0.0.1"
 """Address of this machine that no other machine can reach (RFC 1122, 3.2.1.3)."""
 FAILURES_ALLOWED = 1
@@ -198,6 +202,8 @@ def local_cluster(workers: int, *, dashboard: bool = False) -> Iterator[Cluster]
         "distributed.scheduler.allowed-failures": FAILURES_ALLOWED,
         # At the end of a run a worker logs an error when its scheduler is gone.
         "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical",
+        "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": TRIM_BYTES,
+        "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": MMAP_BYTES,
     }
     if not dashboard:  # Dask opens the ports of its pages in any case; without routes they serve nothing
         settings |= {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
