@@ -1,10 +1,10 @@
 """A world to the films of its cameras."""
 
+import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
 from footscan.virtual.worlds.film.record import record_world
-from pipelines.engine.files.digest import sha256
 from schemas.base.model import canonical_json
 from schemas.world import World
 
@@ -14,4 +14,5 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
     del inputs
     folder = places["folder"]
     record_world(parameters, folder, workers=1)
-    return canonical_json({film.name: sha256(film.read_bytes()) for film in sorted(folder.glob("*.avi"))}).encode()
+    digests = {film.name: hashlib.sha256(film.read_bytes()).hexdigest() for film in sorted(folder.glob("*.avi"))}
+    return canonical_json(digests).encode()
