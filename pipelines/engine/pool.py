@@ -23,9 +23,9 @@ log = logging.getLogger("footscan.run")
 ANSWER_S = 10.0
 """Time to wait for the answer of a scheduler; chosen by hand."""
 TRIM_BYTES, MMAP_BYTES = 2**28, 2**25
-"""Thresholds of glibc's malloc in worker processes: free memory above the first goes back to the system, arrays above the
-second are mapped one by one. With Dask's 64 kB the kernel clears the pages of every array anew, a quarter of the time of
-a world. The second is the largest that glibc takes."""
+"""Thresholds of glibc's malloc in worker processes: free memory above the first goes back to the system, arrays above
+the second are mapped one by one. With Dask's 64 kB the kernel clears the pages of every array anew, which takes a
+quarter of the time of a world. The second is the largest that glibc takes."""
 LOOPBACK = "127.0.0.1"
 """Address of this machine that no other machine can reach (RFC 1122, 3.2.1.3)."""
 FAILURES_ALLOWED = 1
