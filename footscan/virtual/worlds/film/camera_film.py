@@ -8,6 +8,7 @@ import simplejpeg
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
+from footscan.virtual.optics.glass import reflectance
 from footscan.virtual.optics.laser_light import DIVERGENCE, FAN_EDGE_DEGREES, FOCUS_MM, beams_of
 from footscan.virtual.optics.scanner import FAN_DEGREES, WIDTH, Camera
 from footscan.virtual.optics.scene import SKIN, Scene
@@ -15,7 +16,15 @@ from footscan.virtual.optics.sensor import CODES, develop, expose_mosaic
 from footscan.virtual.portable import cos_sin, gaussian_blur, gaussian_kernel
 from footscan.virtual.worlds.draw import TRAVEL_MM
 from footscan.virtual.worlds.film.raster import NOTHING, Projected, Raster, project, rasterise
-from footscan.virtual.worlds.film.scenery import draw_things, hardware, things_of
+from footscan.virtual.worlds.film.scenery import (
+    copies,
+    draw_marks,
+    draw_things,
+    glass_marks,
+    hardware,
+    smudge,
+    things_of,
+)
 from footscan.virtual.worlds.machine import BEND_HALF_MM, HEAD_OF_CAMERA, Machine, Pose, moved_camera, moved_laser
 from footscan.virtual.worlds.stripes import SEEN_HEADS_MM, vertex_albedo
 from footscan.virtual.worlds.subject import Subject
@@ -35,6 +44,8 @@ SEEN_MM = 140.0
 """Distance in X from the laser plane beyond which no camera of a head sees anything of a subject on the glass."""
 REACH_SIGMAS = 4.6
 """Half width of a sheet in standard deviations."""
+FAINTEST_REFLECTED = 0.02
+"""Light of which no reflection is drawn, 1 being white."""
 GLOW_BLOCK = 4
 """Light scattered below the skin is computed for blocks of 4 x 4 pixels: a bound of time."""
 GLOW_SHARE = 0.2
@@ -90,6 +101,8 @@ class CameraFilm:
         self._albedo = vertex_albedo(mesh.vertices, machine.world)
         plates, self._glints = hardware(machine, camera_id)
         self._things = things_of(machine, camera_id, TRAVEL_MM)
+        self._copies, self._smudge = copies(machine, camera_id), smudge(machine, camera_id)
+        self._marks = glass_marks(machine) if self._camera.below_glass else []
         world = machine.world
         relative = np.array(
             SKIN_COLOUR if world.subject.covering == "none" and world.subject.kind == "foot" else (1.0,) * 3
@@ -141,6 +154,7 @@ class CameraFilm:
         raster = self._raster(camera, moment)
         pixels = self._pixels(raster)
         stripe = self._stripes(camera, moment, pixels)
+        stripe += self._reflections(stripe, camera, pixels, raster)
         light = self._behind.copy()
         laser = world.laser.power * float(random.uniform(0.6, 1.2))
         draw_things(
@@ -151,6 +165,10 @@ class CameraFilm:
         _put_object(light, pixels.flat, pixels.normals, pixels.albedo, self._lamp, np.array(LAMPS), self._object_colour)
         glow = self._glow(stripe, raster.face != NOTHING)
         _add(light, self._speckled(stripe, random) + glow, self._laser_colour)
+        draw_marks(self._marks, camera, light)
+        if self._smudge is not None:
+            light *= (1.0 - self._smudge)[:, :, None]
+            light += (self._smudge * np.float32(light.mean()))[:, :, None]
         self._flicker(light, moment)
         scale = machine.size[1] / WIDTH
         blur = scale * float(np.hypot(world.cameras.blur_px, 0.5 * world.cameras.defocus_px))
@@ -229,6 +247,37 @@ class CameraFilm:
             hidden = self._scene.hidden(points[lit] + moved[lit], normals[lit], beams.sources[lit] + moved[lit])
             total[lit[~hidden]] += light[lit[~hidden]]
         return total * world.laser.power * world.subject.albedo * pixels.albedo[near]
+
+    def _reflections(self, stripe: Floats, camera: Camera, pixels: _Pixels, raster: Raster) -> Floats:
+        """The stripe in the glass and in shiny things, (rows, columns).
+
+        A camera below sees it again by light that was reflected at both faces of the plate; one above sees its mirror
+        image beside the subject. Glints that move as the stripe does are faint copies of it, mirrors turned ones.
+        """
+        rows, columns = stripe.shape
+        picture = np.zeros(rows * columns)
+        light = stripe.ravel()[pixels.flat]
+        lit = np.flatnonzero(light > FAINTEST_REFLECTED)
+        points, light = pixels.points[lit], light[lit]
+        if camera.below_glass:
+            places, strength = camera.project(points, passes=3), np.full(len(points), self._machine.world.glass.ghost)
+        else:
+            image = points * np.array([1.0, 1.0, -1.0])
+            sight = image - camera.position
+            places = camera.project(image)
+            strength = reflectance(np.abs(sight[:, 2]) / np.linalg.norm(sight, axis=1))
+        i, j = np.rint(np.nan_to_num(places, nan=-1.0)).astype(np.int64).T
+        inside = (i >= 0) & (i < columns) & (j >= 0) & (j < rows)
+        place = (j * columns + i)[inside]
+        if not camera.below_glass:
+            inside[inside] = raster.face.ravel()[place] == NOTHING
+            place = (j * columns + i)[inside]
+        np.add.at(picture, place, (light * strength)[inside])
+        reflected = picture.reshape(rows, columns)
+        for copy in self._copies:
+            turned = stripe[:, ::-1] if copy.is_mirrored else stripe
+            reflected += copy.mask * np.roll(turned, copy.offset, axis=(0, 1))
+        return reflected
 
     def _glow(self, stripe: Floats, is_object: NDArray[np.bool_]) -> Singles:
         """Laser light that was scattered below the surface, (rows, columns), on the subject alone."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from footscan.compiled import compiled
 from footscan.virtual.optics.scanner import Camera
 from footscan.virtual.portable import gaussian_blur
+from footscan.virtual.worlds.draw import TRAVEL_MM
 from footscan.virtual.worlds.machine import Machine, Pose
 from schemas.world import WorldRoom
 
@@ -118,16 +119,11 @@ def draw_things(
 def _draw_rod(pixels: Floats, radius: float, colour: Singles, adds: bool, into: Singles) -> None:
     rows, columns = into.shape[0], into.shape[1]
     ai, aj, bi, bj = pixels[0, 0], pixels[0, 1], pixels[1, 0], pixels[1, 1]
-    wi, wj = bi - ai, bj - aj
-    squared = wi * wi + wj * wj
     least_i, most_i = max(min(ai, bi) - radius - 1.0, 0.0), min(max(ai, bi) + radius + 1.0, columns - 1.0)
     least_j, most_j = max(min(aj, bj) - radius - 1.0, 0.0), min(max(aj, bj) + radius + 1.0, rows - 1.0)
     for j in range(int(least_j), int(most_j) + 1):
         for i in range(int(least_i), int(most_i) + 1):
-            along = ((i - ai) * wi + (j - aj) * wj) / squared if squared > 0.0 else 0.0
-            along = min(max(along, 0.0), 1.0)
-            away = np.sqrt((i - ai - along * wi) ** 2 + (j - aj - along * wj) ** 2)
-            share = np.float32(min(max(radius + 0.5 - away, 0.0), 1.0))
+            share = np.float32(min(max(radius + 0.5 - _away(i, j, ai, aj, bi, bj), 0.0), 1.0))
             if share > 0.0:
                 for c in range(3):
                     behind = into[j, i, c]
@@ -154,3 +150,107 @@ def hardware(machine: Machine, camera_id: int) -> tuple[Singles, Singles]:
         v = -np.sin(angle) * (column - i) + np.cos(angle) * (row - j)
         glints += random.uniform(0.05, 1.0) * np.exp(-0.5 * ((u / long) ** 2 + (v / short) ** 2))
     return plates.astype(np.float32), glints.astype(np.float32)
+
+
+class Copy(NamedTuple):
+    """A copy of the stripe in a shiny thing."""
+
+    mask: Singles
+    """(R, C) strength, and where it is seen."""
+    offset: tuple[int, int]
+    """Rows and columns."""
+    is_mirrored: bool
+
+
+def copies(machine: Machine, camera_id: int) -> list[Copy]:
+    """Draw the glints that move as the stripe does, and the mirrors that show it turned."""
+    room, (rows, columns) = machine.world.room, machine.size
+    random = np.random.default_rng([machine.world.seed, 580 + camera_id])
+    row, column = np.mgrid[0:rows, 0:columns]
+    made = []
+    for is_mirrored, count in ((False, room.stripe_glints), (True, room.mirrors)):
+        for _ in range(count):
+            j, i = random.uniform([0.0, 0.0], [rows, columns])
+            radius = random.uniform(0.1, 0.4) * rows
+            inside = (row - j) ** 2 + (column - i) ** 2 < radius**2
+            strength = random.uniform(0.1, 0.6) if is_mirrored else random.uniform(0.01, 0.1)
+            offset = random.uniform(-0.3, 0.3, 2) * rows
+            made.append(Copy((strength * inside).astype(np.float32), (int(offset[0]), int(offset[1])), is_mirrored))
+    return made
+
+
+def smudge(machine: Machine, camera_id: int) -> Singles | None:
+    """Draw the share of light that smudges on a lens scatter, (R, C); None for a clean lens."""
+    rows, columns = machine.size
+    random = np.random.default_rng([machine.world.seed, 600 + camera_id])
+    row, column = np.mgrid[0:rows, 0:columns]
+    share = np.zeros((rows, columns))
+    for _ in range(machine.world.cameras.smudges):
+        j, i = random.uniform([0.0, 0.0], [rows, columns])
+        radius = random.uniform(0.05, 0.25) * rows
+        share += random.uniform(0.1, 0.5) * np.exp(-0.5 * ((row - j) ** 2 + (column - i) ** 2) / radius**2)
+    return np.minimum(share, 0.8).astype(np.float32) if share.any() else None
+
+
+class Mark(NamedTuple):
+    """A mark on the plate's upper face: a rod between two points, plate frame."""
+
+    ends: Floats
+    """(2, 3) mm"""
+    radius_mm: float
+    opacity: float
+    """Share of the light from above that it takes away."""
+
+
+def glass_marks(machine: Machine) -> list[Mark]:
+    """Draw dust, scratches, fingerprints and wet spots of the plate; they stand still while heads travel."""
+    glass = machine.world.glass
+    random = np.random.default_rng([machine.world.seed, 620])
+    kinds = [
+        (glass.dust, (0.1, 0.6), 0.0, (0.2, 0.9)),
+        (glass.scratches, (0.05, 0.2), 60.0, (0.1, 0.5)),
+        (glass.fingerprints, (5.0, 9.0), 4.0, (0.02, 0.15)),
+        (glass.wet_spots, (3.0, 20.0), 5.0, (0.05, 0.3)),
+    ]
+    marks = []
+    for count, radii, length, opacities in kinds:
+        for _ in range(count):
+            start = np.array([random.uniform(0.0, TRAVEL_MM), random.uniform(-70.0, 70.0), 0.0])
+            angle = random.uniform(0.0, np.pi)
+            end = start + length * np.array([np.cos(angle), np.sin(angle), 0.0])
+            marks.append(Mark(np.array([start, end]), random.uniform(*radii), random.uniform(*opacities)))
+    return marks
+
+
+def draw_marks(marks: list[Mark], camera: Camera, light: Singles) -> None:
+    """Take away the light that marks of the plate keep from a `camera` below it, plate frame."""
+    for mark in marks:
+        pixels = camera.project(mark.ends)
+        if np.isfinite(pixels).all():
+            distance = float(np.linalg.norm(mark.ends[0] - camera.position))
+            radius_px = max(mark.radius_mm * camera.lens.focal_px / distance, 0.5)
+            _dim_rod(pixels, radius_px, np.float32(mark.opacity), light)
+
+
+@compiled
+def _dim_rod(pixels: Floats, radius: float, opacity: np.float32, light: Singles) -> None:
+    rows, columns = light.shape[0], light.shape[1]
+    ai, aj, bi, bj = pixels[0, 0], pixels[0, 1], pixels[1, 0], pixels[1, 1]
+    least_i, most_i = max(min(ai, bi) - radius - 1.0, 0.0), min(max(ai, bi) + radius + 1.0, columns - 1.0)
+    least_j, most_j = max(min(aj, bj) - radius - 1.0, 0.0), min(max(aj, bj) + radius + 1.0, rows - 1.0)
+    for j in range(int(least_j), int(most_j) + 1):
+        for i in range(int(least_i), int(most_i) + 1):
+            share = np.float32(min(max(radius + 0.5 - _away(i, j, ai, aj, bi, bj), 0.0), 1.0))
+            for c in range(3):
+                light[j, i, c] *= np.float32(1.0) - share * opacity
+
+
+@compiled
+def _away(i: float, j: float, ai: float, aj: float, bi: float, bj: float) -> float:
+    """Distance of a pixel from the segment between two others."""
+    wi, wj = bi - ai, bj - aj
+    squared = wi * wi + wj * wj
+    along = ((i - ai) * wi + (j - aj) * wj) / squared if squared > 0.0 else 0.0
+    along = min(max(along, 0.0), 1.0)
+    away: float = np.sqrt((i - ai - along * wi) ** 2 + (j - aj - along * wj) ** 2)
+    return away
