@@ -64,7 +64,7 @@ class LeftOut(Document):
 class RecordedCamera(Document):
     """One camera's part."""
 
-    id: Annotated[int, Field(ge=1, le=63)]
+    id: Annotated[int, Field(ge=1, le=64)]
     device: Text
     """Its stable name or URL."""
     name: Text | None = None

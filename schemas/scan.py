@@ -20,8 +20,7 @@ class Travel(Document):
 class CameraSource(Document):
     """The place of the frames of one camera."""
 
-    id: Annotated[int, Field(ge=1, le=63)]
-    """A camera is one bit of 64."""
+    id: Annotated[int, Field(ge=1, le=64)]
     file: RelativePath
     """An AVI film, or a folder of PNG or JPEG frames in name order."""
 

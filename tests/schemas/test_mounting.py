@@ -37,7 +37,7 @@ def camera_with(tmp_path: Path, stands: str) -> CaptureCamera:
         (7, Mounting(1, -1, -1)),
         (8, Mounting(-1, -1, -1)),
         (9, Mounting(0, 0, 0)),
-        (63, Mounting(0, 0, 0)),
+        (64, Mounting(0, 0, 0)),
     ],
 )
 def test_the_number_says_where_a_camera_stands(camera: int, mounting: Mounting) -> None:
