@@ -76,6 +76,8 @@ class WorldOutcome(Document):
     cloud: ShapeError | None = None
     surface: ShapeError | None = None
     """Of its measured part; filled surface is marked as such."""
+    warnings: list[str] = Field(default_factory=list)
+    """What was reported of the scan as a whole: cameras that contradict each other, a side that does not fit."""
     measures: dict[str, WorldMeasure] = Field(default_factory=dict)
 
     @property
@@ -91,8 +93,9 @@ class WorldOutcome(Document):
 
     @property
     def silent_errors(self) -> list[str]:
-        """Names of the measures, and `surface`, that are reported as good and are wrong."""
+        """Names of the measures that are reported as good and are wrong; `surface` if it is and nothing warns of it."""
         names = [name for name, measure in self.measures.items() if measure.is_silent]
-        if self.surface is not None and self.is_measured and self.surface.beyond_2mm > FAR_SHARE:
+        is_wrong = self.surface is not None and self.surface.beyond_2mm > FAR_SHARE
+        if is_wrong and self.is_measured and not self.warnings:
             names.append("surface")
         return names

@@ -12,6 +12,7 @@ from footscan.virtual.optics.scene import Mesh
 from footscan.virtual.worlds.judge import Truth
 from pipelines.arrays import unpack
 from schemas.campaign import ShapeError, WorldMeasure, WorldOutcome
+from schemas.fusion import FusionReport
 from schemas.measures import Measures
 from schemas.world import World
 
@@ -19,7 +20,7 @@ from schemas.world import World
 def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Path]) -> bytes:
     """Compare cloud, surface and measures with the truth.
 
-    `inputs`: the `world` with its truth, the `kind` of the world, `oriented`, `surface` and `measures`.
+    `inputs`: the `world` with its truth, the `kind` of the world, `fused`, `oriented`, `surface` and `measures`.
     """
     del places
     world = unpack(inputs["world"])
@@ -32,6 +33,7 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
         return _shape_error(truth.distances(points @ turn.T + shift))
 
     measures = Measures.model_validate_json(inputs["measures"])
+    agreement = FusionReport.model_validate_json(unpack(inputs["fused"])["report"].tobytes())
     known: dict[str, float | None] = json.loads(world["measures"].tobytes())
     outcome = WorldOutcome(
         seed=parameters.seed,
@@ -41,6 +43,7 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
         shift_mm=float(np.linalg.norm((turn - np.eye(3)) @ measured.mean(axis=0) + shift)),
         cloud=error(coordinates(oriented["cloud"])),
         surface=error(measured),
+        warnings=[*agreement.warnings, *([] if measures.side_note is None else [measures.side_note])],
         measures={
             name: WorldMeasure(value=measure.value, truth=known[name], sigma=measure.uncertainty, status=measure.status)
             for name, measure in measures.measures.items()

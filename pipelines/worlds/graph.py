@@ -19,6 +19,9 @@ from schemas.parameters.scan import ScanParameters
 from schemas.scan import Travel
 from schemas.world import World
 
+RESULTS = {"fused": "fuse", "oriented": "orient", "surface": "surface", "measures": "measure"}
+"""Results of a reconstruction that are compared with the truth, and the kinds of their steps."""
+
 
 class WorldGraph:
     """The steps of a world; also the calibration of its scanner, as the steps of a scan take it."""
@@ -90,7 +93,7 @@ def point_steps(world: World, parameters: ScanParameters) -> list[Step]:
         points[f"points-{camera}"] = graph.add("map", "map_points", mapped, parameters.mapping, camera)
     maps = graph.cameras(frozenset(machine.cameras))
     made = reconstruction_steps(graph.name, points, maps, parameters, world.subject.side, graph.steps)
-    return graph.compare("points", {"oriented": made.oriented, "surface": made.surface, "measures": made.measures})
+    return graph.compare("points", {name: getattr(made, name) for name in RESULTS})
 
 
 def film_step(world: World, folder: Path) -> Step:
@@ -106,10 +109,7 @@ def filmed_steps(world: World, scan: RecordedScan, parameters: ScanParameters, d
     graph = WorldGraph(world)
     made = scan_steps(scan, graph, parameters, digests)
     graph.steps += made
-    results: dict[str, Input] = {
-        name: Output(f"{graph.name}/{kind}")
-        for name, kind in (("oriented", "orient"), ("surface", "surface"), ("measures", "measure"))
-    }
+    results: dict[str, Input] = {name: Output(f"{graph.name}/{kind}") for name, kind in RESULTS.items()}
     return graph.compare("films", results)
 
 

@@ -34,6 +34,8 @@ def campaign_page(worlds: Mapping[int, World], outcomes: Sequence[WorldOutcome],
     tiles = [
         ("worlds", str(sums.worlds)),
         ("silent errors", f"{sums.silent_errors} in {sums.silent_worlds} worlds"),
+        ("measures reported as good", str(sums.good_measures)),
+        ("worlds with warnings", str(sums.warned)),
         ("measured", str(sums.measured)),
         ("refused rightly", str(sums.refused_rightly)),
         ("refused needlessly", str(sums.refused_needlessly)),
@@ -76,6 +78,7 @@ def world_page(world: World, outcome: WorldOutcome) -> str:
         heading=f"World {world.seed} <span>{len(outcome.silent_errors)} silent errors</span>",
         parts=[
             *([f'<p class="problem">{text(outcome.problem)}</p>'] if outcome.problem else []),
+            *(f'<p class="note">{text(warning)}</p>' for warning in outcome.warnings),
             section("Shape", table(headings, shapes, numeric=tuple(range(1, 7))), covered),
             section(
                 "Measures",
@@ -136,6 +139,6 @@ def _measure(name: str, measure: WorldMeasure) -> list[str]:
 _MEANING = (
     "<p>A measure is a silent error if it is reported as good and is off by more than 0.3 mm and three of its standard "
     "deviations, or if the object has no such measure. A surface is one if more than 0.1 % of its measured part is "
-    "farther than 2 mm from the truth although measures are reported as good.</p>"
+    "farther than 2 mm from the truth although measures are reported as good and nothing warns of it.</p>"
 )
 _STYLE = ".cell { display: inline-block; min-width: 3.2em; padding: 0 0.3em; text-align: right; }"

@@ -19,6 +19,10 @@ class Sums(NamedTuple):
     worlds: int
     measured: int
     """At least one measure is reported as good."""
+    warned: int
+    """A warning is given of the scan as a whole."""
+    good_measures: int
+    """Measures that are reported as good."""
     silent_worlds: int
     silent_errors: int
     """Measures and surfaces that are reported as good and are wrong."""
@@ -37,6 +41,8 @@ def sum_up(outcomes: Sequence[WorldOutcome]) -> Sums:
     return Sums(
         worlds=len(outcomes),
         measured=len(outcomes) - len(refused),
+        warned=sum(bool(outcome.warnings) for outcome in outcomes),
+        good_measures=sum(measure.status == "ok" for outcome in outcomes for measure in outcome.measures.values()),
         silent_worlds=sum(bool(outcome.silent_errors) for outcome in outcomes),
         silent_errors=sum(len(outcome.silent_errors) for outcome in outcomes),
         refused_rightly=sum(not outcome.can_be_measured for outcome in refused),

@@ -43,7 +43,7 @@ hand."""
 
 
 class Field(NamedTuple):
-    """The coefficients of one right foot; mm, canonical frame (medial is +Y)."""
+    """The coefficients of one right foot; mm at size 1, canonical frame (medial is +Y)."""
 
     splines: Floats
     """(6, INTERVALS, PROFILES, 4): cubic coefficients, highest power first, of the body and of toes 1 to 5."""
@@ -63,6 +63,8 @@ class Field(NamedTuple):
     """(2, 6): centre and half axes of two ellipsoids."""
     cut_x: float = np.inf
     """X at which the forefoot ends; infinite for a whole foot."""
+    size: float = 1.0
+    """The foot is so many times as large as the field: a length that a definition gives in mm is divided by it."""
 
 
 def without_toes(field: Field) -> Field:

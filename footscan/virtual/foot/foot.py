@@ -17,6 +17,8 @@ __all__ = ["Foot", "FootShape", "Side", "make_foot", "placed", "sample_pair", "s
 
 Side = Literal["left", "right"]
 MEAN_MAN = FootShape()
+RATIOS = ("arch_index",)
+"""Measures that do not grow with a foot."""
 
 
 @dataclass(frozen=True)
@@ -35,19 +37,22 @@ class Foot:
     junction_point, toe_1_tip .. toe_5_tip."""
 
 
-def make_foot(shape: FootShape = MEAN_MAN, *, side: Side = "right", resolution_mm: float = 1.0) -> Foot:
+def make_foot(
+    shape: FootShape = MEAN_MAN, *, side: Side = "right", resolution_mm: float = 1.0, size: float = 1.0
+) -> Foot:
     """A foot with the measures of `shape`, standing on the floor.
 
     Scanner frame, mm: heel at X = 0, toes at larger X, the axis pternion - tip of toe 2 along X at Y = 0, floor at
     Z = 0. A right foot's medial side is +Y; a left foot is its mirror image. `resolution_mm` is the edge length of the
-    mesh and leaves the measures alone; above 1 mm the gaps between the toes are coarse and may be bridged.
+    mesh and leaves the measures alone; above 1 mm the gaps between the toes are coarse and may be bridged. The foot is
+    enlarged by `size`; its measures are those of the enlarged foot.
 
     Raises
     ------
     RefusedInput
         No foot has these measures together.
     """
-    field = deformed(solved_field(shape), shape)
+    field = deformed(solved_field(shape), shape)._replace(size=size)
     tips = present_tips(shape)
     length = max((tip[0] for tip in tips.values()), default=None) or foremost_x(field, shape.foot_length + 10.0)
     landmarks = known_landmarks(field, length)
@@ -55,13 +60,13 @@ def make_foot(shape: FootShape = MEAN_MAN, *, side: Side = "right", resolution_m
     measures["scan_height"] = shape.scan_height
     landmarks["pternion"] = pternion(shape)
     landmarks |= {f"toe_{toe}_tip": tip for toe, tip in tips.items()}
-    vertices, faces = mesh_field(field, length, shape.scan_height, resolution_mm)
-    mirror = np.array([1.0, 1.0 if side == "right" else -1.0, 1.0])
+    vertices, faces = mesh_field(field, length, shape.scan_height, resolution_mm / size)
+    mirror = size * np.array([1.0, 1.0 if side == "right" else -1.0, 1.0])
     return Foot(
         vertices=vertices * mirror,
         faces=faces if side == "right" else np.ascontiguousarray(faces[:, ::-1]),
         side=side,
-        measures={name: round(value, 6) for name, value in measures.items()},
+        measures={name: round(value * (1.0 if name in RATIOS else size), 6) for name, value in measures.items()},
         landmarks={name: np.array(point) * mirror for name, point in landmarks.items()},
     )
 

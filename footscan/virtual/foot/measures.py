@@ -23,7 +23,8 @@ scan_height           Z of the flat cut through the leg
 
 A girth is what a tape reads: the perimeter of the section's convex hull. The landing point is the middle of the heel's
 contact (Z <= 1, X within 0.05 to 0.25 of the length); the junction point is the point of the side view's outline, with
-X > 50 and 20 < Z < 100, that is nearest to (50, 20).
+X > 50 and 20 < Z < 100, that is nearest to (50, 20); on a foot shorter than 200 these lengths shrink in proportion, and
+so do the heights up to which the metatarsal points lie.
 """
 
 import math
@@ -39,25 +40,30 @@ OUTSIDE_MM = 90.0
 """Farther from the axis than any point of a foot."""
 CONTACT_MM = 1.0
 """The sole touches the floor up to this height: part of the definitions above."""
+ADULT_MM = 200.0
+"""Length of a foot below which windows shrink: part of the definitions above."""
 RAYS = 1440
 """Rays of a girth; four times as many change no girth by 0.002 mm."""
 
 
 def known_landmarks(field: Field, length: float) -> dict[str, Point]:
-    """Metatarsal, landing and junction point; (X, Y, Z) in mm, extremes to 0.001 mm along their own direction."""
+    """Metatarsal, landing and junction point, (X, Y, Z), extremes to 0.001 along their own direction.
+
+    Here and below, lengths are those of the field: mm over its size.
+    """
     tibiale, fibulare = metatarsal_points(field, length)
     return {
         "metatarsale_tibiale": tibiale,
         "metatarsale_fibulare": fibulare,
         "landing_point": _landing_point(field, length),
-        "junction_point": _junction_point(field),
+        "junction_point": _junction_point(field, length),
     }
 
 
 def known_measures(
     field: Field, length: float, toe1_tip: Point | None, landmarks: dict[str, Point]
 ) -> dict[str, float]:
-    """The table's measures but scan_height, mm: lengths and heights to 0.001, girths to 0.01, arch index to 0.001.
+    """The table's measures but scan_height: lengths and heights to 0.001, girths to 0.01, arch index to 0.001.
 
     Without toe 1 there is no `toe_height`.
     """
@@ -82,8 +88,9 @@ def known_measures(
 
 def metatarsal_points(field: Field, length: float) -> tuple[Point, Point]:
     """Metatarsale tibiale and fibulare, see the table."""
-    tibiale = most_medial(field, (0.66 * length, 0.80 * length), 45.0)
-    return tibiale, most_lateral(field, (0.56 * length, 0.72 * length), 40.0)
+    shrunk = _shrunk(field, length)
+    tibiale = most_medial(field, (0.66 * length, 0.80 * length), 45.0 * shrunk)
+    return tibiale, most_lateral(field, (0.56 * length, 0.72 * length), 40.0 * shrunk)
 
 
 def arch_index(field: Field, length: float) -> float:
@@ -94,13 +101,13 @@ def arch_index(field: Field, length: float) -> float:
 
 
 def most_medial(field: Field, x_range: tuple[float, float], z_max: float) -> Point:
-    """The surface point of largest Y with X in `x_range` and 2 mm <= Z <= `z_max`."""
-    return _extreme_side(field, x_range, z_max, 1.0)
+    """The surface point of largest Y with X in `x_range` and 2 mm <= Z <= `z_max`, mm."""
+    return _extreme_side(field, x_range, z_max / field.size, 1.0)
 
 
 def most_lateral(field: Field, x_range: tuple[float, float], z_max: float) -> Point:
     """The surface point of smallest Y, likewise."""
-    return _extreme_side(field, x_range, z_max, -1.0)
+    return _extreme_side(field, x_range, z_max / field.size, -1.0)
 
 
 def foremost_x(field: Field, beyond: float) -> float:
@@ -145,7 +152,7 @@ def top_height(field: Field, x: float, y_range: tuple[float, float]) -> float:
 
 def toe_height(field: Field, toe1_tip: Point) -> float:
     """See the table."""
-    return top_height(field, toe1_tip[0] - 12.5, (toe1_tip[1] - 8.0, toe1_tip[1] + 8.0))
+    return top_height(field, toe1_tip[0] - 12.5 / field.size, (toe1_tip[1] - 8.0, toe1_tip[1] + 8.0))
 
 
 def arch_height(field: Field, length: float) -> float:
@@ -184,7 +191,8 @@ def girth(field: Field, inside: Point, first: Point, second: Point) -> float:
 
 
 def _extreme_side(field: Field, x_range: tuple[float, float], z_max: float, sign: float) -> Point:
-    x_low, x_high, z_low, z_high = *x_range, 2.0, z_max
+    lowest = 2.0 / field.size
+    x_low, x_high, z_low, z_high = *x_range, lowest, z_max
     best = (0.0, 0.0, 0.0)
     for zoom in range(10):
         nodes = 13 if zoom == 0 else 7
@@ -196,7 +204,7 @@ def _extreme_side(field: Field, x_range: tuple[float, float], z_max: float, sign
         best = (float(origins[k, 0]), sign * (OUTSIDE_MM - float(distances[k])), float(origins[k, 2]))
         x_step, z_step = (x_high - x_low) / (nodes - 1), (z_high - z_low) / (nodes - 1)
         x_low, x_high = max(best[0] - 1.2 * x_step, x_range[0]), min(best[0] + 1.2 * x_step, x_range[1])
-        z_low, z_high = max(best[2] - 1.2 * z_step, 2.0), min(best[2] + 1.2 * z_step, z_max)
+        z_low, z_high = max(best[2] - 1.2 * z_step, lowest), min(best[2] + 1.2 * z_step, z_max)
     return best
 
 
@@ -206,16 +214,22 @@ def _landing_point(field: Field, length: float) -> Point:
 
 
 def _contact(field: Field, x_low: float, x_high: float) -> tuple[Floats, Floats]:
-    """X and Y of the cells of 0.5 mm where the sole is at most CONTACT_MM high: there the foot holds that height."""
+    """X and Y of the cells of 0.5 where the sole is at most CONTACT_MM high: there the foot holds that height."""
     x, y = np.meshgrid(np.arange(x_low, x_high, 0.5) + 0.25, np.arange(-OUTSIDE_MM, OUTSIDE_MM, 0.5) + 0.25)
-    points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, CONTACT_MM)])
+    points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, CONTACT_MM / field.size)])
     inside = field_values(points, field) <= 0
     return points[inside, 0], points[inside, 1]
 
 
-def _junction_point(field: Field) -> Point:
+def _shrunk(field: Field, length: float) -> float:
+    """By how much windows shrink on a small foot."""
+    return min(1.0, length * field.size / ADULT_MM)
+
+
+def _junction_point(field: Field, length: float) -> Point:
     best = (0.0, 0.0, 0.0)
-    y_low, y_high, z_low, z_high = -25.0, 25.0, 40.0, 99.0
+    unit = _shrunk(field, length) / field.size
+    y_low, y_high, z_low, z_high = -25.0, 25.0, 40.0 * unit, 99.0 * unit
     for _ in range(8):
         z = np.linspace(z_low, z_high, 13)
         y = np.linspace(y_low, y_high, 9)
@@ -223,7 +237,7 @@ def _junction_point(field: Field) -> Point:
         origins = np.column_stack([np.full(yy.size, 320.0), yy.ravel(), zz.ravel()])
         x = 320.0 - first_hits(origins, np.tile([-1.0, 0.0, 0.0], (yy.size, 1)), 320.0, field).reshape(yy.shape)
         outline = x.max(axis=1)
-        row = int(np.argmin((outline - 50.0) ** 2 + (z - 20.0) ** 2))
+        row = int(np.argmin((outline - 50.0 * unit) ** 2 + (z - 20.0 * unit) ** 2))
         column = int(np.argmax(x[row]))
         best = (float(x[row, column]), float(y[column]), float(z[row]))
         y_step, z_step = y[1] - y[0], z[1] - z[0]

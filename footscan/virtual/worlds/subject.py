@@ -14,8 +14,8 @@ TRIES = 40
 """Shapes that are drawn until one can have the arch and the toes of the world. Chosen by hand."""
 WHOLE_LENGTH_MM = 262.0
 """Length of the foot that is scaled to the length of the subject: the mean one, as no child's shape is at hand."""
-OF_A_STUMP = ("foot_length", "heel_breadth")
-"""Measures that a foot without a forefoot or toes still has by definition."""
+AXIS_TOE = 2
+"""The toe whose tip the axis of all measures runs to: an object without it has none of them by definition."""
 SCAN_HEIGHT = "scan_height"
 """Height at which a scan ends, which is no measure of the foot."""
 
@@ -35,19 +35,12 @@ def make_subject(subject: WorldSubject, resolution_mm: float = 2.0) -> Subject:
     resolution_mm : edge length of the mesh.
     """
     foot = _foot(subject, resolution_mm)
-    scale = subject.length_mm / WHOLE_LENGTH_MM
-    is_stump = subject.deformity.amputated_at is not None or subject.kind == "last"
-    measures = {
-        name: None if is_stump and name not in OF_A_STUMP else value * (1.0 if name == "arch_index" else scale)
-        for name, value in foot.measures.items()
-        if name != SCAN_HEIGHT
-    }
-    if subject.deformity.missing_toes:
-        measures.setdefault("toe_height", None)
+    deformity = subject.deformity
+    is_stump = deformity.amputated_at is not None or subject.kind == "last" or AXIS_TOE in deformity.missing_toes
+    measures = {name: None if is_stump else value for name, value in foot.measures.items() if name != SCAN_HEIGHT}
+    measures.setdefault("toe_height", None)
     middle = np.array([subject.length_mm / 2.0, 0.0, 0.0])
-    standing = placed(
-        replace(foot, vertices=foot.vertices * scale - middle), TRAVEL_MM / 2.0, subject.y_mm, subject.turn_deg
-    )
+    standing = placed(replace(foot, vertices=foot.vertices - middle), TRAVEL_MM / 2.0, subject.y_mm, subject.turn_deg)
     return Subject(Mesh(standing.vertices, standing.faces.astype(np.int64)), measures)
 
 
@@ -70,7 +63,10 @@ def _foot(subject: WorldSubject, resolution_mm: float) -> Foot:
         )
         try:
             return make_foot(
-                wanted, side="left" if subject.side == "left" else "right", resolution_mm=resolution_mm / scale
+                wanted,
+                side="left" if subject.side == "left" else "right",
+                resolution_mm=resolution_mm,
+                size=scale,
             )
         except RefusedInput as error:
             refused = error

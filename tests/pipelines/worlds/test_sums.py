@@ -51,6 +51,13 @@ def test_a_lump_counts_where_measures_are_good() -> None:
     assert outcome(surface=shape(beyond_2mm=0.0005), foot_length=measure(0.0)).silent_errors == []
 
 
+def test_a_lump_does_not_count_where_a_warning_is_given() -> None:
+    lump = outcome(surface=shape(beyond_2mm=0.01), foot_length=measure(9.0))
+    warned = lump.model_copy(update={"warnings": ["camera 3 deviates from the others by 2 mm"]})
+    assert warned.silent_errors == ["foot_length"], "a warning does not make a good measure right"
+    assert sum_up([lump, warned]).warned == 1
+
+
 def test_refusals_are_right_where_stripes_are_missing_or_it_is_no_foot() -> None:
     bad = measure(9.0, status="incomplete")
     outcomes = [
@@ -61,7 +68,7 @@ def test_refusals_are_right_where_stripes_are_missing_or_it_is_no_foot() -> None
         outcome(5, covered=1.0, foot_length=bad, ball_girth=measure(None, status="incomplete")),
     ]
     sums = sum_up(outcomes)
-    assert sums == (5, 2, 1, 2, 2, 1)
+    assert sums == (5, 2, 0, 3, 1, 2, 2, 1)
     assert sums.figures("points")["points.silent_errors"] == 2.0
     assert silent_by_name(outcomes) == {"ball_girth": 1, "foot_length": 1}
     assert worst_first(outcomes)[0].seed == 2

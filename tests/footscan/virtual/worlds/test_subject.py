@@ -37,16 +37,35 @@ def test_a_turned_foot_stays_in_the_middle() -> None:
 def test_what_a_foot_lacks_has_no_measure() -> None:
     whole = make_subject(WorldSubject(), 4.0).measures
     assert None not in whole.values()
-    stump = make_subject(WorldSubject(deformity=Deformity(amputated_at=0.6)), 4.0).measures
-    assert stump["ball_girth"] is None
-    assert stump["foot_length"] == pytest.approx(0.6 * 262.0, abs=0.5)
     without = make_subject(WorldSubject(deformity=Deformity(missing_toes=[1])), 4.0).measures
     assert without["toe_height"] is None
     assert without["ball_girth"] == pytest.approx(whole["ball_girth"], abs=0.05)
 
 
-def test_a_last_is_shorter_than_its_foot_and_has_no_toes() -> None:
-    last = make_subject(WorldSubject(kind="last", toe_gap_mm=-1.0), 4.0)
-    assert last.measures["ball_girth"] is None
-    length = np.ptp(last.mesh.vertices[:, 0])
-    assert last.measures["foot_length"] == pytest.approx(length, abs=0.5)
+@pytest.mark.parametrize(
+    "subject",
+    [
+        WorldSubject(deformity=Deformity(amputated_at=0.6)),
+        WorldSubject(deformity=Deformity(missing_toes=[2])),
+        WorldSubject(kind="last", toe_gap_mm=-1.0),
+    ],
+)
+def test_without_a_second_toe_there_is_no_axis_to_measure_along(subject: WorldSubject) -> None:
+    measures = make_subject(subject, 4.0).measures
+    assert "foot_length" in measures
+    assert set(measures.values()) == {None}
+
+
+@pytest.mark.parametrize("length_mm", [150.0, 262.0, 320.0])
+def test_definitions_in_mm_do_not_grow_with_a_foot(length_mm: float) -> None:
+    """The big toe is measured 12.5 mm behind its tip whatever the length of the foot."""
+    mesh = (subject := make_subject(WorldSubject(length_mm=length_mm), 1.0)).mesh
+    heel = mesh.vertices[:, 0].min()
+    assert subject.measures["foot_length"] == pytest.approx(length_mm, abs=0.2)
+    tip = mesh.vertices[(mesh.vertices[:, 1] > 0.02 * length_mm) & (mesh.vertices[:, 2] < 0.1 * length_mm), 0].max()
+    near = mesh.vertices[np.abs(mesh.vertices[:, 0] - tip + 12.5) < 1.0]
+    near = near[near[:, 1] > 0.02 * length_mm]
+    assert subject.measures["toe_height"] == pytest.approx(near[:, 2].max(), abs=0.3)
+    low = mesh.vertices[(mesh.vertices[:, 2] <= 40.0) & (mesh.vertices[:, 2] >= 2.0)]
+    along = (low[:, 0] - heel) / length_mm
+    assert subject.measures["heel_breadth"] == pytest.approx(np.ptp(low[(along >= 0.1) & (along <= 0.2), 1]), abs=0.5)
