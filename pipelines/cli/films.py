@@ -115,7 +115,10 @@ def simulate_capture(
 @simulate.command("world")
 def simulate_world(
     out: Out,
-    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Random seed of the whole world.")],
+    seed: Annotated[int | None, typer.Option(min=0, max=2**32 - 1, help="Random seed of the whole world.")] = None,
+    world: Annotated[
+        Path | None, typer.Option(help="Description of a world (world.json) that is filmed instead of a drawn one.")
+    ] = None,
     points: Annotated[
         bool, typer.Option("--points", help="Write the stripe points of each camera (CSV) instead of films.")
     ] = False,
@@ -125,15 +128,19 @@ def simulate_world(
     from footscan.virtual.worlds.film.record import record_world
     from pipelines.cli.terminal.progress import frame_progress
     from pipelines.worlds.export import write_points
+    from schemas.base.json_files import read_json
+    from schemas.world import World
 
+    if (seed is None) == (world is None):
+        raise RefusedInput("simulate world", "expected one of --seed and --world")
     _check_empty(out)
-    world = draw_world(seed)
+    whole = read_json(world, World) if world is not None else draw_world(seed or 0)
     if points:
-        write_points(world, out)
+        write_points(whole, out)
     else:
         with frame_progress("filming") as progress:
-            record_world(world, out, progress=progress)
-    message(f"{out}: world {seed}")
+            record_world(whole, out, progress=progress)
+    message(f"{out}: world {whole.seed}")
 
 
 def ingest(

@@ -14,6 +14,7 @@ COMMANDS = [
     ["demo"],
     ["simulate", "scan"],
     ["simulate", "capture"],
+    ["simulate", "world"],
     ["ingest"],
     ["extract"],
     ["calibrate", "chart"],

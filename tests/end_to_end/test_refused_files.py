@@ -48,6 +48,13 @@ def refuse(footscan: Footscan, mistake: Mistake) -> Refuse:
         ),
         (["simulate", "scan", "--out", "new", "--block", "--patient", "../x"], "--patient: "),
         (["simulate", "scan", "--out", "new", "--block", "--frames", "0"], "--frames"),
+        (["simulate", "world", "--out", "new"], "expected one of --seed and --world"),
+        (
+            ["simulate", "world", "--out", "new", "--seed", "1", "--world", "w.json"],
+            "expected one of --seed and --world",
+        ),
+        (["simulate", "world", "--out", "new", "--world", "w.json"], "w.json: no such file"),
+        (["simulate", "world", "--out", "new", "--seed", "-1"], "--seed"),
         (["calibrate", "chart"], "Missing argument"),
         (["calibrate", "chart", "c.csv", "--order", "6"], "--order"),
         (["calibrate", "chart", "c.csv", "--order", "2", "--model", "quadratic"], "--order: "),

@@ -3,9 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from footscan.virtual.foot.foot import Foot, FootShape, make_foot, placed, sample_shape
 from footscan.virtual.optics.scene import Mesh
+from footscan.virtual.portable import cos_sin
 from footscan.virtual.worlds.draw import TRAVEL_MM
 from schemas.base.errors import RefusedInput
 from schemas.world import WorldSubject
@@ -16,6 +18,8 @@ WHOLE_LENGTH_MM = 262.0
 """Length of the foot that is scaled to the length of the subject: the mean one, as no child's shape is at hand."""
 AXIS_TOE = 2
 """The toe whose tip the axis of all measures runs to: an object without it has none of them by definition."""
+NAIL_MM = 7.0
+"""Half the length of the nail of toe 1; those of the others are shorter. Chosen by hand."""
 SCAN_HEIGHT = "scan_height"
 """Height at which a scan ends, which is no measure of the foot."""
 
@@ -27,6 +31,8 @@ class Subject:
     mesh: Mesh
     measures: dict[str, float | None]
     """True measures, mm; None for those that the object does not have."""
+    nails: NDArray[np.float64]
+    """(K, 4) centre and radius of toenails."""
 
 
 def make_subject(subject: WorldSubject, resolution_mm: float = 2.0) -> Subject:
@@ -40,8 +46,23 @@ def make_subject(subject: WorldSubject, resolution_mm: float = 2.0) -> Subject:
     measures = {name: None if is_stump else value for name, value in foot.measures.items() if name != SCAN_HEIGHT}
     measures.setdefault("toe_height", None)
     middle = np.array([subject.length_mm / 2.0, 0.0, 0.0])
-    standing = placed(replace(foot, vertices=foot.vertices - middle), TRAVEL_MM / 2.0, subject.y_mm, subject.turn_deg)
-    return Subject(Mesh(standing.vertices, standing.faces.astype(np.int64)), measures)
+    tips = {name: place - middle for name, place in foot.landmarks.items()}
+    centred = replace(foot, vertices=foot.vertices - middle, landmarks=tips)
+    standing = placed(centred, TRAVEL_MM / 2.0, subject.y_mm, subject.turn_deg)
+    return Subject(Mesh(standing.vertices, standing.faces.astype(np.int64)), measures, _nails(standing, subject))
+
+
+def _nails(foot: Foot, subject: WorldSubject) -> NDArray[np.float64]:
+    """Nails lie behind the tips of the toes."""
+    size = subject.length_mm / WHOLE_LENGTH_MM
+    cos, sin = cos_sin(subject.turn_deg)
+    nails = []
+    for toe in range(1, 6):
+        tip = foot.landmarks.get(f"toe_{toe}_tip")
+        if tip is not None:
+            radius = size * (NAIL_MM if toe == 1 else 0.6 * NAIL_MM)
+            nails.append([*(tip + radius * np.array([-cos, -sin, 1.0])), 1.2 * radius])
+    return np.array(nails, np.float64).reshape(-1, 4)
 
 
 def _foot(subject: WorldSubject, resolution_mm: float) -> Foot:

@@ -72,6 +72,31 @@ def test_nothing_runs_again_and_no_intermediate_result_stays(
     assert sum(file.stat().st_size for file in (out / "outcomes").iterdir()) < 50_000
 
 
+def test_a_filmed_world_is_extracted_and_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of the lower cameras and every fourth frame of a scan."""
+    cameras = WorldCameras(frames=25, step_mm=16.0, missing=[1, 2, 3, 4, 7, 8])
+    filmed = World(seed=4, cameras=cameras, subject=WorldSubject(leg_mm=80.0))
+    monkeypatch.setattr(campaign, "draw_world", {4: filmed}.__getitem__)
+    (outcome,) = run_worlds([4], "films", ScanParameters(), tmp_path, Threads(2), lambda _: None)
+    assert outcome.kind == "films"
+    assert outcome.problem is not None or outcome.surface is not None
+    assert 0.2 < outcome.covered < 0.9
+    assert outcome.measures["foot_length"].truth == pytest.approx(262.0, abs=0.01)
+    assert [path.name for path in tmp_path.iterdir()] == ["outcomes"], "films are not kept"
+
+
+@pytest.mark.slow
+def test_a_filmed_world_without_errors_is_measured_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    weak = WorldLaser(power=6.0)
+    plain = World(seed=5, cameras=WorldCameras(frames=200, step_mm=2.0), laser=weak, subject=WorldSubject())
+    monkeypatch.setattr(campaign, "draw_world", {5: plain}.__getitem__)
+    (outcome,) = run_worlds([5], "films", ScanParameters(), tmp_path, Threads(2), lambda _: None)
+    assert outcome.problem is None
+    assert outcome.surface is not None
+    assert outcome.surface.mean < 0.05
+    assert outcome.measures["foot_length"].error == pytest.approx(0.0, abs=0.5)
+
+
 def test_a_key_holds_the_world_and_the_parameters() -> None:
     usual = ScanParameters()
     other = usual.model_copy(update={"fusion": usual.fusion.model_copy(update={"spacing_mm": 0.5})})

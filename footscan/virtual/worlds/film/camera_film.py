@@ -7,7 +7,6 @@ import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
 
-from footscan.compiled import compiled
 from footscan.virtual.optics.glass import reflectance
 from footscan.virtual.optics.laser_light import DIVERGENCE, FAN_EDGE_DEGREES, FOCUS_MM, beams_of
 from footscan.virtual.optics.scanner import FAN_DEGREES, WIDTH, Camera
@@ -15,6 +14,8 @@ from footscan.virtual.optics.scene import SKIN, Scene
 from footscan.virtual.optics.sensor import CODES, develop, expose_mosaic
 from footscan.virtual.portable import cos_sin, gaussian_blur, gaussian_kernel
 from footscan.virtual.worlds.draw import TRAVEL_MM
+from footscan.virtual.worlds.film.details import draw_hairs, hairs_of, highlight, lit_hairs, sparkle, visible
+from footscan.virtual.worlds.film.pixels import add_light, blurred, enlarged, interpolated, put_object, sheet_distance
 from footscan.virtual.worlds.film.raster import NOTHING, Projected, Raster, project, rasterise
 from footscan.virtual.worlds.film.scenery import (
     copies,
@@ -54,6 +55,10 @@ GLINT_SHARE = 0.05
 """Light of a glint as a share of the laser's power. Chosen by hand."""
 PX_PER_MM = 3.8
 """Scale in the middle of a picture of 640 columns."""
+FOCUS_DEPTH_MM = 60.0
+"""Distance from the middle of the picture at which the lens is out of focus by its whole `defocus_px`."""
+LEAST_DEFOCUS_PX = 0.2
+"""Defocus that no picture shows."""
 AUTO_MEAN = 0.22
 """Mean brightness that automatic exposure aims at, 1 being white. Chosen by hand."""
 AUTO_RANGE = (0.25, 4.0)
@@ -102,7 +107,8 @@ class CameraFilm:
         plates, self._glints = hardware(machine, camera_id)
         self._things = things_of(machine, camera_id, TRAVEL_MM)
         self._copies, self._smudge = copies(machine, camera_id), smudge(machine, camera_id)
-        self._marks = glass_marks(machine) if self._camera.below_glass else []
+        self._marks = glass_marks(machine)
+        self._hairs, self._centres = hairs_of(mesh, self._normals, machine.world), corners.mean(axis=1)
         world = machine.world
         relative = np.array(
             SKIN_COLOUR if world.subject.covering == "none" and world.subject.kind == "foot" else (1.0,) * 3
@@ -161,18 +167,61 @@ class CameraFilm:
             self._things, self._camera, moment.pose, machine.plate, moment.seconds,
             (world.room.light, laser * GLINT_SHARE), light,
         )  # fmt: skip
-        _add(light, self._glints, self._laser_colour * np.float32(laser * GLINT_SHARE))
-        _put_object(light, pixels.flat, pixels.normals, pixels.albedo, self._lamp, np.array(LAMPS), self._object_colour)
+        add_light(light, self._glints, self._laser_colour * np.float32(laser * GLINT_SHARE))
+        put_object(light, pixels.flat, pixels.normals, pixels.albedo, self._lamp, np.array(LAMPS), self._object_colour)
         glow = self._glow(stripe, raster.face != NOTHING)
-        _add(light, self._speckled(stripe, random) + glow, self._laser_colour)
-        draw_marks(self._marks, camera, light)
+        self._put_highlights(light, camera, pixels)
+        add_light(light, self._speckled(stripe, random) + glow, self._laser_colour)
+        self._put_details(light, camera, moment, raster)
         if self._smudge is not None:
             light *= (1.0 - self._smudge)[:, :, None]
             light += (self._smudge * np.float32(light.mean()))[:, :, None]
         self._flicker(light, moment)
-        scale = machine.size[1] / WIDTH
-        blur = scale * float(np.hypot(world.cameras.blur_px, 0.5 * world.cameras.defocus_px))
-        return _blurred(light, gaussian_kernel(blur, int(3.0 * blur + 1.0)).astype(np.float32))
+        return self._unsharp(light)
+
+    def _unsharp(self, light: Singles) -> Singles:
+        """The picture as the lens shows it; towards its border things are out of focus."""
+        cameras, (rows, columns) = self._machine.world.cameras, self._machine.size
+        scale = columns / WIDTH
+        sharp = _blurred_by(light, scale * cameras.blur_px)
+        if cameras.defocus_px < LEAST_DEFOCUS_PX:
+            return sharp
+        wide = _blurred_by(light, scale * float(np.hypot(cameras.blur_px, cameras.defocus_px)))
+        row, column = np.ogrid[0:rows, 0:columns]
+        away = np.hypot(row - rows / 2.0, column - columns / 2.0) / (FOCUS_DEPTH_MM * PX_PER_MM * scale)
+        share = np.minimum(away, 1.0).astype(np.float32)[:, :, None] ** 2
+        return np.asarray(sharp + share * (wide - sharp))
+
+    def _put_highlights(self, light: Singles, camera: Camera, pixels: _Pixels) -> None:
+        """Put the highlights of the room's lamp on nails."""
+        world, nails = self._machine.world, self._subject.nails
+        if world.subject.nail_gloss == 0.0 or not len(nails):
+            return
+        near = np.flatnonzero(pixels.points[:, 0] > nails[:, 0].min() - nails[:, 3].max())
+        points = pixels.points[near]
+        towards = np.broadcast_to(self._lamp, points.shape)
+        shine = highlight(points, pixels.normals[near], towards, _towards(camera, points), nails)
+        brightness = (world.subject.nail_gloss * shine).astype(np.float32)
+        light.reshape(-1, 3)[pixels.flat[near]] += brightness[:, None] * self._room_colour
+
+    def _put_details(self, light: Singles, camera: Camera, moment: Moment, raster: Raster) -> None:
+        """Put hairs and marks of the glass into the picture, and the laser's light on them."""
+        machine, own = self._machine, HEAD_OF_CAMERA[self._id]
+        hairs = self._hairs[visible(self._hairs, camera, (raster, self._centres))]
+        draw_hairs(hairs, camera, light)
+        if camera.below_glass:
+            draw_marks(self._marks, camera, light)
+        caught = np.zeros((*machine.size, 1), np.float32)
+        for head in self._heads_near(moment):
+            pose = moment.pose if head == own else machine.pose(head, moment.seconds)
+            lit_hairs(hairs, pose, camera, machine.world.laser.power, caught)
+            sparkle(self._marks, pose, camera, machine.world.laser.power, raster, caught)
+        add_light(light, caught[:, :, 0], self._laser_colour)
+
+    def _heads_near(self, moment: Moment) -> list[int]:
+        """The heads whose stripes the camera may see."""
+        own = self._machine.reported_x(HEAD_OF_CAMERA[self._id], moment.seconds)
+        return [head for head in range(3) if abs(self._machine.reported_x(head, moment.seconds) - own) <= SEEN_HEADS_MM]
 
     def _moment(self, frame: int) -> Moment:
         head, machine = HEAD_OF_CAMERA[self._id], self._machine
@@ -198,23 +247,20 @@ class CameraFilm:
         index = np.flatnonzero(raster.face.ravel() != NOTHING)
         face, shares = raster.face.ravel()[index], raster.shares.reshape(-1, 2)[index]
         mesh = self._subject.mesh
-        return _Pixels(index, *_interpolated(face, shares, mesh.faces, mesh.vertices, self._normals, self._albedo))
+        return _Pixels(index, *interpolated(face, shares, mesh.faces, mesh.vertices, self._normals, self._albedo))
 
     def _stripes(self, camera: Camera, moment: Moment, pixels: _Pixels) -> Floats:
         """Laser light of all heads that each pixel receives, (rows, columns)."""
         machine, world = self._machine, self._machine.world
         rows, columns = machine.size
-        own = HEAD_OF_CAMERA[self._id]
         picture = np.zeros(rows * columns)
         row_share = (pixels.flat // columns) / rows
         reach = REACH_SIGMAS * float(np.hypot(world.laser.sigma_mm, 0.3)) + 1.0
-        for head in range(3):
-            if abs(machine.reported_x(head, moment.seconds) - machine.reported_x(own, moment.seconds)) > SEEN_HEADS_MM:
-                continue
+        for head in self._heads_near(moment):
             readout = world.cameras.rolling_shutter_ms / 1000.0
             pose = machine.pose(head, moment.seconds)
             way = machine.pose(head, moment.seconds + readout).shift - pose.shift
-            distance = _sheet_distance(
+            distance = sheet_distance(
                 pixels.points, row_share, pose.turn, pose.shift, way, world.laser.bend_mm / BEND_HALF_MM**2
             )
             near = np.flatnonzero(np.abs(distance) < reach)
@@ -229,8 +275,7 @@ class CameraFilm:
         """Light of a head's lasers on the pixels `near` its sheet, at `distance` (N,) mm from its middle."""
         world = self._machine.world
         points, normals = pixels.points[near] - moved, pixels.normals[near]
-        sight = camera.position - points
-        sight /= np.linalg.norm(sight, axis=1, keepdims=True)
+        sight = _towards(camera, points)
         footprint = 1.0 / (PX_PER_MM * np.clip(np.einsum("ij,ij->i", normals, sight), 0.1, 1.0))
         total = np.zeros(len(near))
         for laser in self._machine.lasers[head]:
@@ -242,11 +287,14 @@ class CameraFilm:
             away = np.linalg.norm(points - np.asarray(moved_one.position), axis=1)
             variance = world.laser.sigma_mm**2 + (DIVERGENCE * (away - FOCUS_MM)) ** 2 + footprint**2 / 12.0
             profile = np.exp(-0.5 * distance**2 / variance) * world.laser.sigma_mm / np.sqrt(variance)
-            light = profile * cosine * fan * beams.transmitted * FOCUS_MM / away
+            light = profile * fan * beams.transmitted * FOCUS_MM / away
+            light *= cosine * world.subject.albedo * pixels.albedo[near] + world.subject.nail_gloss * highlight(
+                points, normals, beams.towards, sight, self._subject.nails
+            )
             lit = np.flatnonzero(light * world.laser.power > 1e-4)
             hidden = self._scene.hidden(points[lit] + moved[lit], normals[lit], beams.sources[lit] + moved[lit])
             total[lit[~hidden]] += light[lit[~hidden]]
-        return total * world.laser.power * world.subject.albedo * pixels.albedo[near]
+        return total * world.laser.power
 
     def _reflections(self, stripe: Floats, camera: Camera, pixels: _Pixels, raster: Raster) -> Floats:
         """The stripe in the glass and in shiny things, (rows, columns).
@@ -285,8 +333,7 @@ class CameraFilm:
         reach = self._machine.world.subject.scatter_mm * PX_PER_MM * columns / WIDTH / GLOW_BLOCK
         blocks = stripe.reshape(rows // GLOW_BLOCK, GLOW_BLOCK, columns // GLOW_BLOCK, GLOW_BLOCK).mean(axis=(1, 3))
         wide = gaussian_blur(blocks.astype(np.float32), reach + 0.3, truncate=3.0)
-        spread = np.repeat(np.repeat(wide, GLOW_BLOCK, axis=0), GLOW_BLOCK, axis=1)
-        return np.asarray(GLOW_SHARE * spread * is_object, dtype=np.float32)
+        return np.asarray(GLOW_SHARE * enlarged(wide, GLOW_BLOCK) * is_object, dtype=np.float32)
 
     def _speckled(self, stripe: Floats, random: np.random.Generator) -> Singles:
         speckle = self._machine.world.laser.speckle
@@ -308,89 +355,11 @@ class CameraFilm:
             ]
 
 
-@compiled
-def _interpolated(
-    face: NDArray[np.int32],
-    shares: Singles,
-    faces: Ints,
-    vertices: Floats,
-    vertex_normals: Floats,
-    vertex_albedo: Floats,
-) -> tuple[Floats, Floats, Floats]:
-    count = len(face)
-    points, normals, albedo = np.empty((count, 3)), np.empty((count, 3)), np.empty(count)
-    for k in range(count):
-        a, b, c = faces[face[k], 0], faces[face[k], 1], faces[face[k], 2]
-        u, v = float(shares[k, 0]), float(shares[k, 1])
-        w = 1.0 - u - v
-        length = 0.0
-        for d in range(3):
-            points[k, d] = w * vertices[a, d] + u * vertices[b, d] + v * vertices[c, d]
-            normals[k, d] = w * vertex_normals[a, d] + u * vertex_normals[b, d] + v * vertex_normals[c, d]
-            length += normals[k, d] * normals[k, d]
-        length = max(np.sqrt(length), 1e-12)
-        for d in range(3):
-            normals[k, d] /= length
-        albedo[k] = w * vertex_albedo[a] + u * vertex_albedo[b] + v * vertex_albedo[c]
-    return points, normals, albedo
+def _towards(camera: Camera, points: Floats) -> Floats:
+    """Unit vectors (N, 3) from points to the camera."""
+    sight = camera.position - points
+    return np.asarray(sight / np.linalg.norm(sight, axis=1, keepdims=True))
 
 
-@compiled
-def _sheet_distance(points: Floats, share: Floats, turn: Floats, shift: Floats, way: Floats, bend: float) -> Floats:
-    """Signed distance in X of points from the sheet of a head that moves by `share` of `way`."""
-    distance = np.empty(len(points))
-    for k in range(len(points)):
-        x, y = 0.0, 0.0
-        for d in range(3):
-            from_head = points[k, d] - shift[d] - share[k] * way[d]
-            x += from_head * turn[d, 0]
-            y += from_head * turn[d, 1]
-        distance[k] = x - bend * y * y
-    return distance
-
-
-@compiled
-def _add(light: Singles, grey: Singles, colour: Singles) -> None:
-    """Add light (R, C) of one colour to a picture."""
-    rows, columns = grey.shape
-    for j in range(rows):
-        for i in range(columns):
-            if grey[j, i] != np.float32(0.0):
-                for c in range(3):
-                    light[j, i, c] += grey[j, i] * colour[c]
-
-
-@compiled
-def _put_object(
-    light: Singles, flat: Ints, normals: Floats, albedo: Floats, lamp: Floats, parts: Floats, colour: Singles
-) -> None:
-    """Put the subject in the light of the room over what is behind it."""
-    pixels = light.reshape(-1, 3)
-    for k in range(len(flat)):
-        facing = normals[k, 0] * lamp[0] + normals[k, 1] * lamp[1] + normals[k, 2] * lamp[2]
-        shade = np.float32((parts[0] + parts[1] * normals[k, 2] + parts[2] * max(facing, 0.0)) * albedo[k])
-        for c in range(3):
-            pixels[flat[k], c] = shade * colour[c]
-
-
-@compiled
-def _blurred(light: Singles, kernel: Singles) -> Singles:
-    """Convolve each row and each column with a symmetric kernel; the border pixels go on beyond the border."""
-    rows, columns, colours = light.shape
-    half, width = len(kernel) // 2, columns * colours
-    along, blurred = np.zeros((rows, width), np.float32), np.zeros((rows, width), np.float32)
-    padded = np.empty(width + 2 * half * colours, np.float32)
-    for j in range(rows):
-        for n in range(len(padded)):
-            column = min(max(n // colours - half, 0), columns - 1)
-            padded[n] = light[j, column, n % colours]
-        for k in range(len(kernel)):
-            weight, first = kernel[k], k * colours
-            for n in range(width):
-                along[j, n] += weight * padded[n + first]
-    for j in range(rows):
-        for k in range(-half, half + 1):
-            row, weight = min(max(j + k, 0), rows - 1), kernel[k + half]
-            for n in range(width):
-                blurred[j, n] += weight * along[row, n]
-    return blurred.reshape(rows, columns, colours)
+def _blurred_by(light: Singles, sigma_px: float) -> Singles:
+    return np.asarray(blurred(light, gaussian_kernel(sigma_px, int(3.0 * sigma_px + 1.0)).astype(np.float32)))

@@ -112,11 +112,12 @@ def draw_things(
         depth = float(np.linalg.norm(ends[0] - camera.position))
         radius_px = max(thing.radius_mm * camera.lens.focal_px / depth, 0.5)
         strength = lights[1] if thing.is_laser_lit else lights[0]
-        _draw_rod(pixels, radius_px, (thing.colour * strength).astype(np.float32), thing.is_laser_lit, into)
+        draw_rod(pixels, radius_px, (thing.colour * strength).astype(np.float32), thing.is_laser_lit, into)
 
 
 @compiled
-def _draw_rod(pixels: Floats, radius: float, colour: Singles, adds: bool, into: Singles) -> None:
+def draw_rod(pixels: Floats, radius: float, colour: Singles, adds: bool, into: Singles) -> None:
+    """Draw a rod between two `pixels` (2, 2), with round ends, over a picture (R, C, K), or add its light."""
     rows, columns = into.shape[0], into.shape[1]
     ai, aj, bi, bj = pixels[0, 0], pixels[0, 1], pixels[1, 0], pixels[1, 1]
     least_i, most_i = max(min(ai, bi) - radius - 1.0, 0.0), min(max(ai, bi) + radius + 1.0, columns - 1.0)
@@ -125,7 +126,7 @@ def _draw_rod(pixels: Floats, radius: float, colour: Singles, adds: bool, into: 
         for i in range(int(least_i), int(most_i) + 1):
             share = np.float32(min(max(radius + 0.5 - _away(i, j, ai, aj, bi, bj), 0.0), 1.0))
             if share > 0.0:
-                for c in range(3):
+                for c in range(len(colour)):
                     behind = into[j, i, c]
                     into[j, i, c] = behind + share * colour[c] if adds else behind + share * (colour[c] - behind)
 
@@ -229,11 +230,12 @@ def draw_marks(marks: list[Mark], camera: Camera, light: Singles) -> None:
         if np.isfinite(pixels).all():
             distance = float(np.linalg.norm(mark.ends[0] - camera.position))
             radius_px = max(mark.radius_mm * camera.lens.focal_px / distance, 0.5)
-            _dim_rod(pixels, radius_px, np.float32(mark.opacity), light)
+            dim_rod(pixels, radius_px, np.float32(mark.opacity), light)
 
 
 @compiled
-def _dim_rod(pixels: Floats, radius: float, opacity: np.float32, light: Singles) -> None:
+def dim_rod(pixels: Floats, radius: float, opacity: np.float32, light: Singles) -> None:
+    """Take a share of the light (R, C, 3) away where a rod between two `pixels` (2, 2) is."""
     rows, columns = light.shape[0], light.shape[1]
     ai, aj, bi, bj = pixels[0, 0], pixels[0, 1], pixels[1, 0], pixels[1, 1]
     least_i, most_i = max(min(ai, bi) - radius - 1.0, 0.0), min(max(ai, bi) + radius + 1.0, columns - 1.0)
