@@ -34,10 +34,7 @@ def campaign_page(worlds: Mapping[int, World], outcomes: Sequence[WorldOutcome],
     tiles = [
         ("worlds", str(sums.worlds)),
         ("silent errors", f"{sums.silent_errors} in {sums.silent_worlds} worlds"),
-        ("measures reported as good", str(sums.good_measures)),
-        ("worlds with warnings", str(sums.warned)),
         ("measured", str(sums.measured)),
-        ("refused rightly", str(sums.refused_rightly)),
         ("refused needlessly", str(sums.refused_needlessly)),
     ]
     by_name = [[breakable(error), str(count)] for error, count in silent_by_name(outcomes).items()]
@@ -48,6 +45,7 @@ def campaign_page(worlds: Mapping[int, World], outcomes: Sequence[WorldOutcome],
         heading=f"{text(name)} <span>{sums.silent_errors} silent errors in {sums.worlds} worlds</span>",
         parts=[
             facts(tiles),
+            section("Sums", _sums(outcomes)),
             section("Silent errors", _MEANING, table(["measure", "worlds"], by_name, numeric=(1,))),
             section("What drives the errors", _drivers([worlds[outcome.seed] for outcome in outcomes], outcomes)),
             section("Worst worlds", _worst(worst_first(outcomes)[:WORST_SHOWN])),
@@ -88,6 +86,18 @@ def world_page(world: World, outcome: WorldOutcome) -> str:
             section("The world", f"<pre>{text(world.model_dump_json(indent=2))}</pre>"),
         ],
     )
+
+
+def _sums(outcomes: Sequence[WorldOutcome]) -> str:
+    rows = []
+    for kind in sorted({outcome.kind for outcome in outcomes}, reverse=True):
+        sums = sum_up([outcome for outcome in outcomes if outcome.kind == kind])
+        rows.append([kind, *map(str, sums)])
+    headings = [
+        "worlds of", "worlds", "measured", "with warnings", "right measures", "worlds with silent errors",
+        "silent errors", "refused rightly", "refused needlessly",
+    ]  # fmt: skip
+    return table(headings, rows, numeric=tuple(range(1, len(headings))))
 
 
 def _drivers(worlds: Sequence[World], outcomes: Sequence[WorldOutcome]) -> str:

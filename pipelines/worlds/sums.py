@@ -21,8 +21,8 @@ class Sums(NamedTuple):
     """At least one measure is reported as good."""
     warned: int
     """A warning is given of the scan as a whole."""
-    good_measures: int
-    """Measures that are reported as good."""
+    right_measures: int
+    """Measures that are reported as good, and are."""
     silent_worlds: int
     silent_errors: int
     """Measures and surfaces that are reported as good and are wrong."""
@@ -42,7 +42,11 @@ def sum_up(outcomes: Sequence[WorldOutcome]) -> Sums:
         worlds=len(outcomes),
         measured=len(outcomes) - len(refused),
         warned=sum(bool(outcome.warnings) for outcome in outcomes),
-        good_measures=sum(measure.status == "ok" for outcome in outcomes for measure in outcome.measures.values()),
+        right_measures=sum(
+            measure.status == "ok" and not measure.is_silent
+            for outcome in outcomes
+            for measure in outcome.measures.values()
+        ),
         silent_worlds=sum(bool(outcome.silent_errors) for outcome in outcomes),
         silent_errors=sum(len(outcome.silent_errors) for outcome in outcomes),
         refused_rightly=sum(not outcome.can_be_measured for outcome in refused),

@@ -17,6 +17,8 @@ Goal = Literal["less", "more", "nearer", "same"]
 GOALS: dict[str, Goal] = {
     "*.worlds": "same",
     "*.measured": "more",
+    "*.right_measures": "more",
+    "*.warned": "less",
     "*.refused_rightly": "same",
     "*.silent_*": "less",
     "*.refused_needlessly": "less",

@@ -1,16 +1,12 @@
 """Records the scan of a world: films, scan.yaml, the true surface, the chart of its scanner, its description."""
 
-from collections import deque
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
-from itertools import islice
-from multiprocessing import get_context
+from collections.abc import Callable
 from pathlib import Path
 
 import yaml
 
-from footscan.child_process import end_with_parent
 from footscan.virtual.filming.film import write_film
+from footscan.virtual.filming.processes import shoot_in_order
 from footscan.virtual.filming.record import film_name, write_stl, write_yaml
 from footscan.virtual.optics.scene import SKIN, Scene
 from footscan.virtual.worlds.chart import world_chart
@@ -39,7 +35,12 @@ def record_world(
     done, total = 0, sum(counts.values())
     pictures: list[bytes] = []
     rows, columns = machine.size
-    for camera, part in _frames(world, counts, workers):
+    tasks = [
+        (camera, range(first, min(first + FRAMES_A_TASK, count)))
+        for camera, count in counts.items()
+        for first in range(0, count, FRAMES_A_TASK)
+    ]
+    for camera, part in shoot_in_order(_Studio, (world,), tasks, workers):
         pictures += part
         done += len(part)
         if len(pictures) == counts[camera]:
@@ -67,32 +68,6 @@ def write_world(machine: Machine, subject: Subject, folder: Path) -> None:
     (folder / "chart.csv").write_text(world_chart(machine), encoding="utf-8")
 
 
-def _frames(world: World, counts: dict[int, int], workers: int) -> Iterator[tuple[int, list[bytes]]]:
-    """Pictures of consecutive frames, camera by camera."""
-    tasks = iter(
-        [
-            (camera, range(first, min(first + FRAMES_A_TASK, count)))
-            for camera, count in counts.items()
-            for first in range(0, count, FRAMES_A_TASK)
-        ]
-    )
-    if workers <= 1:
-        studio = _Studio(world)
-        for camera, frames in tasks:
-            yield camera, studio.jpegs(camera, frames)
-        return
-    with ProcessPoolExecutor(workers, get_context("spawn"), _open, (world,)) as pool:
-        running: deque[tuple[int, Future[list[bytes]]]] = deque()
-        for camera, frames in islice(tasks, 2 * workers):
-            running.append((camera, pool.submit(_render, camera, frames)))
-        while running:
-            camera, future = running.popleft()
-            pictures = future.result()
-            for next_camera, frames in islice(tasks, 1):
-                running.append((next_camera, pool.submit(_render, next_camera, frames)))
-            yield camera, pictures
-
-
 class _Studio:
     """The world that a process films; its camera is kept until another one is requested."""
 
@@ -101,19 +76,8 @@ class _Studio:
         self._scene = Scene(self._subject.mesh, SKIN)
         self._film: tuple[int, CameraFilm] | None = None
 
-    def jpegs(self, camera: int, frames: range) -> list[bytes]:
+    def shoot(self, camera: int, frames: range) -> list[bytes]:
+        """Return the JPEG pictures of frames."""
         if self._film is None or self._film[0] != camera:
             self._film = camera, CameraFilm(self._machine, self._subject, camera, self._scene)
         return [self._film[1].jpeg(frame) for frame in frames]
-
-
-_studios: list[_Studio] = []
-
-
-def _open(world: World) -> None:
-    end_with_parent()
-    _studios[:] = [_Studio(world)]
-
-
-def _render(camera: int, frames: range) -> list[bytes]:
-    return _studios[0].jpegs(camera, frames)
