@@ -15,7 +15,15 @@ from footscan.virtual.optics.sensor import CODES, develop, expose_mosaic
 from footscan.virtual.portable import cos_sin, gaussian_blur, gaussian_kernel
 from footscan.virtual.worlds.draw import TRAVEL_MM
 from footscan.virtual.worlds.film.details import draw_hairs, hairs_of, highlight, lit_hairs, sparkle, visible
-from footscan.virtual.worlds.film.pixels import add_light, blurred, enlarged, interpolated, put_object, sheet_distance
+from footscan.virtual.worlds.film.pixels import (
+    add_light,
+    blurred,
+    enlarged,
+    interpolated,
+    mix,
+    put_object,
+    sheet_distance,
+)
 from footscan.virtual.worlds.film.raster import NOTHING, Projected, Raster, project, rasterise
 from footscan.virtual.worlds.film.scenery import (
     copies,
@@ -57,6 +65,8 @@ PX_PER_MM = 3.8
 """Scale in the middle of a picture of 640 columns."""
 FOCUS_DEPTH_MM = 60.0
 """Distance from the middle of the picture at which the lens is out of focus by its whole `defocus_px`."""
+NOISE_POOL = 1_000_000
+"""Each frame begins its noise elsewhere in a pool of so many numbers: to draw new ones takes 3 ms. A bound of time."""
 LEAST_DEFOCUS_PX = 0.2
 """Defocus that no picture shows."""
 AUTO_MEAN = 0.22
@@ -118,6 +128,9 @@ class CameraFilm:
         self._behind = plates * self._room_colour
         self._object_colour = (world.subject.albedo * relative * self._room_colour).astype(np.float32)
         self._laser_colour = np.array(LASER_COLOURS[world.laser.colour], np.float32)
+        self._defocused = _defocused(*machine.size)
+        pool = np.random.default_rng([world.seed, 660 + camera_id])
+        self._normal = pool.standard_normal(NOISE_POOL + np.prod(machine.size), dtype=np.float32)
         lamp = np.random.default_rng([world.seed, 540]).normal(0.0, 1.0, 3)
         lamp[2] = abs(lamp[2]) + 0.5
         self._lamp = lamp / np.sqrt((lamp**2).sum())
@@ -146,7 +159,9 @@ class CameraFilm:
             means = light.mean(axis=(0, 1)) + 1e-6
             gains *= np.clip(means[1] / means, *AUTO_RANGE).astype(np.float32)
         light *= gains
-        normal = random.standard_normal(light.shape[:2], dtype=np.float32)
+        rows, columns = self._machine.size
+        first = int(random.integers(len(self._normal) - rows * columns))
+        normal = self._normal[first : first + rows * columns].reshape(rows, columns)
         noise = np.float32(world.cameras.noise * np.sqrt(max(scale, 1.0)))
         linear = np.linspace(0.0, 1.0, CODES)
         tone = np.rint(255.0 * linear ** (1.0 / world.cameras.gamma)).astype(np.uint8)
@@ -181,16 +196,12 @@ class CameraFilm:
 
     def _unsharp(self, light: Singles) -> Singles:
         """The picture as the lens shows it; towards its border things are out of focus."""
-        cameras, (rows, columns) = self._machine.world.cameras, self._machine.size
-        scale = columns / WIDTH
+        cameras, scale = self._machine.world.cameras, self._machine.size[1] / WIDTH
         sharp = _blurred_by(light, scale * cameras.blur_px)
         if cameras.defocus_px < LEAST_DEFOCUS_PX:
             return sharp
-        wide = _blurred_by(light, scale * float(np.hypot(cameras.blur_px, cameras.defocus_px)))
-        row, column = np.ogrid[0:rows, 0:columns]
-        away = np.hypot(row - rows / 2.0, column - columns / 2.0) / (FOCUS_DEPTH_MM * PX_PER_MM * scale)
-        share = np.minimum(away, 1.0).astype(np.float32)[:, :, None] ** 2
-        return np.asarray(sharp + share * (wide - sharp))
+        mix(sharp, _blurred_by(light, scale * float(np.hypot(cameras.blur_px, cameras.defocus_px))), self._defocused)
+        return sharp
 
     def _put_highlights(self, light: Singles, camera: Camera, pixels: _Pixels) -> None:
         """Put the highlights of the room's lamp on nails."""
@@ -363,3 +374,11 @@ def _towards(camera: Camera, points: Floats) -> Floats:
 
 def _blurred_by(light: Singles, sigma_px: float) -> Singles:
     return np.asarray(blurred(light, gaussian_kernel(sigma_px, int(3.0 * sigma_px + 1.0)).astype(np.float32)))
+
+
+def _defocused(rows: int, columns: int) -> Singles:
+    """Share of light that is out of focus, which grows towards the border of the picture."""
+    row, column = np.ogrid[0:rows, 0:columns]
+    reach_px = FOCUS_DEPTH_MM * PX_PER_MM * columns / WIDTH
+    away = np.hypot(row - rows / 2.0, column - columns / 2.0) / reach_px
+    return np.asarray(np.minimum(away, 1.0) ** 2, np.float32)
