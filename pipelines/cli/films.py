@@ -123,11 +123,10 @@ def simulate_world(
         bool, typer.Option("--points", help="Write the stripe points of each camera (CSV) instead of films.")
     ] = False,
 ) -> None:
-    """Draw a whole world, and film it: a scan folder with the chart, the true surface and the true measures."""
+    """Draw a whole world, and film it: a calibrated scan, with the true surface and the true measures beside it."""
     from footscan.virtual.worlds.draw import draw_world
-    from footscan.virtual.worlds.film.record import record_world
     from pipelines.cli.terminal.progress import frame_progress
-    from pipelines.worlds.export import write_points
+    from pipelines.worlds.export import write_films, write_points
     from schemas.base.json_files import read_json
     from schemas.world import World
 
@@ -139,7 +138,7 @@ def simulate_world(
         write_points(whole, out)
     else:
         with frame_progress("filming") as progress:
-            record_world(whole, out, progress=progress)
+            write_films(whole, out, progress)
     message(f"{out}: world {whole.seed}")
 
 

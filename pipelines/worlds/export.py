@@ -1,18 +1,43 @@
-"""Writes a world without pictures into a folder, to look at it or to reconstruct it by hand."""
+"""Writes a world into a folder, to look at it or to reconstruct it by hand."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from footscan.calibration.chart.chart import read_chart
+from footscan.calibration.chart.from_chart import calibrate_chart
 from footscan.virtual.filming.record import write_yaml
-from footscan.virtual.worlds.film.record import write_world
+from footscan.virtual.worlds.film.record import CALIBRATION, CHART, record_world, write_world
 from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, machine_of
 from footscan.virtual.worlds.stripes import world_stripes
 from footscan.virtual.worlds.subject import make_subject
+from pipelines.engine.files.atomic import write_atomically
+from pipelines.engine.files.digest import sha256
+from pipelines.version import SOFTWARE
+from schemas.calibration import Source
+from schemas.parameters.calibration import CalibrationParameters
 from schemas.world import World
 
 COLUMNS = ("frame", "i", "j", "width", "peak", "score")
 FORMAT = ("%d", "%.3f", "%.3f", "%.2f", "%.1f", "%.3f")
+
+
+def write_films(world: World, folder: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Film a world into a scan folder that is ready to run: its chart is calibrated.
+
+    Raises
+    ------
+    RefusedInput
+        As in `calibrate_chart`; the films are there.
+    """
+    record_world(world, folder, progress=progress)
+    chart = folder / CHART
+    source = Source(name=CHART, sha256=sha256(chart.read_bytes()))
+    calibration, _ = calibrate_chart(
+        read_chart(chart), parameters=CalibrationParameters(), source=source, software=SOFTWARE
+    )
+    write_atomically(folder / CALIBRATION, (calibration.model_dump_json(indent=2) + "\n").encode())
 
 
 def write_points(world: World, folder: Path) -> None:

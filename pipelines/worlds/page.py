@@ -83,6 +83,7 @@ def world_page(world: World, outcome: WorldOutcome) -> str:
                 table(["", "value", "truth", "error", "sigma", "status"], measures, numeric=(1, 2, 3, 4)),
             ),
             section("Parameters", table(["parameter", "value"], parameters, numeric=(1,))),
+            section("Once more", _AGAIN.format(seed=world.seed)),
             section("The world", f"<pre>{text(world.model_dump_json(indent=2))}</pre>"),
         ],
     )
@@ -150,5 +151,10 @@ _MEANING = (
     "<p>A measure is a silent error if it is reported as good and is off by more than 0.3 mm and three of its standard "
     "deviations, or if the object has no such measure. A surface is one if more than 0.1 % of its measured part is "
     "farther than 2 mm from the truth although measures are reported as good and nothing warns of it.</p>"
+)
+_AGAIN = (
+    "<p>Films of this world, and the whole report of its scan:</p>"
+    "<pre>footscan simulate world --seed {seed} --out world-{seed}\n"
+    "footscan run --scan world-{seed} --out results</pre>"
 )
 _STYLE = ".cell { display: inline-block; min-width: 3.2em; padding: 0 0.3em; text-align: right; }"

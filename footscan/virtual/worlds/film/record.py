@@ -19,6 +19,9 @@ FRAMES_A_TASK = 16
 """Frames that a process renders at a time; no byte depends on it. Chosen by hand."""
 PATIENT = "worlds"
 """Pseudonym in scan.yaml."""
+CHART = "chart.csv"
+CALIBRATION = "calibration.json"
+"""Name in scan.yaml of the calibration that whoever reconstructs the world makes of its chart."""
 
 
 def record_world(
@@ -55,7 +58,7 @@ def record_world(
     ]
     scan = {
         "format": "footscan.scan/1", "patient": PATIENT, "scan": f"{world.seed}", "side": world.subject.side,
-        "truth": "truth.stl", "cameras": cameras,
+        "truth": "truth.stl", "calibration": CALIBRATION, "cameras": cameras,
     }  # fmt: skip
     write_yaml(folder / "scan.yaml", scan)
 
@@ -65,7 +68,7 @@ def write_world(machine: Machine, subject: Subject, folder: Path) -> None:
     (folder / "world.json").write_text(machine.world.model_dump_json(indent=2) + "\n", encoding="utf-8")
     (folder / "measures.yaml").write_text(yaml.safe_dump(subject.measures, sort_keys=False), encoding="utf-8")
     write_stl(folder / "truth.stl", machine.plate.apply(subject.mesh.vertices), subject.mesh.faces)
-    (folder / "chart.csv").write_text(world_chart(machine), encoding="utf-8")
+    (folder / CHART).write_text(world_chart(machine), encoding="utf-8")
 
 
 class _Studio:
