@@ -69,6 +69,8 @@ class WorldOutcome(Document):
     kind: WorldKind
     problem: str | None = None
     """Reason why nothing was measured."""
+    crashed: bool = False
+    """The program failed on this world, instead of refusing it."""
     covered: Share = 0.0
     """Share of the true surface that stripe points cover."""
     shift_mm: NotNegative = 0.0

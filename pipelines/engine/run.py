@@ -116,7 +116,8 @@ def _run_safely(step: Step, image: str, inputs: Mapping[str, str], store: Store)
     except Exception as error:  # a defect in our code or in a library must not stop the other scans
         log.debug("%s", step.name, exc_info=True)
         problem = one_line(f"{step.name}: {type(error).__name__}: {error}")
-        return Failure(problem, "fault", step.name), None
+        is_defect = not isinstance(error, OSError | MemoryError)
+        return Failure(problem, "fault", step.name, is_defect), None
 
 
 def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, str | None]:

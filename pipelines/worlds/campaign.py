@@ -45,7 +45,7 @@ def run_worlds(
     Raises
     ------
     Fault
-        A step failed for a reason that is not the world's: the disk, the memory, or a mistake in the program.
+        A step failed for a reason that is not the world's: the disk, or the memory.
     """
     worlds = {seed: draw_world(seed) for seed in seeds}
     files = {seed: out / OUTCOMES / f"{world_key(world, kind, parameters)}.json" for seed, world in worlds.items()}
@@ -107,17 +107,17 @@ def _run_window(
             if isinstance(end, Success):
                 yield seed, WorldOutcome.model_validate_json(workspace.store.get(end.digest) or b"")
             else:
-                yield seed, _refused(seed, kind, end.problem, workspace, ends[graph[0].name])
+                yield seed, _refused(seed, kind, end, workspace, ends[graph[0].name])
 
 
 def _check(ends: dict[str, Outcome]) -> None:
-    """Raise the first failure that is not a refusal or a finding."""
+    """Raise the first failure that is no refusal, no finding, and no defect of the program: the machine's."""
     for end in ends.values():
-        if isinstance(end, Failure) and end.kind not in {"refused", "finding"}:
+        if isinstance(end, Failure) and end.kind not in {"refused", "finding"} and not end.is_defect:
             raise Fault(end.problem)
 
 
-def _refused(seed: int, kind: WorldKind, problem: str, workspace: Workspace, drawn: Outcome) -> WorldOutcome:
+def _refused(seed: int, kind: WorldKind, end: Failure, workspace: Workspace, drawn: Outcome) -> WorldOutcome:
     covered: float = 0.0
     measures: dict[str, WorldMeasure] = {}
     if isinstance(drawn, Success):
@@ -126,7 +126,9 @@ def _refused(seed: int, kind: WorldKind, problem: str, workspace: Workspace, dra
         known: dict[str, float | None] = json.loads(world["measures"].tobytes())
         nothing = WorldMeasure(value=None, truth=None, sigma=None, status="incomplete")
         measures = {name: nothing.model_copy(update={"truth": truth}) for name, truth in known.items()}
-    return WorldOutcome(seed=seed, kind=kind, problem=problem, covered=covered, measures=measures)
+    return WorldOutcome(
+        seed=seed, kind=kind, problem=end.problem, crashed=end.is_defect, covered=covered, measures=measures
+    )
 
 
 def _read(file: Path) -> WorldOutcome | None:

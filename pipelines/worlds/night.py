@@ -67,7 +67,7 @@ def run_night_of_worlds(
     with local_cluster(cores()) as pool:
         points = {o.seed: o for o in run_worlds(seeds, "points", parameters, out / PAGES, pool, count)}
         films = run_worlds(filmed, "films", parameters, out / PAGES, pool, count)
-    failed = [seed for seed in fresh if points[seed].silent_errors]
+    failed = [seed for seed in fresh if points[seed].silent_errors or points[seed].crashed]
     write_atomically(out / PAGES / KEPT, json.dumps(sorted({*kept, *failed})).encode())
     page = write_pages([*points.values(), *films], out, name)
     figures = sum_up([points[seed] for seed in fixed]).figures("points")

@@ -15,10 +15,10 @@ WORST_SHOWN = 60
 
 
 def worst_first(outcomes: Sequence[WorldOutcome]) -> list[WorldOutcome]:
-    """Sort outcomes: most silent errors first, then the largest errors of the surface."""
+    """Sort outcomes: crashes and most silent errors first, then the largest errors of the surface."""
 
-    def badness(outcome: WorldOutcome) -> tuple[int, float]:
-        return len(outcome.silent_errors), 0.0 if outcome.surface is None else outcome.surface.mean
+    def badness(outcome: WorldOutcome) -> tuple[bool, int, float]:
+        return outcome.crashed, len(outcome.silent_errors), 0.0 if outcome.surface is None else outcome.surface.mean
 
     return sorted(outcomes, key=badness, reverse=True)
 
@@ -96,7 +96,7 @@ def _sums(outcomes: Sequence[WorldOutcome]) -> str:
         rows.append([kind, *map(str, sums)])
     headings = [
         "worlds of", "worlds", "measured", "with warnings", "right measures", "worlds with silent errors",
-        "silent errors", "refused rightly", "refused needlessly",
+        "silent errors", "refused rightly", "refused needlessly", "crashed",
     ]  # fmt: skip
     return table(headings, rows, numeric=tuple(range(1, len(headings))))
 

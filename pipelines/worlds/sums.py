@@ -29,6 +29,8 @@ class Sums(NamedTuple):
     refused_rightly: int
     """Nothing is reported as good, and the stripes do not cover a foot."""
     refused_needlessly: int
+    crashed: int
+    """The program failed; also among those that were refused."""
 
     def figures(self, kind: WorldKind) -> dict[str, float | None]:
         """Return the sums as figures of a suite."""
@@ -51,6 +53,7 @@ def sum_up(outcomes: Sequence[WorldOutcome]) -> Sums:
         silent_errors=sum(len(outcome.silent_errors) for outcome in outcomes),
         refused_rightly=sum(not outcome.can_be_measured for outcome in refused),
         refused_needlessly=sum(outcome.can_be_measured for outcome in refused),
+        crashed=sum(outcome.crashed for outcome in outcomes),
     )
 
 

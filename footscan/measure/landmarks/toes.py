@@ -95,6 +95,8 @@ def _peaks(toes: Floats, length: float, sides: tuple[float, float]) -> list[tupl
     curve = np.interp((medial - toes[:, 1]) / (medial - lateral), ACROSS, AHEAD)
     rise = toes[:, 0] - curve * length
     toes, rise = toes[rise > -CLEFT * length], rise[rise > -CLEFT * length]
+    if not len(toes):  # no surface is near the curve of the tips: a long lump stretches the length
+        return []
     lowest = float(toes[:, 1].min())
     strip = 1 + ((toes[:, 1] - lowest) / STRIP_MM).astype(np.intp)
     foremost = highest_of_each(strip, rise, int(strip.max()) + 2)

@@ -92,6 +92,8 @@ class Failure:
     """`refused` input, a `finding`, a `fault` of the machine, or a `damaged` result in the store."""
     cause: str
     """Name of the step that failed; the steps that depend on it fail with the same cause."""
+    is_defect: bool = False
+    """True if the program is at fault, not the machine."""
 
 
 Outcome = Success | Failure

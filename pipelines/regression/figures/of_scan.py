@@ -19,6 +19,7 @@ GOALS: dict[str, Goal] = {
     "*.measured": "more",
     "*.right_measures": "more",
     "*.warned": "less",
+    "*.crashed": "less",
     "*.refused_rightly": "same",
     "*.silent_*": "less",
     "*.refused_needlessly": "less",

@@ -9,7 +9,7 @@ from pipelines.engine.pool import Threads
 from pipelines.worlds import campaign
 from pipelines.worlds.campaign import run_worlds, world_key
 from pipelines.worlds.night import fresh_seeds, read_kept
-from schemas.base.errors import RefusedInput
+from schemas.base.errors import Fault, RefusedInput
 from schemas.campaign import WorldOutcome
 from schemas.parameters.scan import ScanParameters
 from schemas.world import World, WorldCameras, WorldLaser, WorldSubject
@@ -70,6 +70,28 @@ def test_nothing_runs_again_and_no_intermediate_result_stays(
     assert again == [outcomes[2], outcomes[1]]
     assert [path.name for path in out.iterdir()] == ["outcomes"]
     assert sum(file.stat().st_size for file in (out / "outcomes").iterdir()) < 50_000
+
+
+def test_a_world_on_which_the_program_fails_is_an_outcome(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def crash(*_: object) -> bytes:
+        raise ZeroDivisionError("of a made-up step")
+
+    monkeypatch.setattr("pipelines.steps.world_calibration.run", crash)
+    monkeypatch.setattr(campaign, "draw_world", WORLDS.__getitem__)
+    (outcome,) = run_worlds([2], "points", ScanParameters(), tmp_path, Threads(1), lambda _: None)
+    assert outcome.crashed
+    assert outcome.problem == "worlds/2/calibration: ZeroDivisionError: of a made-up step"
+
+
+def test_a_full_disk_ends_a_campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> bytes:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pipelines.steps.world_calibration.run", fail)
+    monkeypatch.setattr(campaign, "draw_world", WORLDS.__getitem__)
+    with pytest.raises(Fault, match="No space left"):
+        run_worlds([2], "points", ScanParameters(), tmp_path, Threads(1), lambda _: None)
+    assert not list((tmp_path / "outcomes").glob("*")), "nothing is kept of a world that was not tried"
 
 
 def test_a_filmed_world_is_extracted_and_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

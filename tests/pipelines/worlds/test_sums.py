@@ -68,7 +68,7 @@ def test_refusals_are_right_where_stripes_are_missing_or_it_is_no_foot() -> None
         outcome(5, covered=1.0, foot_length=bad, ball_girth=measure(None, status="incomplete")),
     ]
     sums = sum_up(outcomes)
-    assert sums == (5, 2, 0, 1, 1, 2, 2, 1)
+    assert sums == (5, 2, 0, 1, 1, 2, 2, 1, 0)
     assert sums.figures("points")["points.silent_errors"] == 2.0
     assert silent_by_name(outcomes) == {"ball_girth": 1, "foot_length": 1}
     assert worst_first(outcomes)[0].seed == 2
