@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, AwareDatetime, BeforeValidator, Field, model_validator
 
-from schemas.base.model import Document, Pseudonym
+from schemas.base.model import Document, Pseudonym, RelativePath
 from schemas.parameters.scan import ScanParameters
 from schemas.parameters.simulation import Seed
 from schemas.parameters.virtual_scan import VirtualScan
@@ -86,6 +86,8 @@ class SuiteWorlds(Document):
     then on."""
     films: Seeds | None = None
     """Worlds that are filmed: the same every night."""
+    described: list[RelativePath] = Field(default_factory=list)
+    """Files of worlds (world.json) that are filmed every night: cases that are kept."""
 
 
 class Suite(Document):

@@ -241,7 +241,7 @@ def _judge_worlds(
     try:
         today = _now().date()
         figures = run_night_of_worlds(
-            worlds, suite.parameters, regression.out, today, regression.name, on_world
+            worlds, suite.parameters, regression.path.resolve().parent, regression.out, today, regression.name, on_world
         ).figures
     except FootscanError as error:
         gathered.has_fault |= isinstance(error, Fault)

@@ -7,7 +7,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from footscan.recordings.scans import read_scan
-from footscan.virtual.worlds.draw import draw_world
 from pipelines.arrays import unpack
 from pipelines.engine.actions.code import code_identity
 from pipelines.engine.actions.key import image_text, key_of, parameters_text
@@ -36,9 +35,9 @@ OnWorld = Callable[[WorldOutcome], None]
 
 
 def run_worlds(
-    seeds: Sequence[int], kind: WorldKind, parameters: ScanParameters, out: Path, pool: Pool, on_world: OnWorld
+    worlds: Sequence[World], kind: WorldKind, parameters: ScanParameters, out: Path, pool: Pool, on_world: OnWorld
 ) -> list[WorldOutcome]:
-    """Run the worlds of `seeds`, and return what came of each, in their order.
+    """Run worlds, whose seeds differ, and return what came of each, in their order.
 
     A world whose code, parameters and description are those of an earlier run is not run again.
 
@@ -47,20 +46,19 @@ def run_worlds(
     Fault
         A step failed for a reason that is not the world's: the disk, or the memory.
     """
-    worlds = {seed: draw_world(seed) for seed in seeds}
-    files = {seed: out / OUTCOMES / f"{world_key(world, kind, parameters)}.json" for seed, world in worlds.items()}
+    files = {world.seed: out / OUTCOMES / f"{world_key(world, kind, parameters)}.json" for world in worlds}
     outcomes: dict[int, WorldOutcome] = {}
     for seed, file in files.items():
         if (outcome := _read(file)) is not None:
             outcomes[seed] = outcome
             on_world(outcome)
-    missing = iter([seed for seed in seeds if seed not in outcomes])
+    missing = iter([world for world in worlds if world.seed not in outcomes])
     while window := list(islice(missing, WORLDS_AT_ONCE * pool.count)):
-        for seed, outcome in _run_window([worlds[seed] for seed in window], kind, parameters, out, pool):
+        for seed, outcome in _run_window(window, kind, parameters, out, pool):
             write_atomically(files[seed], outcome.model_dump_json().encode())
             outcomes[seed] = outcome
             on_world(outcome)
-    return [outcomes[seed] for seed in seeds]
+    return [outcomes[world.seed] for world in worlds]
 
 
 def world_key(world: World, kind: WorldKind, parameters: ScanParameters) -> str:

@@ -1,7 +1,7 @@
 """The worlds of a suite in one night: the fixed ones, fresh ones of the day, and earlier ones that failed."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import date
 from pathlib import Path
 from typing import NamedTuple
@@ -13,9 +13,11 @@ from pipelines.worlds.campaign import run_worlds
 from pipelines.worlds.page import WORST_SHOWN, campaign_page, world_page, world_page_name, worst_first
 from pipelines.worlds.sums import sum_up
 from schemas.base.errors import RefusedInput
+from schemas.base.json_files import read_json
 from schemas.campaign import WorldOutcome
 from schemas.parameters.scan import ScanParameters
 from schemas.regression import SuiteWorlds
+from schemas.world import World
 
 PAGE = "worlds.html"
 PAGES = "worlds"
@@ -35,6 +37,7 @@ class WorldsNight(NamedTuple):
 def run_night_of_worlds(
     worlds: SuiteWorlds,
     parameters: ScanParameters,
+    base: Path,
     out: Path,
     day: date,
     name: str,
@@ -44,41 +47,48 @@ def run_night_of_worlds(
 
     Parameters
     ----------
+    base : folder that the suite's paths are relative to.
     out : folder of the suite's nights.
     day : its fresh worlds are drawn.
     on_world : called with the number of worlds done and in total.
 
     Raises
     ------
+    RefusedInput
+        A described world is missing, breaks its format, or has the seed of another film.
     Fault
         A step failed for a reason that is not the world's, or the disk refuses.
     """
-    fixed = worlds.points.seeds
-    kept = read_kept(out)
-    fresh = fresh_seeds(day, worlds.fresh_points)
-    seeds = list(dict.fromkeys([*fixed, *kept, *fresh]))
-    filmed = [] if worlds.films is None else worlds.films.seeds
+    fixed, kept, fresh = worlds.points.seeds, read_kept(out), fresh_seeds(day, worlds.fresh_points)
+    without_pictures = [draw_world(seed) for seed in dict.fromkeys([*fixed, *kept, *fresh])]
+    filmed = [draw_world(seed) for seed in ([] if worlds.films is None else worlds.films.seeds)]
+    filmed += [read_json(base / file, World) for file in worlds.described]
+    seeds = [world.seed for world in filmed]
+    if twice := sorted({seed for seed in seeds if seeds.count(seed) > 1}):
+        raise RefusedInput("worlds.described", f"world {twice[0]} is filmed twice, expected each seed once")
     done: list[WorldOutcome] = []
 
     def count(outcome: WorldOutcome) -> None:
         done.append(outcome)
-        on_world(len(done), len(seeds) + len(filmed))
+        on_world(len(done), len(without_pictures) + len(filmed))
 
     with local_cluster(cores()) as pool:
-        points = {o.seed: o for o in run_worlds(seeds, "points", parameters, out / PAGES, pool, count)}
+        points = run_worlds(without_pictures, "points", parameters, out / PAGES, pool, count)
         films = run_worlds(filmed, "films", parameters, out / PAGES, pool, count)
-    failed = [seed for seed in fresh if points[seed].silent_errors or points[seed].crashed]
+    by_seed = {outcome.seed: outcome for outcome in points}
+    failed = [seed for seed in fresh if by_seed[seed].silent_errors or by_seed[seed].crashed]
     write_atomically(out / PAGES / KEPT, json.dumps(sorted({*kept, *failed})).encode())
-    page = write_pages([*points.values(), *films], out, name)
-    figures = sum_up([points[seed] for seed in fixed]).figures("points")
+    page = write_pages([*without_pictures, *filmed], [*points, *films], out, name)
+    figures = sum_up([by_seed[seed] for seed in fixed]).figures("points")
     return WorldsNight(figures | (sum_up(films).figures("films") if films else {}), page)
 
 
-def write_pages(outcomes: list[WorldOutcome], out: Path, name: str) -> Path:
+def write_pages(worlds: Sequence[World], outcomes: Sequence[WorldOutcome], out: Path, name: str) -> Path:
     """Write the page of a campaign and those of its worst worlds; returns the path of the first."""
-    worlds = {outcome.seed: draw_world(outcome.seed) for outcome in outcomes}
+    by_page = {world_page_name(outcome): world for world, outcome in zip(worlds, outcomes, strict=True)}
     for outcome in worst_first(outcomes)[:WORST_SHOWN]:
-        write_atomically(out / PAGES / world_page_name(outcome), world_page(worlds[outcome.seed], outcome).encode())
+        page = world_page_name(outcome)
+        write_atomically(out / PAGES / page, world_page(by_page[page], outcome).encode())
     write_atomically(out / PAGE, campaign_page(worlds, outcomes, name).encode())
     return out / PAGE
 

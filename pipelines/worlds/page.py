@@ -1,6 +1,6 @@
 """The page of a campaign: its sums, what drives its errors, and its worst worlds first."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from footscan.report.markup import breakable, facts, number, section, table, text
 from footscan.report.page import page
@@ -28,8 +28,11 @@ def world_page_name(outcome: WorldOutcome) -> str:
     return f"{outcome.kind}-{outcome.seed}.html"
 
 
-def campaign_page(worlds: Mapping[int, World], outcomes: Sequence[WorldOutcome], name: str) -> str:
-    """Return the self-contained HTML page of a campaign, whose worst worlds link to `world_page`."""
+def campaign_page(worlds: Sequence[World], outcomes: Sequence[WorldOutcome], name: str) -> str:
+    """Return the self-contained HTML page of a campaign: worlds and what came of each, in one order.
+
+    The worst ones link to `world_page`.
+    """
     sums = sum_up(outcomes)
     tiles = [
         ("worlds", str(sums.worlds)),
@@ -47,7 +50,7 @@ def campaign_page(worlds: Mapping[int, World], outcomes: Sequence[WorldOutcome],
             facts(tiles),
             section("Sums", _sums(outcomes)),
             section("Silent errors", _MEANING, table(["measure", "worlds"], by_name, numeric=(1,))),
-            section("What drives the errors", _drivers([worlds[outcome.seed] for outcome in outcomes], outcomes)),
+            section("What drives the errors", _drivers(worlds, outcomes)),
             section("Worst worlds", _worst(worst_first(outcomes)[:WORST_SHOWN])),
         ],
     )

@@ -1,5 +1,6 @@
 """Worlds from their seeds to what came of them."""
 
+import datetime
 from pathlib import Path
 
 import pytest
@@ -8,10 +9,11 @@ from footscan.virtual.worlds.draw import draw_world
 from pipelines.engine.pool import Threads
 from pipelines.worlds import campaign
 from pipelines.worlds.campaign import run_worlds, world_key
-from pipelines.worlds.night import fresh_seeds, read_kept
+from pipelines.worlds.night import fresh_seeds, read_kept, run_night_of_worlds
 from schemas.base.errors import Fault, RefusedInput
 from schemas.campaign import WorldOutcome
 from schemas.parameters.scan import ScanParameters
+from schemas.regression import Seeds, SuiteWorlds
 from schemas.world import World, WorldCameras, WorldLaser, WorldSubject
 
 COARSE = WorldCameras(frames=50, step_mm=8.0)
@@ -29,9 +31,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def outcomes(out: Path) -> dict[int, WorldOutcome]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(campaign, "draw_world", WORLDS.__getitem__)
-        ran = run_worlds(list(WORLDS), "points", ScanParameters(), out, Threads(2), lambda _: None)
+    ran = run_worlds(list(WORLDS.values()), "points", ScanParameters(), out, Threads(2), lambda _: None)
     return {outcome.seed: outcome for outcome in ran}
 
 
@@ -64,9 +64,8 @@ def test_a_last_has_no_ball(outcomes: dict[int, WorldOutcome]) -> None:
 def test_nothing_runs_again_and_no_intermediate_result_stays(
     outcomes: dict[int, WorldOutcome], out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(campaign, "draw_world", WORLDS.__getitem__)
     monkeypatch.setattr(campaign, "_run_window", None)
-    again = run_worlds([2, 1], "points", ScanParameters(), out, Threads(1), lambda _: None)
+    again = run_worlds([WORLDS[2], WORLDS[1]], "points", ScanParameters(), out, Threads(1), lambda _: None)
     assert again == [outcomes[2], outcomes[1]]
     assert [path.name for path in out.iterdir()] == ["outcomes"]
     assert sum(file.stat().st_size for file in (out / "outcomes").iterdir()) < 50_000
@@ -77,8 +76,7 @@ def test_a_world_on_which_the_program_fails_is_an_outcome(tmp_path: Path, monkey
         raise ZeroDivisionError("of a made-up step")
 
     monkeypatch.setattr("pipelines.steps.world_calibration.run", crash)
-    monkeypatch.setattr(campaign, "draw_world", WORLDS.__getitem__)
-    (outcome,) = run_worlds([2], "points", ScanParameters(), tmp_path, Threads(1), lambda _: None)
+    (outcome,) = run_worlds([WORLDS[2]], "points", ScanParameters(), tmp_path, Threads(1), lambda _: None)
     assert outcome.crashed
     assert outcome.problem == "worlds/2/calibration: ZeroDivisionError: of a made-up step"
 
@@ -88,18 +86,16 @@ def test_a_full_disk_ends_a_campaign(tmp_path: Path, monkeypatch: pytest.MonkeyP
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("pipelines.steps.world_calibration.run", fail)
-    monkeypatch.setattr(campaign, "draw_world", WORLDS.__getitem__)
     with pytest.raises(Fault, match="No space left"):
-        run_worlds([2], "points", ScanParameters(), tmp_path, Threads(1), lambda _: None)
+        run_worlds([WORLDS[2]], "points", ScanParameters(), tmp_path, Threads(1), lambda _: None)
     assert not list((tmp_path / "outcomes").glob("*")), "nothing is kept of a world that was not tried"
 
 
-def test_a_filmed_world_is_extracted_and_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_filmed_world_is_extracted_and_compared(tmp_path: Path) -> None:
     """Half of the lower cameras and every fourth frame of a scan."""
     cameras = WorldCameras(frames=25, step_mm=16.0, missing=[1, 2, 3, 4, 7, 8])
     filmed = World(seed=4, cameras=cameras, subject=WorldSubject(leg_mm=80.0))
-    monkeypatch.setattr(campaign, "draw_world", {4: filmed}.__getitem__)
-    (outcome,) = run_worlds([4], "films", ScanParameters(), tmp_path, Threads(2), lambda _: None)
+    (outcome,) = run_worlds([filmed], "films", ScanParameters(), tmp_path, Threads(2), lambda _: None)
     assert outcome.kind == "films"
     assert outcome.problem is not None or outcome.surface is not None
     assert 0.2 < outcome.covered < 0.9
@@ -108,11 +104,10 @@ def test_a_filmed_world_is_extracted_and_compared(tmp_path: Path, monkeypatch: p
 
 
 @pytest.mark.slow
-def test_a_filmed_world_without_errors_is_measured_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_filmed_world_without_errors_is_measured_as_it_is(tmp_path: Path) -> None:
     weak = WorldLaser(power=6.0)
     plain = World(seed=5, cameras=WorldCameras(frames=200, step_mm=2.0), laser=weak, subject=WorldSubject())
-    monkeypatch.setattr(campaign, "draw_world", {5: plain}.__getitem__)
-    (outcome,) = run_worlds([5], "films", ScanParameters(), tmp_path, Threads(2), lambda _: None)
+    (outcome,) = run_worlds([plain], "films", ScanParameters(), tmp_path, Threads(2), lambda _: None)
     assert outcome.problem is None
     assert outcome.surface is not None
     assert outcome.surface.mean < 0.05
@@ -133,12 +128,21 @@ def test_a_key_holds_the_world_and_the_parameters() -> None:
 
 
 def test_seeds_of_days_differ() -> None:
-    import datetime
-
     days = [datetime.date(2026, 11, 23), datetime.date(2026, 11, 24), datetime.date(2027, 1, 1)]
     seeds = [seed for day in days for seed in fresh_seeds(day, 20)]
     assert len(set(seeds)) == 60
     assert max(seeds) < 2**32
+
+
+def test_a_described_world_needs_a_seed_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "mine.json").write_text(World(seed=3).model_dump_json())
+    worlds = SuiteWorlds(points=Seeds(first=1, count=1), films=Seeds(first=1, count=5), described=["mine.json"])
+    day = datetime.date(2026, 11, 23)
+    with pytest.raises(RefusedInput, match="world 3 is filmed twice"):
+        run_night_of_worlds(worlds, ScanParameters(), tmp_path, tmp_path, day, "suite", lambda *_: None)
+    missing = worlds.model_copy(update={"described": ["nowhere.json"]})
+    with pytest.raises(RefusedInput, match="no such file"):
+        run_night_of_worlds(missing, ScanParameters(), tmp_path, tmp_path, day, "suite", lambda *_: None)
 
 
 def test_kept_seeds_are_read_back(tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ def test_numbers_of_a_world_have_choices_and_largest_errors_of_heads() -> None:
 
 def test_pages_show_what_is_wrong() -> None:
     outcomes = [outcome(1, foot_length=measure(0.0)), outcome(2, foot_length=measure(9.0))]
-    page = campaign_page({1: draw_world(1), 2: draw_world(2)}, outcomes, "made up")
+    page = campaign_page([draw_world(1), draw_world(2)], outcomes, "made up")
     assert "1 silent errors in 2 worlds" in page
     assert page.index("points-2.html") < page.index("points-1.html")
     own = world_page(draw_world(2), outcomes[1])
