@@ -114,10 +114,11 @@ def test_faults_are_not_remembered_and_cost_only_what_stands_behind(
     diamond: Any, package: Any, store: Store, run_steps: RunSteps, error: str, problem: str, kind: str
 ) -> None:
     steps = diamond(left=package.step_module("bad", raising(error)))
+    failure = Failure(problem, kind, "P/S/left", is_defect="ZeroDivision" in error)
     for _ in range(2):
         outcomes, ran = run_steps(*steps)
         assert "left" in ran
-        assert outcomes["left"] == outcomes["both"] == Failure(problem, kind, "P/S/left")
+        assert outcomes["left"] == outcomes["both"] == failure
         assert isinstance(outcomes["right"], Success)
     assert store.latest("P/S/left") is None
 
