@@ -18,12 +18,13 @@ from footscan.cloud.outliers import remove_outliers
 from footscan.cloud.views import views_of
 from footscan.frames.film import open_background, open_film
 from footscan.frames.image import Rgb
-from footscan.frames.reader import backgrounds_of, pixel_frames
+from footscan.frames.reader import FrameReader, backgrounds_of, pixel_frames
 from footscan.frames.travel import read_positions, travelled
 from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from footscan.recordings.scans import RecordedScan, read_scan
 from footscan.stripe.film import extract_film
+from footscan.stripe.laser import with_found_laser
 from footscan.stripe.points import StripePoints
 from footscan.surface.surface_of_cloud import surface_of_cloud
 from schemas.base.errors import Finding, RefusedInput
@@ -108,10 +109,13 @@ class OpenScan:
 
     def _stripe(self, camera: int) -> StripePoints:
         film = open_film(self.recorded.film(self._film(camera)))
-        backgrounds: Iterator[Rgb | None] | None = None
+        background: FrameReader | None = None
         if (place := self.recorded.background(self._film(camera))) is not None:
-            backgrounds = backgrounds_of(open_background(place, film.size, film.count), film.count)
-        return extract_film(pixel_frames(film), self.parameters.extraction, backgrounds)
+            background = open_background(place, film.size, film.count)
+        given = self.parameters.extraction.with_laser(self.recorded.document.laser)
+        parameters = with_found_laser(film, given, background)
+        backgrounds = None if background is None else backgrounds_of(background, film.count)
+        return extract_film(pixel_frames(film), parameters, backgrounds)
 
     def _points(self, camera: int) -> NDArray[np.void]:
         film = self._film(camera)

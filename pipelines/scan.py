@@ -206,9 +206,8 @@ def _camera_steps(
                 places={"background": background, "array": laser_off}, writes=laser_off / "zarr.json",
             )
         )  # fmt: skip
-    stripe = add(
-        Step(scan.name, "extract", f"{STEPS}.extract", parameters.extraction, manifests, camera.id, places=places)
-    )
+    extraction = parameters.extraction.with_laser(scan.document.laser)
+    stripe = add(Step(scan.name, "extract", f"{STEPS}.extract", extraction, manifests, camera.id, places=places))
     inputs: dict[str, Input] = {
         "stripe": stripe, "manifest": manifest, "calibration": calibration.camera(camera.id), **_travel(scan, camera)
     }  # fmt: skip

@@ -7,6 +7,7 @@ from pydantic import Field
 from schemas.base.model import Document
 from schemas.calibration import Source
 from schemas.fusion import FusionReport
+from schemas.laser import Laser
 
 Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -22,6 +23,8 @@ class CameraQuality(Document):
     frames_with_stripe: Count
     points: Count
     """Stripe points, before fusion."""
+    laser: Laser | None = None
+    """Colour of the laser in its film, given or found; null if unknown."""
     removed: dict[str, Count]
     """Points that were dropped before fusion, by reason."""
 

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from schemas.base.model import Document, Pseudonym, RelativePath, Side
+from schemas.laser import Laser
 
 
 class Travel(Document):
@@ -47,6 +48,8 @@ class Scan(Document):
     calibration: RelativePath | None = None
     scanner: Pseudonym | None = None
     """The scanner that filmed it: a workflow may have a calibration for each scanner."""
+    laser: Laser | None = None
+    """Colour of the laser in the pictures; default: found in the film of each camera."""
     date: datetime.date | None = None
     """Day of the scan; default: the day that the scan's name begins with, if any."""
     truth: RelativePath | None = None

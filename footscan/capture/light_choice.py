@@ -16,6 +16,7 @@ import numpy as np
 
 from footscan.frames.image import Rgb
 from footscan.stripe.extract import extract_stripe
+from footscan.stripe.laser import laser_of
 from schemas.base.errors import Finding
 from schemas.parameters.extraction import ExtractionParameters
 
@@ -167,6 +168,8 @@ def choose_light(cameras: Sequence[int], look: Look, limits: LightLimits | None 
     while looks < MOST_LOOKS:
         frames = look(power, {camera: search.exposure_ms for camera, search in searches.items()})
         looks += 1
+        everything = [frame for camera in searches for frame in frames[camera]]
+        extraction = ExtractionParameters().with_laser(laser_of(everything, ExtractionParameters()))
         again = [search.learn(stripe_seen(frames[camera], extraction), limits) for camera, search in searches.items()]
         if any(again):
             continue

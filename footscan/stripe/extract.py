@@ -13,7 +13,7 @@ from footscan.stripe.loop_parameters import LoopParameters, loop_parameters_of
 from footscan.stripe.pieces import keep_stripe
 from footscan.stripe.points import STRIPE_DTYPE, StripePoints
 from footscan.stripe.profile import COLUMNS, CONTRAST, REDNESS, SATURATION, SYMMETRY, WIDTH, measure_profiles
-from footscan.stripe.redness import SIGNAL_SCALE, as_words, halve, mark_saturated, red_of, take_away
+from footscan.stripe.redness import SIGNAL_SCALE, as_red, as_words, halve, mark_saturated, red_of, take_away
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, I, J, find_ridges, gaussian
 from footscan.stripe.smoothing import smooth_along
 from schemas.parameters.extraction import ExtractionParameters
@@ -27,6 +27,7 @@ def extract_stripe(
     Parameters
     ----------
     image : (rows, columns, 3) uint8, RGB.
+    parameters : `laser` is taken for red if it is `auto`: `footscan.stripe.laser` finds it, in several frames.
     background : the same view with the laser off, of the same shape and type.
 
     Returns
@@ -77,11 +78,13 @@ def find_stripe(
     rows, columns, _ = image.shape
     if rows == 0 or columns == 0:
         return np.empty((0, MEASURED))
-    words = as_words(image)
+    laser = "red" if parameters.laser == "auto" else parameters.laser
+    words = as_red(as_words(image), laser)
     light = words
     if background is not None:
         light = np.empty((rows, columns), np.uint32)
-        take_away(*(part.view(np.uint8).ravel() for part in (words, as_words(background), light)))
+        dark = as_red(as_words(background), laser)
+        take_away(*(part.view(np.uint8).ravel() for part in (words, dark, light)))
     return np.asarray(
         _find_points(
             words,

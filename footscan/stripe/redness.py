@@ -1,4 +1,4 @@
-"""Signal and redness of pixels.
+"""Signal and redness of pixels. Pictures of another laser are brought to red first, see `as_red`.
 
 A pixel is one 32-bit word, with red in its lowest byte, then green, blue and an unused byte, so that one load reads it.
 """
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from footscan.compiled import compiled
 from footscan.frames.image import padded_pixels
+from schemas.laser import Laser
 
 SIGNAL_SCALE = 4
 """Levels of the signal 2 R + G + B for one grey level. It shows the laser's red and the white of a saturated core."""
@@ -40,6 +41,40 @@ def as_words(image: NDArray[np.uint8]) -> NDArray[np.uint32]:
         padded[..., :3] = image
     words: NDArray[np.uint32] = padded.view("<u4")[..., 0]
     return words if sys.byteorder == "little" else words.astype(np.uint32)
+
+
+def as_red(words: NDArray[np.uint32], laser: Laser) -> NDArray[np.uint32]:
+    """Bring the light of a laser to red: red and the laser's colour change places.
+
+    A picture without colours (`mono`) becomes one of red light alone.
+
+    Returns
+    -------
+    (rows, columns) uint32: `words` itself for a red laser, otherwise a new array.
+
+    >>> print([f"{word:06x}" for word in as_red(np.array([[0x20_50_C8]], np.uint32), "green")[0]])
+    ['20c850']
+    """
+    if laser == "red":
+        return words
+    if laser == "mono":
+        return (words >> _EIGHT) & _BYTE
+    shift = _EIGHT if laser == "green" else _SIXTEEN
+    changed: NDArray[np.uint32] = _exchanged(words, shift)
+    return changed
+
+
+@compiled
+def _exchanged(words: NDArray[np.uint32], shift: np.uint32) -> NDArray[np.uint32]:
+    """Exchange the lowest byte of each word for that `shift` bits higher."""
+    changed = np.empty_like(words)
+    rows, columns = words.shape
+    for y in range(rows):
+        for x in range(columns):
+            word = words[y, x]
+            differs = (word ^ (word >> shift)) & _BYTE
+            changed[y, x] = word ^ (differs | (differs << shift))
+    return changed
 
 
 @compiled

@@ -61,6 +61,7 @@ def extract(
     from footscan.frames.image import SUFFIXES
     from footscan.frames.reader import backgrounds_of, pixel_frames
     from footscan.stripe.film import extract_film, points_csv
+    from footscan.stripe.laser import with_found_laser
     from pipelines.engine.files.atomic import write_atomically
     from schemas.base.overrides import overridden
     from schemas.parameters.extraction import ExtractionParameters
@@ -69,16 +70,16 @@ def extract(
     film = open_film(file)
     if file.is_file() and file.suffix.lower() in SUFFIXES and next(pixel_frames(film)) is None:
         raise RefusedInput(file, "expected a whole image, found one that is torn")
-    backgrounds = None
-    if background is not None:
-        backgrounds = backgrounds_of(open_background(background, film.size, film.count, str(file)), film.count)
+    laser_off = None if background is None else open_background(background, film.size, film.count, str(file))
+    backgrounds = None if laser_off is None else backgrounds_of(laser_off, film.count)
     inputs = [path for source in (file, background) if source is not None for path in film_files(source)]
     keep_inputs([out, overlay], *inputs)
     _check_outputs(out, overlay, [path for path in (file, background) if path is not None])
 
-    seen = _Seen()
-    points = extract_film(seen.watch(pixel_frames(film)), parameters, backgrounds)
-    picture = None if overlay is None else _drawn(film, points, seen.lost, _about(film, background, parameters))
+    seen, about = _Seen(), _about(film, background, parameters)
+    used = with_found_laser(film, parameters, laser_off)
+    points = extract_film(seen.watch(pixel_frames(film)), used, backgrounds)
+    picture = None if overlay is None else _drawn(film, points, seen.lost, about)
     if out is not None:
         write_atomically(out, points_csv(points).encode())
     elif not as_json:
@@ -91,6 +92,7 @@ def extract(
                 "file": str(file),
                 "background": None if background is None else str(background),
                 "parameters": parameters.model_dump(mode="json"),
+                "laser": None if used.laser == "auto" else used.laser,
                 "frames": film.count,
                 "lost": seen.lost,
                 **_figures(film, points),
@@ -98,7 +100,7 @@ def extract(
                 "overlay": None if overlay is None else str(overlay),
             }
         )
-    message(_summary(film, points, seen))
+    message(_summary(film, points, seen, used.laser))
 
 
 def _check_outputs(out: Path | None, overlay: Path | None, sources: Sequence[Path]) -> None:
@@ -183,13 +185,15 @@ def _figures(film: "FrameReader", points: "StripePoints") -> dict[str, Any]:
     }
 
 
-def _summary(film: "FrameReader", points: "StripePoints", seen: _Seen) -> str:
+def _summary(film: "FrameReader", points: "StripePoints", seen: _Seen, laser: str) -> str:
     """The summary in one line."""
     with_points = len(set(points["frame"].tolist()))
     of = f"{with_points} of " if 0 < with_points < film.count else ""
     lost = f", {len(seen.lost)} lost" if seen.lost else ""
     found = f"{film.path}: {len(points)} stripe points in {of}{film.count} frame{'s' * (film.count != 1)}{lost}"
-    if seen.colour or len(seen.lost) == film.count:
+    if laser != "auto":
+        found += f"; laser: {laser}"
+    if seen.colour or laser in ("auto", "mono") or len(seen.lost) == film.count:
         return found
-    so = "what was found is bright, not red" if len(points) else "no red stripe can be found in it"
+    so = f"what was found is bright, not {laser}" if len(points) else f"no {laser} stripe can be found in it"
     return f"{found}; it has no colour (R = G = B in every pixel), so that {so}"

@@ -9,6 +9,7 @@ from footscan.frames.array import IngestedFrames
 from footscan.frames.image import Rgb
 from footscan.frames.reader import backgrounds_of, pixel_frames
 from footscan.stripe.film import extract_film
+from footscan.stripe.laser import with_found_laser
 from pipelines.arrays import pack
 from schemas.frames import FrameManifest
 from schemas.parameters.extraction import ExtractionParameters
@@ -18,16 +19,19 @@ def run(inputs: Mapping[str, bytes], parameters: ExtractionParameters, places: M
     """Extract the stripe points of all frames.
 
     `inputs`: `manifest`, and that of the `background` if the camera has one; `places`: the `array` of the frames, and
-    that of the `background`. The result holds the `stripe` and the numbers of the `lost` frames.
+    that of the `background`. The result holds the `stripe`, the numbers of the `lost` frames, and the
+    `laser`: its colour, or `auto` if it is unknown.
     """
     film = IngestedFrames(places["array"], FrameManifest.model_validate_json(inputs["manifest"]))
     lost: list[int] = []
-    backgrounds = None
+    background = None
     if "background" in inputs:
         manifest = FrameManifest.model_validate_json(inputs["background"])
-        backgrounds = backgrounds_of(IngestedFrames(places["background"], manifest), film.count)
+        background = IngestedFrames(places["background"], manifest)
+    parameters = with_found_laser(film, parameters, background)
+    backgrounds = None if background is None else backgrounds_of(background, film.count)
     stripe = extract_film(_noting_lost(pixel_frames(film), lost), parameters, backgrounds)
-    return pack(stripe=stripe, lost=np.array(lost, np.int32))
+    return pack(stripe=stripe, lost=np.array(lost, np.int32), laser=np.array(parameters.laser))
 
 
 def _noting_lost(frames: Iterator[Rgb | None], lost: list[int]) -> Iterator[Rgb | None]:

@@ -3,14 +3,17 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from footscan.surface.quality import mesh_quality
 from pipelines.arrays import unpack
 from schemas.calibration import Source
 from schemas.frames import FrameManifest
 from schemas.fusion import FusionReport
+from schemas.laser import Laser
 from schemas.quality import CameraQuality, Comparison, Quality
 
 
@@ -46,8 +49,14 @@ def _camera(camera: int, inputs: Mapping[str, bytes], removed: dict[str, int]) -
         frames_lost=len(extracted["lost"]),
         frames_with_stripe=len(np.unique(stripe["frame"])),
         points=len(stripe),
+        laser=_laser(extracted),
         removed=removed,
     )
+
+
+def _laser(extracted: Mapping[str, NDArray[Any]]) -> Laser | None:
+    found = extracted["laser"].item() if "laser" in extracted else "auto"
+    return None if found == "auto" else cast(Laser, found)
 
 
 def _truth(inputs: Mapping[str, bytes]) -> Comparison | None:

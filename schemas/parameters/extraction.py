@@ -5,11 +5,17 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from schemas.base.model import Document
+from schemas.laser import Laser
 
 
 class ExtractionParameters(Document):
     """Parameters that separate the laser stripe from the rest of a frame and locate its centre."""
 
+    laser: Literal["auto", "red", "green", "blue", "mono"] = Field(
+        default="auto",
+        description="colour of the laser in the pictures, `mono` for a camera without colours; `auto` finds it in the "
+        "film. Where others say red, the colour of the laser is meant",
+    )
     red_threshold: int = Field(
         default=18,
         ge=1,
@@ -134,6 +140,12 @@ class ExtractionParameters(Document):
         description="light, relative to the stripe beside it, below which a piece is a ghost; a piece parallel to the "
         "stripe is a ghost below half of the stripe's light",
     )
+
+    def with_laser(self, laser: Laser | None) -> Self:
+        """The same parameters with this laser; None, and parameters that name a laser, change nothing."""
+        if laser is None or self.laser != "auto":
+            return self
+        return self.model_copy(update={"laser": laser})
 
     @model_validator(mode="after")
     def _ends_are_fainter(self) -> Self:

@@ -48,9 +48,11 @@ def _values(annotation: Any) -> list[object]:
     return list(chain.from_iterable(map(_values, get_args(annotation))))
 
 
+OTHER_LASERS = [("extraction.laser", "green"), ("extraction.laser", "blue")]
+"""The archive's films have a red one."""
 STEP_MM = 10.0
 """From frame to frame of the archive's films: heel and toes are known no better."""
-CHOICES = list(choices(ScanParameters))
+CHOICES = [choice for choice in choices(ScanParameters) if choice not in OTHER_LASERS]
 
 
 def test_choices_are_found_wherever_they_stand() -> None:

@@ -23,6 +23,8 @@ FIRST_FRAMES = 400
 """Number of frames in the first fit; its period is exact enough to number four times as many. Chosen by hand."""
 NEAR, FAR = 0.01, 0.2
 """Search ranges about the nominal period and about the median interval, as shares of them. Chosen by hand."""
+PLAINLY = 1.2
+"""Factor by which stamps must be more even at a short interval than at the median one. Chosen by hand."""
 PROMISE_HOLDS = 0.5
 """The nominal period is kept unless another one increases the coherence of the stamps by this much. Chosen by hand."""
 LATE_PERIODS = 0.5
@@ -165,7 +167,11 @@ def _first_line(stamps: Floats, promised: float | None) -> _Line:
     if promised is not None:
         found.append(_evenness(stamps, promised, NEAR))
     if len(stamps) > 1 and np.ptp(stamps) > 0:
-        found.append(_evenness(stamps, max(float(np.median(np.diff(stamps))), 1e-3), FAR))
+        short, median = (max(float(value), 1e-3) for value in np.quantile(np.diff(stamps), (0.25, 0.5)))
+        by_median = _evenness(stamps, median, FAR)
+        # Where a third of the frames is lost, the median interval may be two periods long.
+        by_short = _evenness(stamps, short, FAR)
+        found.append(by_short if by_short[0] > PLAINLY * by_median[0] else by_median)
     if promised is not None and found[0][0] >= PROMISE_HOLDS * found[-1][0]:
         return found[0][1]
     return found[-1][1]

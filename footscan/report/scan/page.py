@@ -200,7 +200,7 @@ def _value(measure: Measure) -> str:
 
 
 def _cameras_table(quality: Quality, cloud: NDArray[np.void]) -> str:
-    headings = ["Camera", "Frames", "Lost", "With stripe", "Points", "Removed", "In cloud"]
+    headings = ["Camera", "Frames", "Lost", "With stripe", "Points", "Removed", "In cloud", "Laser"]
     rows = [
         [
             camera.frames,
@@ -216,8 +216,12 @@ def _cameras_table(quality: Quality, cloud: NDArray[np.void]) -> str:
     if len(rows) > 1:
         rows.append([sum(column) for column in zip(*rows, strict=True)])
         names.append("All")
-    cells = ([name, *(number(count) for count in row)] for name, row in zip(names, rows, strict=True))
-    return table(headings, cells, numeric=range(1, len(headings)))
+    lasers = [camera.laser or "–" for camera in quality.cameras] + [""]
+    cells = (
+        [name, *(number(count) for count in row), laser]
+        for name, row, laser in zip(names, rows, lasers[: len(rows)], strict=True)
+    )
+    return table(headings, cells, numeric=range(1, len(headings) - 1))
 
 
 def _agreement(report: FusionReport) -> list[str]:

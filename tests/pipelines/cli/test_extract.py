@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -81,7 +82,7 @@ def test_one_picture(extract: Extract, frame: Path, tmp_path: Path) -> None:
     assert {name: found[name] for name in (*named, *counted)} == named | counted
     assert found["median_width_px"] == pytest.approx(2.355 * 2.0, rel=0.1)  # of a Gaussian, and a smoothed frame
     assert 0.02 <= found["median_sigma_px"] < 0.1
-    assert told == [f"{frame}: {len(j)} stripe points in 1 frame"]
+    assert told == [f"{frame}: {len(j)} stripe points in 1 frame; laser: red"]
     assert len(j) > 0.9 * COLUMNS
     np.testing.assert_allclose(j, STRIPE, atol=0.1)
     with Image.open(overlay) as picture:
@@ -219,7 +220,7 @@ def test_lost_frames_are_told(extract: Extract, film: Path, tmp_path: Path) -> N
     found = json.loads(printed)
     assert (status, found["frames"], found["lost"]) == (0, 3, [1])
     assert found["points_per_frame"] == [whole[0], 0, whole[2]]
-    assert told == [f"{film}: {whole[0] + whole[2]} stripe points in 2 of 3 frames, 1 lost"]
+    assert told == [f"{film}: {whole[0] + whole[2]} stripe points in 2 of 3 frames, 1 lost; laser: red"]
 
 
 def test_a_folder_of_lost_frames(extract: Extract, film: Path, tmp_path: Path) -> None:
@@ -329,12 +330,13 @@ def test_a_picture_without_colour_is_told(
     grey = tmp_path / f"grey{suffix}"
     with Image.open(frame) as picture:
         picture.convert("L").convert(mode).save(grey)
-    status, _, told = extract(grey)
-    why = "it has no colour (R = G = B in every pixel), so that no red stripe can be found in it"
+    assert re.fullmatch(rf"{grey}: 1\d\d stripe points in 1 frame; laser: mono", extract(grey)[2][0])
+    status, _, told = extract(grey, "--set", "laser=red")
+    why = "laser: red; it has no colour (R = G = B in every pixel), so that no red stripe can be found in it"
     assert (status, told) == (0, [f"{grey}: 0 stripe points in 1 frame; {why}"])
     bright = 90 + 150 * np.exp(-0.5 * ((np.mgrid[0:ROWS, 0:COLUMNS][0] - STRIPE) / 2.0) ** 2)
     Image.fromarray(np.rint(bright).astype(np.uint8)).convert(mode).save(grey)
-    told = extract(grey, "--set", "saturation=100")[2]
+    told = extract(grey, "--set", "saturation=100", "--set", "laser=red")[2]
     assert told[0].endswith("it has no colour (R = G = B in every pixel), so that what was found is bright, not red")
     assert "no colour" not in extract(frame, "--set", "red_threshold=254")[2][0]
 

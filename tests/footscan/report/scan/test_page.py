@@ -72,6 +72,7 @@ def scan():
                     frames_lost=1,
                     frames_with_stripe=2,
                     points=1711,
+                    laser="green",
                     removed={"end": 13, "volume": 0},
                 ),
                 CameraQuality(
@@ -139,10 +140,10 @@ def test_every_measure_stands_with_value_unit_status_and_definition(scan):
 
 def test_the_cameras_table_adds_up(scan):
     rows = rows_of(scan_page(**scan))
-    assert ["Camera", "Frames", "Lost", "With stripe", "Points", "Removed", "In cloud"] in rows
-    assert ["1", "4", "1", "2", "1\u202f711", "13", "2"] in rows
-    assert ["2", "4", "1", "3", "1\u202f722", "17", "2"] in rows
-    assert ["All", "8", "2", "5", "3\u202f433", "30", "4"] in rows
+    assert ["Camera", "Frames", "Lost", "With stripe", "Points", "Removed", "In cloud", "Laser"] in rows
+    assert ["1", "4", "1", "2", "1\u202f711", "13", "2", "green"] in rows
+    assert ["2", "4", "1", "3", "1\u202f722", "17", "2", "–"] in rows
+    assert ["All", "8", "2", "5", "3\u202f433", "30", "4", ""] in rows
 
 
 def test_each_reason_has_a_column_that_adds_up(scan):
