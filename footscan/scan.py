@@ -18,7 +18,7 @@ from footscan.cloud.outliers import remove_outliers
 from footscan.cloud.views import views_of
 from footscan.frames.film import open_background, open_film
 from footscan.frames.image import Rgb
-from footscan.frames.reader import FrameReader, backgrounds_of, pixel_frames
+from footscan.frames.reader import FrameReader, backgrounds_of, noting_lost, pixel_frames
 from footscan.frames.travel import read_positions, travelled
 from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
@@ -43,6 +43,7 @@ class OpenScan:
         self.calibration = calibration
         self.parameters = parameters
         self._films = {camera.id: camera for camera in recorded.document.cameras}
+        self._lost: dict[int, list[int]] = {}
 
     @property
     def cameras(self) -> tuple[int, ...]:
@@ -73,7 +74,10 @@ class OpenScan:
         together = np.concatenate(list(self.points.values()))
         if not len(together):
             raise Finding("no stripe in any camera, expected a foot in the films")
-        kept, _ = remove_outliers(together, views_of(self._used.cameras), self.parameters.outliers)
+        filmed = {camera: self._x_of_frame(camera) for camera in self.cameras}
+        for camera, lost in self._lost.items():
+            filmed[camera][lost] = np.nan
+        kept, _ = remove_outliers(together, views_of(self._used.cameras), self.parameters.outliers, filmed)
         if not len(kept):
             raise Finding("every point is an outlier, expected a foot in the control volume")
         return fuse(kept, self.parameters.fusion).cloud
@@ -115,18 +119,19 @@ class OpenScan:
         given = self.parameters.extraction.with_laser(self.recorded.document.laser)
         parameters = with_found_laser(film, given, background)
         backgrounds = None if background is None else backgrounds_of(background, film.count)
-        return extract_film(pixel_frames(film), parameters, backgrounds)
+        lost = self._lost[camera] = []
+        return extract_film(noting_lost(pixel_frames(film), lost), parameters, backgrounds)
 
     def _points(self, camera: int) -> NDArray[np.void]:
+        model = self.calibration.camera(camera, self.recorded.file)
+        return map_stripe(self.stripes[camera], model, self._x_of_frame(camera), self.parameters.mapping)
+
+    def _x_of_frame(self, camera: int) -> NDArray[np.float64]:
         film = self._film(camera)
         count = open_film(self.recorded.film(film)).count
-        positions = self.recorded.positions(film)
-        if positions is not None:
-            x_of_frame = read_positions(positions)
-        else:
-            x_of_frame = travelled(cast(Travel, film.travel or self.recorded.document.travel), count)
-        model = self.calibration.camera(camera, self.recorded.file)
-        return map_stripe(self.stripes[camera], model, x_of_frame, self.parameters.mapping)
+        if (positions := self.recorded.positions(film)) is not None:
+            return read_positions(positions)[:count]
+        return travelled(cast(Travel, film.travel or self.recorded.document.travel), count)
 
 
 def open_scan(

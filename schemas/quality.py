@@ -120,6 +120,8 @@ class Quality(Document):
     calibration: Source
     """The calibration file that mapped the pixels."""
     cameras: list[CameraQuality]
+    warnings: list[str] = Field(default_factory=list)
+    """Sentences on cameras much of whose points are not the foot."""
     fusion: FusionReport = Field(default_factory=FusionReport)
     """Disagreement of the cameras about the same skin, and their corrections."""
     cloud_points: Count

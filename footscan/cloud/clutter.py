@@ -1,5 +1,7 @@
 """Clutter: static objects, which are seen without the foot too, and small parts apart from the rest."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -23,15 +25,23 @@ NEIGHBOUR_STEPS = 1.5
 Chosen by hand."""
 
 
-def is_static(points: NDArray[np.void], share: float) -> NDArray[np.bool_]:
-    """Select static points: the camera sees them from before the foot appears until after it has gone.
+def is_static(
+    points: NDArray[np.void],
+    share: float,
+    body: tuple[float, float] | None = None,
+    filmed: Mapping[int, NDArray[np.float64]] | None = None,
+) -> NDArray[np.bool_]:
+    """Select static points: the camera sees them in the frames before the foot appears, or after it has gone.
 
-    A static point lies at a place in Y and Z at which more than `share` of the camera's first frames, and of its last
-    frames, have a point.
+    A static point lies at a place in Y and Z at which more than `share` of the camera's frames before the body, or
+    behind it, have a point, and in each frame from there. Without a body a camera's first and last frames are taken
+    instead, and both must have it.
 
     Parameters
     ----------
     points : (N,) of `POINT_DTYPE`, mm, scanner frame, all finite.
+    body : least and greatest X of the body, mm; None if unknown.
+    filmed : camera -> X of its frames, mm; of a camera that is missing here, frames with points alone are known.
 
     Returns
     -------
@@ -53,33 +63,70 @@ def is_static(points: NDArray[np.void], share: float) -> NDArray[np.bool_]:
     for camera in np.unique(points["camera"]):
         own = np.flatnonzero(points["camera"] == camera)
         own = own[np.argsort(points["frame"][own], kind="stable")]
-        static[own] = _static_of_camera(points[own], share)
+        static[own] = _static_of_camera(points[own], (filmed or {}).get(int(camera)), body, share)
     return static
 
 
-def _static_of_camera(points: NDArray[np.void], share: float) -> NDArray[np.bool_]:
-    """Select the static points of one camera, ordered by frame."""
+def _static_of_camera(
+    points: NDArray[np.void], x: NDArray[np.float64] | None, body: tuple[float, float] | None, share: float
+) -> NDArray[np.bool_]:
+    """Select the static points of one camera, ordered by frame; x : (F,) of its frames, or None."""
     nothing = np.zeros(len(points), np.bool_)
-    frame = points["frame"] - points["frame"].min()
-    frames = int(frame.max()) + 1
-    end = max(END_FRAMES, round(END_SHARE * frames))
     yz = np.column_stack([points["y"], points["z"]]).astype(np.float64)
-    if frames < 4 * end or np.prod(np.ptp(yz, axis=0) / CELL_MM + 3) > MOST_CELLS:
+    if np.prod(np.ptp(yz, axis=0) / CELL_MM + 3) > MOST_CELLS:
         return nothing
     cell = np.floor((yz - yz.min(axis=0)) / CELL_MM).astype(np.int64) + 1
     shape = tuple(cell.max(axis=0) + 2)
+    if body is not None and x is not None:
+        return _static_beside(cell, points["frame"], (x < body[0], x > body[1]), shape, share)
+    frame = points["frame"] - points["frame"].min()
+    if body is not None:
+        x = np.full(int(frame.max()) + 1, np.nan)
+        x[frame] = points["x"]
+        return _static_beside(cell, frame, (x < body[0], x > body[1]), shape, share)
+    frames = int(frame.max()) + 1
+    end = max(END_FRAMES, round(END_SHARE * frames))
+    if frames < 4 * end:
+        return nothing
     first, last = frame < end, frame >= frames - end
     often = np.minimum(*(_frames_by_cell(cell[part], frame[part], np.zeros(shape, np.int32)) for part in (first, last)))
-    static: NDArray[np.bool_] = (often > share * end)[tuple(cell.T)]
+    static = (often > share * end)[tuple(cell.T)]
     foot = np.flatnonzero(np.bincount(frame[~static], minlength=frames) >= FEWEST)
     if not len(foot) or foot[0] < end or foot[-1] >= frames - end:
         return nothing
     # The foot may hide a static object, and take its place.
-    steady = frame <= _steady_until(cell, frame, np.full(shape, -1, np.int32))[tuple(cell.T)]
-    back = (frames - 1 - frame)[::-1]
-    steady |= back[::-1] <= _steady_until(cell[::-1].copy(), back, np.full(shape, -1, np.int32))[tuple(cell.T)]
-    static &= steady
+    static &= _is_steady(cell, frame, shape) | _is_steady(cell, frames - 1 - frame, shape)
     return nothing if np.mean(static) > LARGEST_SHARE else static
+
+
+def _static_beside(
+    cell: NDArray[np.int64],
+    frame: NDArray[np.int32],
+    outside: tuple[NDArray[np.bool_], NDArray[np.bool_]],
+    shape: tuple[int, ...],
+    share: float,
+) -> NDArray[np.bool_]:
+    """Select the static points of one camera by what it sees before and behind the body.
+
+    frame : (N,) ascending. outside : for each side, (F,) True for the frames there.
+    """
+    static = np.zeros(len(cell), np.bool_)
+    for there in outside:
+        count = int(np.count_nonzero(there))
+        if count < END_FRAMES:
+            continue
+        empty = there[frame]
+        number = frame if there[: len(there) // 2].sum() > count / 2 else len(there) - 1 - frame
+        often = _frames_by_cell(cell[empty], frame[empty], np.zeros(shape, np.int32))
+        static |= (often > share * count)[tuple(cell.T)] & (_is_steady(cell, number, shape) | empty)
+    return static
+
+
+def _is_steady(cell: NDArray[np.int64], number: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Select the points at places that hold points from frame 0 on, in frames that are numbered up, or down."""
+    way = 1 if number[0] <= number[-1] else -1
+    until = _steady_until(cell[::way].copy(), number[::way].copy(), np.full(shape, -1, np.int32))
+    return np.asarray(number <= until[tuple(cell.T)])
 
 
 @compiled

@@ -18,14 +18,20 @@ BESIDE_MM = 5.0
 """Distance by which the sole may reach beyond the sides in Y. Chosen by hand."""
 AHEAD_PLANES = 2
 """Planes by which the sole may reach beyond the sides along the travel. Chosen by hand."""
+BIN_MM = 2.0
+"""Width in Y of the strips in which the sole is either on the glass or above it. Chosen by hand."""
+SOLE_MM = (2.0, 40.0)
+"""Heights of a sole that does not touch the glass: on the border of what does, it rises by less within a strip; above,
+there are no soles. Chosen by hand."""
 
 
 def is_plate(points: NDArray[np.void], views: Mapping[int, View], glass_mm: float) -> NDArray[np.bool_]:
     """Select the points that lie below the glass at Z = 0 or in it.
 
     Points more than `glass_mm` below it are a mirror image. Points within `glass_mm` of it are in the glass if they lie
-    beside, before or behind the sides of the foot. The latter are dropped only if cameras above the glass see both
-    sides of the foot.
+    beside, before or behind the sides of the foot, or below a sole that two cameras see above the glass: there water,
+    dust or a fingerprint shines. Those beside the foot are dropped only if cameras above the glass see both of its
+    sides.
 
     Parameters
     ----------
@@ -45,11 +51,12 @@ def is_plate(points: NDArray[np.void], views: Mapping[int, View], glass_mm: floa
     z = points["z"]
     below: NDArray[np.bool_] = z < -glass_mm
     step = max(stripe_step(points), PLANE_MM)
+    plane = np.round((points["x"] - points["x"].min()) / step).astype(np.int64)
+    below |= (np.abs(z) <= glass_mm) & _has_sole_above(points, plane, views)
     above = [views[camera].centre for camera in np.unique(points["camera"]) if camera in views]
     sides_seen = {np.sign(centre[1]) for centre in above if centre[2] > 0}
     if not {-1.0, 1.0} <= sides_seen:
         return below
-    plane = np.round((points["x"] - points["x"].min()) / step).astype(np.int64)
     sides = _sides(plane, points["y"], z > HIGH_MM)
     if sides is None:
         return below
@@ -57,6 +64,19 @@ def is_plate(points: NDArray[np.void], views: Mapping[int, View], glass_mm: floa
     y = points["y"]
     beside = (y < low[plane] - BESIDE_MM) | (y > high[plane] + BESIDE_MM)
     return np.asarray(below | (beside & (np.abs(z) <= glass_mm)))
+
+
+def _has_sole_above(points: NDArray[np.void], plane: NDArray[np.int64], views: Mapping[int, View]) -> NDArray[np.bool_]:
+    """(N,) True for points in a plane and strip in which two cameras below the glass see the sole above it."""
+    strip = np.floor((points["y"] - points["y"].min()) / BIN_MM).astype(np.int64)
+    cameras = np.zeros((int(plane.max()) + 1, int(strip.max()) + 1), np.int64)
+    for camera in np.unique(points["camera"]):
+        if camera in views and views[camera].centre[2] < 0:
+            is_sole = (points["camera"] == camera) & (points["z"] > SOLE_MM[0]) & (points["z"] < SOLE_MM[1])
+            seen = np.zeros(cameras.shape, np.bool_)
+            seen[plane[is_sole], strip[is_sole]] = True
+            cameras += seen
+    return np.asarray((cameras >= 2)[plane, strip])
 
 
 def _sides(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cloud.body import body_range, is_apart
 from footscan.cloud.clutter import is_island, is_static
 from footscan.cloud.glass import is_plate
 from footscan.cloud.support import END, ISOLATED, UNCONFIRMED, judge_segments
@@ -18,6 +19,16 @@ REASONS = ("volume", "extrapolated", "end", "isolated", "unconfirmed", "glass", 
 """Reasons to drop a point; the code of a reason is its position here, counted from 1."""
 KEPT = 0
 """Code of a point that is kept."""
+NO_FOOT = ("isolated", "unconfirmed", "clutter")
+"""Reasons that say of a point that it is not the foot."""
+ROUNDS = 3
+"""Rounds in which segments are judged, each without those that were dropped before: what is no foot confirms, and
+hides, other things that are none."""
+CLUTTERED = 0.02
+"""Share of a camera's points that are not the foot from which its pieces of stripe need the confirmation of another
+camera. Cameras in a dark room without mirrors have less. Chosen by hand."""
+MUCH = 0.1
+"""Share of a camera's points that are not the foot from which a warning is given. Chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -28,27 +39,34 @@ class Removed:
     """(N,): `KEPT` or the code of the reason, for each input point."""
     counts: dict[int, dict[str, int]]
     """Camera -> reason -> number of points; all reasons, for each camera that has points."""
+    warnings: list[str]
+    """A sentence for each camera much of whose points are not the foot."""
 
 
 def remove_outliers(
-    points: NDArray[np.void], views: Mapping[int, View], parameters: OutlierParameters
+    points: NDArray[np.void],
+    views: Mapping[int, View],
+    parameters: OutlierParameters,
+    filmed: Mapping[int, NDArray[np.float64]] | None = None,
 ) -> tuple[NDArray[np.void], Removed]:
     """Drop the points that cannot belong to the foot.
 
     They are dropped in this order:
 
     - points outside the control volume ("volume"), and points that the calibration does not support ("extrapolated");
-    - the foot's mirror image and the glass itself ("glass"), then static objects ("clutter"): they would confirm each
-      other;
+    - the foot's mirror image and the glass itself ("glass"), then static objects, and all that is seen where no foot is
+      ("clutter"): they would confirm each other;
     - the last points of a stripe where other cameras see the same place within their stripes ("end"), segments of
-      stripe without any before and behind them ("isolated"), and segments that other cameras should see, but do not
-      ("unconfirmed");
-    - small parts apart from the rest ("clutter" again).
+      stripe without any before and behind them ("isolated"), and segments that other cameras should see, but do not,
+      or that lie behind a surface on which more cameras agree ("unconfirmed");
+    - parts apart from the rest that are small, or on which cameras do not agree ("clutter" again).
 
     Parameters
     ----------
     points : (N,) of `POINT_DTYPE`, mm, scanner frame, of all cameras
     views : camera -> view; only cameras listed here are expected to confirm what another camera saw
+    filmed : camera -> X of the frames that it has, mm: a camera that saw nothing there denies what others saw. Of a
+        camera that is missing here only frames with points count
 
     Returns
     -------
@@ -75,16 +93,50 @@ def remove_outliers(
         mark("extrapolated", left()[~points["supported"][left()]])
     if (inside := left()).size:
         mark("glass", inside[is_plate(points[inside], views, parameters.glass_mm)])
+    body = None
     if (inside := left()).size:
-        mark("clutter", inside[is_static(points[inside], parameters.static_share)])
-    if (inside := left()).size:
-        verdicts = judge_segments(points[inside], views, parameters)
-        mark("end", inside[verdicts == END])
+        if len(views.keys() & set(np.unique(points["camera"]).tolist())) >= parameters.fewest_cameras:
+            body = body_range(points[inside])
+        static = is_static(points[inside], parameters.static_share, body, filmed)
+        if body is not None:
+            static |= (points["x"][inside] < body[0]) | (points["x"][inside] > body[1])
+        mark("clutter", inside[static])
+    for last in [False] * (ROUNDS - 1) + [True]:
+        if not (inside := left()).size:
+            break
+        verdicts = judge_segments(points[inside], views, parameters, filmed, _cluttered(points["camera"], codes))
         mark("isolated", inside[verdicts == ISOLATED])
         mark("unconfirmed", inside[verdicts == UNCONFIRMED])
+        if last or not np.any((verdicts == ISOLATED) | (verdicts == UNCONFIRMED)):
+            mark("end", inside[verdicts == END])
+            break
+    if body is not None and (inside := left()).size:
+        mark("clutter", inside[is_apart(points[inside])])
     if (inside := left()).size:
         mark("clutter", inside[is_island(points[inside], parameters.island_gap_steps, parameters.island_share)])
-    return points[codes == KEPT], Removed(codes, _count(points["camera"], codes))
+    counts = _count(points["camera"], codes)
+    return points[codes == KEPT], Removed(codes, counts, _warnings(points["camera"], counts))
+
+
+def _cluttered(camera: NDArray[np.uint8], codes: NDArray[np.uint8]) -> list[int]:
+    """Cameras that see much that is not the foot, as far as it was judged."""
+    counts = _count(camera, codes)
+    return [number for number, share in _no_foot(camera, counts).items() if share > CLUTTERED]
+
+
+def _no_foot(camera: NDArray[np.uint8], counts: Mapping[int, Mapping[str, int]]) -> dict[int, float]:
+    """Camera -> share of its points that are not the foot."""
+    points = np.bincount(camera)
+    return {number: sum(of[reason] for reason in NO_FOOT) / int(points[number]) for number, of in counts.items()}
+
+
+def _warnings(camera: NDArray[np.uint8], counts: Mapping[int, Mapping[str, int]]) -> list[str]:
+    return [
+        f"camera {number}: {100 * share:.0f} % of its points are not the foot and were dropped: it sees bright or "
+        "shining things, or the room is bright; backgrounds filmed with the laser off take them away"
+        for number, share in _no_foot(camera, counts).items()
+        if share > MUCH
+    ]
 
 
 def _outside(points: NDArray[np.void], parameters: OutlierParameters) -> Mask:

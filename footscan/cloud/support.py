@@ -1,6 +1,6 @@
 """Verdicts on segments of stripe: supported, isolated along the travel, or not confirmed by other cameras."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,16 +26,24 @@ END_REACH = 3
 """Factor on the search distance for the first stripes of heel and toes, which have points on one side only and are
 farther apart than others. Chosen by hand."""
 
+DENIED_AT_ALL = 0.1
+"""Share of a piece's points that other cameras deny from which the piece is in doubt. Chosen by hand."""
+
 SUPPORTED, END, ISOLATED, UNCONFIRMED = range(4)
 """The verdicts on a point."""
 
 
 def judge_segments(
-    points: NDArray[np.void], views: Mapping[int, View], parameters: OutlierParameters
+    points: NDArray[np.void],
+    views: Mapping[int, View],
+    parameters: OutlierParameters,
+    filmed: Mapping[int, NDArray[np.float64]] | None = None,
+    cluttered: Collection[int] = (),
 ) -> NDArray[np.uint8]:
     """Judge the segments of stripe.
 
-    All points of a segment get the same verdict, so that a gap in another camera's stripe does no harm. The exception
+    All points of a segment get the same verdict, so that a gap in another camera's stripe does no harm; and a piece of
+    stripe is dropped as a whole if it is alone. The exception
     is the end of a stripe, where the last pixels see only a part of its width: points there are given up if another
     camera sees the place within its stripe.
 
@@ -43,6 +51,8 @@ def judge_segments(
     ----------
     points : (N,) of `POINT_DTYPE`, N >= 1, mm, scanner frame, all finite
     views : camera -> view, of the cameras whose position is known
+    filmed : camera -> X of its frames, mm; where a camera is missing, only frames with points count as filmed
+    cluttered : cameras that see much that is no foot: their pieces need confirmation
 
     Returns
     -------
@@ -54,7 +64,8 @@ def judge_segments(
     voxels = voxelise(xyz, (max(step, PLANES_MM), CELL_MM, CELL_MM))
     camera_numbers = np.unique(points["camera"])
     camera = np.searchsorted(camera_numbers, points["camera"]).astype(np.uint8)
-    sight = sight_of(xyz, camera, len(camera_numbers), voxels)
+    frames = [(filmed or {}).get(int(number)) for number in camera_numbers]
+    sight = sight_of(xyz, camera, frames, voxels)
     answers = ask_others(
         xyz, camera, voxels.voxel, [views.get(int(number)) for number in camera_numbers], voxels, sight
     )
@@ -64,6 +75,9 @@ def judge_segments(
     verdict = np.full(len(size), SUPPORTED, np.uint8)
     if len(camera_numbers) >= parameters.fewest_cameras:
         verdict[suspect & (denied > parameters.denied_share * size)] = UNCONFIRMED
+        piece, _ = segments_of(points, parameters.gap_mm, np.inf)
+        alone = _is_alone(piece, answers, np.isin(camera_numbers, list(cluttered))[camera], parameters)
+        verdict[np.bincount(segment, alone) > 0] = UNCONFIRMED
     if step > 0:
         beside = _count_beside(segment, suspect, parameters.beside_mm, voxels)
         verdict[suspect & (beside < parameters.beside_share * size)] = ISOLATED
@@ -72,6 +86,21 @@ def judge_segments(
     is_end = from_end < parameters.end_points
     verdicts[_covered(is_end, camera, voxels.number, voxels.voxel, voxels.place) & (verdicts == SUPPORTED)] = END
     return np.asarray(verdicts)
+
+
+def _is_alone(
+    piece: Ints, answers: NDArray[np.uint8], in_clutter: NDArray[np.bool_], parameters: OutlierParameters
+) -> NDArray[np.bool_]:
+    """Select the points (N,) of pieces that hardly another camera confirms, or that more points deny than confirm.
+
+    in_clutter : (N,) True for points of cameras that see much that is not the foot. Of other cameras, pieces that
+        nobody denies are kept: with cameras missing, they may be the only sight of the skin.
+    """
+    length = np.bincount(piece)
+    confirmed, denied = (np.bincount(piece, answers == answer) / length for answer in (CONFIRMED, DENIED))
+    is_denied = denied > DENIED_AT_ALL
+    alone = (confirmed <= parameters.confirmed_share)[piece] & (is_denied[piece] | in_clutter)
+    return np.asarray(alone | (is_denied & (denied >= confirmed))[piece])
 
 
 @compiled

@@ -1,9 +1,12 @@
 """Confirmation and denial of points by the cameras that should see them.
 
 A camera should see a point that lies in its calibrated part of the laser plane, faces it and is not hidden. It denies
-the point if it sees nothing there, although its image of this plane is not empty, or if it sees something behind.
+the point if it has filmed this plane and sees nothing there, or if it sees something behind. A point is denied, too, if
+it lies behind a surface that more cameras see: the camera that saw it looked through the surface, at a reflection.
+Cameras that miss most of what they should see deny nothing.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -32,8 +35,17 @@ CLEARANCE_CELLS = 4.0
 BEFORE_CELLS, BEHIND_CELLS = 3.0, 4.0
 """Distances, in sides of a cell, from which points of other cameras in front of a point hide it, and from which a
 camera that sees points behind it sees through it. Chosen by hand."""
+HIDDEN_CELLS = 5.0
+"""Distance, in sides of a cell, from which surface that more cameras confirm hides a point that fewer confirm. Chosen
+by hand."""
 FARTHEST_BEHIND = 0.5
 """Distance behind a point that is searched, in distances of the camera from the laser plane: a bound of time."""
+
+
+SAMPLED = 8
+"""Every so many points are asked whether a camera is a witness: a bound of time."""
+WITNESS_SHARE = 0.5
+"""A camera denies nothing if it sees less than this share of what it should see, as if it were dark or knocked."""
 
 
 class Sight(NamedTuple):
@@ -44,9 +56,9 @@ class Sight(NamedTuple):
     normals: Floats
     """(V, 3): normal of the surface in and around a cell, of either sign; 0 if it is not determined."""
     films: NDArray[np.bool_]
-    """(cells in X, cameras): True if the camera has points at this X."""
-    solid: NDArray[np.bool_]
-    """True for cells of twice the size that hold points."""
+    """(cells in X, cameras): True if the camera has filmed at this X."""
+    solid: NDArray[np.uint64]
+    """As `seen`, for all cells of twice the size; 0 where there are no points."""
 
 
 class Eyes(NamedTuple):
@@ -60,18 +72,25 @@ class Eyes(NamedTuple):
     """(C + 1,): where the sides of each camera begin."""
 
 
-def sight_of(xyz: Floats, camera: NDArray[np.uint8], cameras: int, voxels: Voxels) -> Sight:
+def sight_of(
+    xyz: Floats, camera: NDArray[np.uint8], filmed: Sequence[NDArray[np.float64] | None], voxels: Voxels
+) -> Sight:
     """Sum up the points of all cameras by cells.
 
     Parameters
     ----------
     xyz : (N, 3) mm, scanner frame
-    camera : (N,) index of each point's camera, less than `cameras`, which is 64 at most
+    camera : (N,) index of each point's camera in `filmed`, which has 64 cameras at most
+    filmed : for each camera, X of its frames, mm; None if they are not known: then only those with points count
     voxels : the cells of the points
     """
-    seen, films, normals = _sum_up(xyz, camera, cameras, voxels.number, voxels.voxel, voxels.place)
-    solid = np.zeros([side // 2 + 1 for side in voxels.number.shape], np.bool_)
-    solid[tuple(voxels.place.T // 2)] = True
+    seen, films, normals = _sum_up(xyz, camera, len(filmed), voxels.number, voxels.voxel, voxels.place)
+    for k, x in enumerate(filmed):
+        if x is not None:
+            cells = ((x[np.isfinite(x)] - voxels.origin[0]) / voxels.size[0]).astype(np.int64)
+            films[cells[(cells >= 0) & (cells < len(films))], k] = True
+    solid = np.zeros([side // 2 + 1 for side in voxels.number.shape], np.uint64)
+    np.bitwise_or.at(solid, tuple(voxels.place.T // 2), seen)
     return Sight(seen, normals, films, solid)
 
 
@@ -89,8 +108,8 @@ def ask_others(
 
     Returns
     -------
-    (N,) uint8: `CONFIRMED` if another camera sees the point, `DENIED` if one that should see it does not, else
-    `UNKNOWN`.
+    (N,) uint8: `CONFIRMED` if another camera sees the point, `DENIED` if one that should see it does not, or if it is
+    behind a surface that more cameras see, else `UNKNOWN`.
     """
     centres = np.array([np.full(3, np.nan) if view is None else view.centre for view in views])
     sides = [_sides(view) for view in views]
@@ -150,39 +169,88 @@ def _ask(
     centres, sides, bounds = eyes
     origin, size, number, _, place = voxels
     seen, normals, films, solid = sight
+    is_witness = _witnesses(xyz, camera, voxel, eyes, voxels, sight)
+    near = np.empty(len(place), np.uint64)
+    for v in range(len(place)):
+        near[v] = cameras_near(number, seen, place[v])
     answers = np.zeros(len(xyz), np.uint8)
     for n in range(len(xyz)):
         x, y, z = xyz[n]
         v = voxel[n]
         own = np.uint64(1) << np.uint64(camera[n])
-        if cameras_near(number, seen, place[v]) & ~own:
-            answers[n] = CONFIRMED
-            continue
-        nx, ny, nz = normals[v]
         dx, dy, dz = centres[camera[n], 0], centres[camera[n], 1] - y, centres[camera[n], 2] - z
-        to_own = nx * dx + ny * dy + nz * dz
-        facing_own = 0.0 if np.isnan(to_own) else np.sign(to_own)
-        own_cosine = abs(to_own) / np.sqrt(dx * dx + dy * dy + dz * dz)
-        facing = max(min(FACING, AS_WELL * own_cosine), GRAZING)
-        if not np.isnan(to_own) and _behind_surface(x, y, z, dx, dy, dz, voxels, seen, ~own):
+        if near[v] & ~own:
+            is_hidden = _behind_surface(x, y, z, dx, dy, dz, HIDDEN_CELLS, voxels, near, own, _count(near[v] & ~own))
+            answers[n] = DENIED if is_hidden else CONFIRMED
+            continue
+        if _behind_surface(x, y, z, dx, dy, dz, BEFORE_CELLS, voxels, seen, own, 0):
             answers[n] = DENIED
             continue
-        nx, ny, nz = facing_own * nx, facing_own * ny, facing_own * nz
+        normal, facing = _towards(normals[v], dx, dy, dz)
         for b in range(len(centres)):
-            if b == camera[n] or not films[place[v, 0], b]:
+            if b == camera[n] or not films[place[v, 0], b] or not is_witness[b]:
                 continue
             if not _inside(y, z, sides[bounds[b] : bounds[b + 1]]):
                 continue
             if _sees_behind(x, y, z, centres[b], b, origin, size, number, seen):
                 answers[n] = DENIED
                 break
-            dx, dy, dz = centres[b, 0], centres[b, 1] - y, centres[b, 2] - z
-            if nx * dx + ny * dy + nz * dz < facing * np.sqrt(dx * dx + dy * dy + dz * dz):
-                continue
-            if not _hidden(x, y, z, dx, dy, dz, origin, size, solid):
+            if _should_see(x, y, z, normal, facing, centres[b], b, origin, size, solid):
                 answers[n] = DENIED
                 break
     return answers
+
+
+@compiled
+def _towards(normal: Floats, dx: float, dy: float, dz: float) -> tuple[Floats, float]:
+    """The normal on the side of the camera that saw the point, in the direction (dx, dy, dz); 0 if that is unknown.
+
+    Also the least cosine between it and the direction to another camera that should see the point as well.
+    """
+    to_own = normal[0] * dx + normal[1] * dy + normal[2] * dz
+    if np.isnan(to_own):
+        return 0.0 * normal, GRAZING
+    own_cosine = abs(to_own) / np.sqrt(dx * dx + dy * dy + dz * dz)
+    return np.sign(to_own) * normal, max(min(FACING, AS_WELL * own_cosine), GRAZING)
+
+
+@compiled
+def _should_see(
+    x: float, y: float, z: float, normal: Floats, facing: float, centre: Floats, camera: int, origin: Floats,
+    size: Floats, solid: NDArray[np.uint64],
+) -> bool:  # fmt: skip
+    """True if a point faces a camera, and nothing hides it."""
+    dx, dy, dz = centre[0], centre[1] - y, centre[2] - z
+    if normal[0] * dx + normal[1] * dy + normal[2] * dz < facing * np.sqrt(dx * dx + dy * dy + dz * dz):
+        return False
+    return not _hidden(x, y, z, dx, dy, dz, origin, size, solid, np.uint64(1) << np.uint64(camera))
+
+
+@compiled
+def _witnesses(
+    xyz: Floats, camera: NDArray[np.uint8], voxel: Ints, eyes: Eyes, voxels: Voxels, sight: Sight
+) -> NDArray[np.bool_]:
+    """(C,) True for cameras that see most of what they should see of the surface that two others agree on."""
+    centres, sides, bounds = eyes
+    origin, size, number, _, place = voxels
+    seen, normals, films, solid = sight
+    should, does = np.zeros(len(centres)), np.zeros(len(centres))
+    for n in range(0, len(xyz), SAMPLED):
+        x, y, z = xyz[n]
+        v = voxel[n]
+        near = cameras_near(number, seen, place[v])
+        dx, dy, dz = centres[camera[n], 0], centres[camera[n], 1] - y, centres[camera[n], 2] - z
+        normal, facing = _towards(normals[v], dx, dy, dz)
+        for b in range(len(centres)):
+            others = near & ~(np.uint64(1) << np.uint64(b))
+            if not others & (others - np.uint64(1)) or not films[place[v, 0], b]:
+                continue
+            if not _inside(y, z, sides[bounds[b] : bounds[b + 1]]):
+                continue
+            if _should_see(x, y, z, normal, facing, centres[b], b, origin, size, solid):
+                should[b] += 1
+                does[b] += others != near
+    return does >= WITNESS_SHARE * should
 
 
 @compiled
@@ -209,9 +277,12 @@ def _inside(y: float, z: float, sides: Floats) -> bool:
 @compiled
 def _hidden(
     x: float, y: float, z: float, dx: float, dy: float, dz: float, origin: Floats, size: Floats,
-    solid: NDArray[np.bool_],
+    solid: NDArray[np.uint64], bit: np.uint64,
 ) -> bool:  # fmt: skip
-    """True if a cell with points lies on the line (dx, dy, dz) from a point to a camera."""
+    """True if surface lies on the line (dx, dy, dz) from a point to a camera, whose bit is `bit`.
+
+    Surface is where this camera has points, or where two others have: what a single other camera sees may be clutter.
+    """
     stride = size[1] / np.sqrt(dx * dx + dy * dy + dz * dz)
     part = CLEARANCE_CELLS * stride
     while part < 1.0:
@@ -220,7 +291,8 @@ def _hidden(
         c = int((z + part * dz - origin[2]) / size[2]) >> 1
         if not (0 <= a < solid.shape[0] and 0 <= b < solid.shape[1] and 0 <= c < solid.shape[2]):
             return False
-        if solid[a, b, c]:
+        there = solid[a, b, c]
+        if there & bit or there & (there - np.uint64(1)):
             return True
         part += stride
     return False
@@ -228,13 +300,18 @@ def _hidden(
 
 @compiled
 def _behind_surface(
-    x: float, y: float, z: float, dx: float, dy: float, dz: float, voxels: Voxels,
-    seen: NDArray[np.uint64], others: np.uint64,
+    x: float, y: float, z: float, dx: float, dy: float, dz: float, clearance: float, voxels: Voxels,
+    seen: NDArray[np.uint64], own: np.uint64, least: int,
 ) -> bool:  # fmt: skip
-    """True if points of other cameras lie on the line (dx, dy, dz) from a point to the camera that saw it."""
+    """True if surface lies on the line (dx, dy, dz) from a point to the camera that saw it, whose bit is `own`.
+
+    Surface is where more than `least` other cameras have points, farther than `clearance` cells from the point.
+    """
+    if np.isnan(dx + dy + dz):
+        return False
     origin, size, number, _, _ = voxels
     stride = 0.5 * size[1] / np.sqrt(dx * dx + dy * dy + dz * dz)
-    part = BEFORE_CELLS * 2.0 * stride
+    part = clearance * 2.0 * stride
     while part < 1.0:
         a = int((x + part * dx - origin[0]) / size[0])
         b = int((y + part * dy - origin[1]) / size[1])
@@ -242,10 +319,20 @@ def _behind_surface(
         if not (0 <= a < number.shape[0] and 0 <= b < number.shape[1] and 0 <= c < number.shape[2]):
             return False
         cell = number[a, b, c]
-        if cell != EMPTY and seen[cell] & others:
+        if cell != EMPTY and _count(seen[cell] & ~own) > least:
             return True
         part += stride
     return False
+
+
+@compiled
+def _count(bits: np.uint64) -> int:
+    """Number of the bits that are set."""
+    count = 0
+    while bits:
+        bits &= bits - np.uint64(1)
+        count += 1
+    return count
 
 
 @compiled

@@ -45,6 +45,14 @@ def pixel_frames(reader: FrameReader, numbers: Iterable[int] | None = None) -> I
         yield decode_or_none(frame, buffer) if isinstance(frame, bytes) else frame
 
 
+def noting_lost(frames: Iterable[Rgb | None], lost: list[int]) -> Iterator[Rgb | None]:
+    """The same frames; the numbers of lost ones are added to `lost`."""
+    for number, frame in enumerate(frames):
+        if frame is None:
+            lost.append(number)
+        yield frame
+
+
 def backgrounds_of(background: FrameReader, frames: int) -> Iterator[Rgb | None]:
     """The laser-off frame of each of so many `frames`: its own, or the only one, which is read once, for all."""
     backgrounds = pixel_frames(background)

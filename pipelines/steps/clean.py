@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from footscan.cloud.outliers import remove_outliers
 from footscan.cloud.views import views_of
@@ -18,7 +19,7 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
     """Remove the outliers from the points of all cameras.
 
     `inputs`: `points-N` of each camera and the `calibration` of all. The result holds the kept `points`, the `codes` of
-    all points, and the counts of `removed` points by camera and reason.
+    all points, the counts of `removed` points by camera and reason, and `warnings`.
 
     Raises
     ------
@@ -28,11 +29,17 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
     del places
     views = views_of(Calibration.model_validate_json(inputs["calibration"]).cameras)
     cameras = sorted((name for name in inputs if name.startswith("points-")), key=lambda name: int(name[7:]))
-    points = np.concatenate([unpack(inputs[name])["points"] for name in cameras])
+    mapped = {int(name[7:]): unpack(inputs[name]) for name in cameras}
+    points = np.concatenate([of_camera["points"] for of_camera in mapped.values()])
     if not len(points):
         raise Finding("no stripe in any camera, expected a foot in the films")
-    kept, removed = remove_outliers(points, views, parameters)
+    filmed = {camera: of_camera["x_of_frame"] for camera, of_camera in mapped.items()}
+    kept, removed = remove_outliers(points, views, parameters, filmed)
     if not len(kept):
         raise Finding("every point is an outlier, expected a foot in the control volume")
-    counts = json.dumps({str(camera): reasons for camera, reasons in removed.counts.items()}, sort_keys=True)
-    return pack(points=kept, codes=removed.codes, removed=np.frombuffer(counts.encode(), np.uint8))
+    counts = {str(camera): reasons for camera, reasons in removed.counts.items()}
+    return pack(points=kept, codes=removed.codes, removed=_json(counts), warnings=_json(removed.warnings))
+
+
+def _json(content: object) -> NDArray[np.uint8]:
+    return np.frombuffer(json.dumps(content, sort_keys=True).encode(), np.uint8)

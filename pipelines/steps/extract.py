@@ -1,13 +1,12 @@
 """Frames to stripe points of one camera."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from footscan.frames.array import IngestedFrames
-from footscan.frames.image import Rgb
-from footscan.frames.reader import backgrounds_of, pixel_frames
+from footscan.frames.reader import backgrounds_of, noting_lost, pixel_frames
 from footscan.stripe.film import extract_film
 from footscan.stripe.laser import with_found_laser
 from pipelines.arrays import pack
@@ -30,13 +29,5 @@ def run(inputs: Mapping[str, bytes], parameters: ExtractionParameters, places: M
         background = IngestedFrames(places["background"], manifest)
     parameters = with_found_laser(film, parameters, background)
     backgrounds = None if background is None else backgrounds_of(background, film.count)
-    stripe = extract_film(_noting_lost(pixel_frames(film), lost), parameters, backgrounds)
+    stripe = extract_film(noting_lost(pixel_frames(film), lost), parameters, backgrounds)
     return pack(stripe=stripe, lost=np.array(lost, np.int32), laser=np.array(parameters.laser))
-
-
-def _noting_lost(frames: Iterator[Rgb | None], lost: list[int]) -> Iterator[Rgb | None]:
-    """The same frames; the numbers of lost ones are added to `lost`."""
-    for number, frame in enumerate(frames):
-        if frame is None:
-            lost.append(number)
-        yield frame

@@ -19,7 +19,8 @@ from schemas.scan import Travel
 def run(inputs: Mapping[str, bytes], parameters: MappingParameters, places: Mapping[str, Path]) -> bytes:
     """Map the stripe points of one camera to world points.
 
-    `inputs`: `stripe`, `manifest`, the camera's `calibration`, and its `travel` or `positions`.
+    `inputs`: `stripe`, `manifest`, the camera's `calibration`, and its `travel` or `positions`. The result holds the
+    `points`, and `x_of_frame`: X of each frame, mm, NaN for those that are lost.
 
     Raises
     ------
@@ -27,7 +28,7 @@ def run(inputs: Mapping[str, bytes], parameters: MappingParameters, places: Mapp
         A frame has no position.
     """
     del places
-    stripe = unpack(inputs["stripe"])["stripe"]
+    extracted = unpack(inputs["stripe"])
     camera = CameraCalibration.model_validate_json(inputs["calibration"])
     frames = len(FrameManifest.model_validate_json(inputs["manifest"]).frames)
     if "positions" in inputs:
@@ -37,4 +38,7 @@ def run(inputs: Mapping[str, bytes], parameters: MappingParameters, places: Mapp
             raise RefusedInput(positions["file"], f"expected a position for each of {frames} frames", field="frame")
     else:
         x_of_frame = travelled(Travel.model_validate_json(inputs["travel"]), frames)
-    return pack(points=map_stripe(stripe, camera, x_of_frame, parameters))
+    points = map_stripe(extracted["stripe"], camera, x_of_frame, parameters)
+    x_of_frame = x_of_frame[:frames].copy()
+    x_of_frame[extracted["lost"]] = np.nan
+    return pack(points=points, x_of_frame=x_of_frame)

@@ -24,7 +24,8 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     camera, and `verified` if the scan has a truth.
     """
     del parameters, places
-    removed = json.loads(unpack(inputs["clean"])["removed"].tobytes())
+    cleaned = unpack(inputs["clean"])
+    removed = json.loads(cleaned["removed"].tobytes())
     fused = unpack(inputs["fused"])
     surface = unpack(inputs["surface"])
     cut_mm = surface["cut_mm"].item() if "cut_mm" in surface else None
@@ -32,6 +33,7 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     quality = Quality(
         calibration=Source.model_validate_json(inputs["calibration"]),
         cameras=[_camera(camera, inputs, removed.get(str(camera), {})) for camera in ids],
+        warnings=json.loads(cleaned["warnings"].tobytes()),
         fusion=FusionReport.model_validate_json(fused["report"].tobytes()),
         cloud_points=len(fused["cloud"]),
         mesh=mesh_quality(surface["vertices"], surface["faces"], surface.get("filled"), cut_mm),

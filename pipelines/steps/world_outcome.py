@@ -20,7 +20,8 @@ from schemas.world import World
 def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Path]) -> bytes:
     """Compare cloud, surface and measures with the truth.
 
-    `inputs`: the `world` with its truth, the `kind` of the world, `fused`, `oriented`, `surface` and `measures`.
+    `inputs`: the `world` with its truth, the `kind` of the world, `cleaned`, `fused`, `oriented`, `surface` and
+    `measures`.
     """
     del places
     world = unpack(inputs["world"])
@@ -34,6 +35,7 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
 
     measures = Measures.model_validate_json(inputs["measures"])
     agreement = FusionReport.model_validate_json(unpack(inputs["fused"])["report"].tobytes())
+    cleaning: list[str] = json.loads(unpack(inputs["cleaned"])["warnings"].tobytes())
     known: dict[str, float | None] = json.loads(world["measures"].tobytes())
     outcome = WorldOutcome(
         seed=parameters.seed,
@@ -43,7 +45,7 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
         shift_mm=float(np.linalg.norm((turn - np.eye(3)) @ measured.mean(axis=0) + shift)),
         cloud=error(coordinates(oriented["cloud"])),
         surface=error(measured),
-        warnings=[*agreement.warnings, *([] if measures.side_note is None else [measures.side_note])],
+        warnings=[*cleaning, *agreement.warnings, *([] if measures.side_note is None else [measures.side_note])],
         measures={
             name: WorldMeasure(value=measure.value, truth=known[name], sigma=measure.uncertainty, status=measure.status)
             for name, measure in measures.measures.items()

@@ -19,7 +19,7 @@ from schemas.parameters.scan import ScanParameters
 from schemas.scan import Travel
 from schemas.world import World
 
-RESULTS = {"fused": "fuse", "oriented": "orient", "surface": "surface", "measures": "measure"}
+RESULTS = {"cleaned": "clean", "fused": "fuse", "oriented": "orient", "surface": "surface", "measures": "measure"}
 """Results of a reconstruction that are compared with the truth, and the kinds of their steps."""
 
 

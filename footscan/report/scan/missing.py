@@ -12,7 +12,13 @@ _MUCH_FILLED = 0.1
 
 def missing_list(measures: Measures, quality: Quality) -> str:
     """List all defects of a scan, the gravest first, as HTML; a scan without defects gets one sentence."""
-    lines = [*_measures(measures), *_cameras(quality), *_mesh(quality.mesh), *quality.fusion.warnings]
+    lines = [
+        *_measures(measures),
+        *_cameras(quality),
+        *_mesh(quality.mesh),
+        *quality.warnings,
+        *quality.fusion.warnings,
+    ]
     if not lines:
         return "<p>Nothing: all measures were taken, no frame was lost, and every camera saw the foot.</p>"
     return '<ul class="missing">' + "".join(f"<li>{text(line)}</li>" for line in lines) + "</ul>"

@@ -19,7 +19,7 @@ def answers(parts: list[tuple[int, np.ndarray]], views: list[View | None]) -> li
     xyz = np.concatenate([points for _, points in parts])
     camera = np.concatenate([np.full(len(points), number, np.uint8) for number, points in parts])
     voxels = voxelise(xyz, (2.0, 1.0, 1.0))
-    answer = ask_others(xyz, camera, voxels.voxel, views, voxels, sight_of(xyz, camera, len(views), voxels))
+    answer = ask_others(xyz, camera, voxels.voxel, views, voxels, sight_of(xyz, camera, [None] * len(views), voxels))
     return np.split(answer, np.cumsum([len(points) for _, points in parts])[:-1])
 
 

@@ -68,6 +68,13 @@ def test_the_threshold_of_redness_counts():
     assert kept(rim, red_threshold=20) == [False]
 
 
+def test_a_white_piece_has_no_red_flanks():
+    white, red = crossings(18, 4.0, 0.04, 0.0), crossings(3, 4.0, 0.04, 18.0)
+    assert kept(white) == [False]
+    assert kept(np.concatenate([white, red])) == [True]
+    assert kept(np.concatenate([white, red[:2]])) == [False]
+
+
 def test_few_frames_tell_nothing():
     rim = crossings(5, 9.0, 0.1, 20.0)
     assert kept(rim, frames=7) == [True]

@@ -106,10 +106,11 @@ def sparkle(marks: list[Mark], pose: Pose, camera: Camera, brightness: float, hi
     for mark in marks:
         first, last = pose.undo(mark.ends)[:, 0]
         share = min(max(first / (first - last), 0.0), 1.0) if first != last else 0.0
-        off = abs(first + share * (last - first))
-        if off >= mark.radius_mm:
+        off = first + share * (last - first)
+        if abs(off) >= mark.radius_mm:
             continue
-        place = mark.ends[0] + share * (mark.ends[1] - mark.ends[0])
+        on_axis = mark.ends[0] + share * (mark.ends[1] - mark.ends[0])
+        place = on_axis - np.array([off, 0.0, 0.0])  # a chord of the mark, in the sheet
         half = np.array([0.0, np.sqrt(mark.radius_mm**2 - off**2), 0.0])
         pixels = camera.project(np.array([place - half, place + half]))
         if np.isfinite(pixels).all() and (camera.below_glass or not _is_hidden(pixels, hidden)):

@@ -2,12 +2,14 @@
 
 from collections.abc import Iterable
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from footscan.virtual.worlds.film.camera_film import CameraFilm
-from footscan.virtual.worlds.film.details import hairs_of, highlight
+from footscan.virtual.worlds.film.details import hairs_of, highlight, sparkle
+from footscan.virtual.worlds.film.scenery import Mark
 from footscan.virtual.worlds.machine import machine_of
 from footscan.virtual.worlds.subject import Subject, make_subject
 from schemas.world import World, WorldCameras, WorldGlass, WorldLaser, WorldRoom, WorldSubject
@@ -49,6 +51,16 @@ def test_hairs_are_dark_in_front_of_lit_skin_and_shine_in_the_laser() -> None:
     hairy = light(world(room=room, subject=WorldSubject(hairs=40)), ABOVE)
     assert (bald - hairy).max() > 0.02
     assert brightest(world(subject=WorldSubject(hairs=40)), world(), ABOVE, (48, 50, 52, 54)) > 0.01
+
+
+def test_a_wide_mark_shines_where_the_sheet_crosses_it() -> None:
+    """A mark of 20 mm radius whose axis the sheet, at X = 112 mm, does not meet."""
+    drawn = []
+    pose = SimpleNamespace(undo=lambda points: points - [112.0, 0.0, 0.0])
+    camera = SimpleNamespace(below_glass=True, project=lambda points: drawn.append(points) or points[:, :2])
+    ends = np.array([[100.0, 5.0, 0.0], [98.0, 9.0, 0.0]])
+    sparkle([Mark(ends, 20.0, 0.2)], pose, camera, 1.0, None, np.zeros((40, 200, 1), np.float32))  # type: ignore[arg-type]
+    np.testing.assert_allclose(drawn, [[[112.0, -11.0, 0.0], [112.0, 21.0, 0.0]]])
 
 
 def test_hairs_grow_where_a_foot_has_some() -> None:
