@@ -29,9 +29,8 @@ def is_plate(points: NDArray[np.void], views: Mapping[int, View], glass_mm: floa
     """Select the points that lie below the glass at Z = 0 or in it.
 
     Points more than `glass_mm` below it are a mirror image. Points within `glass_mm` of it are in the glass if they lie
-    beside, before or behind the sides of the foot, or below a sole that two cameras see above the glass: there water,
-    dust or a fingerprint shines. Those beside the foot are dropped only if cameras above the glass see both of its
-    sides.
+    beside, before or behind the sides of the foot. The latter are dropped only if cameras above the glass see both
+    sides of the foot.
 
     Parameters
     ----------
@@ -50,13 +49,11 @@ def is_plate(points: NDArray[np.void], views: Mapping[int, View], glass_mm: floa
     """
     z = points["z"]
     below: NDArray[np.bool_] = z < -glass_mm
-    step = max(stripe_step(points), PLANE_MM)
-    plane = np.round((points["x"] - points["x"].min()) / step).astype(np.int64)
-    below |= (np.abs(z) <= glass_mm) & _has_sole_above(points, plane, views)
     above = [views[camera].centre for camera in np.unique(points["camera"]) if camera in views]
     sides_seen = {np.sign(centre[1]) for centre in above if centre[2] > 0}
     if not {-1.0, 1.0} <= sides_seen:
         return below
+    plane = _planes(points)
     sides = _sides(plane, points["y"], z > HIGH_MM)
     if sides is None:
         return below
@@ -66,17 +63,37 @@ def is_plate(points: NDArray[np.void], views: Mapping[int, View], glass_mm: floa
     return np.asarray(below | (beside & (np.abs(z) <= glass_mm)))
 
 
-def _has_sole_above(points: NDArray[np.void], plane: NDArray[np.int64], views: Mapping[int, View]) -> NDArray[np.bool_]:
-    """(N,) True for points in a plane and strip in which two cameras below the glass see the sole above it."""
+def is_below_sole(points: NDArray[np.void], views: Mapping[int, View], glass_mm: float) -> NDArray[np.bool_]:
+    """Select the points of the glass below a sole that does not touch it: water, dust or a fingerprint shines there.
+
+    They lie within `glass_mm` of Z = 0, in strips of planes in which two cameras below the glass see the sole above.
+
+    Parameters
+    ----------
+    points : (N,) of `POINT_DTYPE`, N >= 1, mm, scanner frame, all finite, without ghosts
+    views : camera -> view, mm
+
+    Returns
+    -------
+    (N,) bool.
+    """
+    plane = _planes(points)
     strip = np.floor((points["y"] - points["y"].min()) / BIN_MM).astype(np.int64)
     cameras = np.zeros((int(plane.max()) + 1, int(strip.max()) + 1), np.int64)
+    is_sole = (points["z"] > SOLE_MM[0]) & (points["z"] < SOLE_MM[1])
     for camera in np.unique(points["camera"]):
         if camera in views and views[camera].centre[2] < 0:
-            is_sole = (points["camera"] == camera) & (points["z"] > SOLE_MM[0]) & (points["z"] < SOLE_MM[1])
+            own = is_sole & (points["camera"] == camera)
             seen = np.zeros(cameras.shape, np.bool_)
-            seen[plane[is_sole], strip[is_sole]] = True
+            seen[plane[own], strip[own]] = True
             cameras += seen
-    return np.asarray((cameras >= 2)[plane, strip])
+    return np.asarray((np.abs(points["z"]) <= glass_mm) & (cameras >= 2)[plane, strip])
+
+
+def _planes(points: NDArray[np.void]) -> NDArray[np.int64]:
+    """(N,) the number of each point's plane."""
+    step = max(stripe_step(points), PLANE_MM)
+    return np.asarray(np.round((points["x"] - points["x"].min()) / step).astype(np.int64))
 
 
 def _sides(

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from footscan.cloud.body import body_range, is_apart
 from footscan.cloud.clutter import is_island, is_static
-from footscan.cloud.glass import is_plate
+from footscan.cloud.ghost import is_ghost
+from footscan.cloud.glass import is_below_sole, is_plate
 from footscan.cloud.support import END, ISOLATED, UNCONFIRMED, judge_segments
 from footscan.cloud.views import View
 from schemas.parameters.outliers import OutlierParameters
@@ -101,6 +102,10 @@ def remove_outliers(
         if body is not None:
             static |= (points["x"][inside] < body[0]) | (points["x"][inside] > body[1])
         mark("clutter", inside[static])
+    if (inside := left()).size:
+        mark("glass", inside[is_ghost(points[inside], views, parameters.gap_mm, parameters.segment_mm)])
+    if (inside := left()).size:
+        mark("glass", inside[is_below_sole(points[inside], views, parameters.glass_mm)])
     for last in [False] * (ROUNDS - 1) + [True]:
         if not (inside := left()).size:
             break
