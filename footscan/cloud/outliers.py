@@ -115,6 +115,10 @@ def remove_outliers(
         if last or not np.any((verdicts == ISOLATED) | (verdicts == UNCONFIRMED)):
             mark("end", inside[verdicts == END])
             break
+    if (inside := left()).size:
+        mark(
+            "glass", inside[is_plate(points[inside], views, parameters.glass_mm)]
+        )  # without what stood beside the foot
     if body is not None and (inside := left()).size:
         mark("clutter", inside[is_apart(points[inside])])
     if (inside := left()).size:

@@ -58,10 +58,10 @@ def extract_stripe(
 
 CROSSING_COLUMNS = ("i", "j", "width", "peak", "score", "saturation", "sigma")
 """The first columns of `find_stripe`, named as the fields of `STRIPE_DTYPE`."""
-PIECE, CHAIN, RED = range(len(CROSSING_COLUMNS), len(CROSSING_COLUMNS) + 3)
-"""The other columns of `find_stripe`: the numbers of the piece and of the chain, and by how many grey levels the stripe
-is redder than its feet."""
-MEASURED = RED + 1
+PIECE, CHAIN, RED, BRIGHT = range(len(CROSSING_COLUMNS), len(CROSSING_COLUMNS) + 4)
+"""The other columns of `find_stripe`: the numbers of the piece and of the chain, by how many grey levels the stripe
+is redder than its feet, and by how many it is brighter."""
+MEASURED = BRIGHT + 1
 """Number of columns of `find_stripe`."""
 
 
@@ -72,7 +72,7 @@ def find_stripe(
 
     Returns
     -------
-    (N, 10) float64, one crossing a row, in the columns of `CROSSING_COLUMNS`, `PIECE`, `CHAIN` and `RED`. Crossings of
+    (N, 11) float64, one crossing a row, in the columns of `CROSSING_COLUMNS`, `PIECE`, `CHAIN`, `RED` and `BRIGHT`. Crossings of
     one chain follow each other along the stripe; chains of one piece lie close to each other.
     """
     rows, columns, _ = image.shape
@@ -115,7 +115,7 @@ def as_points(crossings: NDArray[np.float64], frame: NDArray[np.int32]) -> Strip
 
     Parameters
     ----------
-    crossings : (N, 10) float64, of one frame or several, in the columns of `find_stripe`.
+    crossings : (N, 11) float64, of one frame or several, in the columns of `find_stripe`.
     frame : (N,) int32, the frame of each crossing, ascending.
 
     Returns
@@ -213,7 +213,7 @@ def _rows(
     chain: NDArray[np.int32],
     faintest: float,
 ) -> NDArray[np.float64]:
-    """(N, 10): the columns of `CROSSING_COLUMNS`, `PIECE`, `CHAIN` and `RED`."""
+    """(N, 11): the columns of `CROSSING_COLUMNS`, `PIECE`, `CHAIN`, `RED` and `BRIGHT`."""
     crossings = np.empty((len(profiles), MEASURED))
     rows, columns = words.shape
     for a in range(len(profiles)):
@@ -229,6 +229,7 @@ def _rows(
         crossings[a, PIECE] = piece[a]
         crossings[a, CHAIN] = chain[a]
         crossings[a, RED] = profiles[a, REDNESS]
+        crossings[a, BRIGHT] = profiles[a, CONTRAST] / SIGNAL_SCALE
     return crossings
 
 

@@ -75,7 +75,7 @@ def test_the_rim_of_lit_skin_goes_by_the_stripe_of_the_whole_film():
 
     def rim(k):
         along = np.exp(-0.5 * ((J - 70 - 2 * k - wander + wander.mean()) / 5.0) ** 2) * ((I > 40) & (I < 120))
-        return 110 * along[..., np.newaxis] * [1.0, 0.8, 0.8]
+        return 32 * along[..., np.newaxis] * [1.0, 0.2, 0.2]
 
     frames = [coloured(stripe(place_of(k)) if k < 14 else 0 * J) for k in range(14)]
     lit = [np.clip(15 + rim(k), 0, 255).astype(np.uint8) for k in range(6)]
