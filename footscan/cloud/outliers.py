@@ -1,6 +1,6 @@
 """Removal of the points that do not belong to the foot, by reason."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,48 +83,46 @@ def remove_outliers(
     """
     codes = np.zeros(len(points), np.uint8)
 
-    def mark(reason: str, dropped: NDArray[np.intp]) -> None:
-        codes[dropped] = 1 + REASONS.index(reason)
+    def drop(reason: str, select: Callable[[NDArray[np.void]], Mask]) -> None:
+        """Drop what `select` selects among the points that are left."""
+        if (left := np.flatnonzero(codes == KEPT)).size:
+            codes[left[select(points[left])]] = 1 + REASONS.index(reason)
 
-    def left() -> NDArray[np.intp]:
-        return np.flatnonzero(codes == KEPT)
-
-    mark("volume", np.flatnonzero(_outside(points, parameters)))
+    drop("volume", lambda left: _outside(left, parameters))
     if parameters.drop_unsupported:
-        mark("extrapolated", left()[~points["supported"][left()]])
-    if (inside := left()).size:
-        mark("glass", inside[is_plate(points[inside], views, parameters.glass_mm)])
-    body = None
-    if (inside := left()).size:
-        if len(views.keys() & set(np.unique(points["camera"]).tolist())) >= parameters.fewest_cameras:
-            body = body_range(points[inside])
-        static = is_static(points[inside], parameters.static_share, body, filmed)
-        if body is not None:
-            static |= (points["x"][inside] < body[0]) | (points["x"][inside] > body[1])
-        mark("clutter", inside[static])
-    if (inside := left()).size:
-        mark("glass", inside[is_ghost(points[inside], views, parameters.gap_mm, parameters.segment_mm)])
-    if (inside := left()).size:
-        mark("glass", inside[is_below_sole(points[inside], views, parameters.glass_mm)])
-    for last in [False] * (ROUNDS - 1) + [True]:
-        if not (inside := left()).size:
-            break
-        verdicts = judge_segments(points[inside], views, parameters, filmed, _cluttered(points["camera"], codes))
-        mark("isolated", inside[verdicts == ISOLATED])
-        mark("unconfirmed", inside[verdicts == UNCONFIRMED])
-        if last or not np.any((verdicts == ISOLATED) | (verdicts == UNCONFIRMED)):
-            mark("end", inside[verdicts == END])
-            break
-    if (inside := left()).size:
-        mark(
-            "glass", inside[is_plate(points[inside], views, parameters.glass_mm)]
-        )  # without what stood beside the foot
-    if body is not None and (inside := left()).size:
-        mark("clutter", inside[is_apart(points[inside])])
-    if (inside := left()).size:
-        mark("clutter", inside[is_island(points[inside], parameters.island_gap_steps, parameters.island_share)])
+        drop("extrapolated", lambda left: ~left["supported"])
+    drop("glass", lambda left: is_plate(left, views, parameters.glass_mm))
+    body = _body(points[codes == KEPT], views, parameters)
+    drop("clutter", lambda left: is_static(left, parameters.static_share, body, filmed) | _is_beside(left, body))
+    drop("glass", lambda left: is_ghost(left, views, parameters.gap_mm, parameters.segment_mm))
+    drop("glass", lambda left: is_below_sole(left, views, parameters.glass_mm))
+    _drop_by_segment(points, codes, views, parameters, filmed)
+    drop("glass", lambda left: is_plate(left, views, parameters.glass_mm))  # without what seemed to be its sides
+    if body is not None:
+        drop("clutter", is_apart)
+    drop("clutter", lambda left: is_island(left, parameters.island_gap_steps, parameters.island_share))
     counts = _count(points["camera"], codes)
     return points[codes == KEPT], Removed(codes, counts, _warnings(points["camera"], counts))
+
+
+def _drop_by_segment(
+    points: NDArray[np.void],
+    codes: NDArray[np.uint8],
+    views: Mapping[int, View],
+    parameters: OutlierParameters,
+    filmed: Mapping[int, NDArray[np.float64]] | None,
+) -> None:
+    """Write the codes of points that are isolated, unconfirmed, or at an end of a stripe into `codes` (N,)."""
+    for last in [False] * (ROUNDS - 1) + [True]:
+        left = np.flatnonzero(codes == KEPT)
+        if not left.size:
+            return
+        verdicts = judge_segments(points[left], views, parameters, filmed, _cluttered(points["camera"], codes))
+        for reason, verdict in (("isolated", ISOLATED), ("unconfirmed", UNCONFIRMED)):
+            codes[left[verdicts == verdict]] = 1 + REASONS.index(reason)
+        if last or not np.any((verdicts == ISOLATED) | (verdicts == UNCONFIRMED)):
+            codes[left[verdicts == END]] = 1 + REASONS.index("end")
+            return
 
 
 def _cluttered(camera: NDArray[np.uint8], codes: NDArray[np.uint8]) -> list[int]:
@@ -146,6 +144,21 @@ def _warnings(camera: NDArray[np.uint8], counts: Mapping[int, Mapping[str, int]]
         for number, share in _no_foot(camera, counts).items()
         if share > MUCH
     ]
+
+
+def _body(
+    left: NDArray[np.void], views: Mapping[int, View], parameters: OutlierParameters
+) -> tuple[float, float] | None:
+    """Least and greatest X of the body; None if too few cameras can confirm each other."""
+    cameras = views.keys() & set(np.unique(left["camera"]).tolist())
+    return body_range(left) if len(cameras) >= parameters.fewest_cameras else None
+
+
+def _is_beside(left: NDArray[np.void], body: tuple[float, float] | None) -> Mask:
+    """Select the points before and behind the body."""
+    if body is None:
+        return np.zeros(len(left), np.bool_)
+    return np.asarray((left["x"] < body[0]) | (left["x"] > body[1]))
 
 
 def _outside(points: NDArray[np.void], parameters: OutlierParameters) -> Mask:

@@ -34,9 +34,9 @@ pictures were white all over (1.3 and 2 %)."""
 
 PURE, PURE_SHARE = 0.6, 0.2
 """A crossing is pure if it is redder than its surroundings by at least so many of the grey levels by which it is
-brighter; a piece is the room's light if most of it is not saturated, and less than this share of that is pure. Chosen by
-hand, on films of a dozen drawn worlds: it dropped up to 60 % of what was no stripe in lit rooms, and 0.2 % of the stripe
-at most."""
+brighter. A piece is lit by the room if most of it is not saturated, and less than this share of that is pure. Chosen by
+hand, on films of a dozen drawn worlds: it dropped up to 60 % of what was no stripe in lit rooms, and at most 0.2 % of
+the stripe."""
 SATURATES = 25
 """Grey levels below `saturation` from which other colours may grow with the stripe. Chosen by hand."""
 
@@ -47,7 +47,7 @@ def is_laser_light(
     """Select the crossings of a film that lie in pieces lit by the laser.
 
     A piece is rejected if most of its crossings exceed `largest_blur` times the film's median width and `largest_blur`
-    times its median uncertainty, and are hardly red; or if hardly any of its crossings is red, or has a pure red. In films
+    times its median uncertainty, and are hardly red; or if hardly any of its crossings is red, or purely red. In films
     of fewer than `FEWEST_FRAMES` frames all pieces are kept.
 
     Parameters

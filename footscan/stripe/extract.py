@@ -72,8 +72,8 @@ def find_stripe(
 
     Returns
     -------
-    (N, 11) float64, one crossing a row, in the columns of `CROSSING_COLUMNS`, `PIECE`, `CHAIN`, `RED` and `BRIGHT`. Crossings of
-    one chain follow each other along the stripe; chains of one piece lie close to each other.
+    (N, 11) float64, one crossing a row, in the columns of `CROSSING_COLUMNS`, `PIECE`, `CHAIN`, `RED` and `BRIGHT`.
+    Crossings of one chain follow each other along the stripe; chains of one piece lie close to each other.
     """
     rows, columns, _ = image.shape
     if rows == 0 or columns == 0:

@@ -1,6 +1,8 @@
+from collections.abc import Callable
+
 import numpy as np
 
-from footscan.cloud.glass import is_plate
+from footscan.cloud.glass import is_below_sole, is_plate
 from footscan.cloud.points import make_points
 from footscan.cloud.views import View
 
@@ -57,3 +59,21 @@ def test_without_cameras_above_on_both_sides_nothing_is_known_of_the_glass() -> 
     points = np.concatenate([sides(), flat(31, 60, range(20, 40))])
     assert not is_plate(points[points["camera"] != 3], VIEWS, 0.5).any()
     assert not is_plate(points, {}, 0.5).any()
+
+
+def test_a_mark_below_a_sole_above_the_glass(
+    ellipsoid: Callable[..., tuple[np.ndarray, np.ndarray]], views: dict[int, View]
+) -> None:
+    """The ellipsoid touches the glass in its middle; towards its ends it is higher."""
+    clean, _ = ellipsoid()
+    contact = clean[(clean["camera"] > 4) & (np.abs(clean["x"] - 60.0) < 8.0) & (np.abs(clean["y"]) < 4.0)]
+    assert contact["z"].max() < 1.0
+    mark = contact.copy()
+    mark["x"] -= 30.0
+    mark["z"] = 0.0
+    points = np.concatenate([clean, mark])
+    below = is_below_sole(points, views, 0.5)
+    assert below[len(clean) :].all()
+    assert not below[: len(clean)].any()
+    one = points[points["camera"] <= 5]  # a single camera below may see a reflection
+    assert not is_below_sole(one, views, 0.5).any()

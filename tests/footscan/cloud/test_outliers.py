@@ -265,3 +265,32 @@ def test_points_outside_the_control_volume_and_no_others_are_outside(ellipsoid: 
         _, removed = remove_outliers(clean, views, OutlierParameters(**{f"{axis}_mm": bounds}))
         outside = (clean[axis] < bounds[0]) | (clean[axis] > bounds[1])
         assert np.array_equal(removed.codes == 1 + REASONS.index("volume"), outside)
+
+
+def test_a_camera_that_saw_nothing_where_it_filmed_denies(ellipsoid: Film, views: Views) -> None:
+    """A ledge that only camera 1 sees, in planes in which the others see the tip of the foot at most."""
+    clean, _ = ellipsoid()
+    ledge = np.concatenate([line(1, frame, (20.0, 30.0), (40.0, 34.0)) for frame in range(4, 8)])
+    points = np.concatenate([clean, ledge])
+    filmed = {camera: np.arange(0.0, 120.0, 2.0) for camera in views}
+    _, removed = remove_outliers(points, views, WITH_ENDS, filmed)
+    assert (removed.codes[len(clean) :] > 0).all()
+    assert not removed.codes[: len(clean)].any()
+
+
+def test_a_reflection_goes_as_a_whole(ellipsoid: Film, views: Views) -> None:
+    """A tilted line that others deny where it leaves the foot, and that touches the foot at its end."""
+    clean, _ = ellipsoid()
+    spoilt = np.concatenate([line(1, frame, (0.0, 50.5), (0.0, 66.0), 60) for frame in range(20, 40)])
+    assert sum(dropped(clean, spoilt, views).values()) == len(spoilt)
+
+
+def test_much_that_is_not_the_foot_is_warned_of(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    _, removed = remove_outliers(clean, views, WITH_ENDS)
+    assert removed.warnings == []
+    spoilt = np.concatenate([line(3, frame, (-60.0, 40.0), (-55.0, 50.0), 100) for frame in range(-30, 90)])
+    _, removed = remove_outliers(np.concatenate([clean, spoilt]), views, WITH_ENDS)
+    share = len(spoilt) / (len(spoilt) + np.count_nonzero(clean["camera"] == 3))
+    [warning] = removed.warnings
+    assert warning.startswith(f"camera 3: {100 * share:.0f} % of its points are not the foot and were dropped")

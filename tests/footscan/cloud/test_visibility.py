@@ -14,12 +14,15 @@ def sheet(z: float, half: float = 30.0, middle: float = 0.0) -> np.ndarray:
     return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, z)])
 
 
-def answers(parts: list[tuple[int, np.ndarray]], views: list[View | None]) -> list[np.ndarray]:
+def answers(
+    parts: list[tuple[int, np.ndarray]], views: list[View | None], filmed: list[np.ndarray | None] | None = None
+) -> list[np.ndarray]:
     """The answers for the points of each part, (number of its camera, points)."""
     xyz = np.concatenate([points for _, points in parts])
     camera = np.concatenate([np.full(len(points), number, np.uint8) for number, points in parts])
     voxels = voxelise(xyz, (2.0, 1.0, 1.0))
-    answer = ask_others(xyz, camera, voxels.voxel, views, voxels, sight_of(xyz, camera, [None] * len(views), voxels))
+    sight = sight_of(xyz, camera, filmed or [None] * len(views), voxels)
+    answer = ask_others(xyz, camera, voxels.voxel, views, voxels, sight)
     return np.split(answer, np.cumsum([len(points) for _, points in parts])[:-1])
 
 
@@ -73,3 +76,39 @@ def test_cameras_of_unknown_place(views: list[View | None]) -> None:
     floating = sheet(9.0, half=6.0)
     answer = answers([(1, sheet(0.0)), (0, floating)], views)[1]
     assert set(np.unique(answer)) <= {UNKNOWN, DENIED}
+
+
+def test_a_camera_that_filmed_the_plane_and_saw_nothing_denies() -> None:
+    own = sheet(0.0)
+    seen = [(1, sheet(40.0)[:1]), (0, own)]
+    planes = np.arange(0.0, 81.0, 2.0)
+    assert (middle_of(answers(seen, [LEFT, RIGHT], [None, planes])[1], own) == DENIED).all()
+    planes[10:30] = np.nan  # lost
+    assert (middle_of(answers(seen, [LEFT, RIGHT], [None, planes])[1], own) == UNKNOWN).all()
+
+
+def test_a_camera_that_is_nearly_blind_denies_nothing() -> None:
+    """Two cameras agree on the ground; the third saw a spot of it. What one of them sees above, it does not deny."""
+    planes = np.arange(0.0, 81.0, 2.0)
+    third = View(np.array([100.0, -150.0, 200.0]), WIDE)
+    ground, own = sheet(0.0, half=20.0), sheet(0.0, half=6.0, middle=60.0)
+    parts = [(0, ground), (1, ground), (2, ground[:40]), (0, own)]
+    narrow = View(RIGHT.centre, np.array([[-40.0, -100.0], [40.0, -100.0], [40.0, 100.0], [-40.0, 100.0]]))
+    views: list[View | None] = [LEFT, narrow, third]
+    blind = answers(parts, views, [planes, planes, planes])[3]
+    assert (middle_of(blind, own) == UNKNOWN).all()
+    parts[2] = (2, ground)
+    witness = answers(parts, views, [planes, planes, planes])[3]
+    assert (middle_of(witness, own) == DENIED).all()
+
+
+def test_a_reflection_that_two_cameras_see_behind_a_surface_of_three_is_denied() -> None:
+    third = View(np.array([100.0, -150.0, 200.0]), WIDE)
+    surface, behind = sheet(0.0), sheet(-8.0, half=6.0)
+    parts = [(0, surface), (1, surface), (2, surface), (0, behind), (1, behind)]
+    planes = np.arange(0.0, 81.0, 2.0)
+    found = answers(parts, [LEFT, RIGHT, third], [planes] * 3)
+    for answer in found[3:]:
+        assert (middle_of(answer, behind) == DENIED).all()
+    for answer in found[:3]:
+        assert (answer == CONFIRMED).all()

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from footscan.stripe.blur import SIGMA, WIDTH, is_laser_light
-from footscan.stripe.extract import MEASURED, RED
+from footscan.stripe.blur import PEAK, SIGMA, WIDTH, is_laser_light
+from footscan.stripe.extract import BRIGHT, MEASURED, RED
 from schemas.parameters.extraction import ExtractionParameters
 
 FRAMES = 100
@@ -13,10 +13,10 @@ HARDLY_RED = 26.0
 """Less than one and a half times the threshold."""
 
 
-def crossings(count, width, sigma, red):
+def crossings(count, width, sigma, red, bright=0.0, peak=100.0):
     """`count` of them, all alike."""
     alike = np.zeros((count, MEASURED))
-    alike[:, [WIDTH, SIGMA, RED]] = width, sigma, red
+    alike[:, [WIDTH, SIGMA, RED, BRIGHT, PEAK]] = width, sigma, red, bright, peak
     return alike
 
 
@@ -73,6 +73,19 @@ def test_a_white_piece_has_no_red_flanks():
     assert kept(white) == [False]
     assert kept(np.concatenate([white, red])) == [True]
     assert kept(np.concatenate([white, red[:2]])) == [False]
+
+
+def test_a_lit_ridge_is_brighter_in_all_colours():
+    ridge, stripe = crossings(8, 4.0, 0.04, 23.0, bright=40.0), crossings(2, 4.0, 0.04, 24.0, bright=40.0)
+    assert kept(ridge) == [False]
+    assert kept(np.concatenate([ridge, stripe])) == [True]
+    assert kept(np.concatenate([ridge, stripe[:1]])) == [False]
+
+
+def test_a_saturated_stripe_is_bright_in_all_colours_too():
+    core = crossings(8, 4.0, 0.04, 23.0, bright=40.0, peak=221.0)
+    assert kept(core) == [True]
+    assert kept(crossings(8, 4.0, 0.04, 23.0, bright=40.0, peak=219.0)) == [False]
 
 
 def test_few_frames_tell_nothing():
