@@ -1,6 +1,6 @@
 """Removal of the points that do not belong to the foot, by reason."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +26,7 @@ ROUNDS = 3
 """Rounds in which segments are judged, each without those that were dropped before: what is no foot confirms, and
 hides, other things that are none."""
 CLUTTERED = 0.02
-"""Share of a camera's points that are not the foot from which its pieces of stripe need the confirmation of another
+"""Share of a camera's points that were isolated or unconfirmed from which its stripes need the confirmation of another
 camera. Cameras in a dark room without mirrors have less. Chosen by hand."""
 MUCH = 0.1
 """Share of a camera's points that are not the foot from which a warning is given. Chosen by hand."""
@@ -126,22 +126,24 @@ def _drop_by_segment(
 
 
 def _cluttered(camera: NDArray[np.uint8], codes: NDArray[np.uint8]) -> list[int]:
-    """Cameras that see much that is not the foot, as far as it was judged."""
-    counts = _count(camera, codes)
-    return [number for number, share in _no_foot(camera, counts).items() if share > CLUTTERED]
+    """Cameras that see much in the planes of the foot that is not the foot, as far as it was judged."""
+    shares = _shares(camera, _count(camera, codes), ("isolated", "unconfirmed"))
+    return [number for number, share in shares.items() if share > CLUTTERED]
 
 
-def _no_foot(camera: NDArray[np.uint8], counts: Mapping[int, Mapping[str, int]]) -> dict[int, float]:
-    """Camera -> share of its points that are not the foot."""
-    points = np.bincount(camera)
-    return {number: sum(of[reason] for reason in NO_FOOT) / int(points[number]) for number, of in counts.items()}
+def _shares(
+    camera: NDArray[np.uint8], counts: Mapping[int, Mapping[str, int]], reasons: Iterable[str]
+) -> dict[int, float]:
+    """Camera -> share of its points that were dropped for one of these reasons."""
+    points, chosen = np.bincount(camera), tuple(reasons)
+    return {number: sum(of[reason] for reason in chosen) / int(points[number]) for number, of in counts.items()}
 
 
 def _warnings(camera: NDArray[np.uint8], counts: Mapping[int, Mapping[str, int]]) -> list[str]:
     return [
         f"camera {number}: {100 * share:.0f} % of its points are not the foot and were dropped: it sees bright or "
         "shining things, or the room is bright; backgrounds filmed with the laser off take them away"
-        for number, share in _no_foot(camera, counts).items()
+        for number, share in _shares(camera, counts, NO_FOOT).items()
         if share > MUCH
     ]
 

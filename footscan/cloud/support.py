@@ -29,6 +29,8 @@ farther apart than others. Chosen by hand."""
 DENIED_AT_ALL = 0.1
 """Share of a piece's points that other cameras deny from which the piece is in doubt. Chosen by hand."""
 
+CLUTTER_CONFIRMED = 0.5
+"""Share of a segment that other cameras must confirm, if its camera sees much that is not the foot. Chosen by hand."""
 SUPPORTED, END, ISOLATED, UNCONFIRMED = range(4)
 """The verdicts on a point."""
 
@@ -52,7 +54,7 @@ def judge_segments(
     points : (N,) of `POINT_DTYPE`, N >= 1, mm, scanner frame, all finite
     views : camera -> view, of the cameras whose position is known
     filmed : camera -> X of its frames, mm; where a camera is missing, only frames with points count as filmed
-    cluttered : cameras that see much that is no foot: their pieces need confirmation
+    cluttered : cameras that see much that is not the foot: their stripes need confirmation
 
     Returns
     -------
@@ -76,8 +78,10 @@ def judge_segments(
     if len(camera_numbers) >= parameters.fewest_cameras:
         verdict[suspect & (denied > parameters.denied_share * size)] = UNCONFIRMED
         piece, _ = segments_of(points, parameters.gap_mm, np.inf)
-        alone = _is_alone(piece, answers, np.isin(camera_numbers, list(cluttered))[camera], parameters)
+        in_clutter = np.isin(camera_numbers, list(cluttered))[camera]
+        alone = _is_alone(piece, answers, in_clutter, parameters)
         verdict[np.bincount(segment, alone) > 0] = UNCONFIRMED
+        verdict[(np.bincount(segment, in_clutter) > 0) & (confirmed < CLUTTER_CONFIRMED * size)] = UNCONFIRMED
     if step > 0:
         beside = _count_beside(segment, suspect, parameters.beside_mm, voxels)
         verdict[suspect & (beside < parameters.beside_share * size)] = ISOLATED
