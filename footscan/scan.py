@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.fusion.fuse import fuse
-from footscan.cloud.mapping import map_stripe
+from footscan.cloud.mapping import map_stripe, refuse_other_size
 from footscan.cloud.normals import estimate_normals
 from footscan.cloud.outliers import remove_outliers
 from footscan.cloud.views import views_of
@@ -124,6 +124,8 @@ class OpenScan:
 
     def _points(self, camera: int) -> NDArray[np.void]:
         model = self.calibration.camera(camera, self.recorded.file)
+        film = open_film(self.recorded.film(self._film(camera)))
+        refuse_other_size(model, film.size, film.path)
         return map_stripe(self.stripes[camera], model, self._x_of_frame(camera), self.parameters.mapping)
 
     def _x_of_frame(self, camera: int) -> NDArray[np.float64]:

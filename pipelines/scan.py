@@ -211,7 +211,9 @@ def _camera_steps(
     inputs: dict[str, Input] = {
         "stripe": stripe, "manifest": manifest, "calibration": calibration.camera(camera.id), **_travel(scan, camera)
     }  # fmt: skip
-    points = add(Step(scan.name, "map", f"{STEPS}.map_points", parameters.mapping, inputs, camera.id))
+    points = add(
+        Step(scan.name, "map", f"{STEPS}.map_points", parameters.mapping, inputs, camera.id, places={"film": film})
+    )
     colours = None
     if background is not None:
         colour_inputs: dict[str, Input] = {"stripe": stripe, "background": manifests["background"]}

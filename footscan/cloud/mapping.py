@@ -1,5 +1,7 @@
 """Stripe points of one camera to world points."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,6 +10,7 @@ from footscan.cloud.points import make_points
 from footscan.cloud.uncertainty import predicted_deviations, standard_deviations
 from footscan.stripe.points import StripePoints
 from schemas.base.errors import RefusedInput
+from schemas.base.image_size import ImageSize
 from schemas.calibration import CameraCalibration
 from schemas.parameters.mapping import MappingParameters
 
@@ -67,6 +70,19 @@ def map_stripe(
         supported=_supported(camera, pixels, parameters),
         sigma=standard_deviations(stripe, camera),
     )
+
+
+def refuse_other_size(camera: CameraCalibration, size: ImageSize, film: Path | str) -> None:
+    """Refuse frames of another size than those of the calibration.
+
+    Raises
+    ------
+    RefusedInput
+        `film` is not of the size that the calibration of its camera is for.
+    """
+    if size != camera.image_size:
+        expected = f"expected frames of {camera.image_size} pixels, the size in the camera's calibration"
+        raise RefusedInput(film, f"{expected}, found {size}", field="frame size")
 
 
 def _supported(camera: CameraCalibration, pixels: NDArray[np.float64], parameters: MappingParameters) -> Mask:

@@ -8,7 +8,7 @@ from footscan.frames.image import SUFFIXES
 from footscan.frames.image_files import open_images
 from footscan.frames.reader import FrameReader, pixel_frames
 from schemas.base.errors import RefusedInput
-from schemas.base.image_size import ImageSize
+from schemas.base.image_size import SMALLEST_FRAME, ImageSize
 
 
 def open_film(path: Path, size: ImageSize | None = None) -> FrameReader:
@@ -29,6 +29,21 @@ def open_film(path: Path, size: ImageSize | None = None) -> FrameReader:
     film = _open_film(path)
     if size is not None and film.size != size:
         raise RefusedInput(path, f"expected frames of {size} pixels, found {film.size}", field="frame size")
+    return film
+
+
+def open_camera_film(path: Path) -> FrameReader:
+    """`open_film` for a film of a scanner's camera, of any size from 320 x 240 up.
+
+    Raises
+    ------
+    RefusedInput
+        As in `open_film`; or the frames are smaller.
+    """
+    film = open_film(path)
+    if film.size.rows < SMALLEST_FRAME.rows or film.size.columns < SMALLEST_FRAME.columns:
+        problem = f"expected frames of at least {SMALLEST_FRAME} pixels, found {film.size}"
+        raise RefusedInput(path, problem, field="frame size")
     return film
 
 

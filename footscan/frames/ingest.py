@@ -18,17 +18,17 @@ from zarr.errors import ContainsGroupError
 
 from footscan.frames.array import METADATA, chunk_name, is_recorded, read_manifest
 from footscan.frames.codec import ImageCodec
-from footscan.frames.film import open_background, open_film
+from footscan.frames.film import open_background, open_camera_film, open_film
 from footscan.frames.image import frame_digest
 from footscan.frames.partial import make_partial, move_into_place, partial_folder, sweep
 from footscan.frames.reader import FrameReader
 from schemas.base.errors import Fault, RefusedInput
-from schemas.base.image_size import FRAME_SIZE, ImageSize
+from schemas.base.image_size import ImageSize
 from schemas.base.limits import read_bounded
 from schemas.frames import Encoding, FrameManifest
 
 
-def ingest_film(film: Path, array: Path, size: ImageSize = FRAME_SIZE) -> FrameManifest:
+def ingest_film(film: Path, array: Path, size: ImageSize | None = None) -> FrameManifest:
     """Write the frames of `film` as the Zarr array `array`, in place of what is there.
 
     JPEG and PNG frames keep their bytes; raw ones are compressed without loss. Frames that were recorded straight into
@@ -41,17 +41,17 @@ def ingest_film(film: Path, array: Path, size: ImageSize = FRAME_SIZE) -> FrameM
     array : Path
         Folder of the array, e.g. `SCAN/frames.zarr/cam1`; its parent becomes a Zarr group.
     size : ImageSize, optional
-        Expected size of the frames.
+        Expected size of the frames; without it, any size from 320 x 240 up.
 
     Raises
     ------
     RefusedInput
-        The film is missing, truncated, or not of this size; or `array` holds another camera's recorded frames.
+        The film is missing, truncated, or of another size; or `array` holds another camera's recorded frames.
     Fault
         The array cannot be written, and nothing that looks whole is left; or a recorded frame is damaged; or something
         lies at the array's place that footscan did not write.
     """
-    opened = open_film(film, size)
+    opened = open_camera_film(film) if size is None else open_film(film, size)
     if film.resolve() == array.resolve():
         deque(opened.stored(), maxlen=0)  # each is checked on reading
         return read_manifest(array)
@@ -114,8 +114,8 @@ class FrameWriter:
         return _describe(_create_array(self._folder, "image", frames, size), "image", digests, None)
 
 
-def ingest_background(background: Path, array: Path, frames: int, size: ImageSize = FRAME_SIZE) -> FrameManifest:
-    """`ingest_film` for the background of a film of so many `frames`.
+def ingest_background(background: Path, array: Path, frames: int, size: ImageSize) -> FrameManifest:
+    """`ingest_film` for the background of a film of so many `frames` of this `size`.
 
     Raises
     ------

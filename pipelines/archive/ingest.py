@@ -61,7 +61,7 @@ def _ingest_scan(folder: Path, archive: Path | None) -> list[CameraIngest]:
             manifest = ingest_film(scan.film(camera), scan.array(camera))
             if background is not None:
                 arrays[background] = scan.background_array(camera)
-                ingest_background(background, arrays[background], len(manifest.frames))
+                ingest_background(background, arrays[background], len(manifest.frames), manifest.size)
             size = sum(file.stat().st_size for film in arrays for file in film_files(film))
         except FootscanError as error:
             ends.append(CameraIngest(scan.name, camera.id, problem=str(error), exit_status=error.exit_status))

@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from footscan.frames.film import film_files, open_film
+from footscan.frames.film import film_files, open_camera_film
 from footscan.recordings.film_paths import film_inside
 from footscan.recordings.scans import recorded_folder
 from schemas.base.errors import RefusedInput
-from schemas.base.image_size import FRAME_SIZE
 from schemas.base.paths import inside
 from schemas.base.yaml_files import read_yaml
 from schemas.mounting import CaptureCamera
@@ -62,7 +61,7 @@ def read_capture(folder: Path) -> RecordedCapture:
     films = [capture.film(camera) for camera in document.cameras]  # all refused before any is opened
     placements = len(reference.placements_mm)
     for film in films:
-        frames = open_film(film, FRAME_SIZE).count
+        frames = open_camera_film(film).count
         if frames != placements:
             expected = f"expected {placements}, one for each placement of {capture.reference_file.name}"
             raise RefusedInput(film, f"{frames} frame{'s' * (frames != 1)}, {expected}")

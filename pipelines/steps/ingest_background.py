@@ -15,5 +15,5 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     """
     del parameters
     film = FrameManifest.model_validate_json(inputs["manifest"])
-    manifest = ingest_background(places["background"], places["array"], len(film.frames))
+    manifest = ingest_background(places["background"], places["array"], len(film.frames), film.size)
     return canonical_json(manifest.model_dump(mode="json")).encode()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.cloud.mapping import map_stripe
+from footscan.cloud.mapping import map_stripe, refuse_other_size
 from footscan.frames.travel import travelled
 from pipelines.arrays import pack, unpack
 from schemas.base.errors import RefusedInput
@@ -19,18 +19,20 @@ from schemas.scan import Travel
 def run(inputs: Mapping[str, bytes], parameters: MappingParameters, places: Mapping[str, Path]) -> bytes:
     """Map the stripe points of one camera to world points.
 
-    `inputs`: `stripe`, `manifest`, the camera's `calibration`, and its `travel` or `positions`. The result holds the
+    `inputs`: `stripe`, `manifest`, the camera's `calibration`, and its `travel` or `positions`; `places`: the `film`,
+    to name it. The result holds the
     `points`, and `x_of_frame`: X of each frame, mm, NaN for those that are lost.
 
     Raises
     ------
     RefusedInput
-        A frame has no position.
+        A frame has no position, or the frames are not of the size that the calibration is for.
     """
-    del places
     extracted = unpack(inputs["stripe"])
     camera = CameraCalibration.model_validate_json(inputs["calibration"])
-    frames = len(FrameManifest.model_validate_json(inputs["manifest"]).frames)
+    manifest = FrameManifest.model_validate_json(inputs["manifest"])
+    refuse_other_size(camera, manifest.size, places.get("film", f"camera {camera.camera}"))
+    frames = len(manifest.frames)
     if "positions" in inputs:
         positions = json.loads(inputs["positions"])
         x_of_frame = np.array(positions["x_mm"], np.float64)  # null becomes NaN

@@ -25,3 +25,5 @@ class ImageSize(NamedTuple):
 
 FRAME_SIZE = ImageSize(rows=480, columns=640)
 """Size of the frames of the scanner's cameras."""
+SMALLEST_FRAME = ImageSize(rows=240, columns=320)
+"""Size from which frames are accepted."""

@@ -87,7 +87,7 @@ def stripe(film: Path, background: Path | None, folder: Path) -> NDArray[Any]:
     places = {"array": folder / "frames.zarr/cam5"}
     if background is not None:
         places["background"] = folder / "frames.zarr/cam5-background"
-        kept = ingest_background(background, places["background"], len(manifest.frames))
+        kept = ingest_background(background, places["background"], len(manifest.frames), manifest.size)
         inputs["background"] = kept.model_dump_json().encode()
     return unpack(extract.run(inputs, ExtractionParameters(), places))["stripe"]
 

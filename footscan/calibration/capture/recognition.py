@@ -18,7 +18,6 @@ from footscan.calibration.capture.edge_points import edge_distances
 from footscan.calibration.capture.lines import ImageLine, find_lines
 from footscan.calibration.capture.reference import Edges
 from footscan.calibration.models.homography import algebraic_homography, project
-from schemas.base.image_size import FRAME_SIZE
 from schemas.mounting import Mounting, Sign
 
 Floats = NDArray[np.float64]
@@ -59,8 +58,6 @@ UNKNOWN = Mounting(0, 0, 0)
 APART_MM = 5.0
 """Distance from which two maps place a point differently; maps differ if more than `STRAY_SHARE` of the points do.
 Chosen by hand."""
-MIDDLE_PX, REACH_PX = (FRAME_SIZE.columns / 2, FRAME_SIZE.rows / 2), 200.0
-"""Middle and scale of an image by which lines are normalised when the condition of four of them is judged."""
 FROM_PAIR, FROM_ALL = 3, 8
 """Number of the longest pieces of each of two frames, and of all frames, from which sets are formed if single frames
 give too few: a bound of time."""
@@ -159,8 +156,9 @@ class _Frames:
 
 def _quadruples(pieces: list[tuple[int, ImageLine]]) -> list[tuple[int, ...]]:
     """Choose sets of four pieces, of one frame if possible, best conditioned first: no three meet in one point."""
-    middle = np.array(MIDDLE_PX)
-    rows = np.array([[*line.normal, (line.normal @ middle - line.offset) / REACH_PX] for _, line in pieces])
+    ends = np.array([end for _, line in pieces for end in line.ends])
+    middle, reach = ends.mean(axis=0), float(np.linalg.norm(ends.std(axis=0)))
+    rows = np.array([[*line.normal, (line.normal @ middle - line.offset) / reach] for _, line in pieces])
     rows /= np.linalg.norm(rows, axis=1, keepdims=True)
     by_frame: dict[int, list[int]] = {}
     for k, (placement, _) in enumerate(pieces):

@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.base.errors import RefusedInput
+from schemas.base.image_size import FRAME_SIZE, SMALLEST_FRAME, ImageSize
 from schemas.base.limits import refuse_beyond
 from schemas.base.units import LengthUnit
 from schemas.tables import finite, read_records
 
+LARGEST_SIDE = 16384
+"""Largest width or height of an image, px: beyond any camera."""
 MAX_MAGNITUDE = 1e6
 """Largest coordinate, in any unit: beyond any foot scanner, and its powers stay finite."""
 
@@ -19,6 +22,8 @@ _WORLD: dict[LengthUnit, tuple[str, str, str]] = {
     "cm": ("x_cm", "y_cm", "z_cm"),
     "mm": ("x_mm", "y_mm", "z_mm"),
 }
+_SIZE = ("width_px", "height_px")
+"""Optional columns: the size of the camera's images."""
 _CAMERA = re.compile(r"[1-9][0-9]{0,8}")
 
 
@@ -34,6 +39,8 @@ class Chart:
     unit: LengthUnit
     pixels: NDArray[np.float64]
     """(N, 2): column i and row j, px, the centre of the top-left pixel at (0, 0)."""
+    size: ImageSize = FRAME_SIZE
+    """Of the camera's images."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +50,15 @@ class _Row:
     point: str
     world: tuple[float, float, float]
     pixel: tuple[float, float]
+    size: ImageSize
 
 
 def read_chart(path: Path) -> dict[int, Chart]:
     """Read the charts of all cameras from the CSV file `path`.
 
-    Columns are `camera,point,x_cm,y_cm,z_cm,i,j`, or `_mm` instead of `_cm`, in any order, one control point a row.
+    Columns are `camera,point,x_cm,y_cm,z_cm,i,j`, or `_mm` instead of `_cm`, in any order, one control point a
+    row. The optional columns `width_px,height_px` have the size of the camera's images; without them it is that of the
+    scanner's own cameras.
 
     Returns
     -------
@@ -67,6 +77,7 @@ def read_chart(path: Path) -> dict[int, Chart]:
     unit, columns = _columns(path, line, header)
     rows: list[_Row] = []
     seen: dict[tuple[int, str], int] = {}
+    sizes: dict[int, ImageSize] = {}
     for line, cells in records:
         row = _row(path, line, cells, unit, columns)
         first = seen.setdefault((row.camera, row.point), line)
@@ -74,6 +85,9 @@ def read_chart(path: Path) -> dict[int, Chart]:
             problem = f"camera {row.camera} has {row.point!r} in line {first} already, expected each point once"
             raise RefusedInput(path, problem, field=f"line {line}, column point")
         rows.append(row)
+        if row.size != (of_first := sizes.setdefault(row.camera, row.size)):
+            problem = f"camera {row.camera} has images of {of_first} before, expected one size, found {row.size}"
+            raise RefusedInput(path, problem, field=f"line {line}, column {_SIZE[0]}")
         refuse_beyond("chart_points", len(rows), path)
     if not rows:
         raise RefusedInput(path, "has a header but no control point, expected at least one row")
@@ -89,7 +103,7 @@ def _columns(path: Path, line: int, header: list[str]) -> tuple[LengthUnit, dict
         raise RefusedInput(path, "mixes cm and mm, expected one unit for x, y and z", field=where)
     unit = units[0] if units else "mm"
     expected = _header(unit) if units else f"{_header('cm')} or {_header('mm')}"
-    valid_names = {"camera", "point", "i", "j", *_WORLD[unit]}
+    valid_names = {"camera", "point", "i", "j", *_WORLD[unit], *_SIZE}
     if len(header) == 1:
         raise RefusedInput(path, f"one column, expected {expected}, with commas between them", field=where)
     for name in header:
@@ -99,7 +113,7 @@ def _columns(path: Path, line: int, header: list[str]) -> tuple[LengthUnit, dict
             )
         if names.count(name.lower()) > 1:
             raise RefusedInput(path, "is listed twice, expected each column once", field=f"{where}, column {name}")
-    for name in _header(unit).split(","):
+    for name in (*_header(unit).split(","), *(_SIZE if set(_SIZE) & set(names) else ())):
         if name not in names:
             raise RefusedInput(path, f"is missing, expected {expected}", field=f"{where}, column {name}")
     return unit, {name: index for index, name in enumerate(names)}
@@ -132,7 +146,13 @@ def _row(path: Path, line: int, cells: list[str], unit: LengthUnit, columns: dic
     if not point:
         raise refuse("point", "a name")
     x, y, z = (number(column) for column in _WORLD[unit])
-    return _Row(line, int(camera), point, (x, y, z), (number("i"), number("j")))
+    size = FRAME_SIZE
+    if _SIZE[0] in columns:
+        for column, least in zip(_SIZE, SMALLEST_FRAME.px, strict=True):
+            if not number(column).is_integer() or not least <= number(column) <= LARGEST_SIDE:
+                raise refuse(column, f"a whole number from {least} to {LARGEST_SIDE}")
+        size = ImageSize(rows=int(number(_SIZE[1])), columns=int(number(_SIZE[0])))
+    return _Row(line, int(camera), point, (x, y, z), (number("i"), number("j")), size)
 
 
 def _chart(camera: int, unit: LengthUnit, rows: list[_Row]) -> Chart:
@@ -143,4 +163,5 @@ def _chart(camera: int, unit: LengthUnit, rows: list[_Row]) -> Chart:
         world=np.array([row.world for row in own]),
         unit=unit,
         pixels=np.array([row.pixel for row in own]),
+        size=own[0].size,
     )

@@ -32,7 +32,6 @@ from footscan.calibration.chart.plane_fit import PASSED, agreeing, fit_homograph
 from footscan.calibration.chart.repair_proposals import place_of
 from footscan.calibration.chart.suspect_points import suspects
 from schemas.base.errors import RefusedInput
-from schemas.base.image_size import FRAME_SIZE
 from schemas.base.units import MILLIMETRES
 
 Floats = NDArray[np.float64]
@@ -132,15 +131,15 @@ def _check_camera(
         if suspect.point is None:
             message = suspect.message + _beside_others(others_rms)
             yield ChartWarning(chart.camera, None, "residual", message)
-        elif not outside_image(chart.pixels)[suspect.point]:
+        elif not outside_image(chart.pixels, chart.size)[suspect.point]:
             yield ChartWarning(chart.camera, chart.points[suspect.point], "mistyped", suspect.message)
     if not suspected and own_rms is not None and own_rms > level:
         message = f"residual {own_rms:.1f} px rms against a plane seen by a camera" + _beside_others(others_rms)
         yield ChartWarning(chart.camera, None, "residual", message)
     reasons = {suspect.point: f"; {suspect.message}" for suspect in suspected}
-    for point in np.flatnonzero(outside_image(chart.pixels)).tolist():
+    for point in np.flatnonzero(outside_image(chart.pixels, chart.size)).tolist():
         i, j = chart.pixels[point]
-        expected = f"expected 0 to {FRAME_SIZE.columns - 1} and 0 to {FRAME_SIZE.rows - 1}"
+        expected = f"expected 0 to {chart.size.columns - 1} and 0 to {chart.size.rows - 1}"
         message = f"i = {i:g}, j = {j:g} lies outside of the image, {expected}"
         yield ChartWarning(chart.camera, chart.points[point], "outside", message + reasons.get(point, ""))
     yield from _below(chart, named)
@@ -196,7 +195,7 @@ def _below(chart: Chart, named: set[int | None]) -> Iterator[ChartWarning]:
 def _border(chart: Chart, named: set[int | None], limit: float) -> Iterator[ChartWarning]:
     """Find points on the border of the image, unless many other points confirm their place."""
     count = len(chart.points)
-    for point in np.flatnonzero(is_on_border(chart.pixels)).tolist():
+    for point in np.flatnonzero(is_on_border(chart.pixels, chart.size)).tolist():
         others = np.delete(np.arange(count), point)
         placed = count >= MANY_POINTS and np.hypot(*(place_of(chart, point, others) - chart.pixels[point])) <= limit
         if point not in named and not placed:

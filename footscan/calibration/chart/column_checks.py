@@ -1,5 +1,6 @@
 """Mistakes in a chart that concern a whole camera: swapped columns, or coordinates in another unit."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -16,7 +17,7 @@ from footscan.calibration.chart.plane_fit import (
     project,
     samples,
 )
-from schemas.base.image_size import FRAME_SIZE
+from schemas.base.image_size import ImageSize
 from schemas.base.units import MILLIMETRES
 
 Floats = NDArray[np.float64]
@@ -40,16 +41,16 @@ MOST_NAMED = 10
 """Points that a message names at most."""
 
 
-def outside_image(pixels: Floats) -> NDArray[np.bool_]:
+def outside_image(pixels: Floats, size: ImageSize) -> NDArray[np.bool_]:
     """Select the `pixels` (N, 2) that lie outside the image and its border; (N,)."""
-    low, high = -OUTSIDE_PX, np.array(FRAME_SIZE.px) - 1.0 + OUTSIDE_PX
+    low, high = -OUTSIDE_PX, np.array(size.px) - 1.0 + OUTSIDE_PX
     return np.asarray(((pixels < low) | (pixels > high)).any(axis=1))
 
 
-def is_on_border(pixels: Floats) -> NDArray[np.bool_]:
+def is_on_border(pixels: Floats, size: ImageSize) -> NDArray[np.bool_]:
     """Select the `pixels` (N, 2) on the border of the image, whether counted from 0 or from 1; (N,)."""
-    high = np.array(FRAME_SIZE.px) - 1.0 - BORDER_PX
-    return np.asarray(((pixels <= BORDER_PX) | (pixels >= high)).any(axis=1) & ~outside_image(pixels))
+    high = np.array(size.px) - 1.0 - BORDER_PX
+    return np.asarray(((pixels <= BORDER_PX) | (pixels >= high)).any(axis=1) & ~outside_image(pixels, size))
 
 
 def is_below_glass(chart: Chart) -> NDArray[np.bool_]:
@@ -60,20 +61,20 @@ def is_below_glass(chart: Chart) -> NDArray[np.bool_]:
 def swapped_columns(chart: Chart, limit_px: float) -> str | None:
     """Describe the swapped columns of a camera; None unless they are certainly swapped."""
     x, y, z = chart.world.T
-    pixels = chart.pixels
+    pixels, size = chart.pixels, chart.size
     for name, column in (("y", y), ("z", z)):
         if np.ptp(column) == 0 and np.ptp(x) > 0 and len(x) > 2:
             names = f"x_{chart.unit} and {name}_{chart.unit}"
             return f"{name} is the same for all points and x is not, expected the reverse: {names} are swapped"
-    if outside_image(pixels).any() or _view_mm(chart) > VIEW_MM[1]:
+    if outside_image(pixels, size).any() or _view_mm(chart) > VIEW_MM[1]:
         world_as_pixels = chart.world[:, 1:]
-        if not outside_image(world_as_pixels).any() and _view_mm(_exchanged(chart)) < VIEW_MM[1]:
+        if not outside_image(world_as_pixels, size).any() and _view_mm(_exchanged(chart)) < VIEW_MM[1]:
             return "y and z are pixels and i and j lengths, expected the reverse: y, z and i, j are swapped"
     notes = []
     if _fits(chart, limit_px):
-        outside = outside_image(pixels)
-        if outside.any() and (pixels[outside, 1] > FRAME_SIZE.rows).all() and not outside_image(pixels[:, ::-1]).any():
-            most = FRAME_SIZE.rows - 1
+        outside, turned = outside_image(pixels, size), outside_image(pixels[:, ::-1], size)
+        if outside.any() and (pixels[outside, 1] > size.rows).all() and not turned.any():
+            most = size.rows - 1
             notes.append(f"j reaches {pixels[:, 1].max():g}, expected at most {most}: i and j are swapped")
         millimetres = MILLIMETRES[chart.unit]
         if millimetres * z.min() < -GLASS_MM and millimetres * y.min() > -GLASS_MM:
@@ -150,13 +151,13 @@ def _view_mm(chart: Chart) -> float:
     apart = (in_mm > 0) & (in_px > 0)
     if not apart.any():
         return float(np.mean(VIEW_MM))
-    return float(FRAME_SIZE.columns * np.median(in_mm[apart] / in_px[apart]))
+    return float(chart.size.columns * np.median(in_mm[apart] / in_px[apart]))
 
 
 def _exchanged(chart: Chart) -> Chart:
     """The chart with Y, Z and i, j exchanged."""
     world = np.column_stack([chart.world[:, 0], chart.pixels])
-    return Chart(chart.camera, chart.points, world, chart.unit, chart.world[:, 1:])
+    return replace(chart, world=world, pixels=chart.world[:, 1:])
 
 
 def _fits(chart: Chart, limit_px: float) -> bool:

@@ -17,7 +17,6 @@ from footscan.calibration.models.region import region_of
 from footscan.calibration.models.selection import ModelTrial, candidates, requested_models, rms, select, try_model
 from footscan.rows import distinct_rows
 from schemas.base.errors import RefusedInput
-from schemas.base.image_size import FRAME_SIZE
 from schemas.base.units import MILLIMETRES
 from schemas.calibration import Calibration, CameraCalibration, Residual, Source
 from schemas.parameters.calibration import CalibrationParameters
@@ -71,7 +70,7 @@ def compare_models(chart: Chart, source: str = "chart") -> list[ModelTrial]:
     """
     _refuse_poor(chart, source)
     observations = observe(chart)
-    tried = select(candidates(observations.pixels, FRAME_SIZE.px), observations, chart.camera, robust=False)[1]
+    tried = select(candidates(observations.pixels, chart.size.px), observations, chart.camera, robust=False)[1]
     return [_thesis_trial(chart, observations), *tried]
 
 
@@ -87,7 +86,7 @@ def _calibrate_camera(
     observations = observe(chart)
     if parameters.model == "quadratic":
         return _quadratic(chart, observations)
-    tried = requested_models(candidates(chart.pixels, FRAME_SIZE.px), parameters)
+    tried = requested_models(candidates(chart.pixels, chart.size.px), parameters)
     fitted, trials = select(tried, observations, chart.camera, robust=False)
     if fitted is None and len(tried) == 1:  # a single requested model is used even if its error is unknown
         fitted, _ = try_model(tried[0], observations, chart.camera, robust=False)
@@ -95,7 +94,7 @@ def _calibrate_camera(
         reasons = "; ".join(f"{trial.model}: {trial.remark or 'no point can be held out'}" for trial in trials[:1])
         raise RefusedInput(source, f"no model can be judged: {reasons}", field=f"camera {chart.camera}")
     chosen = next((trial for trial in trials if trial.status == "chosen"), trials[0])
-    return calibrated(fitted, observations, chosen, FRAME_SIZE.px), trials
+    return calibrated(fitted, observations, chosen, chart.size.px), trials
 
 
 def _refuse_poor(chart: Chart, source: str) -> None:
@@ -141,7 +140,7 @@ def _residuals(model: Model, parameters: NDArray[np.float64], observations: Obse
 def _quadratic(chart: Chart, observations: Observations) -> tuple[CameraCalibration, list[ModelTrial]]:
     """Calibrate by the model of the thesis; its held-out error is that of the normalised polynomial of second order."""
     second_order = CalibrationParameters(model="polynomial", order=QUADRATIC)
-    (normalised,) = requested_models(candidates(chart.pixels, FRAME_SIZE.px), second_order)
+    (normalised,) = requested_models(candidates(chart.pixels, chart.size.px), second_order)
     _, trial = try_model(normalised, observations, chart.camera, robust=False)
     result = fit_quadratic(chart)
     parameters = _in_mm(result)
@@ -158,7 +157,7 @@ def _quadratic(chart: Chart, observations: Observations) -> tuple[CameraCalibrat
     )
     camera = CameraCalibration(
         camera=chart.camera,
-        image_px=FRAME_SIZE.px,
+        image_px=chart.size.px,
         map=PLAIN_QUADRATIC.as_map(parameters),
         region_px=region_of(chart.pixels),
         points=len(chart.points),

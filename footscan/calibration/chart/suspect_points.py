@@ -74,7 +74,7 @@ def _of_few(chart: Chart, world: Floats, limit_px: float, chart_values: Sequence
     if before <= limit_px:
         return []
     points = np.arange(len(world))
-    impossible = outside_image(chart.pixels) | is_below_glass(chart)
+    impossible = outside_image(chart.pixels, chart.size) | is_below_glass(chart)
     candidates = np.flatnonzero(impossible) if impossible.any() else points
     repairs = [
         repair

@@ -10,7 +10,7 @@ Floats = NDArray[np.float64]
 
 PLANE_STEPS = 4
 """Fixed-point steps to the X at which a sheet that is slightly tilted and bent meets an edge along X."""
-HEADER = "camera,point,x_mm,y_mm,z_mm,i,j\n"
+HEADER = "camera,point,x_mm,y_mm,z_mm,i,j,width_px,height_px\n"
 
 
 def world_chart(machine: Machine) -> str:
@@ -33,7 +33,7 @@ def world_chart(machine: Machine) -> str:
         seen = _can_be_seen(camera_id, corners, pixels, rows, columns)
         located = pixels + random.normal(0.0, machine.world.cameras.corner_px, pixels.shape)
         lines += [
-            f"{camera_id},{n},0,{y:g},{z:g},{i:.4f},{j:.4f}\n"
+            f"{camera_id},{n},0,{y:g},{z:g},{i:.4f},{j:.4f},{columns},{rows}\n"
             for n, ((y, z), (i, j)) in enumerate(zip(corners[seen], located[seen], strict=True), start=1)
         ]
     return "".join(lines)

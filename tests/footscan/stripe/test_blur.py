@@ -13,8 +13,9 @@ HARDLY_RED = 26.0
 """Less than one and a half times the threshold."""
 
 
-def crossings(count, width, sigma, red, bright=0.0, peak=100.0):
-    """`count` of them, all alike."""
+def crossings(count, width, sigma, red, bright=None, peak=100.0):
+    """`count` of them, all alike; as pure as the stripe of the film unless they say how bright they are."""
+    bright = red / 1.5 if bright is None else bright
     alike = np.zeros((count, MEASURED))
     alike[:, [WIDTH, SIGMA, RED, BRIGHT, PEAK]] = width, sigma, red, bright, peak
     return alike
@@ -69,23 +70,28 @@ def test_the_threshold_of_redness_counts():
 
 
 def test_a_white_piece_has_no_red_flanks():
-    white, red = crossings(18, 4.0, 0.04, 0.0), crossings(3, 4.0, 0.04, 18.0)
+    white, red = crossings(18, 4.0, 0.04, 0.0, peak=250.0), crossings(3, 4.0, 0.04, 18.0, peak=250.0)
     assert kept(white) == [False]
     assert kept(np.concatenate([white, red])) == [True]
     assert kept(np.concatenate([white, red[:2]])) == [False]
 
 
 def test_a_lit_ridge_is_brighter_in_all_colours():
-    ridge, stripe = crossings(8, 4.0, 0.04, 23.0, bright=40.0), crossings(2, 4.0, 0.04, 24.0, bright=40.0)
+    # the stripe of the film has a purity of 1.5
+    ridge, stripe = crossings(8, 4.0, 0.04, 29.0, bright=40.0), crossings(2, 4.0, 0.04, 31.0, bright=40.0)
     assert kept(ridge) == [False]
     assert kept(np.concatenate([ridge, stripe])) == [True]
     assert kept(np.concatenate([ridge, stripe[:1]])) == [False]
 
 
 def test_a_saturated_stripe_is_bright_in_all_colours_too():
-    core = crossings(8, 4.0, 0.04, 23.0, bright=40.0, peak=221.0)
-    assert kept(core) == [True]
-    assert kept(crossings(8, 4.0, 0.04, 23.0, bright=40.0, peak=219.0)) == [False]
+    assert kept(crossings(8, 4.0, 0.04, 29.0, bright=40.0, peak=221.0)) == [True]
+    assert kept(crossings(8, 4.0, 0.04, 29.0, bright=40.0, peak=219.0)) == [False]
+
+
+def test_a_white_balance_that_takes_the_colour_from_the_stripe():
+    stripe = crossings(100, 4.0, 0.04, 30.0, bright=100.0)
+    assert kept(stripe, crossings(8, 4.0, 0.04, 20.0, bright=100.0)) == [True, True]
 
 
 def test_few_frames_tell_nothing():

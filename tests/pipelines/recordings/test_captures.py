@@ -103,10 +103,10 @@ def test_what_is_no_film_is_refused(folder: Path) -> None:
     assert refusal(folder) == "cam1.avi: header: expected an AVI film"
 
 
-def test_frames_of_another_size_are_refused(folder: Path) -> None:
+def test_frames_that_are_too_small_are_refused(folder: Path) -> None:
     for number in range(3):
-        Image.fromarray(BLACK[:240, :320]).save(folder / f"cam2/{number:04}.png")
-    assert refusal(folder) == "cam2: frame size: expected frames of 640 x 480 pixels, found 320 x 240"
+        Image.fromarray(BLACK[:240, :319]).save(folder / f"cam2/{number:04}.png")
+    assert refusal(folder) == "cam2: frame size: expected frames of at least 320 x 240 pixels, found 319 x 240"
 
 
 def test_a_broken_reference_is_refused_by_name(folder: Path) -> None:

@@ -80,3 +80,35 @@ def test_refuses_what_is_no_file(tmp_path: Path) -> None:
         read_chart(tmp_path / "absent.csv")
     with pytest.raises(RefusedInput, match="expected a file"):
         read_chart(tmp_path)
+
+
+def test_the_size_of_the_images(tmp_path: Path) -> None:
+    path = tmp_path / "chart.csv"
+    head = "camera,point,x_mm,y_mm,z_mm,i,j,width_px,height_px\n"
+    path.write_text(head + "1,a,0,1,2,900,700,1280,720\n2,a,0,1,2,3,4,640,480\n1,b,0,1,3,3,4,1280,720\n")
+    assert {camera: chart.size.px for camera, chart in read_chart(path).items()} == {1: (1280, 720), 2: (640, 480)}
+
+
+@pytest.mark.parametrize(
+    ("rows", "problem"),
+    [
+        (
+            "1,a,0,1,2,3,4,1280,720\n1,b,0,1,3,3,4,640,480\n",
+            "line 3, column width_px: camera 1 has images of 1280 x 720",
+        ),
+        ("1,a,0,1,2,3,4,300,720\n", "line 2, column width_px: expected a whole number from 320 to 16384, found '300'"),
+        ("1,a,0,1,2,3,4,640,480.5\n", "line 2, column height_px: expected a whole number from 240 to 16384"),
+    ],
+)
+def test_sizes_that_no_camera_has(tmp_path: Path, rows: str, problem: str) -> None:
+    path = tmp_path / "chart.csv"
+    path.write_text("camera,point,x_mm,y_mm,z_mm,i,j,width_px,height_px\n" + rows)
+    with pytest.raises(RefusedInput, match=problem):
+        read_chart(path)
+
+
+def test_one_side_alone_is_no_size(tmp_path: Path) -> None:
+    path = tmp_path / "chart.csv"
+    path.write_text("camera,point,x_mm,y_mm,z_mm,i,j,width_px\n1,a,0,1,2,3,4,1280\n")
+    with pytest.raises(RefusedInput, match="line 1, column height_px: is missing"):
+        read_chart(path)
