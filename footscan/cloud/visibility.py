@@ -156,6 +156,17 @@ def _sum_up(
     return seen, films, normals
 
 
+class Line(NamedTuple):
+    """From a point to a camera: the point and the difference of both, mm."""
+
+    x: float
+    y: float
+    z: float
+    dx: float
+    dy: float
+    dz: float
+
+
 @compiled
 def _ask(
     xyz: Floats,
@@ -178,15 +189,15 @@ def _ask(
         x, y, z = xyz[n]
         v = voxel[n]
         own = np.uint64(1) << np.uint64(camera[n])
-        dx, dy, dz = centres[camera[n], 0], centres[camera[n], 1] - y, centres[camera[n], 2] - z
+        line = _line(x, y, z, centres[camera[n]])
         if near[v] & ~own:
-            is_hidden = _behind_surface(x, y, z, dx, dy, dz, HIDDEN_CELLS, voxels, near, own, _count(near[v] & ~own))
+            is_hidden = _behind_surface(line, HIDDEN_CELLS, voxels, near, own, _count(near[v] & ~own))
             answers[n] = DENIED if is_hidden else CONFIRMED
             continue
-        if _behind_surface(x, y, z, dx, dy, dz, BEFORE_CELLS, voxels, seen, own, 0):
+        if _behind_surface(line, BEFORE_CELLS, voxels, seen, own, 0):
             answers[n] = DENIED
             continue
-        normal, facing = _towards(normals[v], dx, dy, dz)
+        normal, facing = _towards(normals[v], line)
         for b in range(len(centres)):
             if b == camera[n] or not films[place[v, 0], b] or not is_witness[b]:
                 continue
@@ -195,35 +206,44 @@ def _ask(
             if _sees_behind(x, y, z, centres[b], b, origin, size, number, seen):
                 answers[n] = DENIED
                 break
-            if _should_see(x, y, z, normal, facing, centres[b], b, origin, size, solid):
+            if _should_see(_line(x, y, z, centres[b]), normal, facing, voxels, solid, np.uint64(1) << np.uint64(b)):
                 answers[n] = DENIED
                 break
     return answers
 
 
 @compiled
-def _towards(normal: Floats, dx: float, dy: float, dz: float) -> tuple[Floats, float]:
-    """The normal on the side of the camera that saw the point, in the direction (dx, dy, dz); 0 if that is unknown.
+def _line(x: float, y: float, z: float, centre: Floats) -> Line:
+    """The line from a point to a camera, whose `centre` is that of its frame in this plane."""
+    return Line(x, y, z, centre[0], centre[1] - y, centre[2] - z)
+
+
+@compiled
+def _towards(normal: Floats, line: Line) -> tuple[Floats, float]:
+    """The normal on the side of the camera that saw the point, to which the line leads; 0 if that is unknown.
 
     Also the least cosine between it and the direction to another camera that should see the point as well.
     """
-    to_own = normal[0] * dx + normal[1] * dy + normal[2] * dz
+    to_own = normal[0] * line.dx + normal[1] * line.dy + normal[2] * line.dz
     if np.isnan(to_own):
         return 0.0 * normal, GRAZING
-    own_cosine = abs(to_own) / np.sqrt(dx * dx + dy * dy + dz * dz)
+    own_cosine = abs(to_own) / _length(line)
     return np.sign(to_own) * normal, max(min(FACING, AS_WELL * own_cosine), GRAZING)
 
 
 @compiled
+def _length(line: Line) -> float:
+    return float(np.sqrt(line.dx * line.dx + line.dy * line.dy + line.dz * line.dz))
+
+
+@compiled
 def _should_see(
-    x: float, y: float, z: float, normal: Floats, facing: float, centre: Floats, camera: int, origin: Floats,
-    size: Floats, solid: NDArray[np.uint64],
-) -> bool:  # fmt: skip
-    """True if a point faces a camera, and nothing hides it."""
-    dx, dy, dz = centre[0], centre[1] - y, centre[2] - z
-    if normal[0] * dx + normal[1] * dy + normal[2] * dz < facing * np.sqrt(dx * dx + dy * dy + dz * dz):
+    line: Line, normal: Floats, facing: float, voxels: Voxels, solid: NDArray[np.uint64], bit: np.uint64
+) -> bool:
+    """True if a point faces the camera to which the line leads, whose bit is `bit`, and nothing hides it."""
+    if normal[0] * line.dx + normal[1] * line.dy + normal[2] * line.dz < facing * _length(line):
         return False
-    return not _hidden(x, y, z, dx, dy, dz, origin, size, solid, np.uint64(1) << np.uint64(camera))
+    return not _hidden(line, voxels, solid, bit)
 
 
 @compiled
@@ -232,22 +252,21 @@ def _witnesses(
 ) -> NDArray[np.bool_]:
     """(C,) True for cameras that see most of what they should see of the surface that two others agree on."""
     centres, sides, bounds = eyes
-    origin, size, number, _, place = voxels
+    _, _, number, _, place = voxels
     seen, normals, films, solid = sight
     should, does = np.zeros(len(centres)), np.zeros(len(centres))
     for n in range(0, len(xyz), SAMPLED):
         x, y, z = xyz[n]
         v = voxel[n]
         near = cameras_near(number, seen, place[v])
-        dx, dy, dz = centres[camera[n], 0], centres[camera[n], 1] - y, centres[camera[n], 2] - z
-        normal, facing = _towards(normals[v], dx, dy, dz)
+        normal, facing = _towards(normals[v], _line(x, y, z, centres[camera[n]]))
         for b in range(len(centres)):
             others = near & ~(np.uint64(1) << np.uint64(b))
             if not others & (others - np.uint64(1)) or not films[place[v, 0], b]:
                 continue
             if not _inside(y, z, sides[bounds[b] : bounds[b + 1]]):
                 continue
-            if _should_see(x, y, z, normal, facing, centres[b], b, origin, size, solid):
+            if _should_see(_line(x, y, z, centres[b]), normal, facing, voxels, solid, np.uint64(1) << np.uint64(b)):
                 should[b] += 1
                 does[b] += others != near
     return does >= WITNESS_SHARE * should
@@ -275,20 +294,18 @@ def _inside(y: float, z: float, sides: Floats) -> bool:
 
 
 @compiled
-def _hidden(
-    x: float, y: float, z: float, dx: float, dy: float, dz: float, origin: Floats, size: Floats,
-    solid: NDArray[np.uint64], bit: np.uint64,
-) -> bool:  # fmt: skip
-    """True if surface lies on the line (dx, dy, dz) from a point to a camera, whose bit is `bit`.
+def _hidden(line: Line, voxels: Voxels, solid: NDArray[np.uint64], bit: np.uint64) -> bool:
+    """True if surface lies on the line from a point to a camera, whose bit is `bit`.
 
     Surface is where this camera has points, or where two others have: what a single other camera sees may be clutter.
     """
-    stride = size[1] / np.sqrt(dx * dx + dy * dy + dz * dz)
+    origin, size, _, _, _ = voxels
+    stride = size[1] / _length(line)
     part = CLEARANCE_CELLS * stride
     while part < 1.0:
-        a = int((x + part * dx - origin[0]) / size[0]) >> 1
-        b = int((y + part * dy - origin[1]) / size[1]) >> 1
-        c = int((z + part * dz - origin[2]) / size[2]) >> 1
+        a = int((line.x + part * line.dx - origin[0]) / size[0]) >> 1
+        b = int((line.y + part * line.dy - origin[1]) / size[1]) >> 1
+        c = int((line.z + part * line.dz - origin[2]) / size[2]) >> 1
         if not (0 <= a < solid.shape[0] and 0 <= b < solid.shape[1] and 0 <= c < solid.shape[2]):
             return False
         there = solid[a, b, c]
@@ -300,22 +317,21 @@ def _hidden(
 
 @compiled
 def _behind_surface(
-    x: float, y: float, z: float, dx: float, dy: float, dz: float, clearance: float, voxels: Voxels,
-    seen: NDArray[np.uint64], own: np.uint64, least: int,
-) -> bool:  # fmt: skip
-    """True if surface lies on the line (dx, dy, dz) from a point to the camera that saw it, whose bit is `own`.
+    line: Line, clearance: float, voxels: Voxels, seen: NDArray[np.uint64], own: np.uint64, least: int
+) -> bool:
+    """True if surface lies on the line from a point to the camera that saw it, whose bit is `own`.
 
     Surface is where more than `least` other cameras have points, farther than `clearance` cells from the point.
     """
-    if np.isnan(dx + dy + dz):
+    if np.isnan(line.dx + line.dy + line.dz):
         return False
     origin, size, number, _, _ = voxels
-    stride = 0.5 * size[1] / np.sqrt(dx * dx + dy * dy + dz * dz)
+    stride = 0.5 * size[1] / _length(line)
     part = clearance * 2.0 * stride
     while part < 1.0:
-        a = int((x + part * dx - origin[0]) / size[0])
-        b = int((y + part * dy - origin[1]) / size[1])
-        c = int((z + part * dz - origin[2]) / size[2])
+        a = int((line.x + part * line.dx - origin[0]) / size[0])
+        b = int((line.y + part * line.dy - origin[1]) / size[1])
+        c = int((line.z + part * line.dz - origin[2]) / size[2])
         if not (0 <= a < number.shape[0] and 0 <= b < number.shape[1] and 0 <= c < number.shape[2]):
             return False
         cell = number[a, b, c]

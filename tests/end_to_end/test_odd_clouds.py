@@ -104,7 +104,8 @@ def truth(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def meshed(cloud: Cloud, calibration: bytes, parameters: SurfaceParameters) -> dict[str, bytes]:
     """The results of the steps up to the surface."""
-    clean = pack(points=cloud, codes=np.full(len(cloud), KEPT, np.uint8), removed=np.frombuffer(b"{}", np.uint8))
+    reports = {"removed": np.frombuffer(b"{}", np.uint8), "warnings": np.frombuffer(b"[]", np.uint8)}
+    clean = pack(points=cloud, codes=np.full(len(cloud), KEPT, np.uint8), **reports)
     fused = fuse.run({"clean": clean}, FusionParameters(), {})
     oriented = orient.run({"fused": fused, "calibration": calibration}, NormalParameters(), {})
     return {
