@@ -24,7 +24,7 @@ from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from footscan.recordings.scans import RecordedScan, read_scan
 from footscan.stripe.film import extract_film
-from footscan.stripe.laser import with_found_laser
+from footscan.stripe.laser import adapted
 from footscan.stripe.points import StripePoints
 from footscan.surface.surface_of_cloud import surface_of_cloud
 from schemas.base.errors import Finding, RefusedInput
@@ -117,7 +117,7 @@ class OpenScan:
         if (place := self.recorded.background(self._film(camera))) is not None:
             background = open_background(place, film.size, film.count)
         given = self.parameters.extraction.with_laser(self.recorded.document.laser)
-        parameters = with_found_laser(film, given, background)
+        parameters = adapted(film, given, background)
         backgrounds = None if background is None else backgrounds_of(background, film.count)
         lost = self._lost[camera] = []
         return extract_film(noting_lost(pixel_frames(film), lost), parameters, backgrounds)

@@ -28,7 +28,7 @@ def extract_film(
     Parameters
     ----------
     frames : (rows, columns, 3) uint8 RGB each, valid until the next one is read; a lost frame (None) has no points.
-    parameters : `laser` is taken for red if it is `auto`, see `footscan.stripe.laser.with_found_laser`.
+    parameters : `laser` is taken for red if it is `auto`, see `footscan.stripe.laser.adapted`.
     backgrounds : for each frame the same view with the laser off; None for a frame without background.
 
     Returns

@@ -1,48 +1,87 @@
-"""The laser of a film: its colour, found in a sample of the frames."""
+"""What a film shows of its laser: the colour, and how strong the stripe is, found in a sample of the frames."""
 
 from collections.abc import Iterable
 from itertools import repeat
 from typing import get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from footscan.frames.image import Rgb
 from footscan.frames.reader import FrameReader, backgrounds_of, pixel_frames
+from footscan.robust import MAD_TO_SD
 from footscan.stripe.extract import RED, find_stripe
+from footscan.stripe.redness import as_red, as_words
 from schemas.laser import Laser
 from schemas.parameters.extraction import ExtractionParameters
 
-SAMPLED = 8
+SAMPLED = 6
 """Frames that are searched, evenly spread over the film: a bound of time."""
 LEAST = 1000.0
 """Grey levels, summed over the crossings in all searched frames, by which a stripe must exceed its surroundings: that
 of a faint stripe of 100 px in one frame. With less in each colour the laser stays unknown. Chosen by hand."""
 MOST_CHROMA = 10
 """Grey levels by which R, G and B of a pixel may differ in a picture without colours. Chosen by hand."""
+SENSITIVE = 4
+"""`red_threshold` at which the redness of the stripe is measured. Chosen by hand."""
+STRONGEST = 0.97
+"""The redness of the stripe is that quantile of its crossings: most of what is found at a sensitive threshold in a lit
+room is not the stripe. Chosen by hand, on films of fifteen drawn worlds."""
+NOISE_SDS = 4.0
+"""A threshold is at least so many standard deviations of the noise of the redness. Chosen by hand."""
+
+Pair = tuple[Rgb, Rgb | None]
+"""A frame and its background."""
 
 
-def with_found_laser(
+def adapted(
     film: FrameReader, parameters: ExtractionParameters, background: FrameReader | None = None
 ) -> ExtractionParameters:
-    """Replace `auto` by the laser of a film.
+    """Adapt parameters to a film: its laser, and thresholds for a stripe that is faint throughout.
 
     `background` : as `footscan.frames.film.open_background` opens it.
 
     Returns
     -------
-    `parameters`, with `laser` unchanged if they name one, or if no colour shows a stripe.
+    `parameters` with `laser` unchanged if they name one, or if no colour shows a stripe; and with lower thresholds if
+    the stripe of the film is faint, see `faint_thresholds`.
     """
-    if parameters.laser != "auto":
-        return parameters
     numbers = np.unique(np.linspace(0, film.count - 1, min(SAMPLED + 2, film.count)).round().astype(int)).tolist()
     if len(numbers) > SAMPLED:
         numbers = numbers[1:-1]  # the foot is rarely in the first and the last frame
-    frames = pixel_frames(film, numbers)
-    if background is None:
-        return parameters.with_laser(laser_of(frames, parameters))
-    own = background.count == film.count
-    backgrounds = pixel_frames(background, numbers) if own else backgrounds_of(background, film.count)
-    return parameters.with_laser(laser_of(frames, parameters, backgrounds))
+    backgrounds: Iterable[Rgb | None] | None = None
+    if background is not None:
+        own = background.count == film.count
+        backgrounds = pixel_frames(background, numbers) if own else backgrounds_of(background, film.count)
+    return adapted_to(pixel_frames(film, numbers), parameters, backgrounds)
+
+
+def adapted_to(
+    frames: Iterable[Rgb | None],
+    parameters: ExtractionParameters,
+    backgrounds: Iterable[Rgb | None] | None = None,
+) -> ExtractionParameters:
+    """`adapted` to a few frames; frames and backgrounds as for `extract_film`.
+
+    Examples
+    --------
+    A green stripe that is 13 grey levels greener than its surroundings:
+
+    >>> frame = np.full((64, 320, 3), 40, np.uint8)
+    >>> frame[29:32, :, 1] += np.array([[7], [13], [7]], np.uint8)
+    >>> parameters = adapted_to([frame], ExtractionParameters())
+    >>> print(parameters.laser, parameters.red_threshold)
+    green 4
+    """
+    pairs = [
+        (frame.copy(), None if background is None else background.copy())
+        for frame, background in zip(frames, backgrounds or repeat(None), strict=False)
+        if frame is not None
+    ]
+    if parameters.laser == "auto":
+        sensitive = _scaled(parameters, SENSITIVE / parameters.red_threshold)
+        parameters = parameters.with_laser(_laser(pairs, parameters) or _laser(pairs, sensitive))
+    return _with_faint_thresholds(pairs, parameters)
 
 
 def laser_of(
@@ -61,11 +100,14 @@ def laser_of(
     >>> print(laser_of([frame], ExtractionParameters()))
     green
     """
+    pairs = zip(frames, backgrounds or repeat(None), strict=False)
+    return _laser(((frame, background) for frame, background in pairs if frame is not None), parameters)
+
+
+def _laser(pairs: Iterable[Pair], parameters: ExtractionParameters) -> Laser | None:
     weights = dict.fromkeys(get_args(Laser), 0.0)
     is_grey = True
-    for frame, background in zip(frames, backgrounds or repeat(None), strict=False):
-        if frame is None:
-            continue
+    for frame, background in pairs:
         is_grey = is_grey and bool(np.all(np.ptp(frame[::2, ::2], axis=2) <= MOST_CHROMA))
         for laser in ("mono",) if is_grey else ("red", "green", "blue"):
             crossings = find_stripe(frame, parameters.model_copy(update={"laser": laser}), background)
@@ -74,3 +116,43 @@ def laser_of(
         weights["mono"] = 0.0
     laser = max(get_args(Laser), key=lambda name: weights[name])
     return laser if weights[laser] >= LEAST else None
+
+
+def _with_faint_thresholds(pairs: list[Pair], parameters: ExtractionParameters) -> ExtractionParameters:
+    """Lower the thresholds to the share `threshold_share` of the stripe's redness, but not into the noise."""
+    full = parameters.red_threshold
+    if full <= SENSITIVE or parameters.threshold_share == 0.0:
+        return parameters
+    sensitive = _scaled(parameters, SENSITIVE / full)
+    redness = np.concatenate([np.empty(0), *(find_stripe(*_arguments(pair, sensitive))[:, RED] for pair in pairs)])
+    if not len(redness):
+        return parameters
+    least = max(SENSITIVE, NOISE_SDS * max(_noise(frame, parameters) for frame, _ in pairs))
+    wanted = parameters.threshold_share * float(np.quantile(redness, STRONGEST))
+    return parameters if wanted >= full else _scaled(parameters, min(max(wanted, least) / full, 1.0))
+
+
+def _arguments(pair: Pair, parameters: ExtractionParameters) -> tuple[Rgb, ExtractionParameters, Rgb | None]:
+    return pair[0], parameters, pair[1]
+
+
+def _scaled(parameters: ExtractionParameters, factor: float) -> ExtractionParameters:
+    """The same parameters with all thresholds times `factor`."""
+    return parameters.model_copy(
+        update={
+            "red_threshold": max(round(factor * parameters.red_threshold), 1),
+            "smallest_contrast": max(factor * parameters.smallest_contrast, 1.0),
+            "faintest_contrast": max(factor * parameters.faintest_contrast, 1.0),
+        }
+    )
+
+
+def _noise(frame: Rgb, parameters: ExtractionParameters) -> float:
+    """Standard deviation of the redness of the half-size image, by the differences of neighbours, grey levels."""
+    laser = "red" if parameters.laser == "auto" else parameters.laser
+    words = np.ascontiguousarray(as_red(as_words(frame), laser))
+    rows, columns = words.shape[0] // 2, words.shape[1] // 2
+    pixels = words.view(np.uint8).reshape(*words.shape, 4)[: 2 * rows, : 2 * columns, :3].astype(np.float32)
+    halved: NDArray[np.float32] = pixels.reshape(rows, 2, columns, 2, 3).mean(axis=(1, 3))
+    redness = halved[..., 0] - np.maximum(halved[..., 1], halved[..., 2])
+    return float(MAD_TO_SD * np.median(np.abs(np.diff(redness, axis=1))) / np.sqrt(2.0))

@@ -61,7 +61,7 @@ def extract(
     from footscan.frames.image import SUFFIXES
     from footscan.frames.reader import backgrounds_of, pixel_frames
     from footscan.stripe.film import extract_film, points_csv
-    from footscan.stripe.laser import with_found_laser
+    from footscan.stripe.laser import adapted
     from pipelines.engine.files.atomic import write_atomically
     from schemas.base.overrides import overridden
     from schemas.parameters.extraction import ExtractionParameters
@@ -77,7 +77,7 @@ def extract(
     _check_outputs(out, overlay, [path for path in (file, background) if path is not None])
 
     seen, about = _Seen(), _about(film, background, parameters)
-    used = with_found_laser(film, parameters, laser_off)
+    used = adapted(film, parameters, laser_off)
     points = extract_film(seen.watch(pixel_frames(film)), used, backgrounds)
     picture = None if overlay is None else _drawn(film, points, seen.lost, about)
     if out is not None:

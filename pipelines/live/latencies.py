@@ -16,7 +16,7 @@ from footscan.frames.array import chunk_name
 from footscan.frames.image_files import ImageFiles
 from footscan.frames.reader import pixel_frames
 from footscan.stripe.film import extract_film
-from footscan.stripe.laser import with_found_laser
+from footscan.stripe.laser import adapted
 from pipelines.live.devices import passes_of
 from pipelines.live.light import ScanLight
 from pipelines.live.scanner import LiveScanner
@@ -124,7 +124,7 @@ def _observed(
     ]
     array = recording.file(GROUP) / film_name(camera)
     film = ImageFiles(array, [array / chunk_name(arrival) for arrival in arrivals], FRAME_SIZE)
-    stripe = extract_film(pixel_frames(film), with_found_laser(film, ExtractionParameters()))
+    stripe = extract_film(pixel_frames(film), adapted(film, ExtractionParameters()))
     rows = np.array(arrivals, np.int64) - first
     motion = motion_of_head(scanner.heads.log, head, filmed.travel)
     return LatencyPass(stripe, clock.seconds[rows], clock.delay_s[rows], motion)

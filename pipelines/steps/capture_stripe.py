@@ -12,7 +12,7 @@ from footscan.calibration.capture.stripe_arrays import stripe_arrays
 from footscan.frames.film import open_film
 from footscan.frames.reader import pixel_frames
 from footscan.stripe.extract import extract_stripe
-from footscan.stripe.laser import with_found_laser
+from footscan.stripe.laser import adapted
 from pipelines.arrays import pack
 from schemas.base.errors import DamagedError
 from schemas.parameters.extraction import ExtractionParameters
@@ -38,7 +38,7 @@ def run(inputs: Mapping[str, bytes], parameters: ExtractionParameters, places: M
     if inputs["film"]:
         _check_filmed(places["film"], json.loads(inputs["film"]), places["capture"])
     film = open_film(places["film"])
-    parameters = with_found_laser(film, parameters)
+    parameters = adapted(film, parameters)
     stripes: list[NDArray[np.float64]] = []
     lost: list[int] = []
     for number, frame in enumerate(pixel_frames(film)):

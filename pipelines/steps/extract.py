@@ -8,7 +8,7 @@ import numpy as np
 from footscan.frames.array import IngestedFrames
 from footscan.frames.reader import backgrounds_of, noting_lost, pixel_frames
 from footscan.stripe.film import extract_film
-from footscan.stripe.laser import with_found_laser
+from footscan.stripe.laser import adapted
 from pipelines.arrays import pack
 from schemas.frames import FrameManifest
 from schemas.parameters.extraction import ExtractionParameters
@@ -27,7 +27,7 @@ def run(inputs: Mapping[str, bytes], parameters: ExtractionParameters, places: M
     if "background" in inputs:
         manifest = FrameManifest.model_validate_json(inputs["background"])
         background = IngestedFrames(places["background"], manifest)
-    parameters = with_found_laser(film, parameters, background)
+    parameters = adapted(film, parameters, background)
     backgrounds = None if background is None else backgrounds_of(background, film.count)
     stripe = extract_film(noting_lost(pixel_frames(film), lost), parameters, backgrounds)
     return pack(stripe=stripe, lost=np.array(lost, np.int32), laser=np.array(parameters.laser))

@@ -22,6 +22,13 @@ class ExtractionParameters(Document):
         le=254,
         description="grey levels by which a pixel must be redder (R - max(G, B)) than its surroundings",
     )
+    threshold_share: float = Field(
+        default=0.3,
+        ge=0.0,
+        le=1.0,
+        description="share of the redness of the film's stripe that `red_threshold` is at most: where the stripe is faint "
+        "throughout, it is lowered, and `smallest_contrast` and `faintest_contrast` with it; 0 lowers nothing",
+    )
     saturation: int = Field(
         default=245,
         ge=1,

@@ -10,7 +10,7 @@ from PIL import Image
 
 from footscan.frames.film import open_film
 from footscan.stripe.extract import extract_stripe
-from footscan.stripe.laser import laser_of, with_found_laser
+from footscan.stripe.laser import adapted, laser_of
 from schemas.laser import Laser
 from schemas.parameters.extraction import ExtractionParameters
 
@@ -59,9 +59,9 @@ def test_the_film_decides_and_a_given_laser_wins(red: Frame, frame: Callable[...
     for number in range(12):
         Image.fromarray(green if 4 <= number < 8 else dark).save(tmp_path / f"{number:02}.png")
     film = open_film(tmp_path)
-    assert with_found_laser(film, AUTO).laser == "green"
-    assert with_found_laser(film, AUTO.with_laser("blue")).laser == "blue"
-    assert with_found_laser(film, ExtractionParameters(laser="red")).laser == "red"
+    assert adapted(film, AUTO).laser == "green"
+    assert adapted(film, AUTO.with_laser("blue")).laser == "blue"
+    assert adapted(film, ExtractionParameters(laser="red")).laser == "red"
 
 
 def test_red_things_in_the_room_beside_a_green_stripe(red: Frame) -> None:
