@@ -43,8 +43,8 @@ def adapted(
 
     Returns
     -------
-    `parameters` with `laser` unchanged if they name one, or if no colour shows a stripe; and with lower thresholds if
-    the stripe of the film is faint, see `faint_thresholds`.
+    `parameters`, with `laser` unchanged if they name one, or if no colour shows a stripe, and with lower thresholds if
+    the stripe of the film is fainter than `full_redness`.
     """
     numbers = np.unique(np.linspace(0, film.count - 1, min(SAMPLED + 2, film.count)).round().astype(int)).tolist()
     if len(numbers) > SAMPLED:
@@ -119,17 +119,19 @@ def _laser(pairs: Iterable[Pair], parameters: ExtractionParameters) -> Laser | N
 
 
 def _with_faint_thresholds(pairs: list[Pair], parameters: ExtractionParameters) -> ExtractionParameters:
-    """Lower the thresholds to the share `threshold_share` of the stripe's redness, but not into the noise."""
+    """Lower the thresholds where the redness of the stripe is less than `full_redness`, but not into the noise."""
     full = parameters.red_threshold
-    if full <= SENSITIVE or parameters.threshold_share == 0.0:
+    if full <= SENSITIVE or parameters.full_redness == 0.0:
         return parameters
     sensitive = _scaled(parameters, SENSITIVE / full)
     redness = np.concatenate([np.empty(0), *(find_stripe(*_arguments(pair, sensitive))[:, RED] for pair in pairs)])
     if not len(redness):
         return parameters
+    factor = float(np.quantile(redness, STRONGEST)) / parameters.full_redness
+    if factor >= 1.0:
+        return parameters
     least = max(SENSITIVE, NOISE_SDS * max(_noise(frame, parameters) for frame, _ in pairs))
-    wanted = parameters.threshold_share * float(np.quantile(redness, STRONGEST))
-    return parameters if wanted >= full else _scaled(parameters, min(max(wanted, least) / full, 1.0))
+    return _scaled(parameters, min(max(factor, least / full), 1.0))
 
 
 def _arguments(pair: Pair, parameters: ExtractionParameters) -> tuple[Rgb, ExtractionParameters, Rgb | None]:

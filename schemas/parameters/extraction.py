@@ -22,12 +22,12 @@ class ExtractionParameters(Document):
         le=254,
         description="grey levels by which a pixel must be redder (R - max(G, B)) than its surroundings",
     )
-    threshold_share: float = Field(
-        default=0.3,
+    full_redness: float = Field(
+        default=60.0,
         ge=0.0,
-        le=1.0,
-        description="share of the redness of the film's stripe that `red_threshold` is at most: where the stripe is faint "
-        "throughout, it is lowered, and `smallest_contrast` and `faintest_contrast` with it; 0 lowers nothing",
+        le=255.0,
+        description="grey levels of redness of a film's stripe below which `red_threshold`, `smallest_contrast` and "
+        "`faintest_contrast` are lowered in proportion, but not into the noise; 0 lowers nothing",
     )
     saturation: int = Field(
         default=245,

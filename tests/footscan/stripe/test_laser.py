@@ -10,7 +10,7 @@ from PIL import Image
 
 from footscan.frames.film import open_film
 from footscan.stripe.extract import extract_stripe
-from footscan.stripe.laser import adapted, laser_of
+from footscan.stripe.laser import adapted, adapted_to, laser_of
 from schemas.laser import Laser
 from schemas.parameters.extraction import ExtractionParameters
 
@@ -68,3 +68,41 @@ def test_red_things_in_the_room_beside_a_green_stripe(red: Frame) -> None:
     image = red[..., CHANNELS["green"]].copy()
     image[100:160, 50:56, 0] += 80
     assert laser_of([image], AUTO) == "green"
+
+
+def faint(
+    line: Callable[..., object], light: Callable[..., object], frame: Callable[..., Frame], level: float
+) -> Frame:
+    return frame(light(line(20.0), amplitude=level), ambient=40.0, noise=0.4)
+
+
+def test_a_faint_stripe_is_found(
+    line: Callable[..., object], light: Callable[..., object], frame: Callable[..., Frame]
+) -> None:
+    image = faint(line, light, frame)
+    assert len(extract_stripe(image, AUTO)) == 0
+    parameters = adapted_to([image], AUTO)
+    assert parameters.laser == "red"
+    assert parameters.red_threshold < 8
+    points = extract_stripe(image, parameters)
+    assert len(points) > 500
+    assert np.abs(line(20.0)(points["i"], points["j"])).max() < 0.5  # type: ignore[operator]
+
+
+def test_thresholds_stay_where_the_stripe_is_strong_and_where_they_are_to_stay(
+    red: Frame, line: Callable[..., object], light: Callable[..., object], frame: Callable[..., Frame]
+) -> None:
+    assert adapted_to([red], AUTO) == AUTO.with_laser("red")
+    strict = ExtractionParameters(red_threshold=120)
+    assert adapted_to([red], strict).red_threshold == 120
+    fixed = ExtractionParameters(full_redness=0.0, laser="red")
+    assert adapted_to([faint(line, light, frame)], fixed) == fixed
+
+
+def test_thresholds_stay_above_the_noise(
+    line: Callable[..., object], light: Callable[..., object], frame: Callable[..., Frame]
+) -> None:
+    noisy = frame(light(line(20.0), amplitude=15.0), ambient=40.0, noise=6.0)
+    quiet = faint(line, light, frame)
+    of_noisy, of_quiet = (adapted_to([image], AUTO.with_laser("red")).red_threshold for image in (noisy, quiet))
+    assert of_quiet < 8 < of_noisy
