@@ -70,10 +70,8 @@ def test_red_things_in_the_room_beside_a_green_stripe(red: Frame) -> None:
     assert laser_of([image], AUTO) == "green"
 
 
-def faint(
-    line: Callable[..., object], light: Callable[..., object], frame: Callable[..., Frame], level: float
-) -> Frame:
-    return frame(light(line(20.0), amplitude=level), ambient=40.0, noise=0.4)
+def faint(line: Callable[..., object], light: Callable[..., object], frame: Callable[..., Frame]) -> Frame:
+    return frame(light(line(20.0), amplitude=15.0), ambient=40.0, noise=0.4)
 
 
 def test_a_faint_stripe_is_found(
