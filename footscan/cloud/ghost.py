@@ -59,11 +59,11 @@ def is_ghost(
         own = np.flatnonzero(points["camera"] == camera)
         own = own[np.argsort(points["frame"][own], kind="stable")]
         frame, y, z = points["frame"][own], points["y"][own].astype(np.float64), points["z"][own].astype(np.float64)
-        distance = _distance(_count_distances(frame, y, z), len(own))
+        distance = _distance(_look_up(frame, y, z, np.inf)[0], len(own))
         if distance is None:
             continue
         segment, _ = segments_of(points[own], gap_mm, segment_mm)
-        above = _is_above(frame, y, z, distance)
+        _, above = _look_up(frame, y, z, distance)
         ghost[own] = (np.bincount(segment, above) > MAJORITY * np.bincount(segment))[segment]
     return ghost
 
@@ -82,28 +82,17 @@ def _distance(counts: NDArray[np.int64], points: int) -> float | None:
 
 
 @compiled
-def _count_distances(frame: NDArray[np.int32], y: Floats, z: Floats) -> NDArray[np.int64]:
-    """(BINS,) the number of points with another one of their frame above them, by the distance; `frame` ascending."""
+def _look_up(
+    frame: NDArray[np.int32], y: Floats, z: Floats, distance: float
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Compare each point with the others of its frame; `frame` (N,) ascending.
+
+    Returns
+    -------
+    counts : (BINS,) the number of points with another one above them, by the distance in height.
+    above : (N,) True for points that lie above another one by `distance`.
+    """
     counts, latest = np.zeros(BINS, np.int64), np.full(BINS, -1, np.int64)
-    first = 0
-    for n in range(len(frame)):
-        while frame[first] != frame[n]:
-            first += 1
-        m = first
-        while m < len(frame) and frame[m] == frame[n]:
-            height = z[m] - z[n]
-            if LEAST_MM <= height < MOST_MM and abs(y[m] - y[n]) <= BESIDE_MM:
-                k = int((height - LEAST_MM) / BIN_MM)
-                if latest[k] != n:
-                    latest[k] = n
-                    counts[k] += 1
-            m += 1
-    return counts
-
-
-@compiled
-def _is_above(frame: NDArray[np.int32], y: Floats, z: Floats, distance: float) -> NDArray[np.bool_]:
-    """(N,) True for points that lie above another one of their frame by a `distance`; `frame` ascending."""
     above = np.zeros(len(frame), np.bool_)
     first = 0
     for n in range(len(frame)):
@@ -111,6 +100,12 @@ def _is_above(frame: NDArray[np.int32], y: Floats, z: Floats, distance: float) -
             first += 1
         m = first
         while m < len(frame) and frame[m] == frame[n]:
-            above[n] |= abs(z[n] - z[m] - distance) <= NEAR_MM and abs(y[m] - y[n]) <= BESIDE_MM
+            height = z[m] - z[n]
+            if height > 0.0 and abs(y[m] - y[n]) <= BESIDE_MM:
+                above[m] |= abs(height - distance) <= NEAR_MM
+                k = int((height - LEAST_MM) / BIN_MM)
+                if LEAST_MM <= height < MOST_MM and latest[k] != n:
+                    latest[k] = n
+                    counts[k] += 1
             m += 1
-    return above
+    return counts, above
