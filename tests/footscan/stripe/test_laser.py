@@ -104,3 +104,13 @@ def test_thresholds_stay_above_the_noise(
     quiet = faint(line, light, frame)
     of_noisy, of_quiet = (adapted_to([image], AUTO.with_laser("red")).red_threshold for image in (noisy, quiet))
     assert of_quiet < 8 < of_noisy
+
+
+def test_thresholds_stay_in_a_room_full_of_faint_red_things(
+    line: Callable[..., object], light: Callable[..., object], frame: Callable[..., Frame]
+) -> None:
+    room = sum(light(line(20.0, (320.0, row)), amplitude=6.0) for row in range(30, 460, 40))  # type: ignore[misc]
+    image = frame(light(line(80.0), amplitude=40.0) + room, ambient=40.0, noise=0.4)
+    assert adapted_to([image], AUTO).red_threshold == AUTO.red_threshold
+    without = frame(light(line(80.0), amplitude=40.0), ambient=40.0, noise=0.4)
+    assert adapted_to([without], AUTO).red_threshold < AUTO.red_threshold
