@@ -7,7 +7,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.frames.image import Rgb
+from footscan.frames.image import Rgb, pixel_buffer
 from footscan.frames.reader import FrameReader, backgrounds_of, pixel_frames
 from footscan.robust import MAD_TO_SD
 from footscan.stripe.extract import RED, find_stripe
@@ -76,7 +76,7 @@ def adapted_to(
     green 4
     """
     pairs = [
-        (frame.copy(), None if background is None else background.copy())
+        (_kept(frame), None if background is None else _kept(background))
         for frame, background in zip(frames, backgrounds or repeat(None), strict=False)
         if frame is not None
     ]
@@ -84,6 +84,13 @@ def adapted_to(
         sensitive = _scaled(parameters, SENSITIVE / parameters.red_threshold)
         parameters = parameters.with_laser(_laser(pairs, parameters) or _laser(pairs, sensitive))
     return _with_faint_thresholds(pairs, parameters)
+
+
+def _kept(frame: Rgb) -> Rgb:
+    """A copy that is viewed as words without another one."""
+    copy = pixel_buffer(*frame.shape[:2])
+    copy[...] = frame
+    return copy
 
 
 def laser_of(
