@@ -5,15 +5,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from footscan.cloud.points import coordinates, stripe_step
-from footscan.cloud.visibility import cameras_near
-from footscan.compiled import compiled
+from footscan.cloud.support import PLANES_MM
+from footscan.cloud.visibility import cameras_around
 from footscan.mesh.voxels import EMPTY, Voxels, voxelise
 
 CELL_MM = 1.5
 """Side of the cells in Y and Z: two cameras agree where they have points in the same cell, or in cells beside each
 other. Chosen by hand."""
-PLANES_MM = 2.0
-"""Least length of the cells along the travel; they are as long as its steps if these are longer. Chosen by hand."""
 FEWEST_CELLS, LEAST_SHARE = 4, 0.1
 """The body is in a plane in which cameras agree in so many cells, and in this share of the cells in which they agree in
 its richest planes. Chosen by hand."""
@@ -85,20 +83,7 @@ def _agreed(points: NDArray[np.void], cell_mm: float) -> tuple[Voxels, NDArray[n
     step = max(stripe_step(points), PLANES_MM)
     voxels = voxelise(coordinates(points), (step, cell_mm, cell_mm))
     numbers = np.unique(points["camera"])
-    camera = np.searchsorted(numbers, points["camera"]).astype(np.uint8)
-    return voxels, _is_agreed(camera, voxels.number, voxels.voxel, voxels.place)
-
-
-@compiled
-def _is_agreed(
-    camera: NDArray[np.uint8], number: NDArray[np.int32], voxel: NDArray[np.int32], place: NDArray[np.int32]
-) -> NDArray[np.bool_]:
-    """(V,) True for cells in and around which two cameras have points."""
-    seen = np.zeros(len(place), np.uint64)
-    for n in range(len(voxel)):
-        seen[voxel[n]] |= np.uint64(1) << np.uint64(camera[n])
-    agreed = np.zeros(len(place), np.bool_)
-    for v in range(len(place)):
-        near = cameras_near(number, seen, place[v])
-        agreed[v] = near & (near - np.uint64(1)) != 0
-    return agreed
+    seen = np.zeros(len(voxels.place), np.uint64)
+    np.bitwise_or.at(seen, voxels.voxel, np.uint64(1) << np.searchsorted(numbers, points["camera"]).astype(np.uint64))
+    near = cameras_around(voxels.number, seen, voxels.place)
+    return voxels, near & (near - np.uint64(1)) != 0

@@ -77,12 +77,13 @@ def _static_of_camera(
         return nothing
     cell = np.floor((yz - yz.min(axis=0)) / CELL_MM).astype(np.int64) + 1
     shape = tuple(cell.max(axis=0) + 2)
-    if body is not None and x is not None:
-        return _static_beside(cell, points["frame"], (x < body[0], x > body[1]), shape, share)
     frame = points["frame"] - points["frame"].min()
     if body is not None:
-        x = np.full(int(frame.max()) + 1, np.nan)
-        x[frame] = points["x"]
+        if x is None:
+            x = np.full(int(frame.max()) + 1, np.nan)
+            x[frame] = points["x"]
+        else:
+            frame = points["frame"]
         return _static_beside(cell, frame, (x < body[0], x > body[1]), shape, share)
     frames = int(frame.max()) + 1
     end = max(END_FRAMES, round(END_SHARE * frames))

@@ -181,9 +181,7 @@ def _ask(
     origin, size, number, _, place = voxels
     seen, normals, films, solid = sight
     is_witness = _witnesses(xyz, camera, voxel, eyes, voxels, sight)
-    near = np.empty(len(place), np.uint64)
-    for v in range(len(place)):
-        near[v] = cameras_near(number, seen, place[v])
+    near = cameras_around(number, seen, place)
     answers = np.zeros(len(xyz), np.uint8)
     for n in range(len(xyz)):
         x, y, z = xyz[n]
@@ -282,6 +280,15 @@ def cameras_near(number: Ints, seen: NDArray[np.uint64], place: Ints) -> np.uint
                 if number[i, j, k] != EMPTY:
                     cameras |= seen[number[i, j, k]]
     return cameras
+
+
+@compiled
+def cameras_around(number: Ints, seen: NDArray[np.uint64], place: Ints) -> NDArray[np.uint64]:
+    """(V,) `cameras_near` of each numbered cell."""
+    near = np.empty(len(place), np.uint64)
+    for v in range(len(place)):
+        near[v] = cameras_near(number, seen, place[v])
+    return near
 
 
 @compiled

@@ -24,14 +24,10 @@ HARDLY_RED = 1.5
 widens the laser line, the line is mostly twice as red. Chosen by hand."""
 BLURRED_SHARE = 0.5
 """A piece with more than this share of blurred crossings is blurred. Chosen by hand."""
-
-
 RED_SHARE = 0.1
 """A piece is white if no more than this share of its crossings is redder than `red_threshold`. Chosen by hand. On films
 of a dozen drawn worlds, half of them in bright rooms, it cost less than 0.3 % of the stripe, except in two whose
 pictures were white all over (1.3 and 2 %)."""
-
-
 PURITY_RANK, PURE, PURE_SHARE = 0.75, 0.5, 0.2
 """The purity of a crossing is the ratio of the grey levels by which it is redder than its surroundings to those by
 which it is brighter. It depends on the camera's white balance: in the dark, an automatic one makes the stripe itself

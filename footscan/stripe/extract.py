@@ -78,7 +78,7 @@ def find_stripe(
     rows, columns, _ = image.shape
     if rows == 0 or columns == 0:
         return np.empty((0, MEASURED))
-    laser = "red" if parameters.laser == "auto" else parameters.laser
+    laser = parameters.searched_laser
     words = as_red(as_words(image), laser)
     light = words
     if background is not None:

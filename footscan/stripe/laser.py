@@ -133,7 +133,8 @@ def _with_faint_thresholds(pairs: list[Pair], parameters: ExtractionParameters) 
     if full <= SENSITIVE or parameters.full_redness == 0.0:
         return parameters
     sensitive = _scaled(parameters, SENSITIVE / full)
-    redness = np.concatenate([np.empty(0), *(find_stripe(*_arguments(pair, sensitive))[:, RED] for pair in pairs)])
+    found = [find_stripe(frame, sensitive, background)[:, RED] for frame, background in pairs]
+    redness = np.concatenate([np.empty(0), *found])
     if not len(redness):
         return parameters
     usual, strongest = (float(level) for level in np.quantile(redness, (0.5, STRONGEST)))
@@ -142,10 +143,6 @@ def _with_faint_thresholds(pairs: list[Pair], parameters: ExtractionParameters) 
         return parameters
     least = max(SENSITIVE, NOISE_SDS * max(_noise(frame, parameters) for frame, _ in pairs))
     return _scaled(parameters, min(max(factor, least / full), 1.0))
-
-
-def _arguments(pair: Pair, parameters: ExtractionParameters) -> tuple[Rgb, ExtractionParameters, Rgb | None]:
-    return pair[0], parameters, pair[1]
 
 
 def _scaled(parameters: ExtractionParameters, factor: float) -> ExtractionParameters:
@@ -161,8 +158,7 @@ def _scaled(parameters: ExtractionParameters, factor: float) -> ExtractionParame
 
 def _noise(frame: Rgb, parameters: ExtractionParameters) -> float:
     """Standard deviation of the redness of the half-size image, by the differences of neighbours, grey levels."""
-    laser = "red" if parameters.laser == "auto" else parameters.laser
-    words = np.ascontiguousarray(as_red(as_words(frame), laser))
+    words = np.ascontiguousarray(as_red(as_words(frame), parameters.searched_laser))
     rows, columns = words.shape[0] // 2, words.shape[1] // 2
     pixels = words.view(np.uint8).reshape(*words.shape, 4)[: 2 * rows, : 2 * columns, :3].astype(np.float32)
     halved: NDArray[np.float32] = pixels.reshape(rows, 2, columns, 2, 3).mean(axis=(1, 3))

@@ -20,8 +20,7 @@ def run(inputs: Mapping[str, bytes], parameters: MappingParameters, places: Mapp
     """Map the stripe points of one camera to world points.
 
     `inputs`: `stripe`, `manifest`, the camera's `calibration`, and its `travel` or `positions`; `places`: the `film`,
-    to name it. The result holds the
-    `points`, and `x_of_frame`: X of each frame, mm, NaN for those that are lost.
+    to name it. The result holds the `points`, and `x_of_frame`: X of each frame, mm, NaN for those that are lost.
 
     Raises
     ------

@@ -154,6 +154,11 @@ class ExtractionParameters(Document):
             return self
         return self.model_copy(update={"laser": laser})
 
+    @property
+    def searched_laser(self) -> Laser:
+        """The laser whose stripe is searched; red while none was named or found."""
+        return "red" if self.laser == "auto" else self.laser
+
     @model_validator(mode="after")
     def _ends_are_fainter(self) -> Self:
         strong, faint = self.smallest_contrast, self.faintest_contrast
