@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.stripe.clutter import FEWEST_FRAMES
-from footscan.stripe.extract import BRIGHT, CROSSING_COLUMNS, RED
+from footscan.stripe.crossings import BRIGHT, CROSSING_COLUMNS, RED
 from schemas.parameters.extraction import ExtractionParameters
 
 WIDTH, PEAK, SIGMA = (CROSSING_COLUMNS.index(name) for name in ("width", "peak", "sigma"))

@@ -10,7 +10,8 @@ import numpy as np
 from footscan.frames.image import Rgb
 from footscan.stripe.blur import is_laser_light
 from footscan.stripe.clutter import is_moving_stripe, number_pieces
-from footscan.stripe.extract import MEASURED, PIECE, as_points, find_stripe
+from footscan.stripe.crossings import MEASURED, PIECE, find_stripe
+from footscan.stripe.extract import as_points
 from footscan.stripe.points import StripePoints
 from schemas.parameters.extraction import ExtractionParameters
 

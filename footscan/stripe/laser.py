@@ -1,4 +1,4 @@
-"""What a film shows of its laser: the colour, and how strong the stripe is, found in a sample of the frames."""
+"""What a film shows of its laser: the colour, and how clear the stripe is, found in a sample of the frames."""
 
 from collections.abc import Iterable
 from itertools import repeat
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from footscan.frames.image import Rgb, pixel_buffer
 from footscan.frames.reader import FrameReader, backgrounds_of, pixel_frames
 from footscan.robust import MAD_TO_SD
-from footscan.stripe.extract import RED, find_stripe
+from footscan.stripe.crossings import RED, find_stripe
 from footscan.stripe.redness import as_red, as_words
 from schemas.laser import Laser
 from schemas.parameters.extraction import ExtractionParameters
@@ -20,6 +20,8 @@ SAMPLED = 6
 LEAST = 1000.0
 """Grey levels, summed over the crossings in all searched frames, by which a stripe must exceed its surroundings: that
 of a faint stripe of 100 px in one frame. With less in each colour the laser stays unknown. Chosen by hand."""
+CERTAIN = 10.0
+"""Multiple of that, and of the strength of the next colour, at which no more frames are searched for a colour."""
 MOST_CHROMA = 10
 """Grey levels by which R, G and B of a pixel may differ in a picture without colours. Chosen by hand."""
 SENSITIVE = 4
@@ -31,6 +33,12 @@ median is 0.1 to 0.3 of the quantile in bright rooms, and 0.4 to 0.75 in others.
 worlds."""
 NOISE_SDS = 4.0
 """A threshold is at least so many standard deviations of the noise of the redness. Chosen by hand."""
+
+CLEAR = 40
+"""Crossings a frame, two pixels apart, from which a stripe is clear, and no faint line is searched for. Chosen by
+hand."""
+LEAST_LINE = 12
+"""Crossings a frame of a faint line at least. Chosen by hand."""
 
 Pair = tuple[Rgb, Rgb | None]
 """A frame and its background."""
@@ -45,8 +53,8 @@ def adapted(
 
     Returns
     -------
-    `parameters`, with `laser` unchanged if they name one, or if no colour shows a stripe, and with lower thresholds if
-    the stripe of the film is fainter than `full_redness`.
+    `parameters`, with `laser` unchanged if they name one, or if no colour shows a stripe; with lower thresholds if the
+    stripe of the film is fainter than `full_redness`, and for a faint line (`stripe`) if there is hardly any other.
     """
     numbers = np.unique(np.linspace(0, film.count - 1, min(SAMPLED + 2, film.count)).round().astype(int)).tolist()
     if len(numbers) > SAMPLED:
@@ -80,10 +88,32 @@ def adapted_to(
         for frame, background in zip(frames, backgrounds or repeat(None), strict=False)
         if frame is not None
     ]
-    if parameters.laser == "auto":
-        sensitive = _scaled(parameters, SENSITIVE / parameters.red_threshold)
-        parameters = parameters.with_laser(_laser(pairs, parameters) or _laser(pairs, sensitive))
-    return _with_faint_thresholds(pairs, parameters)
+    sensitive = _scaled(parameters, SENSITIVE / parameters.red_threshold)
+    clear = parameters.with_laser(_laser(pairs, parameters) or _laser(pairs, sensitive))
+    if parameters.stripe == "auto":
+        line = _faint_line(pairs, parameters, clear)
+        if line is not None:
+            return line
+    return _with_faint_thresholds(pairs, clear)
+
+
+def _faint_line(
+    pairs: list[Pair], parameters: ExtractionParameters, clear: ExtractionParameters
+) -> ExtractionParameters | None:
+    """The parameters that find a faint line, if that is longer than the stripe that is found without them."""
+    found = 0
+    for frame, background in pairs:
+        found += len(find_stripe(frame, clear, background))
+        if found > CLEAR * len(pairs):
+            return None
+    faint = _scaled(parameters, 1.0 / parameters.red_threshold).model_copy(update={"stripe": "faint"})
+    best, most = None, 0.0
+    for laser in ("red", "green", "blue") if parameters.laser == "auto" else (parameters.searched_laser,):
+        line = faint.model_copy(update={"laser": laser})
+        red = np.concatenate([find_stripe(frame, line, background)[:, RED] for frame, background in pairs])
+        if len(red) > max(2 * found, LEAST_LINE * len(pairs)) and float(np.sum(red)) > most:
+            best, most = line, float(np.sum(red))
+    return best
 
 
 def _kept(frame: Rgb) -> Rgb:
@@ -114,17 +144,25 @@ def laser_of(
 
 
 def _laser(pairs: Iterable[Pair], parameters: ExtractionParameters) -> Laser | None:
-    weights = dict.fromkeys(get_args(Laser), 0.0)
+    lasers: tuple[Laser, ...] = get_args(Laser)
+    redness = dict.fromkeys(lasers, 0.0)
+    # Squares, since a stripe is strong, and what the room lights is mostly long and weak.
+    strength = dict.fromkeys(lasers, 0.0)
     is_grey = True
+    best = lasers[0]
     for frame, background in pairs:
         is_grey = is_grey and bool(np.all(np.ptp(frame[::2, ::2], axis=2) <= MOST_CHROMA))
-        for laser in ("mono",) if is_grey else ("red", "green", "blue"):
-            crossings = find_stripe(frame, parameters.model_copy(update={"laser": laser}), background)
-            weights[laser] += float(np.sum(crossings[:, RED]))
-    if not is_grey:
-        weights["mono"] = 0.0
-    laser = max(get_args(Laser), key=lambda name: weights[name])
-    return laser if weights[laser] >= LEAST else None
+        if not is_grey:
+            redness["mono"] = strength["mono"] = 0.0
+        for laser in lasers:
+            if is_grey == (laser == "mono"):
+                red = find_stripe(frame, parameters.model_copy(update={"laser": laser}), background)[:, RED]
+                redness[laser] += float(np.sum(red))
+                strength[laser] += float(np.sum(red * red))
+        best, second = sorted(lasers, key=lambda laser: -strength[laser])[:2]
+        if redness[best] > CERTAIN * LEAST and strength[best] > CERTAIN * strength[second] and not is_grey:
+            break
+    return best if redness[best] >= LEAST else None
 
 
 def _with_faint_thresholds(pairs: list[Pair], parameters: ExtractionParameters) -> ExtractionParameters:

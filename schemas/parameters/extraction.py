@@ -16,6 +16,11 @@ class ExtractionParameters(Document):
         description="colour of the laser in the pictures, `mono` for a camera without colours; `auto` finds it in the "
         "film. Where others say red, the colour of the laser is meant",
     )
+    stripe: Literal["auto", "clear", "faint"] = Field(
+        default="auto",
+        description="`faint` for a narrow line a few grey levels above a bright surface, whose single pixels do not "
+        "stand out, `clear` for any other stripe; `auto` finds out in the film",
+    )
     red_threshold: int = Field(
         default=18,
         ge=1,

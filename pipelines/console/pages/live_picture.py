@@ -7,7 +7,6 @@ import simplejpeg
 
 from footscan.frames.image import decode_image
 from footscan.stripe.extract import extract_stripe
-from footscan.stripe.laser import laser_of
 from schemas.parameters.extraction import ExtractionParameters
 
 DOT = (0, 240, 138)
@@ -41,8 +40,7 @@ class LivePictures:
 def draw_stripe(jpeg: bytes) -> tuple[bytes, int]:
     """As `LivePictures.drawn`."""
     image = decode_image(jpeg)
-    parameters = ExtractionParameters()
-    points = extract_stripe(image, parameters.with_laser(laser_of([image], parameters)))
+    points = extract_stripe(image, ExtractionParameters())
     shown = np.ascontiguousarray(image[::SMALLER, ::SMALLER])
     rows = np.clip(np.rint(points["j"] / SMALLER).astype(int), 0, shown.shape[0] - 1)
     columns = np.clip(np.rint(points["i"] / SMALLER).astype(int), 0, shown.shape[1] - 1)

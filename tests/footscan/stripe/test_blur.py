@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from footscan.stripe.blur import PEAK, SIGMA, WIDTH, is_laser_light
-from footscan.stripe.extract import BRIGHT, MEASURED, RED
+from footscan.stripe.crossings import BRIGHT, MEASURED, RED
 from schemas.parameters.extraction import ExtractionParameters
 
 FRAMES = 100
