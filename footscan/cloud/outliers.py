@@ -1,5 +1,6 @@
 """Removal of the points that do not belong to the foot, by reason."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
@@ -28,6 +29,11 @@ hides, other things that are none."""
 CLUTTERED = 0.02
 """Share of a camera's points that were isolated or unconfirmed from which its stripes need the confirmation of another
 camera. Cameras in a dark room without mirrors have less. Chosen by hand."""
+REACH_MARGIN_MM, REGION_MARGIN_MM = 5.0, 10.0
+"""By how much the control volume exceeds the first and the last frame, and the calibrated region: frames are placed to
+millimetres, and a map may hold a little beyond its control points. Chosen by hand."""
+STRIPE_GAPS = 3.0
+"""Points of one stripe may be so many `gap_mm` apart where it is asked whether the volume cuts it. Chosen by hand."""
 MUCH = 0.1
 """Share of a camera's points that are not the foot from which a warning is given. Chosen by hand."""
 
@@ -41,7 +47,7 @@ class Removed:
     counts: dict[int, dict[str, int]]
     """Camera -> reason -> number of points; all reasons, for each camera that has points."""
     warnings: list[str]
-    """A sentence for each camera much of whose points are not the foot."""
+    """A sentence for each camera much of whose points are not the foot, or that sees the foot where it is cut off."""
 
 
 def remove_outliers(
@@ -88,7 +94,8 @@ def remove_outliers(
         if (left := np.flatnonzero(codes == KEPT)).size:
             codes[left[select(points[left])]] = 1 + REASONS.index(reason)
 
-    drop("volume", lambda left: _outside(left, parameters))
+    volume = control_volume(views, parameters, filmed)
+    drop("volume", lambda left: _outside(left, volume))
     if parameters.drop_unsupported:
         drop("extrapolated", lambda left: ~left["supported"])
     drop("glass", lambda left: is_plate(left, views, parameters.glass_mm))
@@ -102,7 +109,8 @@ def remove_outliers(
         drop("clutter", is_apart)
     drop("clutter", lambda left: is_island(left, parameters.island_gap_steps, parameters.island_share))
     counts = _count(points["camera"], codes)
-    return points[codes == KEPT], Removed(codes, counts, _warnings(points["camera"], counts))
+    warnings = _warnings(points["camera"], counts) + _cut_warnings(points, codes, parameters)
+    return points[codes == KEPT], Removed(codes, counts, warnings)
 
 
 def _drop_by_segment(
@@ -163,11 +171,61 @@ def _is_beside(left: NDArray[np.void], body: tuple[float, float] | None) -> Mask
     return np.asarray((left["x"] < body[0]) | (left["x"] > body[1]))
 
 
-def _outside(points: NDArray[np.void], parameters: OutlierParameters) -> Mask:
+def control_volume(
+    views: Mapping[int, View], parameters: OutlierParameters, filmed: Mapping[int, NDArray[np.float64]] | None = None
+) -> NDArray[np.float64]:
+    """Limits in X, Y and Z (3, 2), mm, of what can be the foot: those of the parameters, or those of the scanner.
+
+    The scanner reaches along X from the first frame to the last, and in Y and Z as far as any camera's calibration.
+    Where that is not known, the volume is not limited.
+
+    >>> from footscan.cloud.views import View
+    >>> view = View(np.zeros(3), np.array([[-90.0, 0.0], [90.0, 0.0], [0.0, 100.0]]))
+    >>> limits = control_volume({1: view}, OutlierParameters(z_mm=(-20.0, 110.0)), {1: np.array([2.0, 300.0])})
+    >>> print(limits.tolist())
+    [[-3.0, 305.0], [-100.0, 100.0], [-20.0, 110.0]]
+    """
+    limits = np.tile([-math.inf, math.inf], (3, 1))
+    places = [x[np.isfinite(x)] for x in (filmed or {}).values()]
+    if any(x.size for x in places):
+        along = np.concatenate(places)
+        limits[0] = along.min() - REACH_MARGIN_MM, along.max() + REACH_MARGIN_MM
+    if views and all(len(view.outline) for view in views.values()):
+        corners = np.concatenate([view.outline for view in views.values()])
+        limits[1:, 0], limits[1:, 1] = corners.min(axis=0) - REGION_MARGIN_MM, corners.max(axis=0) + REGION_MARGIN_MM
+    for axis, given in enumerate((parameters.x_mm, parameters.y_mm, parameters.z_mm)):
+        if given is not None:
+            limits[axis] = given
+    return limits
+
+
+def _outside(points: NDArray[np.void], volume: NDArray[np.float64]) -> Mask:
     inside = np.ones(len(points), np.bool_)
-    for axis, (low, high) in (("x", parameters.x_mm), ("y", parameters.y_mm), ("z", parameters.z_mm)):
+    for axis, (low, high) in zip("xyz", volume, strict=True):
         inside &= (points[axis] >= low) & (points[axis] <= high)  # false for NaN
     return ~inside
+
+
+def _cut_warnings(points: NDArray[np.void], codes: NDArray[np.uint8], parameters: OutlierParameters) -> list[str]:
+    """A sentence for each camera that sees the foot beyond the control volume or the calibrated region."""
+    order = np.lexsort([points["source"], points["frame"], points["camera"]])
+    ordered, code = points[order], codes[order]
+    apart = (
+        np.linalg.norm(np.stack([np.diff(ordered[axis]) for axis in "yz"]), axis=0) > STRIPE_GAPS * parameters.gap_mm
+    )
+    apart |= (np.diff(ordered["frame"]) != 0) | (np.diff(ordered["camera"]) != 0)
+    stripe = np.concatenate([[0], np.cumsum(apart)]) if len(ordered) else np.empty(0, np.int64)
+    of_foot = np.bincount(stripe, code == KEPT) > 0 if len(ordered) else np.empty(0, np.bool_)
+    cut = np.isin(code, [1 + REASONS.index(reason) for reason in ("volume", "extrapolated")]) & of_foot[stripe]
+    kept = np.bincount(ordered["camera"], code == KEPT)
+    beyond = np.bincount(ordered["camera"], cut)
+    shares = beyond / np.maximum(beyond + kept, 1)
+    return [
+        f"camera {camera}: {100 * shares[camera]:.0f} % of its points on the foot lie outside the control volume or "
+        "the part of the picture that the calibration supports, and were dropped: place the foot in the middle, or "
+        "calibrate with a larger object"
+        for camera in np.flatnonzero(shares > parameters.largest_cut)
+    ]
 
 
 def _count(camera: NDArray[np.uint8], codes: NDArray[np.uint8]) -> dict[int, dict[str, int]]:

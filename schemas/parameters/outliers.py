@@ -13,12 +13,15 @@ Share = Annotated[float, Field(ge=0, le=1)]
 class OutlierParameters(Document):
     """Limits beyond which points are dropped."""
 
-    x_mm: Range = (-500.0, 500.0)
-    """Control volume along the travel; wide, because the travel itself bounds X."""
-    y_mm: Range = (-75.0, 75.0)
-    """Control volume across the travel."""
-    z_mm: Range = (-150.0, 120.0)
-    """Control volume in height; it includes the mirror image below the glass, which `glass_mm` limits."""
+    x_mm: Range | None = None
+    """Control volume along the travel; null for the reach of the heads: from the first frame to the last."""
+    y_mm: Range | None = None
+    """Control volume across the travel; null for all that the calibration supports."""
+    z_mm: Range | None = None
+    """Control volume in height; null for all that the calibration supports. It includes the mirror image below the
+    glass, which `glass_mm` limits."""
+    largest_cut: Share = 0.01
+    """Share of a camera's points on stripes of the foot that may lie outside without a warning."""
     drop_unsupported: bool = True
     """Drop points of pixels that no control point of the calibration supports."""
     glass_mm: Annotated[float, Field(ge=0, le=50)] = 0.5
@@ -53,7 +56,7 @@ class OutlierParameters(Document):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         for name in ("x_mm", "y_mm", "z_mm"):
-            low, high = getattr(self, name)
-            if low >= high:
-                raise ValueError(f"{name}: expected the lower limit first, found {low} and {high}")
+            limits = getattr(self, name)
+            if limits is not None and limits[0] >= limits[1]:
+                raise ValueError(f"{name}: expected the lower limit first, found {limits[0]} and {limits[1]}")
         return self

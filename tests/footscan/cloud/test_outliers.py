@@ -96,9 +96,31 @@ def test_the_order_of_points_does_not_matter(ellipsoid: Film, views: Views) -> N
 
 def test_outside_the_control_volume(ellipsoid: Film, views: Views) -> None:
     spoilt = make_points(
-        np.array([[60.0, 90.0, 10.0], [60.0, 0.0, -160.0], [60.0, 0.0, 200.0], [np.nan, 0.0, 10.0]]), camera=3
+        np.array([[60.0, 190.0, 10.0], [60.0, 0.0, -160.0], [60.0, 0.0, 200.0], [np.nan, 0.0, 10.0]]), camera=3
     )
     assert dropped(ellipsoid()[0], spoilt, views) == {"volume": 4}
+
+
+def test_a_given_volume_replaces_that_of_the_scanner(ellipsoid: Film, views: Views) -> None:
+    spoilt = make_points(np.array([[60.0, 190.0, 10.0]]), camera=3)
+    assert dropped(ellipsoid()[0], spoilt, views, y_mm=(-200.0, 200.0)) != {"volume": 1}
+    beyond = line(1, 400, (0.0, 20.0), (0.0, 40.0))  # the frames end before
+    filmed = {camera: 2.0 * np.arange(61) for camera in views}
+    _, removed = remove_outliers(np.concatenate([ellipsoid()[0], beyond]), views, WITH_ENDS, filmed)
+    assert removed.counts[1]["volume"] == len(beyond)
+
+
+@pytest.mark.parametrize("limits", [{"z_mm": (0.0, 20.0)}, {"y_mm": (-60.0, 5.0)}])
+def test_a_volume_that_cuts_the_foot_is_reported(
+    ellipsoid: Film, views: Views, limits: dict[str, tuple[float, float]]
+) -> None:
+    clean, _ = ellipsoid()
+    _, whole = remove_outliers(clean, views, WITH_ENDS)
+    assert not whole.warnings
+    _, removed = remove_outliers(clean, views, OutlierParameters(end_points=0, **limits))
+    cut = [warning for warning in removed.warnings if "control volume" in warning]
+    assert cut
+    assert all(warning.startswith("camera ") for warning in cut)
 
 
 def test_extrapolated(ellipsoid: Film, views: Views) -> None:
