@@ -11,13 +11,14 @@ from footscan.cloud.body import body_range, is_apart
 from footscan.cloud.clutter import is_island, is_static
 from footscan.cloud.ghost import is_ghost
 from footscan.cloud.glass import is_below_sole, is_plate
+from footscan.cloud.levels import is_far, is_off_median
 from footscan.cloud.support import END, ISOLATED, UNCONFIRMED, judge_segments
 from footscan.cloud.views import View
 from schemas.parameters.outliers import OutlierParameters
 
 Mask = NDArray[np.bool_]
 
-REASONS = ("volume", "extrapolated", "end", "isolated", "unconfirmed", "glass", "clutter")
+REASONS = ("volume", "extrapolated", "end", "isolated", "unconfirmed", "glass", "clutter", "median")
 """Reasons to drop a point; the code of a reason is its position here, counted from 1."""
 KEPT = 0
 """Code of a point that is kept."""
@@ -68,6 +69,10 @@ def remove_outliers(
       or that lie behind a surface on which more cameras agree ("unconfirmed");
     - parts apart from the rest that are small, or on which cameras do not agree ("clutter" again).
 
+    With the method `levels` they are dropped without the evidence of other cameras, as in the thesis: points far from
+    all others ("isolated"), then those outside the control volume ("volume"), then those that lie beside the median of
+    their stripe ("median").
+
     Parameters
     ----------
     points : (N,) of `POINT_DTYPE`, mm, scanner frame, of all cameras
@@ -83,7 +88,7 @@ def remove_outliers(
     --------
     >>> from footscan.cloud.points import make_points
     >>> points = make_points(np.array([[0.0, 0.0, 1e6]]), camera=3)
-    >>> kept, removed = remove_outliers(points, {}, OutlierParameters())
+    >>> kept, removed = remove_outliers(points, {}, OutlierParameters(z_mm=(-20.0, 200.0)))
     >>> print(len(kept), removed.counts[3]["volume"])
     0 1
     """
@@ -95,6 +100,11 @@ def remove_outliers(
             codes[left[select(points[left])]] = 1 + REASONS.index(reason)
 
     volume = control_volume(views, parameters, filmed)
+    if parameters.method == "levels":
+        drop("isolated", lambda left: is_far(left, parameters.nearest_mm))
+        drop("volume", lambda left: _outside(left, volume))
+        drop("median", lambda left: is_off_median(left, parameters.median_mm))
+        return points[codes == KEPT], Removed(codes, _count(points["camera"], codes), [])
     drop("volume", lambda left: _outside(left, volume))
     if parameters.drop_unsupported:
         drop("extrapolated", lambda left: ~left["supported"])

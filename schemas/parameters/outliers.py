@@ -1,6 +1,6 @@
 """Parameters of the outlier filter."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -12,6 +12,16 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 class OutlierParameters(Document):
     """Limits beyond which points are dropped."""
+
+    method: Literal["evidence", "levels"] = "evidence"
+    """`evidence` of other cameras, neighbouring frames and the glass; or the three `levels` of the thesis, for
+    comparison: nearest distance, control volume, median. The levels use `nearest_mm`, the volume and `median_mm`
+    alone."""
+    nearest_mm: Annotated[float, Field(gt=0, le=50)] = 2.0
+    """Level of the nearest distance: points without another one within this distance are dropped."""
+    median_mm: Annotated[float, Field(gt=0, le=50)] = 1.0
+    """Level of the median: points farther than this from the median of their neighbours along the stripe are
+    dropped."""
 
     x_mm: Range | None = None
     """Control volume along the travel; null for the reach of the heads: from the first frame to the last."""

@@ -101,6 +101,24 @@ def test_outside_the_control_volume(ellipsoid: Film, views: Views) -> None:
     assert dropped(ellipsoid()[0], spoilt, views) == {"volume": 4}
 
 
+def test_levels_drop_without_evidence(ellipsoid: Film, views: Views) -> None:
+    clean, _ = ellipsoid()
+    alone = make_points(np.array([[60.0, 0.0, 100.0]]), camera=3)
+    beyond = line(5, 30, (190.0, 20.0), (200.0, 20.0))
+    clutter = line(1, 30, (10.0, 70.0), (14.0, 70.0))  # no other camera sees it
+    spoilt = clean[2000:2001].copy()
+    spoilt["z"] += 1.6
+    points = np.concatenate([np.delete(clean, 2000), spoilt, alone, beyond, clutter])
+    kept, removed = remove_outliers(points, views, OutlierParameters(method="levels"))
+    reasons = np.array(["", *REASONS])[removed.codes]
+    assert reasons[len(clean) - 1] == "median"
+    assert reasons[len(clean)] == "isolated"
+    assert set(reasons[len(clean) + 1 : len(clean) + 41]) == {"volume"}
+    assert set(reasons[len(clean) + 41 :]) == {""}
+    assert np.count_nonzero(removed.codes[: len(clean) - 1]) < 0.02 * len(clean)
+    assert len(kept) == np.count_nonzero(removed.codes == 0)
+
+
 def test_a_given_volume_replaces_that_of_the_scanner(ellipsoid: Film, views: Views) -> None:
     spoilt = make_points(np.array([[60.0, 190.0, 10.0]]), camera=3)
     assert dropped(ellipsoid()[0], spoilt, views, y_mm=(-200.0, 200.0)) != {"volume": 1}
