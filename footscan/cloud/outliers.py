@@ -12,6 +12,7 @@ from footscan.cloud.clutter import is_island, is_static
 from footscan.cloud.ghost import is_ghost
 from footscan.cloud.glass import is_below_sole, is_plate
 from footscan.cloud.levels import is_far, is_off_median
+from footscan.cloud.off_surface import is_off_surface
 from footscan.cloud.support import END, ISOLATED, UNCONFIRMED, judge_segments
 from footscan.cloud.views import View
 from schemas.parameters.outliers import OutlierParameters
@@ -66,7 +67,8 @@ def remove_outliers(
       ("clutter"): they would confirm each other;
     - the last points of a stripe where other cameras see the same place within their stripes ("end"), segments of
       stripe without any before and behind them ("isolated"), and segments that other cameras should see, but do not,
-      or that lie behind a surface on which more cameras agree ("unconfirmed");
+      or that lie behind a surface on which more cameras agree, and points off the surface that the stripes around them
+      make ("unconfirmed");
     - parts apart from the rest that are small, or on which cameras do not agree ("clutter" again).
 
     With the method `levels` they are dropped without the evidence of other cameras, as in the thesis: points far from
@@ -115,6 +117,7 @@ def remove_outliers(
     drop("glass", lambda left: is_below_sole(left, views, parameters.glass_mm))
     _drop_by_segment(points, codes, views, parameters, filmed)
     drop("glass", lambda left: is_plate(left, views, parameters.glass_mm))  # without what seemed to be its sides
+    drop("unconfirmed", is_off_surface)
     if body is not None:
         drop("clutter", is_apart)
     drop("clutter", lambda left: is_island(left, parameters.island_gap_steps, parameters.island_share))
