@@ -88,8 +88,10 @@ def adapted_to(
         for frame, background in zip(frames, backgrounds or repeat(None), strict=False)
         if frame is not None
     ]
-    sensitive = _scaled(parameters, SENSITIVE / parameters.red_threshold)
-    clear = parameters.with_laser(_laser(pairs, parameters) or _laser(pairs, sensitive))
+    clear = parameters
+    if parameters.laser == "auto":
+        sensitive = _scaled(parameters, SENSITIVE / parameters.red_threshold)
+        clear = parameters.with_laser(_laser(pairs, parameters) or _laser(pairs, sensitive))
     if parameters.stripe == "auto":
         line = _faint_line(pairs, parameters, clear)
         if line is not None:

@@ -11,6 +11,7 @@ from footscan.cloud.fusion.agreement import Pairs, disagreements, find_overlaps
 from footscan.cloud.fusion.correction import correct
 from footscan.cloud.fusion.merge import merge
 from footscan.cloud.fusion.stripes import Floats, Stripes, sort_stripes
+from footscan.cloud.off_surface import is_off_shared_surface
 from schemas.fusion import FusionReport, PairDisagreement
 from schemas.parameters.fusion import FusionParameters
 
@@ -28,7 +29,8 @@ def fuse(points: NDArray[np.void] | Iterable[NDArray[np.void]], parameters: Fusi
 
     The distance at which two cameras place the same skin is measured for each pair. Cameras that deviate from the
     others are moved if that improves the agreement on held-out data. Then the stripes of all cameras in one laser plane
-    are averaged across the stripe, with weights 1 / sigma^2, and thinned out.
+    are averaged across the stripe, with weights 1 / sigma^2, and thinned out. Points that one camera alone saw, off the
+    surface that several cameras saw, are dropped (`off_surface`).
 
     Parameters
     ----------
@@ -65,13 +67,15 @@ def fuse(points: NDArray[np.void] | Iterable[NDArray[np.void]], parameters: Fusi
         _deviations(stripes, after),
         parameters,
     )
+    off = is_off_shared_surface(merged.points)
+    lonely = np.bincount(merged.points["camera"][off], minlength=256)
     report = FusionReport(
         pairs=[
             PairDisagreement(cameras=pair, points=count, before=disagreement, after=after.get(pair, before[pair])[1])
             for pair, (count, disagreement) in before.items()
         ],
         corrections=corrected.corrections,
-        contradicted=merged.contradicted,
+        contradicted={camera: count + int(lonely[camera]) for camera, count in merged.contradicted.items()},
         warnings=[
             f"camera {camera} deviates from the others by {away:.2f} mm, expected "
             f"{parameters.largest_correction_mm:g} mm at most: it was moved since the calibration, or its travel is "
@@ -79,7 +83,7 @@ def fuse(points: NDArray[np.void] | Iterable[NDArray[np.void]], parameters: Fusi
             for camera, away in sorted(corrected.too_far.items())
         ],
     )
-    return Fusion(merged.points, report)
+    return Fusion(merged.points[~off], report)
 
 
 def _deviations(stripes: Stripes, pairs: Pairs) -> Floats:

@@ -2,7 +2,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from footscan.cloud.off_surface import is_off_surface
+from footscan.cloud.off_surface import is_off_shared_surface, is_off_surface
 from footscan.cloud.points import make_points
 
 Film = Callable[..., tuple[np.ndarray, np.ndarray]]
@@ -44,3 +44,18 @@ def test_the_order_of_points_does_not_matter(ellipsoid: Film) -> None:
 def test_few_points_are_never_off() -> None:
     assert not is_off_surface(make_points(np.zeros((0, 3)), camera=1)).any()
     assert not is_off_surface(make_points(np.array([[0.0, 0.0, 0.0], [0.0, 3.0, 0.0]]), camera=1)).any()
+
+
+def test_what_one_camera_alone_saw_is_compared_with_what_several_saw(ellipsoid: Film) -> None:
+    cloud, _ = ellipsoid()
+    cloud["cameras"] = 3
+    alone = np.flatnonzero((cloud["camera"] == 1) & (cloud["frame"] % 5 == 0))
+    cloud["cameras"][alone] = 1
+    assert not is_off_shared_surface(cloud).any()
+    points = lifted(cloud, camera=1, frame=30, by_mm=1.5)
+    moved = points != cloud
+    off = is_off_shared_surface(points)
+    assert off[moved].mean() > 0.8
+    assert not off[~moved].any()
+    points["cameras"] = 2
+    assert not is_off_shared_surface(points).any()
