@@ -169,7 +169,7 @@ def choose_light(cameras: Sequence[int], look: Look, limits: LightLimits | None 
         frames = look(power, {camera: search.exposure_ms for camera, search in searches.items()})
         looks += 1
         everything = [frame for camera in searches for frame in frames[camera]]
-        extraction = ExtractionParameters().with_laser(laser_of(everything, ExtractionParameters()))
+        extraction = ExtractionParameters().with_laser(laser_of(everything, ExtractionParameters()) or "red")
         again = [search.learn(stripe_seen(frames[camera], extraction), limits) for camera, search in searches.items()]
         if any(again):
             continue

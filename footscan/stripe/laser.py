@@ -92,7 +92,7 @@ def adapted_to(
     if parameters.laser == "auto":
         sensitive = _scaled(parameters, SENSITIVE / parameters.red_threshold)
         clear = parameters.with_laser(_laser(pairs, parameters) or _laser(pairs, sensitive))
-    if parameters.stripe == "auto":
+    if pairs and parameters.stripe == "auto":
         line = _faint_line(pairs, parameters, clear)
         if line is not None:
             return line

@@ -88,7 +88,7 @@ def test_nothing_has_changed(root: Path) -> None:
     ("parameters", "steps", "change", "worse"),
     [
         ("{extraction: {red_threshold: 60}}", ["extract-1", "extract-5"], "red_threshold: 18 → 60", "points.stripe"),
-        ("{outliers: {z_mm: [5, 120]}}", ["clean"], "z_mm: [-150.0, 120.0] → [5.0, 120.0]", "points.removed"),
+        ("{outliers: {z_mm: [5, 120]}}", ["clean"], "z_mm: None → [5.0, 120.0]", "points.removed"),
         ("{surface: {grid_steps: 1.25}}", ["surface"], "grid_steps: 0.625 → 1.25", "surface.triangles"),
     ],
 )

@@ -63,7 +63,7 @@ def test_the_present_point_holds_what_is_sought() -> None:
         "extraction.ridge_px": 2.5,
         "extraction.centre_method": "gravity",
         "outliers.island_share": 0.005,
-        "outliers.z_mm": [-150.0, 120.0],
+        "outliers.z_mm": None,
     }
 
 
