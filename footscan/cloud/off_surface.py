@@ -26,6 +26,9 @@ FEWEST = 8
 """Points of other stripes from which a plane is fitted; with fewer nothing is dropped."""
 SURROUNDING = 3
 """Of them at least so many before, and so many behind."""
+LEAST_BREADTH = 0.15
+"""Standard deviation of the neighbours across their longest direction, in radii, at least: points of one line, such as
+the only other stripe in reach, have no plane."""
 MOST = 400
 """Points of other stripes that are used at most: a bound of memory."""
 PASSES, INLIER = 3, 3.0
@@ -127,24 +130,25 @@ def _off(
             for k in range(count):
                 if distances[k] <= limit:
                     add_point(sums, near[k, 0], near[k, 1], near[k, 2], 1.0)
-            a, b, c, _, _ = plane_normal(sums)
+            a, b, c, _, breadth = plane_normal(sums)
             level = (a * sums[1] + b * sums[2] + c * sums[3]) / sums[0]
             for k in range(count):
                 distances[k] = abs(a * near[k, 0] + b * near[k, 1] + c * near[k, 2] - level)
             spread = max(MAD_TO_SD * float(np.median(distances[:count])), LEAST_SPREAD_MM)
             limit = INLIER * spread
-            distance = abs(level) if sums[0] >= FEWEST and a * a + b * b + c * c > 0.0 else 0.0
+            broad = breadth >= (LEAST_BREADTH * around.radius_mm) ** 2
+            distance = abs(level) if sums[0] >= FEWEST and broad else 0.0
         off[n] = distance > max(around.least_off_mm, around.off * spread)
     return off
 
 
 @compiled
 def _is_surrounded(near: NDArray[np.float64], least: int) -> bool:
-    """True if there are points before and behind, or in the same plane: beyond the last stripe a plane says little."""
+    """True if there are points before and behind: beyond the last stripe, and on one stripe, a plane says little."""
     before = behind = 0
     for k in range(len(near)):
-        before += near[k, 0] <= PLANE_MM
-        behind += near[k, 0] >= -PLANE_MM
+        before += near[k, 0] < -PLANE_MM
+        behind += near[k, 0] > PLANE_MM
     return min(before, behind) >= least
 
 
