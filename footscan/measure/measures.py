@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from footscan.measure import girths, linear, plantar, solid
+from footscan.measure.attached import things_at_foot
 from footscan.measure.foot_landmarks import Landmark, find_landmarks
 from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame import FootFrame, foot_frame
@@ -215,13 +216,21 @@ def measure_foot(
         source = KDTree(vertices).query(back)[1]
         errors_mm = None if errors_mm is None else np.asarray(errors_mm, np.float64)[source]
         filled = None if filled is None else filled[source]
+    things = things_at_foot(foot)
     return Measures(
         side=foot.side,
         side_note=foot.side_note,
+        things=things,
         axis=foot.axis,
         transform=foot.transform.tolist(),
         measures=take_measures(
-            foot, landmarks, errors_mm=errors_mm, reach_mm=reach_mm, filled=filled, calibration=calibration
+            foot,
+            landmarks,
+            errors_mm=errors_mm,
+            reach_mm=reach_mm,
+            filled=filled,
+            calibration=calibration,
+            doubt="; ".join(things) or None,
         ),
         landmarks=_in_mesh(landmarks, foot.transform),
     )
@@ -235,17 +244,19 @@ def take_measures(
     reach_mm: float = 0.0,
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
+    doubt: str | None = None,
 ) -> dict[str, Measure]:
     """Compute all measures of a foot in its own frame.
 
-    Parameters are those of `measure_foot`; arrays (V,) are by the vertices of `foot`.
+    Parameters are those of `measure_foot`; arrays (V,) are by the vertices of `foot`. `doubt` is a reason for which all
+    measures are uncertain.
     """
     surface = FootSurface(foot, landmarks)
     errors = _Errors(surface.errors if errors_mm is None else errors_mm, _cubes(foot.vertices, reach_mm), filled)
     calibrations = calibration or {}
     to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
     return {
-        name: _measure(definition, surface, errors, calibrations.get(name), to_mesh)
+        name: _measure(definition, surface, errors, calibrations.get(name), to_mesh, doubt)
         for name, definition in _definitions().items()
     }
 
@@ -274,6 +285,7 @@ def _measure(
     errors: _Errors,
     calibration: tuple[float, float] | None,
     to_mesh: Floats,
+    doubt: str | None,
 ) -> Measure:
     try:
         quantity = definition.compute(surface)
@@ -284,7 +296,7 @@ def _measure(
     offset, factor = calibration or (0.0, 1.0)
     digits = DIGITS[definition.unit]
     share = None if errors.filled is None else round(quantity.share(errors.filled), 3)
-    doubts = [] if quantity.doubt is None else [quantity.doubt]
+    doubts = [reason for reason in (quantity.doubt, doubt) if reason is not None]
     if share is not None and share > FILLED_SHARE:
         doubts.append(f"{100 * share:.0f} % of it rests on surface that was filled, not measured")
     status: Status = "uncertain" if doubts else "ok"

@@ -198,3 +198,9 @@ def _sampled_back(gradient: Complex, places: Floats) -> Floats:
             back[point, 0] += part * gradient[k].real
             back[point, 1] += part * gradient[k].imag
     return back
+
+
+def polygon_area(polygon: Floats) -> float:
+    """Area of (N, 2) corners in mm², positive if they run counter-clockwise."""
+    ahead = np.roll(polygon, -1, axis=0)
+    return float(0.5 * np.sum(polygon[:, 0] * ahead[:, 1] - polygon[:, 1] * ahead[:, 0]))

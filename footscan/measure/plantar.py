@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from footscan.measure.foot_surface import CLOSED_GAP_MM, UP, FootSurface
 from footscan.measure.hull import hull_corners
-from footscan.measure.outline import Outline, Plane
+from footscan.measure.outline import Outline, Plane, polygon_area
 from footscan.measure.quantity import NotMeasurable, Quantity, combined
 
 Floats = NDArray[np.float64]
@@ -64,7 +64,7 @@ def footprint(foot: FootSurface) -> Print:
     outlines = [
         outline
         for outline in outlines
-        if abs(_area(outline.points)) >= LEAST_MM2 and ball.ahead(outline.points).min() < TOES * foot.length_mm
+        if abs(polygon_area(outline.points)) >= LEAST_MM2 and ball.ahead(outline.points).min() < TOES * foot.length_mm
     ]
     if not outlines:
         raise NotMeasurable("the foot does not reach the floor")
@@ -117,7 +117,7 @@ def clarke_angle(foot: FootSurface) -> Quantity:
     The line starts on the tangent beside the head of the first metatarsal.
     """
     contact = foot.once(footprint)
-    largest = max(contact.outlines, key=lambda outline: abs(_area(outline.points)))
+    largest = max(contact.outlines, key=lambda outline: abs(polygon_area(outline.points)))
     points, thirds = largest.points, contact.rear + (contact.front - contact.rear) * np.array([1 / 3, 2 / 3])
     if not (points[:, 0].min() < thirds[0] and points[:, 0].max() > thirds[1]):
         raise NotMeasurable("the print is in two parts: its medial border does not run from heel to ball")
@@ -191,7 +191,7 @@ def _widths(outlines: list[Outline], stations: Floats, ball: _BallLine, limit: f
         if np.isfinite(limit):
             border = ball.lateral[1] + (x - limit - ball.lateral[0]) / ball.slope  # by `limit` ahead of the ball
             y = np.maximum(y, border)
-        widths += np.bincount(station, -np.sign(along) * np.sign(_area(start)) * y, len(stations))
+        widths += np.bincount(station, -np.sign(along) * np.sign(polygon_area(start)) * y, len(stations))
     return widths
 
 
@@ -232,11 +232,5 @@ def _side_quantity(foot: FootSurface, contact: Print, station: int) -> Quantity:
 def _outwards(polygon: Floats) -> Floats:
     """Returns (N, 2) derivatives of the polygon's area by its points."""
     chord = np.roll(polygon, -1, axis=0) - np.roll(polygon, 1, axis=0)
-    outwards: Floats = 0.5 * np.sign(_area(polygon)) * np.column_stack([chord[:, 1], -chord[:, 0]])
+    outwards: Floats = 0.5 * np.sign(polygon_area(polygon)) * np.column_stack([chord[:, 1], -chord[:, 0]])
     return outwards
-
-
-def _area(polygon: Floats) -> float:
-    """Area of a polygon in mm², positive if its corners run counter-clockwise."""
-    ahead = np.roll(polygon, -1, axis=0)
-    return float(0.5 * np.sum(polygon[:, 0] * ahead[:, 1] - polygon[:, 1] * ahead[:, 0]))

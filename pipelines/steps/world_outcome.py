@@ -45,7 +45,7 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
         shift_mm=float(np.linalg.norm((turn - np.eye(3)) @ measured.mean(axis=0) + shift)),
         cloud=error(coordinates(oriented["cloud"])),
         surface=error(measured),
-        warnings=[*cleaning, *agreement.warnings, *([] if measures.side_note is None else [measures.side_note])],
+        warnings=[*cleaning, *agreement.warnings, *measures.warnings],
         measures={
             name: WorldMeasure(value=measure.value, truth=known[name], sigma=measure.uncertainty, status=measure.status)
             for name, measure in measures.measures.items()

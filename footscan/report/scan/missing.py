@@ -27,8 +27,8 @@ def missing_list(measures: Measures, quality: Quality) -> str:
 def _measures(measures: Measures) -> Iterator[str]:
     if measures.finding is not None:
         yield f"Not measured: {measures.finding}."
-    if measures.side_note is not None:
-        yield f"{measures.side_note[:1].upper()}{measures.side_note[1:]}."
+    for warning in measures.warnings:
+        yield f"{warning[:1].upper()}{warning[1:]}."
     for status, reading in (("incomplete", "could not be taken"), ("uncertain", "is uncertain")):
         for name, measure in measures.measures.items():
             if measure.status == status:

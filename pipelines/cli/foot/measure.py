@@ -65,7 +65,7 @@ def measure(
         measures = measure_foot(mesh.vertices, mesh.faces, side, axis=axis, manual=manual)
     except Finding as error:
         raise RefusedInput(file, str(error)) from None
-    for note in (*mesh.notes, *([] if measures.side_note is None else [measures.side_note])):
+    for note in (*mesh.notes, *measures.warnings):
         message(f"{file}: {note}")
     if out is not None:
         write_atomically(out, (measures.model_dump_json(indent=2) + "\n").encode())

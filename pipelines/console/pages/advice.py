@@ -35,6 +35,8 @@ def _finding(measures: Measures) -> Iterator[str]:
         yield f"Nothing was measured ({measures.finding}). Is a bare foot flat on the glass, toes forward? Scan again."
     if measures.side_note is not None:
         yield f"{measures.side_note[:1].upper()}{measures.side_note[1:]}: was the right side chosen? Scan again if not."
+    for thing in measures.things:
+        yield f"{thing[:1].upper()}{thing[1:]}. Take everything away from the foot, and scan again."
 
 
 def _cameras(quality: Quality, filmed: dict[int, RecordedCamera]) -> Iterator[str]:
