@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from footscan.cloud.fusion.fuse import fuse
 from footscan.cloud.mapping import map_stripe, refuse_other_size
 from footscan.cloud.normals import estimate_normals
-from footscan.cloud.outliers import remove_outliers
+from footscan.cloud.outliers.remove import remove_outliers
 from footscan.cloud.views import views_of
 from footscan.frames.film import open_background, open_film
 from footscan.frames.image import Rgb

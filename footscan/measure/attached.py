@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.frame import FootFrame
+from footscan.measure.frame.foot_frame import FootFrame
 from footscan.measure.landmarks.sides import FULL_SIZE_MM
 from footscan.measure.outline import polygon_area
 from footscan.mesh.sections import Cuttable, cut, cuttable

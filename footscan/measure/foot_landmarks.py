@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from footscan.measure.frame import FootFrame, forefoot_points
+from footscan.measure.frame.foot_frame import FootFrame, forefoot_points
 from footscan.measure.landmarks.dorsal import BELOW_CUT_MM, instep_point, junction_point, metatarsal_top
 from footscan.measure.landmarks.extreme import Cap, Floats, Point, Summit
 from footscan.measure.landmarks.plantar import landing_point

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from footscan.compiled import compiled
 from footscan.measure.foot_landmarks import Landmark
-from footscan.measure.frame import FootFrame
+from footscan.measure.frame.foot_frame import FootFrame
 from footscan.measure.landmarks.dorsal import CORNER_MM
 from footscan.measure.landmarks.errors import saddle_gradient, summit_gradient
 from footscan.measure.landmarks.sides import FULL_SIZE_MM

@@ -12,7 +12,7 @@ from footscan.measure import girths, linear, plantar, solid
 from footscan.measure.attached import things_at_foot
 from footscan.measure.foot_landmarks import Landmark, find_landmarks
 from footscan.measure.foot_surface import FootSurface
-from footscan.measure.frame import FootFrame, foot_frame
+from footscan.measure.frame.foot_frame import FootFrame, foot_frame
 from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.mesh.rigid_transform import apply
 from footscan.rows import distinct_rows

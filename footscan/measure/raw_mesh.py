@@ -8,8 +8,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
-from footscan.measure.frame import CONVEX
-from footscan.measure.pose import find_pose, volume
+from footscan.measure.frame.foot_frame import CONVEX
+from footscan.measure.frame.pose import find_pose, volume
 from footscan.mesh.rigid_transform import apply
 from footscan.mesh.topology import directed_edges, face_components, used_vertices
 from footscan.rows import distinct_rows

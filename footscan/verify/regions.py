@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.frame import foot_frame
+from footscan.measure.frame.foot_frame import foot_frame
 from footscan.mesh.formats.files import Shape
 from footscan.mesh.rigid_transform import apply
 from footscan.mesh.sampling import surface_area

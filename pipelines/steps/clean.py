@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.outliers import remove_outliers
+from footscan.cloud.outliers.remove import remove_outliers
 from footscan.cloud.views import views_of
 from pipelines.arrays import pack, unpack
 from schemas.base.errors import Finding

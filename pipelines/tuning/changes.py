@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.outliers import KEPT
+from footscan.cloud.outliers.remove import KEPT
 from footscan.frames.array import IngestedFrames
 from footscan.frames.reader import pixel_frames
 from footscan.recordings.scans import RecordedScan

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from footscan.cloud.outliers import KEPT
+from footscan.cloud.outliers.remove import KEPT
 from footscan.cloud.points import POINT_DTYPE, make_points
 from footscan.mesh.formats.ply import ply_of
 from footscan.mesh.mesh import Mesh

@@ -11,7 +11,8 @@ from footscan.cloud.fusion.agreement import Pairs, disagreements, find_overlaps
 from footscan.cloud.fusion.correction import correct
 from footscan.cloud.fusion.merge import merge
 from footscan.cloud.fusion.stripes import Floats, Stripes, sort_stripes
-from footscan.cloud.off_surface import is_off_shared_surface
+from footscan.cloud.outliers.alone import is_off_alone
+from footscan.cloud.outliers.off_surface import is_off_shared_surface
 from schemas.fusion import FusionReport, PairDisagreement
 from schemas.parameters.fusion import FusionParameters
 
@@ -67,7 +68,7 @@ def fuse(points: NDArray[np.void] | Iterable[NDArray[np.void]], parameters: Fusi
         _deviations(stripes, after),
         parameters,
     )
-    off = is_off_shared_surface(merged.points)
+    off = is_off_shared_surface(merged.points) | is_off_alone(merged.points)
     lonely = np.bincount(merged.points["camera"][off], minlength=256)
     report = FusionReport(
         pairs=[

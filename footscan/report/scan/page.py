@@ -59,7 +59,7 @@ class ScanPoints(NamedTuple):
     points: NDArray[np.void]
     """(N,) points of all cameras before the fusion."""
     codes: NDArray[np.uint8]
-    """(N,) why each was removed, as in `footscan.cloud.outliers.Removed`."""
+    """(N,) why each was removed, as in `footscan.cloud.outliers.remove.Removed`."""
     cloud: NDArray[np.void]
     """(M,) points from which the surface was made."""
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from footscan.cloud.outliers import KEPT, REASONS
+from footscan.cloud.outliers.remove import KEPT, REASONS
 from footscan.cloud.points import coordinates
 from footscan.report.markup import data_uri, key, number, table, text, words
 from schemas.quality import CameraQuality
@@ -59,7 +59,7 @@ def removed_pictures(points: NDArray[np.void], codes: NDArray[np.uint8]) -> str:
     Parameters
     ----------
     points : (N,) array of `footscan.cloud.points.POINT_DTYPE`, mm, scanner frame, of all cameras, before the fusion
-    codes : (N,) uint8, as in `footscan.cloud.outliers.Removed`
+    codes : (N,) uint8, as in `footscan.cloud.outliers.remove.Removed`
     """
     places = coordinates(points)
     finite = np.isfinite(places).all(axis=1)

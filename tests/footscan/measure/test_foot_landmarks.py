@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from footscan.measure.foot_landmarks import Landmark, check_manual, find_landmarks
-from footscan.measure.frame import foot_frame
+from footscan.measure.frame.foot_frame import foot_frame
 from footscan.measure.landmarks.dorsal import instep_point
 from footscan.mesh.formats.files import read_mesh
 from footscan.virtual.foot.foot import Foot, make_foot, sample_shape

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from footscan.measure.foot_surface import FootSurface
-from footscan.measure.frame import FootFrame
+from footscan.measure.frame.foot_frame import FootFrame
 from footscan.measure.girths import girth, tape
 from footscan.measure.outline import Plane
 from footscan.measure.quantity import NotMeasurable, Quantity

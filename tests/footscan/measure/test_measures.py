@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from footscan.measure.foot_landmarks import Landmark
-from footscan.measure.frame import FootFrame
+from footscan.measure.frame.foot_frame import FootFrame
 from footscan.measure.measures import measure_foot, take_measures
 from footscan.mesh.formats.files import read_mesh
 from footscan.mesh.topology import vertex_normals

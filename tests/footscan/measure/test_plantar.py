@@ -3,7 +3,7 @@ import pytest
 
 from footscan.measure.foot_landmarks import Landmark
 from footscan.measure.foot_surface import FootSurface
-from footscan.measure.frame import FootFrame
+from footscan.measure.frame.foot_frame import FootFrame
 from footscan.measure.plantar import arch_index, chippaux_smirak, clarke_angle, footprint, staheli
 from footscan.measure.quantity import NotMeasurable
 

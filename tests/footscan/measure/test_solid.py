@@ -4,7 +4,7 @@ import trimesh
 
 from footscan.measure.foot_landmarks import Landmark
 from footscan.measure.foot_surface import FootSurface
-from footscan.measure.frame import FootFrame
+from footscan.measure.frame.foot_frame import FootFrame
 from footscan.measure.landmarks.extreme import Cap
 from footscan.measure.quantity import NotMeasurable
 from footscan.measure.solid import foot_surface, foot_volume

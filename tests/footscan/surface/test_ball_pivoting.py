@@ -3,7 +3,7 @@ import pytest
 
 from footscan.cloud.fusion.fuse import fuse
 from footscan.cloud.normals import estimate_normals
-from footscan.cloud.outliers import remove_outliers
+from footscan.cloud.outliers.remove import remove_outliers
 from footscan.cloud.points import coordinates, make_points
 from footscan.surface.ball_pivoting import mesh_cloud
 from footscan.surface.quality import mesh_quality

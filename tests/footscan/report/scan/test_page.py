@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from footscan.cloud.outliers import REASONS
+from footscan.cloud.outliers.remove import REASONS
 from footscan.cloud.points import make_points
 from footscan.report.sample_frames import FrameSample
 from footscan.report.scan.foot_colours import FootSurface

@@ -5,7 +5,7 @@ import re
 import numpy as np
 from PIL import Image
 
-from footscan.cloud.outliers import REASONS
+from footscan.cloud.outliers.remove import REASONS
 from footscan.cloud.points import make_points
 from footscan.report.scan.removed import removed_pictures, removed_table
 from schemas.quality import CameraQuality

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.segments import segments_of
+from footscan.cloud.outliers.segments import segments_of
 from footscan.cloud.views import View
 from footscan.compiled import compiled
 

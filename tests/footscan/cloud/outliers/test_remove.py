@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from footscan.cloud.outliers import REASONS, Removed, remove_outliers
+from footscan.cloud.outliers.remove import REASONS, Removed, remove_outliers
 from footscan.cloud.points import POINT_DTYPE, make_points
 from footscan.cloud.views import View
 from schemas.parameters.outliers import OutlierParameters

@@ -6,10 +6,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.axis import along_axis
+from footscan.measure.frame.axis import along_axis
+from footscan.measure.frame.pose import Pose, find_pose
 from footscan.measure.landmarks.dense_points import dense_points
 from footscan.measure.landmarks.toes import FOREFOOT, STRIP_MM
-from footscan.measure.pose import Pose, find_pose
 from footscan.mesh.rigid_transform import apply, low_height
 from footscan.mesh.topology import keep_large_components, used_vertices
 from schemas.base.errors import Finding

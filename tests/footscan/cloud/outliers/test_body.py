@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from footscan.cloud.body import body_range, is_apart
+from footscan.cloud.outliers.body import body_range, is_apart
 from footscan.cloud.points import make_points
 
 Film = Callable[..., tuple[np.ndarray, np.ndarray]]

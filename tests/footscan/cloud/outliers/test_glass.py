@@ -2,7 +2,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from footscan.cloud.glass import is_below_sole, is_plate
+from footscan.cloud.outliers.glass import is_below_sole, is_plate
 from footscan.cloud.points import make_points
 from footscan.cloud.views import View
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from footscan.cloud.clutter import is_island, is_static
+from footscan.cloud.outliers.clutter import is_island, is_static
 from footscan.cloud.points import make_points
 
 

@@ -2,7 +2,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from footscan.cloud.off_surface import is_off_shared_surface, is_off_surface
+from footscan.cloud.outliers.off_surface import is_off_shared_surface, is_off_surface
 from footscan.cloud.points import make_points
 
 Film = Callable[..., tuple[np.ndarray, np.ndarray]]

@@ -5,10 +5,10 @@ from collections.abc import Collection, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cloud.outliers.segments import segments_of
+from footscan.cloud.outliers.visibility import CONFIRMED, DENIED, ask_others, cameras_near, sight_of
 from footscan.cloud.points import coordinates, stripe_step
-from footscan.cloud.segments import segments_of
 from footscan.cloud.views import View
-from footscan.cloud.visibility import CONFIRMED, DENIED, ask_others, cameras_near, sight_of
 from footscan.compiled import compiled
 from footscan.mesh.voxels import EMPTY, Voxels, voxelise
 from schemas.parameters.outliers import OutlierParameters

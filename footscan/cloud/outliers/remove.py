@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.body import body_range, is_apart
-from footscan.cloud.clutter import is_island, is_static
-from footscan.cloud.ghost import is_ghost
-from footscan.cloud.glass import is_below_sole, is_plate
-from footscan.cloud.levels import is_far, is_off_median
-from footscan.cloud.off_surface import is_off_surface
-from footscan.cloud.support import END, ISOLATED, UNCONFIRMED, judge_segments
+from footscan.cloud.outliers.body import body_range, is_apart
+from footscan.cloud.outliers.clutter import is_island, is_static
+from footscan.cloud.outliers.ghost import is_ghost
+from footscan.cloud.outliers.glass import is_below_sole, is_plate
+from footscan.cloud.outliers.levels import is_far, is_off_median
+from footscan.cloud.outliers.off_surface import is_off_surface
+from footscan.cloud.outliers.support import END, ISOLATED, UNCONFIRMED, judge_segments
 from footscan.cloud.views import View
 from schemas.parameters.outliers import OutlierParameters
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from footscan.cloud.ghost import is_ghost
-from footscan.cloud.outliers import REASONS, remove_outliers
+from footscan.cloud.outliers.ghost import is_ghost
+from footscan.cloud.outliers.remove import REASONS, remove_outliers
 from footscan.cloud.views import View
 from schemas.parameters.outliers import OutlierParameters
 

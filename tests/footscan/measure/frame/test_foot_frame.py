@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from footscan.measure.frame import FootFrame, foot_frame
+from footscan.measure.frame.foot_frame import FootFrame, foot_frame
 from footscan.mesh.rigid_transform import apply
 from footscan.virtual.foot.foot import Foot, make_foot, sample_shape
 from schemas.base.errors import Finding

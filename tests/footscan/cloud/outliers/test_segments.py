@@ -1,7 +1,7 @@
 import numpy as np
 
+from footscan.cloud.outliers.segments import segments_of
 from footscan.cloud.points import make_points
-from footscan.cloud.segments import segments_of
 
 
 def along(y: list[float], camera: int = 1, frame: int = 0) -> np.ndarray:

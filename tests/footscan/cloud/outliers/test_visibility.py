@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from footscan.cloud.outliers.visibility import CONFIRMED, DENIED, UNKNOWN, ask_others, sight_of
 from footscan.cloud.views import View
-from footscan.cloud.visibility import CONFIRMED, DENIED, UNKNOWN, ask_others, sight_of
 from footscan.mesh.voxels import voxelise
 
 WIDE = np.array([[-100.0, -100.0], [100.0, -100.0], [100.0, 100.0], [-100.0, 100.0]])

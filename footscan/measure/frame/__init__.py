@@ -1,0 +1,1 @@
+"""The frame of a foot: how it stands, and its axis."""
