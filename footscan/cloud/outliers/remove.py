@@ -1,7 +1,7 @@
 """Removal of the points that do not belong to the foot, by reason."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,7 +122,7 @@ def remove_outliers(
         drop("clutter", is_apart)
     drop("clutter", lambda left: is_island(left, parameters.island_gap_steps, parameters.island_share))
     counts = _count(points["camera"], codes)
-    warnings = _warnings(points["camera"], counts) + _cut_warnings(points, codes, parameters)
+    warnings = [*_warnings(points["camera"], counts), *_cut_warnings(points, codes, parameters, views)]
     return points[codes == KEPT], Removed(codes, counts, warnings)
 
 
@@ -160,13 +160,27 @@ def _shares(
     return {number: sum(of[reason] for reason in chosen) / int(points[number]) for number, of in counts.items()}
 
 
-def _warnings(camera: NDArray[np.uint8], counts: Mapping[int, Mapping[str, int]]) -> list[str]:
-    return [
-        f"camera {number}: {100 * share:.0f} % of its points are not the foot and were dropped: it sees bright or "
-        "shining things, or the room is bright; backgrounds filmed with the laser off take them away"
-        for number, share in _shares(camera, counts, NO_FOOT).items()
-        if share > MUCH
-    ]
+def _warnings(camera: NDArray[np.uint8], counts: Mapping[int, Mapping[str, int]]) -> Iterator[str]:
+    much = {number: share for number, share in _shares(camera, counts, NO_FOOT).items() if share > MUCH}
+    if much:
+        yield (
+            f"{_of_points(much)} are not the foot and were dropped: bright or shining things are in sight, or the room "
+            "is bright; backgrounds filmed with the laser off take them away"
+        )
+
+
+def _of_points(shares: Mapping[int, float]) -> str:
+    """Name the cameras, and the share of their points.
+
+    >>> print(_of_points({3: 0.21}), "|", _of_points({1: 0.2, 2: 0.04, 5: 0.13}))
+    camera 3: 21 % of its points | cameras 1, 2 and 5: 4 to 20 % of their points
+    """
+    percent = sorted(round(100 * share) for share in shares.values())
+    numbers = [str(number) for number in sorted(shares)]
+    if len(numbers) == 1:
+        return f"camera {numbers[0]}: {percent[0]} % of its points"
+    span = str(percent[0]) if percent[0] == percent[-1] else f"{percent[0]} to {percent[-1]}"
+    return f"cameras {', '.join(numbers[:-1])} and {numbers[-1]}: {span} % of their points"
 
 
 def _body(
@@ -219,8 +233,16 @@ def _outside(points: NDArray[np.void], volume: NDArray[np.float64]) -> Mask:
     return ~inside
 
 
-def _cut_warnings(points: NDArray[np.void], codes: NDArray[np.uint8], parameters: OutlierParameters) -> list[str]:
-    """A sentence for each camera that sees the foot beyond the control volume or the calibrated region."""
+def _cut_warnings(
+    points: NDArray[np.void],
+    codes: NDArray[np.uint8],
+    parameters: OutlierParameters,
+    views: Mapping[int, View],
+) -> Iterator[str]:
+    """Say which cameras see the foot beyond the control volume or the calibrated region.
+
+    What lies above the region does not count: there the leg goes on.
+    """
     order = np.lexsort([points["source"], points["frame"], points["camera"]])
     ordered, code = points[order], codes[order]
     apart = (
@@ -229,16 +251,21 @@ def _cut_warnings(points: NDArray[np.void], codes: NDArray[np.uint8], parameters
     apart |= (np.diff(ordered["frame"]) != 0) | (np.diff(ordered["camera"]) != 0)
     stripe = np.concatenate([[0], np.cumsum(apart)]) if len(ordered) else np.empty(0, np.int64)
     of_foot = np.bincount(stripe, code == KEPT) > 0 if len(ordered) else np.empty(0, np.bool_)
+    top = np.full(256, math.inf)
+    for number, view in views.items():
+        if len(view.outline):
+            top[number] = view.outline[:, 1].max()
     cut = np.isin(code, [1 + REASONS.index(reason) for reason in ("volume", "extrapolated")]) & of_foot[stripe]
+    cut &= ordered["z"] < top[ordered["camera"]] - REGION_MARGIN_MM
     kept = np.bincount(ordered["camera"], code == KEPT)
     beyond = np.bincount(ordered["camera"], cut)
     shares = beyond / np.maximum(beyond + kept, 1)
-    return [
-        f"camera {camera}: {100 * shares[camera]:.0f} % of its points on the foot lie outside the control volume or "
-        "the part of the picture that the calibration supports, and were dropped: place the foot in the middle, or "
-        "calibrate with a larger object"
-        for camera in np.flatnonzero(shares > parameters.largest_cut)
-    ]
+    much = {int(camera): float(shares[camera]) for camera in np.flatnonzero(shares > parameters.largest_cut)}
+    if much:
+        yield (
+            f"{_of_points(much)} on the foot lie outside the control volume or the part of the picture that the "
+            "calibration supports, and were dropped: place the foot in the middle, or calibrate with a larger object"
+        )
 
 
 def _count(camera: NDArray[np.uint8], codes: NDArray[np.uint8]) -> dict[int, dict[str, int]]:
