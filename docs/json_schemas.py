@@ -37,7 +37,8 @@ def main() -> None:
 def json_schemas() -> dict[str, str]:
     """The content of every file, by its name."""
     models = _all_models()
-    documents = {_format(model): model for model in models.values() if "format" in model.model_fields}
+    public = [model for model in models.values() if not model.__name__.startswith("_")]
+    documents = {_format(model): model for model in public if "format" in model.model_fields}
     newest = {name: max(version for other, version in documents if other == name) for name, _ in documents}
     return {
         f"{name}.schema.json" if version == newest[name] else f"{name}-{version}.schema.json": _text(model, models)

@@ -63,6 +63,11 @@ class CalibrationFile:
         """Name and digest of the calibration."""
         return self._cached("source", lambda: Source(name=self.path.name, sha256=self.digest))
 
+    @property
+    def whole(self) -> Value:
+        """All of it."""
+        return self._cached("whole", lambda: self.content)
+
     def camera(self, camera: int) -> Value:
         """The map of one camera; RefusedInput if there is none."""
         return self._cached(camera, lambda: self.content.camera(camera, self.path))

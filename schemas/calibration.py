@@ -1,9 +1,9 @@
 """The calibration file: a map from pixels to millimetres for each camera, versioned.
 
 Version 1 holds what the thesis holds: six coefficients for Y and six for Z a camera, of the plain pixel coordinates.
-Version 2 holds polynomials of any order in normalised coordinates with the region that supports them. Version 3, the
-current one, holds any of the models with their covariance and their sources. Older files are migrated when they are
-read.
+Version 2 holds polynomials of any order in normalised coordinates with the region that supports them. Version 3 holds
+any of the models with their covariance and their sources. Version 4, the current one, also says where each camera's
+laser plane lies along the travel. Older files are migrated when they are read.
 """
 
 import math
@@ -20,7 +20,7 @@ from schemas.base.model import Document
 from schemas.base.units import Point
 from schemas.calibration_history import CalibrationV1, CalibrationV2, migrate_v1, migrate_v2
 
-VERSION = 3
+VERSION = 4
 _FAMILY = "footscan.calibration/"
 LARGEST = 1e15
 """Largest number in a camera's map, so that results computed from it stay finite; chosen by hand."""
@@ -93,6 +93,38 @@ class HomographyMap(Document):
 PixelMap = Annotated[PolynomialMap | HomographyMap, Field(discriminator="model")]
 
 
+class LaserPlane(Document):
+    """Where the laser plane that a camera sees lies along the travel: X of a point of it at Y and Z, in mm, is
+
+    x + offset_mm + yaw Y + pitch (Z - 57) + bend_mm (Y / 70)^2 + scale (x - x_mm)
+    + step (delay_frames + shutter_frames row),
+
+    with x the place of its head by the travel when the frame was taken, `step` the way to the next frame, and `row` the
+    place in the picture: -0.5 at the upper border, 0.5 at the lower one.
+    """
+
+    head: Annotated[int, Field(ge=1, le=64)]
+    """Cameras of one head see one plane."""
+    offset_mm: Number = 0.0
+    """Along X, relative to the mean of all heads."""
+    yaw: Number = 0.0
+    """Turn about Z, mm per mm."""
+    pitch: Number = 0.0
+    """Turn about Y, mm per mm."""
+    bend_mm: Number = 0.0
+    """Sagitta of the sheet over 140 mm."""
+    scale: Number = 0.0
+    """The head travels 1 + this per millimetre that it reports."""
+    x_mm: Number = 0.0
+    """Where `offset_mm` holds, if the scale is off."""
+    delay_frames: Number = 0.0
+    """Time by which this camera is later than the others of its head, in periods of its frames."""
+    shutter_frames: Number = 0.0
+    """Time from the first row to the last, in periods of its frames."""
+    sd: Annotated[list[Number], Field(min_length=7, max_length=7)]
+    """Standard deviations of the seven, in their order; 0 for those that the film does not determine."""
+
+
 Residual = tuple[Number, Number, Number, Number]
 """A pixel (i, j), and the error of its mapped place in Y and in Z, mm."""
 
@@ -121,6 +153,8 @@ class CameraCalibration(Document):
     """Largest distance, of the points held out if there are any."""
     residuals: Annotated[list[Residual], Field(max_length=10_000)] = Field(default_factory=list)
     """Residuals of the fit at each control point, or across each stretch of an edge; empty if unknown."""
+    plane: LaserPlane | None = None
+    """None if no film has shown it: the plane is where the travel says, at right angles to it."""
 
     @property
     def image_size(self) -> ImageSize:
@@ -159,10 +193,10 @@ class Source(Document):
     sha256: str
 
 
-class Calibration(Document):
-    """The content of a calibration file, in its current version."""
+class _Calibration(Document):
+    """What versions 3 and 4 have in common: version 3 has neither planes nor a body."""
 
-    format: Literal["footscan.calibration/3"] = "footscan.calibration/3"
+    format: str
     unit: Literal["mm"] = "mm"
     sources: list[Source]
     """The chart; or the capture, its reference object and its films."""
@@ -173,6 +207,8 @@ class Calibration(Document):
     cameras: Annotated[list[CameraCalibration], Field(min_length=1)]
     warnings: list[str] = Field(default_factory=list)
     """Probable mistakes in the sources, one line each."""
+    body_rms_mm: float | None = None
+    """Root mean square of the distances of the points from the body that showed the laser planes; None without one."""
     pairs: list[PairAgreement] = Field(default_factory=list)
     """Disagreement of each pair of cameras that saw the same edges."""
 
@@ -190,6 +226,18 @@ class Calibration(Document):
                 return camera
         known = ", ".join(str(camera.camera) for camera in self.cameras)
         raise RefusedInput(source, f"has no camera {camera_id}, expected one of {known}", field="cameras")
+
+
+class CalibrationV3(_Calibration):
+    """The content of a calibration file of version 3."""
+
+    format: Literal["footscan.calibration/3"]
+
+
+class Calibration(_Calibration):
+    """The content of a calibration file, in its current version."""
+
+    format: Literal["footscan.calibration/4"] = "footscan.calibration/4"
 
 
 def parameter_count(pixel_map: PolynomialMap | HomographyMap) -> int:
@@ -232,6 +280,9 @@ def calibration_from_json(text: str, source: Path | str) -> Calibration:
         case "footscan.calibration/2":
             value = migrate_v2(validate(source, CalibrationV2, value))
         case "footscan.calibration/3":
+            old = validate(source, CalibrationV3, value)
+            value = old.model_dump(mode="json") | {"format": "footscan.calibration/4"}
+        case "footscan.calibration/4":
             pass
         case _:
             raise RefusedInput(source, _unknown(found), field="format")

@@ -105,7 +105,7 @@ def migrate_v1(old: CalibrationV1, source: Path | str) -> CalibrationV2:
 def migrate_v2(old: CalibrationV2) -> dict[str, Any]:
     """Version 2 as the content of version 3: the same polynomials, without a covariance."""
     return {
-        "format": "footscan.calibration/3",
+        "format": "footscan.calibration/4",
         "sources": [{"name": old.source, "sha256": old.source_sha256}],
         "software": old.software,
         "cameras": [

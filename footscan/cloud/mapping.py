@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.calibration.models.laser_plane import row_share, x_in_plane
 from footscan.calibration.models.maps import is_supported, to_world
 from footscan.cloud.points import make_points
 from footscan.cloud.uncertainty import predicted_deviations, standard_deviations
@@ -25,7 +26,8 @@ def map_stripe(
 ) -> NDArray[np.void]:
     """Map stripe points to world points.
 
-    Y and Z follow from the pixel by the camera's calibration, X from the position of the head.
+    Y and Z follow from the pixel by the camera's calibration, X from the position of the head and, if the calibration
+    says it, from the place and the turn of its laser plane.
 
     Parameters
     ----------
@@ -62,13 +64,20 @@ def map_stripe(
         raise RefusedInput(f"camera {camera.camera}", problem, field="positions")
     pixels = np.column_stack([stripe["i"], stripe["j"]]).astype(np.float64)
     yz = to_world(camera, pixels)
+    x = plane = x_of_frame[frame]
+    if camera.plane is not None:
+        step = np.gradient(x_of_frame)[frame] if len(x_of_frame) > 1 else np.zeros(len(frame))
+        row = row_share(pixels[:, 1], camera.image_size)
+        plane = x + camera.plane.offset_mm + camera.plane.scale * (x - camera.plane.x_mm)
+        x = x_in_plane(camera.plane, x, yz, step, row)
     return make_points(
-        np.column_stack([x_of_frame[frame], yz]),
+        np.column_stack([x, yz]),
         camera=camera.camera,
         frame=frame,
         source=np.arange(len(pixels)),
         supported=_supported(camera, pixels, parameters),
         sigma=standard_deviations(stripe, camera),
+        plane=plane,
     )
 
 

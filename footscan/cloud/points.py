@@ -14,6 +14,7 @@ POINT_DTYPE = np.dtype(
         ("x", "<f4"),
         ("y", "<f4"),
         ("z", "<f4"),
+        ("plane", "<f4"),
         ("source", "<i4"),
         ("frame", "<i4"),
         ("camera", "u1"),
@@ -25,6 +26,7 @@ POINT_DTYPE = np.dtype(
 """A world point.
 
 x, y, z : mm, scanner frame
+plane : X of its laser plane, mm: that of all points of a stripe, even if the plane is turned
 source : row of the stripe point that it was mapped from
 frame : number of that point's frame
 camera : number of the camera
@@ -44,6 +46,7 @@ def make_points(
     source: int | NDArray[np.integer] = 0,
     supported: bool | NDArray[np.bool_] = True,
     sigma: float | NDArray[np.floating] = UNKNOWN_SIGMA_MM,
+    plane: NDArray[np.floating] | None = None,
 ) -> NDArray[np.void]:
     """Build points from coordinates; the other fields are one value for all points or (N,) values.
 
@@ -51,6 +54,7 @@ def make_points(
     ----------
     xyz : (N, 3), mm, scanner frame.
     sigma : mm.
+    plane : mm; default: the X of each point.
 
     Returns
     -------
@@ -66,6 +70,7 @@ def make_points(
     points["x"], points["y"], points["z"] = np.asarray(xyz).T
     points["camera"], points["frame"], points["source"], points["supported"] = camera, frame, source, supported
     points["sigma"], points["cameras"] = sigma, 1
+    points["plane"] = points["x"] if plane is None else plane
     return points
 
 
@@ -79,7 +84,7 @@ def stripe_step(points: NDArray[np.void]) -> float:
     1.5
     """
     steps = [
-        _frame_steps(points["frame"][points["camera"] == camera], points["x"][points["camera"] == camera])
+        _frame_steps(points["frame"][points["camera"] == camera], points["plane"][points["camera"] == camera])
         for camera in np.unique(points["camera"])
     ]
     return float(np.median(np.concatenate(steps))) if any(len(step) for step in steps) else 0.0

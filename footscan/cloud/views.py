@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from footscan.calibration.models.maps import to_world
 from footscan.calibration.models.pose import camera_centres
-from schemas.calibration import CameraCalibration
+from schemas.calibration import CameraCalibration, LaserPlane
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +26,8 @@ class View:
     outline: Floats
     """(M, 2) corners in Y and Z, mm, of the convex part of the laser plane that the calibration supports,
     counterclockwise; (0, 2) if it is not known."""
+    plane: LaserPlane | None = None
+    """Where the laser plane lies; None if no film has shown it."""
 
 
 def views_of(cameras: Iterable[CameraCalibration]) -> dict[int, View]:
@@ -47,7 +49,10 @@ def views_of(cameras: Iterable[CameraCalibration]) -> dict[int, View]:
     """
     calibrations = {camera.camera: camera for camera in cameras}
     centres = camera_centres(calibrations.values())
-    return {camera: View(centre, _outline(calibrations[camera])) for camera, centre in centres.items()}
+    return {
+        camera: View(centre, _outline(calibrations[camera]), calibrations[camera].plane)
+        for camera, centre in centres.items()
+    }
 
 
 def _outline(camera: CameraCalibration) -> Floats:

@@ -179,7 +179,7 @@ def test_missing_positions(refuse: Refuse, scan: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ('"footscan.calibration/3"', '"footscan.calibration/7"', "format: expected version 1 to 3, found 'footscan.c"),
+        ('"footscan.calibration/4"', '"footscan.calibration/7"', "format: expected version 1 to 4, found 'footscan.c"),
         ('"camera": 3,', '"camera": 33,', "cameras: has no camera 3, expected one of 1, 2, 33, 4"),
         ('"camera": 3,', '"camera": 2,', "expected each camera once"),
         ('"scale_px": ', '"scale_px": NaN, "x": ', "expected a JSON document (NaN is no JSON number)"),

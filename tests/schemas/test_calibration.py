@@ -16,7 +16,7 @@ from schemas.calibration import Calibration, calibration_from_json, read_calibra
 
 FROZEN = Path(__file__).parent / "frozen"
 FILES = sorted(FROZEN.glob("calibration-*.json"))
-RANGE = "'footscan.calibration/1' to 'footscan.calibration/3'"
+RANGE = "'footscan.calibration/1' to 'footscan.calibration/4'"
 
 
 def frozen(name: str) -> dict[str, Any]:
@@ -70,7 +70,7 @@ def test_version_1_in_centimetres() -> None:
 def test_what_version_1_does_not_say_is_not_made_up() -> None:
     calibration = read_calibration(FROZEN / "calibration-1-cm.json")
     camera = calibration.camera(1)
-    assert (calibration.format, calibration.unit) == ("footscan.calibration/3", "mm")
+    assert (calibration.format, calibration.unit) == ("footscan.calibration/4", "mm")
     assert (calibration.software, calibration.created) == ("footscan.calibration/1", None)
     assert [source.name for source in calibration.sources] == [str(FROZEN / "calibration-1-cm.json")]
     assert (camera.image_px, camera.covariance, camera.region_px, camera.points) == (None, [], [], 0)
@@ -131,19 +131,21 @@ def test_what_was_migrated_is_written_and_read_again(file: Path, tmp_path: Path)
     calibration = read_calibration(file)
     path = tmp_path / "calibration.json"
     path.write_text(calibration.model_dump_json(indent=2))
-    assert json.loads(path.read_text())["format"] == "footscan.calibration/3"
+    assert json.loads(path.read_text())["format"] == "footscan.calibration/4"
     assert read_calibration(path) == calibration
 
 
 def test_every_version_is_frozen() -> None:
-    assert [file.stem for file in FILES] == ["calibration-1-cm", "calibration-1-mm", "calibration-2", "calibration-3"]
+    assert [file.stem for file in FILES] == [
+        "calibration-1-cm", "calibration-1-mm", "calibration-2", "calibration-3", "calibration-4",
+    ]  # fmt: skip
 
 
-@pytest.mark.parametrize("version", ["4", "10", "99", "9" * 300])
+@pytest.mark.parametrize("version", ["5", "10", "99", "9" * 300])
 def test_a_newer_version_is_refused_by_name(version: str) -> None:
     value = frozen("3") | {"format": f"footscan.calibration/{version}"}
     message = refusal(value)
-    assert message.startswith("format: expected version 1 to 3, found 'footscan.calibration/")
+    assert message.startswith("format: expected version 1 to 4, found 'footscan.calibration/")
     assert message.endswith(": a newer footscan wrote it")
 
 
@@ -281,3 +283,9 @@ def test_missing_camera_is_refused_with_those_there_are() -> None:
     calibration = read_calibration(FROZEN / "calibration-3.json")
     with pytest.raises(RefusedInput, match=r"^c\.json: cameras: has no camera 7, expected one of 1, 5$"):
         calibration.camera(7, "c.json")
+
+
+def test_version_3_does_not_say_where_the_laser_planes_lie() -> None:
+    assert all(camera.plane is None for camera in read_calibration(FROZEN / "calibration-3.json").cameras)
+    planes = [camera.plane for camera in read_calibration(FROZEN / "calibration-4.json").cameras]
+    assert [plane.head for plane in planes if plane is not None] == [1, 1]

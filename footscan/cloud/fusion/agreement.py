@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.fusion.stripes import Floats, Stripes, Traces, meet, traces_of
-from footscan.cloud.points import stripe_step
+from footscan.cloud.points import PLANE_MM, stripe_step
 from footscan.compiled import compiled
 from footscan.robust import MAD_TO_SD
 from schemas.fusion import Disagreement
@@ -123,7 +123,6 @@ def _compare(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats]:
     """The fields of `Overlaps`, for the points of `sample`."""
     camera, plane, starts, x, yz, sigma, normals, linked, around = traces
-    planes = (len(starts) - 1) // max(cameras, 1)
     points, others = np.empty(len(sample) * cameras, np.intp), np.empty(len(sample) * cameras, np.intp)
     distances, variances = np.empty(len(sample) * cameras), np.empty(len(sample) * cameras)
     count = 0
@@ -131,30 +130,42 @@ def _compare(
         for b in range(cameras):
             if b == camera[n]:
                 continue
-            before = plane[n]
-            while before > 0 and starts[before * cameras + b] == starts[before * cameras + b + 1]:
-                before -= 1
-            first, last = starts[before * cameras + b], starts[before * cameras + b + 1]
+            near = _plane_of(b, plane[n], -1, cameras, starts)
+            first, last = starts[near * cameras + b], starts[near * cameras + b + 1]
             if first == last or x[n] - x[first] > gap:
                 continue
             k, share, distance = meet(n, first, last, reach, yz, normals, linked, around)
             if k < 0 or not (usable[k] and usable[k + 1]):
                 continue
             variance = (1 - share) * sigma[k] ** 2 + share * sigma[k + 1] ** 2
-            if before != plane[n]:
-                after = plane[n]
-                while after < planes - 1 and starts[after * cameras + b] == starts[after * cameras + b + 1]:
-                    after += 1
-                from_x, first, last = x[first], starts[after * cameras + b], starts[after * cameras + b + 1]
-                if first == last or x[first] - from_x > gap:
+            met_x = x[k] + share * (x[k + 1] - x[k])
+            if abs(x[n] - met_x) > PLANE_MM:
+                # Planes that are turned against each other cross: the next one is on either side.
+                way = 1 if x[n] > met_x else -1
+                far = _plane_of(b, near + way, way, cameras, starts)
+                first, last = starts[far * cameras + b], starts[far * cameras + b + 1]
+                if first == last or abs(x[first] - met_x) > gap + abs(x[n] - met_x):
                     continue
                 k, share, there = meet(n, first, last, reach, yz, normals, linked, around)
                 if k < 0 or not (usable[k] and usable[k + 1]):
                     continue
-                part = (x[n] - from_x) / (x[first] - from_x)
+                far_x = x[k] + share * (x[k + 1] - x[k])
+                if (far_x - x[n]) * way < 0.0 or abs(far_x - met_x) > gap:
+                    continue
+                part = (x[n] - met_x) / (far_x - met_x)
                 distance = (1 - part) * distance + part * there
                 variance = (1 - part) * variance + part * ((1 - share) * sigma[k] ** 2 + share * sigma[k + 1] ** 2)
             points[count], others[count], distances[count] = n, b, distance
             variances[count] = variance + sigma[n] ** 2
             count += 1
     return points[:count], others[:count], distances[:count], variances[:count]
+
+
+@compiled
+def _plane_of(camera: int, plane: int, way: int, cameras: int, starts: NDArray[np.intp]) -> int:
+    """The first plane from `plane` on, up or down by `way`, in which a camera has points; the last one if none has."""
+    planes = (len(starts) - 1) // max(cameras, 1)
+    plane = min(max(plane, 0), planes - 1)
+    while 0 < plane < planes - 1 and starts[plane * cameras + camera] == starts[plane * cameras + camera + 1]:
+        plane += way
+    return plane

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.fusion.stripes import Floats, Stripes, Traces, meet, traces_of
+from footscan.cloud.points import PLANE_MM
 from footscan.compiled import compiled
 from schemas.parameters.fusion import FusionParameters
 
@@ -150,7 +151,8 @@ def _look(
         first, last = starts[plane[n] * cameras + b], starts[plane[n] * cameras + b + 1]
         within = max(reach[b], reach[camera[n]])
         k, share, distance = meet(n, first, last, within, yz, normals, linked, around)
-        if k >= 0:
+        # In planes that are turned against each other it may be other skin.
+        if k >= 0 and abs(x[k] - x[n]) <= PLANE_MM:
             sights[seen, 0], sights[seen, 1] = distance, x[k] - x[n]
             sights[seen, 2] = (1 - share) * sigma[k] ** 2 + share * sigma[k + 1] ** 2
             seen_by[seen, 0], seen_by[seen, 1] = b, k if share < 0.5 else k + 1

@@ -91,7 +91,7 @@ def sort_stripes(points_by_camera: Iterable[NDArray[np.void]]) -> Stripes:
     points = np.concatenate([np.empty(0, POINT_DTYPE), *points_by_camera])
     points = points[np.isfinite(points["x"]) & np.isfinite(points["y"]) & np.isfinite(points["z"])]
     cameras, camera = np.unique(points["camera"], return_inverse=True)
-    group = _planes(points["x"]) * max(len(cameras), 1) + camera
+    group = _planes(points["plane"]) * max(len(cameras), 1) + camera
     order = np.lexsort((points["source"], points["frame"], group))
     points, group = points[order], group[order]
     planes = int(group[-1]) // len(cameras) + 1 if len(points) else 0

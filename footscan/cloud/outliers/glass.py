@@ -93,7 +93,7 @@ def is_below_sole(points: NDArray[np.void], views: Mapping[int, View], glass_mm:
 def _planes(points: NDArray[np.void]) -> NDArray[np.int64]:
     """(N,) the number of each point's plane."""
     step = max(stripe_step(points), PLANE_MM)
-    return np.asarray(np.round((points["x"] - points["x"].min()) / step).astype(np.int64))
+    return np.asarray(np.round((points["plane"] - points["plane"].min()) / step).astype(np.int64))
 
 
 def _sides(

@@ -13,6 +13,7 @@ from footscan.cloud.outliers.ghost import is_ghost
 from footscan.cloud.outliers.glass import is_below_sole, is_plate
 from footscan.cloud.outliers.levels import is_far, is_off_median
 from footscan.cloud.outliers.off_surface import is_off_surface
+from footscan.cloud.outliers.other_laser import is_of_other_laser
 from footscan.cloud.outliers.support import END, ISOLATED, UNCONFIRMED, judge_segments
 from footscan.cloud.views import View
 from schemas.parameters.outliers import OutlierParameters
@@ -111,6 +112,7 @@ def remove_outliers(
     if parameters.drop_unsupported:
         drop("extrapolated", lambda left: ~left["supported"])
     drop("glass", lambda left: is_plate(left, views, parameters.glass_mm))
+    drop("unconfirmed", lambda left: is_of_other_laser(left, views))
     body = _body(points[codes == KEPT], views, parameters)
     drop("clutter", lambda left: is_static(left, parameters.static_share, body, filmed) | _is_beside(left, body))
     drop("glass", lambda left: is_ghost(left, views, parameters.gap_mm, parameters.segment_mm))

@@ -14,7 +14,7 @@ def test_fields_and_coordinates() -> None:
 
 
 def test_layout_is_the_same_on_every_machine() -> None:
-    assert POINT_DTYPE.itemsize == 27
+    assert POINT_DTYPE.itemsize == 31
     assert POINT_DTYPE["x"].str == "<f4"
     assert POINT_DTYPE["source"].str == "<i4"
 

@@ -70,6 +70,7 @@ def test_a_mark_below_a_sole_above_the_glass(
     assert contact["z"].max() < 1.0
     mark = contact.copy()
     mark["x"] -= 30.0
+    mark["plane"] -= 30.0
     mark["z"] = 0.0
     points = np.concatenate([clean, mark])
     below = is_below_sole(points, views, 0.5)

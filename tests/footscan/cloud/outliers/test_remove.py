@@ -66,6 +66,7 @@ def test_lost_frames_and_uneven_steps_cost_nothing(ellipsoid: Film, views: Views
     there = ~np.isin(clean["frame"], [20, 31, 32]) & ~((clean["camera"] == 3) & (clean["frame"] > 35))
     clean = clean[there]
     clean["x"] += 0.8 * np.sin(clean["frame"])
+    clean["plane"] = clean["x"]
     kept, _ = remove_outliers(clean, views, WITH_ENDS)
     assert len(kept) == len(clean)
 

@@ -1,0 +1,120 @@
+"""A calibration with the laser planes that a film of a body shows."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.calibration.models.laser_plane import row_share
+from footscan.calibration.models.maps import is_supported, to_world
+from footscan.calibration.travel.body import Body
+from footscan.calibration.travel.fit import TravelFit, TravelPoints, fit_travel
+from footscan.cloud.uncertainty import standard_deviations
+from footscan.cloud.views import views_of
+from footscan.stripe.points import StripePoints
+from schemas.base.errors import Finding
+from schemas.calibration import Calibration, CameraCalibration, LaserPlane
+
+Floats = NDArray[np.float64]
+
+FEWEST = 500
+"""Points of a camera on the body, at least. Chosen by hand."""
+LARGEST_RMS_MM = 0.1
+"""Distance of the points from the body from which a warning is given: the body is another one, its form is off, or the
+cameras' maps are. Chosen by hand."""
+
+
+class CameraTravel(NamedTuple):
+    """The film of one camera."""
+
+    stripe: StripePoints
+    """(N,) its stripe points"""
+    x_of_frame: Floats
+    """(F,) X of its head by the travel, mm"""
+
+
+def with_laser_planes(
+    calibration: Calibration, films: Mapping[int, CameraTravel], head_of_camera: Mapping[int, int], body: Body
+) -> tuple[Calibration, TravelFit]:
+    """Find where the laser planes lie, from the film of a body.
+
+    Parameters
+    ----------
+    calibration : with the maps of the cameras
+    films : camera -> its film
+    head_of_camera : camera -> number of its head
+
+    Returns
+    -------
+    The calibration with the planes of the cameras that filmed the body, and the fit.
+
+    Raises
+    ------
+    Finding
+        A camera hardly saw the body, or the points do not lie on it.
+    """
+    cameras = sorted(films)
+    heads = sorted({head_of_camera[camera] for camera in cameras})
+    maps = {camera: calibration.camera(camera).model_copy(update={"plane": None}) for camera in cameras}
+    views = views_of(maps.values())
+    parts = []
+    for index, camera in enumerate(cameras):
+        centre = views[camera].centre if camera in views else np.full(3, np.nan)
+        part = _points(index, maps[camera], films[camera], centre)
+        if len(part.x) < FEWEST:
+            raise Finding(f"camera {camera} saw {len(part.x)} points of the body, expected {FEWEST} at least")
+        parts.append(part)
+    points = TravelPoints(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
+    fit = fit_travel(points, [heads.index(head_of_camera[camera]) for camera in cameras], body)
+    planes = {camera: _plane(fit, index, head_of_camera[camera]) for index, camera in enumerate(cameras)}
+    warnings = [*calibration.warnings]
+    if fit.rms_mm > LARGEST_RMS_MM:
+        warnings.append(
+            f"the points lie {fit.rms_mm:.2f} mm off the body that shows the laser planes, expected "
+            f"{LARGEST_RMS_MM:g} mm: its form is not that of the file, or the maps of the cameras are off"
+        )
+    document = calibration.model_copy(
+        update={
+            "cameras": [
+                camera.model_copy(update={"plane": planes.get(camera.camera)}) for camera in calibration.cameras
+            ],
+            "body_rms_mm": round(fit.rms_mm, 5),
+            "warnings": warnings,
+        }
+    )
+    return document, fit
+
+
+def _points(index: int, camera: CameraCalibration, film: CameraTravel, centre: Floats) -> TravelPoints:
+    """The points of one camera within its region of support."""
+    pixels = np.column_stack([film.stripe["i"], film.stripe["j"]]).astype(np.float64)
+    supported = is_supported(camera, pixels)
+    stripe, pixels = film.stripe[supported], pixels[supported]
+    yz = to_world(camera, pixels)
+    sight = centre - np.column_stack([np.zeros(len(yz)), yz])
+    return TravelPoints(
+        np.full(len(yz), index),
+        film.x_of_frame[stripe["frame"]],
+        np.gradient(film.x_of_frame)[stripe["frame"]],
+        row_share(pixels[:, 1], camera.image_size),
+        yz,
+        sight,
+        standard_deviations(stripe, camera),
+    )
+
+
+def _plane(fit: TravelFit, index: int, head: int) -> LaserPlane:
+    offset, yaw, pitch, bend, scale, delay, shutter = (float(value) for value in fit.planes[index])
+    return LaserPlane(
+        head=head,
+        offset_mm=offset,
+        yaw=yaw,
+        pitch=pitch,
+        bend_mm=bend,
+        scale=scale,
+        x_mm=fit.x_mm,
+        delay_frames=delay,
+        shutter_frames=shutter,
+        sd=[float(value) for value in fit.deviations[index]],
+    )

@@ -1,0 +1,58 @@
+from dataclasses import replace
+
+import numpy as np
+
+from footscan.cloud.outliers.other_laser import is_of_other_laser
+from footscan.cloud.points import make_points
+from footscan.cloud.views import View
+from schemas.calibration import LaserPlane
+
+UPPER, LOWER = (LaserPlane(head=head, offset_mm=offset, sd=[0.0] * 7) for head, offset in ((1, 1.5), (2, -1.5)))
+VIEWS = {
+    1: View(np.array([200.0, 0.0, 250.0]), np.empty((0, 2)), UPPER),
+    2: View(np.array([-200.0, 40.0, 250.0]), np.empty((0, 2)), UPPER),
+    3: View(np.array([200.0, -80.0, 200.0]), np.empty((0, 2)), LOWER),
+}
+
+
+def slope(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return 30.0 + 0.3 * (x - 50.0) + 0.1 * y
+
+
+def scene() -> tuple[np.ndarray, np.ndarray]:
+    """A slope that three cameras see in their planes. Camera 3 also sees the stripe of head 1: True for its points."""
+    parts, strange = [], []
+    for frame in range(20):
+        y = np.arange(-30.0, 30.0, 0.3)
+        for camera, view in VIEWS.items():
+            assert view.plane is not None
+            x = np.full(len(y), 2.0 * frame + view.plane.offset_mm)
+            own = np.column_stack([x, y, slope(x, y)])
+            parts.append(make_points(own, camera, frame, plane=x))
+            strange.append(np.zeros(len(y), np.bool_))
+        x = np.full(len(y), 2.0 * frame + UPPER.offset_mm)
+        there = np.column_stack([x, y, slope(x, y)])
+        eye = VIEWS[3].centre + np.array([2.0 * frame + LOWER.offset_mm, 0.0, 0.0])
+        share = (2.0 * frame + LOWER.offset_mm - x) / (eye[0] - x)
+        seen = there + share[:, None] * (eye - there)
+        parts.append(make_points(seen, 3, frame, plane=seen[:, 0]))
+        strange.append(np.ones(len(y), np.bool_))
+    return np.concatenate(parts), np.concatenate(strange)
+
+
+def test_the_stripe_of_another_head_is_found() -> None:
+    points, strange = scene()
+    np.testing.assert_array_equal(is_of_other_laser(points, VIEWS)[strange], True)
+    assert not is_of_other_laser(points, VIEWS)[~strange].any()
+
+
+def test_nothing_is_known_without_planes() -> None:
+    points, _ = scene()
+    assert not is_of_other_laser(points, {camera: replace(view, plane=None) for camera, view in VIEWS.items()}).any()
+    assert not is_of_other_laser(points[:0], VIEWS).any()
+
+
+def test_planes_that_coincide_hide_nothing() -> None:
+    points, _ = scene()
+    same = {camera: replace(view, plane=LaserPlane(head=camera, sd=[0.0] * 7)) for camera, view in VIEWS.items()}
+    assert not is_of_other_laser(points, same).any()
