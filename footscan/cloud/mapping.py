@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from footscan.calibration.models.laser_plane import row_share, x_in_plane
 from footscan.calibration.models.maps import is_supported, to_world
+from footscan.calibration.models.uncertainty import predicted_deviations, standard_deviations
 from footscan.cloud.points import make_points
-from footscan.cloud.uncertainty import predicted_deviations, standard_deviations
 from footscan.stripe.points import StripePoints
 from schemas.base.errors import RefusedInput
 from schemas.base.image_size import ImageSize

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from footscan.calibration.models.laser_plane import row_share
 from footscan.calibration.models.maps import is_supported, to_world
+from footscan.calibration.models.pose import camera_centres
+from footscan.calibration.models.uncertainty import standard_deviations
 from footscan.calibration.travel.body import Body
 from footscan.calibration.travel.fit import TravelFit, TravelPoints, fit_travel
-from footscan.cloud.uncertainty import standard_deviations
-from footscan.cloud.views import views_of
 from footscan.stripe.points import StripePoints
 from schemas.base.errors import Finding
 from schemas.calibration import Calibration, CameraCalibration, LaserPlane
@@ -57,11 +57,10 @@ def with_laser_planes(
     cameras = sorted(films)
     heads = sorted({head_of_camera[camera] for camera in cameras})
     maps = {camera: calibration.camera(camera).model_copy(update={"plane": None}) for camera in cameras}
-    views = views_of(maps.values())
+    centres = camera_centres(maps.values())
     parts = []
     for index, camera in enumerate(cameras):
-        centre = views[camera].centre if camera in views else np.full(3, np.nan)
-        part = _points(index, maps[camera], films[camera], centre)
+        part = _points(index, maps[camera], films[camera], centres.get(camera, np.full(3, np.nan)))
         if len(part.x) < FEWEST:
             raise Finding(f"camera {camera} saw {len(part.x)} points of the body, expected {FEWEST} at least")
         parts.append(part)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from footscan.cloud.uncertainty import END_ERROR, standard_deviations
+from footscan.calibration.models.uncertainty import END_ERROR, standard_deviations
 from footscan.stripe.points import STRIPE_DTYPE
 from schemas.calibration import CameraCalibration, PolynomialMap
 
