@@ -41,7 +41,7 @@ def standard_body() -> Body:
     --------
     >>> body = standard_body()
     >>> print(np.ptp(body.vertices, axis=0).round(6), len(body.vertices))
-    [150.  64.  84.] 24
+    [150.  64.  84.] 32
     """
     half = np.array(SIZE_MM) / 2.0
     sides = [(sign * axis, length) for axis, length in zip(np.eye(3), half, strict=True) for sign in (1.0, -1.0)]
