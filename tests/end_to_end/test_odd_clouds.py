@@ -57,6 +57,8 @@ def spoilt(**values: float) -> Cloud:
     cloud = egg()
     for axis, value in values.items():
         cloud[axis] = value
+        if axis == "x":
+            cloud["plane"] = value
     return cloud
 
 
