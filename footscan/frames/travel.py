@@ -1,5 +1,6 @@
 """Where the laser plane stood at each frame."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,23 @@ FARTHEST_MM = 1e5
 def travelled(travel: Travel, frames: int) -> NDArray[np.float64]:
     """(F,) X in mm of each frame of an even travel."""
     return np.asarray(travel.start_mm + travel.step_mm * np.arange(frames), np.float64)
+
+
+def x_of_frames(travel: bytes | None, positions: bytes | None, frames: int) -> NDArray[np.float64]:
+    """X in mm of each frame, from the inputs of a step: an even travel, or else positions; (F,), F >= `frames`.
+
+    Raises
+    ------
+    RefusedInput
+        A frame has no position.
+    """
+    if positions is None:
+        return travelled(Travel.model_validate_json(travel or b""), frames)
+    document = json.loads(positions)
+    x = np.array(document["x_mm"], np.float64)  # null becomes NaN
+    if len(x) < frames or np.isnan(x[:frames]).any():
+        raise RefusedInput(document["file"], f"expected a position for each of {frames} frames", field="frame")
+    return x
 
 
 def read_positions(path: Path) -> NDArray[np.float64]:

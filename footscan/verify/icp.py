@@ -11,12 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from footscan.robust import MAD_TO_SD
+from footscan.robust import MAD_TO_SD, TUKEY
 from footscan.verify.nearest import Floats, Surface
 
-TUKEY = 4.685
-"""Tuning constant of Tukey's biweight, in standard deviations: 95 % efficient for Gaussian noise. Residuals beyond have
-no weight."""
 DAMPING = 1e-6
 """Share of the mean diagonal that is added to the normal matrix, so that unconstrained directions do not move."""
 LONGEST_TURN = 0.3

@@ -4,15 +4,12 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from footscan.calibration.travel.body import Body
 from footscan.calibration.travel.from_film import CameraTravel, with_laser_planes
-from footscan.frames.travel import travelled
+from footscan.frames.travel import x_of_frames
 from pipelines.arrays import unpack
 from schemas.calibration import Calibration
 from schemas.frames import FrameManifest
-from schemas.scan import Travel
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
@@ -25,6 +22,8 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     ------
     Finding
         The film does not show the body.
+    RefusedInput
+        A frame has no position.
     """
     del parameters, places
     shape = unpack(inputs["body"])
@@ -34,15 +33,8 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
         if name.startswith("stripe-"):
             camera = int(name.partition("-")[2])
             frames = len(FrameManifest.model_validate_json(inputs[f"manifest-{camera}"]).frames)
-            films[camera] = CameraTravel(unpack(inputs[name])["stripe"], _x_of_frame(inputs, camera, frames))
+            x = x_of_frames(inputs.get(f"travel-{camera}"), inputs.get(f"positions-{camera}"), frames)
+            films[camera] = CameraTravel(unpack(inputs[name])["stripe"], x)
     calibration = Calibration.model_validate_json(inputs["calibration"])
     made, _ = with_laser_planes(calibration, films, heads, Body(shape["vertices"], shape["faces"]))
     return (made.model_dump_json(indent=2) + "\n").encode()
-
-
-def _x_of_frame(
-    inputs: Mapping[str, bytes], camera: int, frames: int
-) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":
-    if f"positions-{camera}" in inputs:
-        return np.array(json.loads(inputs[f"positions-{camera}"])["x_mm"], np.float64)
-    return travelled(Travel.model_validate_json(inputs[f"travel-{camera}"]), frames)

@@ -1,19 +1,16 @@
 """Stripe points to world points of one camera."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from footscan.cloud.mapping import map_stripe, refuse_other_size
-from footscan.frames.travel import travelled
+from footscan.frames.travel import x_of_frames
 from pipelines.arrays import pack, unpack
-from schemas.base.errors import RefusedInput
 from schemas.calibration import CameraCalibration
 from schemas.frames import FrameManifest
 from schemas.parameters.mapping import MappingParameters
-from schemas.scan import Travel
 
 
 def run(inputs: Mapping[str, bytes], parameters: MappingParameters, places: Mapping[str, Path]) -> bytes:
@@ -32,13 +29,7 @@ def run(inputs: Mapping[str, bytes], parameters: MappingParameters, places: Mapp
     manifest = FrameManifest.model_validate_json(inputs["manifest"])
     refuse_other_size(camera, manifest.size, places.get("film", f"camera {camera.camera}"))
     frames = len(manifest.frames)
-    if "positions" in inputs:
-        positions = json.loads(inputs["positions"])
-        x_of_frame = np.array(positions["x_mm"], np.float64)  # null becomes NaN
-        if len(x_of_frame) < frames or np.isnan(x_of_frame[:frames]).any():
-            raise RefusedInput(positions["file"], f"expected a position for each of {frames} frames", field="frame")
-    else:
-        x_of_frame = travelled(Travel.model_validate_json(inputs["travel"]), frames)
+    x_of_frame = x_of_frames(inputs.get("travel"), inputs.get("positions"), frames)
     points = map_stripe(extracted["stripe"], camera, x_of_frame, parameters)
     x_of_frame = x_of_frame[:frames].copy()
     x_of_frame[extracted["lost"]] = np.nan

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from footscan.calibration.models.maps import Model
 from footscan.calibration.models.observations import Observations
 from footscan.compiled import compiled
-from footscan.robust import MAD_TO_SD
+from footscan.robust import MAD_TO_SD, TUKEY
 from schemas.calibration import LARGEST
 
 Floats = NDArray[np.float64]
@@ -20,9 +20,6 @@ STEPS = 40
 """Steps of a minimisation at most: a bound of time."""
 ROUNDS = 4
 """How often the weights of outliers are updated: a bound of time."""
-TUKEY = 4.685
-"""Residual, in standard deviations, from which an observation has no weight (Tukey's biweight): 95 % efficiency for
-normal errors."""
 LEAST_SPREAD_MM = 0.01
 """Lower bound of the residuals' standard deviation, so that exact data have no outliers. Chosen by hand."""
 ATTEMPTS = 12

@@ -16,7 +16,7 @@ from footscan.calibration.models.laser_plane import terms_of_plane
 from footscan.calibration.travel.body import Body
 from footscan.calibration.travel.nearest_face import NearestFace
 from footscan.calibration.travel.place import Place, find_place
-from footscan.robust import MAD_TO_SD
+from footscan.robust import MAD_TO_SD, TUKEY
 from schemas.base.errors import Finding
 
 Floats = NDArray[np.float64]
@@ -54,9 +54,6 @@ USED = 8_000
 ROUNDS, SETTLED = 30, 1e-8
 FALLS = 0.8
 """Factor by which the spread that is expected falls from round to round."""
-TUKEY = 4.685
-"""Residual, in standard deviations, from which a point has no weight (A. E. Beaton and J. W. Tukey, Technometrics
-16(2), 1974, doi:10.1080/00401706.1974.10489171)."""
 FARTHEST_MM = 4.0
 """Points farther from the body are not of it."""
 OTHER, FAR_SPREADS = 2.0, 2.0

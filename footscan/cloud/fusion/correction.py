@@ -11,7 +11,7 @@ from footscan.cloud.fusion.correction_model import ALL_STRETCHES, STRETCHES, cho
 from footscan.cloud.fusion.motion import MOST_TERMS, SCALE_MM, TERMS, motion_terms, moved
 from footscan.cloud.fusion.pair_least_squares import Forms, solve, sum_up
 from footscan.cloud.fusion.stripes import Floats, Stripes
-from footscan.robust import MAD_TO_SD
+from footscan.robust import MAD_TO_SD, TUKEY
 from schemas.fusion import CameraCorrection
 from schemas.parameters.fusion import FusionParameters
 
@@ -20,9 +20,6 @@ ROUNDS = 2
 LEAST_POINTS = 200
 LEAST_STRETCHES = 6
 """Comparisons, and stretches with comparisons, from which a camera may be moved. Chosen by hand."""
-TUKEY = 4.685
-"""Residual, in standard deviations, from which a comparison has no weight, in the last iteration: 95 % efficiency for
-normal errors (A. E. Beaton and J. W. Tukey, Technometrics 16(2), 1974, doi:10.1080/00401706.1974.10489171)."""
 HUBER = 1.345
 """Residual, in standard deviations, up to which a comparison counts in full, in the first iterations: 95 % efficiency
 for normal errors (P. J. Huber, Annals of Mathematical Statistics 35(1), 1964, doi:10.1214/aoms/1177703732)."""

@@ -79,11 +79,8 @@ class _Lit(NamedTuple):
     """(N,) albedo relative to the mean."""
 
 
-def world_stripes(machine: Machine, subject: Subject, alone: bool = False) -> dict[int, NDArray[np.void]]:
-    """Return the stripe points of each camera, (N,) of `STRIPE_DTYPE`, by frame and along the stripe.
-
-    alone : the heads travel one after the other, so that no camera sees another head's laser.
-    """
+def world_stripes(machine: Machine, subject: Subject) -> dict[int, NDArray[np.void]]:
+    """Return the stripe points of each camera, (N,) of `STRIPE_DTYPE`, by frame and along the stripe."""
     cut_mesh, scene = CutMesh(subject.mesh), Scene(subject.mesh, SKIN)
     parts: dict[int, list[NDArray[np.void]]] = {camera: [] for camera in machine.cameras}
     random = {camera: np.random.default_rng([machine.world.seed, 300 + camera]) for camera in machine.cameras}
@@ -91,7 +88,7 @@ def world_stripes(machine: Machine, subject: Subject, alone: bool = False) -> di
         lit: dict[tuple[int, float], _Lit] = {}
         for camera in machine.cameras:
             if frame < machine.frames(HEAD_OF_CAMERA[camera]):
-                seen = _seen_in_frame(machine, camera, frame, cut_mesh, scene, lit, alone)
+                seen = _seen_in_frame(machine, camera, frame, cut_mesh, scene, lit)
                 if len(seen.light):
                     parts[camera].append(_measured(seen, frame, machine.world, machine, random[camera]))
     stripes = {}
@@ -102,13 +99,7 @@ def world_stripes(machine: Machine, subject: Subject, alone: bool = False) -> di
 
 
 def _seen_in_frame(
-    machine: Machine,
-    camera_id: int,
-    frame: int,
-    cut_mesh: CutMesh,
-    scene: Scene,
-    lit: dict[tuple[int, float], _Lit],
-    alone: bool,
+    machine: Machine, camera_id: int, frame: int, cut_mesh: CutMesh, scene: Scene, lit: dict[tuple[int, float], _Lit]
 ) -> _Seen:
     """All stripes in one frame; rows that are exposed later see heads that have travelled on.
 
@@ -123,8 +114,7 @@ def _seen_in_frame(
         seconds = machine.seconds(frame) + (part + 0.5) / slices * readout
         camera = moved_camera(machine.cameras[camera_id], machine.pose(head, seconds))
         for other in range(3):
-            apart = abs(machine.reported_x(other, seconds) - machine.reported_x(head, seconds))
-            if other != head and (alone or apart > SEEN_HEADS_MM):
+            if abs(machine.reported_x(other, seconds) - machine.reported_x(head, seconds)) > SEEN_HEADS_MM:
                 continue
             if (other, seconds) not in lit:
                 lit[other, seconds] = _lit_stripe(machine, other, seconds, cut_mesh, scene)

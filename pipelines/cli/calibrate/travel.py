@@ -36,12 +36,12 @@ def travel(
     from footscan.recordings.scans import read_scan
     from pipelines.engine.files.digest import sha256
     from pipelines.engine.pool import cores
+    from pipelines.live.rig_file import read_rig
     from pipelines.scan import CalibrationFile
     from pipelines.travel_job import calibrate_travel
     from schemas.base.errors import RefusedInput
-    from schemas.base.yaml_files import read_yaml
     from schemas.calibration import read_calibration
-    from schemas.rig import USUAL_HEADS, Rig
+    from schemas.rig import USUAL_HEADS
 
     film = read_scan(folder)
     maps = calibration or film.calibration
@@ -51,7 +51,7 @@ def travel(
     shape = standard_body() if body is None else _body(body)
     heads = dict(USUAL_HEADS)
     if rig is not None:
-        heads = {camera.id: camera.on_head for camera in read_yaml(rig, Rig).cameras}
+        heads = {camera.id: camera.on_head for camera in read_rig(rig).cameras}
     for camera in film.document.cameras:
         if camera.id not in heads:
             raise RefusedInput(rig or "--rig", f"says no head of camera {camera.id}, expected one", field="cameras")

@@ -97,7 +97,7 @@ def test_the_first_step_and_what_changed_in_it(
 ) -> None:
     found = night(root, with_parameters(parameters))
     one = only(found)
-    assert found.status == 1
+    assert (found.status, one.problem) == (1, None)
     [first] = one.first
     assert list(first.steps) == steps
     assert [told.text for told in first.changes] == [f"parameter {change.replace(': ', ' changed: ', 1)}"]
