@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.compiled import compiled
 from footscan.virtual.optics.scanner import HEIGHT, WIDTH, Camera, Laser, standard_scanner
 from footscan.virtual.worlds.draw import TRAVEL_MM
 from schemas.world import World, WorldHead
@@ -25,6 +26,8 @@ HEAD_CENTRE = np.array([0.0, 0.0, 57.0])
 """Point of a head about which it is turned, head frame: the middle of the scan volume."""
 PLATE_CENTRE = np.array([TRAVEL_MM / 2.0, 0.0, 0.0])
 """Point about which the plate is tilted, scanner frame."""
+SEEN_HEADS_MM = 60.0
+"""Stripes of other heads that are farther away are out of the picture."""
 BEND_HALF_MM = 70.0
 """The sagitta of a bent sheet is measured over twice this length."""
 TREMOR_HZ, SWAY_HZ = (8.0, 12.0), (0.2, 0.8)
@@ -48,6 +51,22 @@ class Pose(NamedTuple):
         return np.asarray(np.einsum("ji,nj->ni", self.turn, points - self.shift))
 
 
+class Exposure(NamedTuple):
+    """The exposure of one frame: from the first row to the last, a head moves from `pose` by `way`."""
+
+    seconds: float
+    """When the first row is exposed."""
+    pose: Pose
+    """Head frame to plate frame at that time."""
+    way: Floats
+    """(3,) mm, plate frame."""
+
+    @property
+    def middle(self) -> Pose:
+        """The head when the middle row is exposed."""
+        return Pose(self.pose.turn, self.pose.shift + 0.5 * self.way)
+
+
 @dataclass(frozen=True)
 class Machine:
     """The scanner of a world."""
@@ -67,6 +86,8 @@ class Machine:
     """(8,) of ripple, tremor and sway."""
     plate: Pose
     """Plate frame to scanner frame."""
+    one_by_one: bool = False
+    """The heads travel one after the other: no camera sees the laser of another head."""
 
     def step_mm(self, head: int) -> float:
         """Reported travel of a head from frame to frame."""
@@ -91,17 +112,32 @@ class Machine:
         turn = self.plate.turn.T @ to_scanner.turn
         return Pose(turn, self.plate.turn.T @ (to_scanner.shift - self.plate.shift) - moved)
 
+    def exposure(self, head: int, seconds: float) -> Exposure:
+        """The exposure of the frame that begins at a time."""
+        first = self.pose(head, seconds)
+        last = self.pose(head, seconds + self.world.cameras.rolling_shutter_ms / 1000.0)
+        return Exposure(seconds, first, last.shift - first.shift)
+
+    def heads_near(self, head: int, seconds: float) -> list[int]:
+        """The heads whose stripes the cameras of a head may see."""
+        own = self.reported_x(head, seconds)
+        near = [other for other in range(3) if abs(self.reported_x(other, seconds) - own) <= SEEN_HEADS_MM]
+        return [head] if self.one_by_one else near
+
     def calibration_pose(self, head: int) -> Pose:
         """Head frame to scanner frame when the reference object was filmed, at X = 0 by the travel."""
         errors = self.world.heads[head]
         turn = _turn(errors.roll_deg, errors.pitch_deg, errors.yaw_deg)
         return Pose(turn, HEAD_CENTRE - turn @ HEAD_CENTRE + np.array([errors.offset_mm, 0.0, 0.0]))
 
-    def sheet_distance(self, points: Floats, pose: Pose) -> Floats:
-        """Signed distance in X, (N,), of points (N, 3) in the plate frame from the laser sheet of a head at `pose`."""
-        p, q, r = (points - pose.shift).T
-        x, y = (p * column[0] + q * column[1] + r * column[2] for column in pose.turn.T[:2])
-        return np.asarray(x - self.world.laser.bend_mm * (y / BEND_HALF_MM) ** 2)
+    def sheet_distance(self, points: Floats, exposure: Exposure, share: Floats) -> Floats:
+        """Signed distance in X, (N,), of points (N, 3) in the plate frame from the laser sheet of a head.
+
+        share : (N,) part of the exposure's way that the head has moved.
+        """
+        bend = self.world.laser.bend_mm / BEND_HALF_MM**2
+        pose, way = exposure.pose, exposure.way
+        return np.asarray(_sheet_distance(points, np.asarray(share, np.float64), pose.turn, pose.shift, way, bend))
 
     def _head_pose(self, head: int, seconds: float) -> Pose:
         still = self.calibration_pose(head)
@@ -123,6 +159,16 @@ class Machine:
         angle = self.phases[7]
         shift = subject.shift_mm if head == LOWER_HEAD else (0.0, 0.0)
         return np.array([tremor + sway * np.cos(angle) + shift[0], sway * np.sin(angle) + shift[1], 0.0])
+
+
+def when_calibrated(machine: Machine) -> Machine:
+    """The scanner as it was when it was calibrated, with heads that travel one after the other over a still object."""
+    world = machine.world
+    still = world.subject.model_copy(update={"tremor_mm": 0.0, "sway_mm": 0.0, "shift_mm": (0.0, 0.0)})
+    world = world.model_copy(update={"subject": still})
+    return replace(
+        machine, world=world, cameras=machine.calibrated, plate=Pose(np.eye(3), np.zeros(3)), one_by_one=True
+    )
 
 
 def machine_of(world: World) -> Machine:
@@ -186,6 +232,20 @@ def _resized(camera: Camera, rows: int, columns: int) -> Camera:
     i, j = camera.lens.centre_px
     centre = (scale * (i + 0.5) - 0.5, scale * (j + 0.5 - HEIGHT / 2.0) + rows / 2.0 - 0.5)
     return replace(camera, lens=replace(camera.lens, focal_px=scale * camera.lens.focal_px, centre_px=centre))
+
+
+@compiled
+def _sheet_distance(points: Floats, share: Floats, turn: Floats, shift: Floats, way: Floats, bend: float) -> Floats:
+    """Signed distance in X of points from the sheet of a head that moves by `share` of `way`."""
+    distance = np.empty(len(points))
+    for k in range(len(points)):
+        x, y = 0.0, 0.0
+        for d in range(3):
+            from_head = points[k, d] - shift[d] - share[k] * way[d]
+            x += from_head * turn[d, 0]
+            y += from_head * turn[d, 1]
+        distance[k] = x - bend * y * y
+    return distance
 
 
 def _turn(x_deg: float, y_deg: float, z_deg: float) -> Floats:

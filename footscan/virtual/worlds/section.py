@@ -44,6 +44,13 @@ class CutMesh:
             np.add.at(normals, faces[:, corner], crossed)
         self._normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
 
+    def ends_near(self, distance: Floats, mm: float) -> Ints:
+        """Vertices, (K,), whose edges may be cut if `distance`, (V,) mm at the vertices, changes by less than `mm`."""
+        first, second = distance[self._edges[:, 0]], distance[self._edges[:, 1]]
+        is_near = np.zeros(len(distance), np.bool_)
+        is_near[self._edges[(np.minimum(first, second) < mm) & (np.maximum(first, second) > -mm)]] = True
+        return np.flatnonzero(is_near)
+
     def cut(self, distance: Floats) -> Cut:
         """Cut where `distance`, (V,) mm at the vertices, is zero."""
         above = distance > 0.0

@@ -16,7 +16,7 @@ from footscan.virtual.optics.laser_light import FAN_EDGE_DEGREES, FOCUS_MM, beam
 from footscan.virtual.optics.scanner import FAN_DEGREES, WIDTH, Camera, Laser
 from footscan.virtual.optics.scene import SKIN, Scene
 from footscan.virtual.portable import cos_sin
-from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Machine, moved_camera, moved_laser
+from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Exposure, Machine, moved_camera, moved_laser
 from footscan.virtual.worlds.section import Cut, CutMesh
 from footscan.virtual.worlds.subject import Subject
 from schemas.world import World
@@ -39,15 +39,14 @@ FAINTEST_SNR = 4.0
 """Ratio of a stripe's peak to the noise at which half of its points are found (A. Rose's criterion, 1948)."""
 FAINTEST = 0.01
 """Smallest peak that 8 bits show, in units of the white."""
-SLICE_MM = 0.15
-"""Travel within one exposure row by row up to which rows count as one moment. Chosen by hand."""
+ONE_MOMENT_MM = 0.02
+"""Travel within one exposure row by row up to which all rows count as one moment: less than noise. Chosen by hand."""
+ROUNDS = 2
+"""Steps to the row in which a point is seen, which depends on how far the head has moved until that row is exposed.
+Each step divides the error by 70 or more."""
 TATTOO_PLACE, TATTOO_SPREAD = np.array([200.0, 0.0, 60.0]), np.array([50.0, 25.0, 20.0])
 """Mean place of tattoos, mm, plate frame, and its standard deviation. Chosen by hand."""
 TATTOO_MM = 18.0
-MOST_SLICES = 3
-"""A bound of time."""
-SEEN_HEADS_MM = 60.0
-"""Stripes of other heads that are farther away are out of the picture."""
 LEAST_ROOM_LIGHT = 0.1
 """Share of the room's light that reaches a surface that faces down. Chosen by hand."""
 TEXTURE_SD = 0.15
@@ -85,7 +84,7 @@ def world_stripes(machine: Machine, subject: Subject) -> dict[int, NDArray[np.vo
     parts: dict[int, list[NDArray[np.void]]] = {camera: [] for camera in machine.cameras}
     random = {camera: np.random.default_rng([machine.world.seed, 300 + camera]) for camera in machine.cameras}
     for frame in range(max(machine.frames(head) for head in range(3))):
-        lit: dict[tuple[int, float], _Lit] = {}
+        lit: dict[int, _Lit] = {}
         for camera in machine.cameras:
             if frame < machine.frames(HEAD_OF_CAMERA[camera]):
                 seen = _seen_in_frame(machine, camera, frame, cut_mesh, scene, lit)
@@ -99,47 +98,70 @@ def world_stripes(machine: Machine, subject: Subject) -> dict[int, NDArray[np.vo
 
 
 def _seen_in_frame(
-    machine: Machine, camera_id: int, frame: int, cut_mesh: CutMesh, scene: Scene, lit: dict[tuple[int, float], _Lit]
+    machine: Machine, camera_id: int, frame: int, cut_mesh: CutMesh, scene: Scene, lit: dict[int, _Lit]
 ) -> _Seen:
     """All stripes in one frame; rows that are exposed later see heads that have travelled on.
 
-    `lit` keeps the stripes of each head and moment for the other cameras.
+    `lit` keeps the stripes of each head for the other cameras, where all rows are of one moment.
     """
-    head, rows = HEAD_OF_CAMERA[camera_id], machine.size[0]
-    readout = machine.world.cameras.rolling_shutter_ms / 1000.0
-    speed = machine.step_mm(head) * machine.world.cameras.frames_per_second
-    slices = min(int(readout * speed / SLICE_MM) + 1, MOST_SLICES)
+    head = HEAD_OF_CAMERA[camera_id]
+    own = machine.exposure(head, machine.seconds(frame))
+    camera = moved_camera(machine.cameras[camera_id], own.middle)
     parts = []
-    for part in range(slices):
-        seconds = machine.seconds(frame) + (part + 0.5) / slices * readout
-        camera = moved_camera(machine.cameras[camera_id], machine.pose(head, seconds))
-        for other in range(3):
-            if abs(machine.reported_x(other, seconds) - machine.reported_x(head, seconds)) > SEEN_HEADS_MM:
-                continue
-            if (other, seconds) not in lit:
-                lit[other, seconds] = _lit_stripe(machine, other, seconds, cut_mesh, scene)
-            seen = _seen_by(machine, camera, lit[other, seconds], scene)
-            within = (seen.pixels[:, 1] >= rows * part / slices) & (seen.pixels[:, 1] < rows * (part + 1) / slices)
-            parts.append(_Seen(*(values[within] for values in seen)))
+    for other in machine.heads_near(head, own.seconds):
+        sheet = machine.exposure(other, own.seconds)
+        if max(np.abs(own.way).max(), np.abs(sheet.way).max()) > ONE_MOMENT_MM:
+            distance = _distance_by_rows(machine, camera, own.way, sheet, cut_mesh)
+            stripe = _lit_stripe(machine, other, sheet, cut_mesh.cut(distance), scene)
+        else:
+            if other not in lit:
+                distance = machine.sheet_distance(cut_mesh.mesh.vertices, sheet, _middle(cut_mesh.mesh.vertices))
+                lit[other] = _lit_stripe(machine, other, sheet, cut_mesh.cut(distance), scene)
+            stripe = lit[other]
+        parts.append(_seen_by(machine, camera, own.way, stripe, scene))
     return _Seen(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 
 
-def _lit_stripe(machine: Machine, head: int, seconds: float, cut_mesh: CutMesh, scene: Scene) -> _Lit:
-    """The stripe of a head on the subject at a moment."""
-    pose = machine.pose(head, seconds)
-    cut = cut_mesh.cut(machine.sheet_distance(cut_mesh.mesh.vertices, pose))
+def _distance_by_rows(machine: Machine, camera: Camera, way: Floats, sheet: Exposure, cut_mesh: CutMesh) -> Floats:
+    """Distances (V,) in X of vertices from a sheet as it stands when the row of each vertex is exposed."""
+    vertices = cut_mesh.mesh.vertices
+    distance = machine.sheet_distance(vertices, sheet, _middle(vertices))
+    near = cut_mesh.ends_near(distance, float(np.abs(sheet.way).max()))
+    share = _row_share(camera, way, vertices[near], machine.size[0])
+    distance[near] = machine.sheet_distance(vertices[near], sheet, share)
+    return distance
+
+
+def _row_share(camera: Camera, way: Floats, points: Floats, rows: int) -> Floats:
+    """Part of the exposure after which each of points (N, 3) is seen by a camera that stands at its middle pose."""
+    share = _middle(points)
+    if not way.any():
+        return share
+    for _ in range(ROUNDS):
+        row = camera.project(points - (share - 0.5)[:, None] * way)[:, 1]
+        share = np.clip(np.nan_to_num(row + 0.5, nan=0.5 * rows) / rows, 0.0, 1.0)
+    return share
+
+
+def _middle(points: Floats) -> Floats:
+    return np.full(len(points), 0.5)
+
+
+def _lit_stripe(machine: Machine, head: int, sheet: Exposure, cut: Cut, scene: Scene) -> _Lit:
+    """The lit part of a head's stripe on the subject; the light is that of the middle of the exposure."""
     light = np.zeros(len(cut.points))
     for laser in machine.lasers[head]:
-        light += _irradiance(moved_laser(laser, pose), cut, scene)
+        light += _irradiance(moved_laser(laser, sheet.middle), cut, scene)
     lit = light > 0.0
     cut = Cut(cut.points[lit], cut.normals[lit])
     return _Lit(cut, light[lit], vertex_albedo(cut.points, machine.world))
 
 
-def _seen_by(machine: Machine, camera: Camera, lit: _Lit, scene: Scene) -> _Seen:
-    """A stripe as a camera sees it, in the plate frame."""
+def _seen_by(machine: Machine, camera: Camera, way: Floats, lit: _Lit, scene: Scene) -> _Seen:
+    """A stripe as a camera sees it, in the plate frame; from the first row to the last the camera moves by `way`."""
     world = machine.world
-    pixels, facing = _view(lit.cut, camera, machine.size, scene)
+    moved = (_row_share(camera, way, lit.cut.points, machine.size[0]) - 0.5)[:, None] * way
+    pixels, facing = _view(lit.cut, moved, camera, machine.size, scene)
     seen = facing > 0.0
     normals = lit.cut.normals[seen]
     brightness = world.subject.albedo * world.cameras.gain * lit.texture[seen]
@@ -163,9 +185,12 @@ def _irradiance(laser: Laser, cut: Cut, scene: Scene) -> Floats:
     return np.asarray(light)
 
 
-def _view(cut: Cut, camera: Camera, size: tuple[int, int], scene: Scene) -> tuple[Floats, Floats]:
-    """Pixels (N, 2) of points, and the cosine (N,) of the sight; 0 where the camera does not see the point."""
-    points = cut.points
+def _view(cut: Cut, moved: Floats, camera: Camera, size: tuple[int, int], scene: Scene) -> tuple[Floats, Floats]:
+    """Pixels (N, 2) of points, and the cosine (N,) of the sight; 0 where the camera does not see the point.
+
+    moved : (N, 3) mm, how far the camera is from its middle pose when the row of each point is exposed.
+    """
+    points = cut.points - moved
     if camera.below_glass:
         directions = directions_from_below(camera.position, points, thickness=camera.plate_mm)
         eyes, towards = exits_above(camera.position, directions, thickness=camera.plate_mm), -directions
@@ -177,7 +202,7 @@ def _view(cut: Cut, camera: Camera, size: tuple[int, int], scene: Scene) -> tupl
     facing = np.einsum("ij,ij->i", cut.normals, towards)
     inside = (pixels > -0.5).all(axis=1) & (pixels[:, 0] < columns - 0.5) & (pixels[:, 1] < rows - 0.5)
     seen = np.flatnonzero(inside & (facing > GRAZING))
-    hidden = scene.hidden(points[seen], cut.normals[seen], eyes[seen])
+    hidden = scene.hidden(cut.points[seen], cut.normals[seen], (eyes + moved)[seen])
     cosine = np.zeros(len(points))
     cosine[seen[~hidden]] = facing[seen[~hidden]]
     return pixels, cosine

@@ -1,6 +1,5 @@
 """Films of one camera of a world: all light on its sensor, row by row as it is exposed, and the JPEG that it sends."""
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +21,6 @@ from footscan.virtual.worlds.film.pixels import (
     interpolated,
     mix,
     put_object,
-    sheet_distance,
 )
 from footscan.virtual.worlds.film.raster import NOTHING, Projected, Raster, project, rasterise
 from footscan.virtual.worlds.film.scenery import (
@@ -34,8 +32,8 @@ from footscan.virtual.worlds.film.scenery import (
     smudge,
     things_of,
 )
-from footscan.virtual.worlds.machine import BEND_HALF_MM, HEAD_OF_CAMERA, Machine, Pose, moved_camera, moved_laser
-from footscan.virtual.worlds.stripes import SEEN_HEADS_MM, vertex_albedo
+from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Exposure, Machine, Pose, moved_camera, moved_laser
+from footscan.virtual.worlds.stripes import vertex_albedo
 from footscan.virtual.worlds.subject import Subject
 
 Floats = NDArray[np.float64]
@@ -73,17 +71,6 @@ AUTO_MEAN = 0.22
 """Mean brightness that automatic exposure aims at, 1 being white. Chosen by hand."""
 AUTO_RANGE = (0.25, 4.0)
 """Range of automatic exposure and of the gains of automatic white balance."""
-
-
-@dataclass(frozen=True)
-class Moment:
-    """The exposure of one frame: rows follow each other from `pose` to `pose` + `way`."""
-
-    seconds: float
-    pose: Pose
-    """Head frame to plate frame when the first row is exposed."""
-    way: Floats
-    """(3,) mm that the head travels until the last row, plate frame."""
 
 
 class _Pixels(NamedTuple):
@@ -170,7 +157,7 @@ class CameraFilm:
     def light(self, frame: int, random: np.random.Generator) -> Singles:
         """Light on the sensor at gain 1, (rows, columns, 3) float32, 1 being its white."""
         machine, world = self._machine, self._machine.world
-        moment = self._moment(frame)
+        moment = machine.exposure(HEAD_OF_CAMERA[self._id], machine.seconds(frame))
         camera = moved_camera(self._camera, moment.pose)
         raster = self._raster(camera, moment)
         pixels = self._pixels(raster)
@@ -215,7 +202,7 @@ class CameraFilm:
         brightness = (world.subject.nail_gloss * shine).astype(np.float32)
         light.reshape(-1, 3)[pixels.flat[near]] += brightness[:, None] * self._room_colour
 
-    def _put_details(self, light: Singles, camera: Camera, moment: Moment, raster: Raster) -> None:
+    def _put_details(self, light: Singles, camera: Camera, moment: Exposure, raster: Raster) -> None:
         """Put hairs and marks of the glass into the picture, and the laser's light on them."""
         machine, own = self._machine, HEAD_OF_CAMERA[self._id]
         hairs = self._hairs[visible(self._hairs, camera, (raster, self._centres))]
@@ -223,25 +210,13 @@ class CameraFilm:
         if camera.below_glass:
             draw_marks(self._marks, camera, light)
         caught = np.zeros((*machine.size, 1), np.float32)
-        for head in self._heads_near(moment):
+        for head in machine.heads_near(own, moment.seconds):
             pose = moment.pose if head == own else machine.pose(head, moment.seconds)
             lit_hairs(hairs, pose, camera, machine.world.laser.power, caught)
             sparkle(self._marks, pose, camera, machine.world.laser.power, raster, caught)
         add_light(light, caught[:, :, 0], self._laser_colour)
 
-    def _heads_near(self, moment: Moment) -> list[int]:
-        """The heads whose stripes the camera may see."""
-        own = self._machine.reported_x(HEAD_OF_CAMERA[self._id], moment.seconds)
-        return [head for head in range(3) if abs(self._machine.reported_x(head, moment.seconds) - own) <= SEEN_HEADS_MM]
-
-    def _moment(self, frame: int) -> Moment:
-        head, machine = HEAD_OF_CAMERA[self._id], self._machine
-        seconds = machine.seconds(frame)
-        first = machine.pose(head, seconds)
-        last = machine.pose(head, seconds + machine.world.cameras.rolling_shutter_ms / 1000.0)
-        return Moment(seconds, first, last.shift - first.shift)
-
-    def _raster(self, camera: Camera, moment: Moment) -> Raster:
+    def _raster(self, camera: Camera, moment: Exposure) -> Raster:
         """Scan conversion of the subject; a vertex is seen when the row is exposed in which it lies then."""
         mesh, rows = self._subject.mesh, self._machine.size[0]
         near = np.flatnonzero(np.abs(mesh.vertices[:, 0] - moment.pose.shift[0]) < SEEN_MM)
@@ -260,23 +235,20 @@ class CameraFilm:
         mesh = self._subject.mesh
         return _Pixels(index, *interpolated(face, shares, mesh.faces, mesh.vertices, self._normals, self._albedo))
 
-    def _stripes(self, camera: Camera, moment: Moment, pixels: _Pixels) -> Floats:
+    def _stripes(self, camera: Camera, moment: Exposure, pixels: _Pixels) -> Floats:
         """Laser light of all heads that each pixel receives, (rows, columns)."""
         machine, world = self._machine, self._machine.world
         rows, columns = machine.size
         picture = np.zeros(rows * columns)
         row_share = (pixels.flat // columns) / rows
         reach = REACH_SIGMAS * float(np.hypot(world.laser.sigma_mm, 0.3)) + 1.0
-        for head in self._heads_near(moment):
-            readout = world.cameras.rolling_shutter_ms / 1000.0
-            pose = machine.pose(head, moment.seconds)
-            way = machine.pose(head, moment.seconds + readout).shift - pose.shift
-            distance = sheet_distance(
-                pixels.points, row_share, pose.turn, pose.shift, way, world.laser.bend_mm / BEND_HALF_MM**2
-            )
+        for head in machine.heads_near(HEAD_OF_CAMERA[self._id], moment.seconds):
+            sheet = machine.exposure(head, moment.seconds)
+            distance = machine.sheet_distance(pixels.points, sheet, row_share)
             near = np.flatnonzero(np.abs(distance) < reach)
             if len(near):
-                light = self._sheet_light(head, pose, way * row_share[near, None], pixels, near, distance[near], camera)
+                moved = sheet.way * row_share[near, None]
+                light = self._sheet_light(head, sheet.pose, moved, pixels, near, distance[near], camera)
                 picture[pixels.flat[near]] += light
         return picture.reshape(rows, columns)
 
@@ -355,7 +327,7 @@ class CameraFilm:
             line[rows, columns] *= grain
         return line
 
-    def _flicker(self, light: Singles, moment: Moment) -> None:
+    def _flicker(self, light: Singles, moment: Exposure) -> None:
         """Lamps at the mains: rows that are exposed at other times are brighter or darker."""
         room, cameras = self._machine.world.room, self._machine.world.cameras
         if room.flicker > 0.0:

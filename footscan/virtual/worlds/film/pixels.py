@@ -38,20 +38,6 @@ def interpolated(
 
 
 @compiled
-def sheet_distance(points: Floats, share: Floats, turn: Floats, shift: Floats, way: Floats, bend: float) -> Floats:
-    """Signed distance in X of points from the sheet of a head that moves by `share` of `way`."""
-    distance = np.empty(len(points))
-    for k in range(len(points)):
-        x, y = 0.0, 0.0
-        for d in range(3):
-            from_head = points[k, d] - shift[d] - share[k] * way[d]
-            x += from_head * turn[d, 0]
-            y += from_head * turn[d, 1]
-        distance[k] = x - bend * y * y
-    return distance
-
-
-@compiled
 def add_light(light: Singles, grey: Singles, colour: Singles) -> None:
     """Add light (R, C) of one colour to a picture."""
     rows, columns = grey.shape

@@ -5,7 +5,7 @@ import pytest
 
 from footscan.virtual.optics.scanner import standard_scanner
 from footscan.virtual.worlds.draw import draw_world
-from footscan.virtual.worlds.machine import HEAD_CENTRE, machine_of, moved_camera
+from footscan.virtual.worlds.machine import HEAD_CENTRE, Exposure, machine_of, moved_camera
 from schemas.world import Knock, World, WorldCameras, WorldGlass, WorldHead, WorldLaser, WorldSubject
 
 NOMINAL = World(seed=5)
@@ -33,7 +33,8 @@ def test_poses_are_rigid_and_can_be_undone(world: World) -> None:
         pose = machine.pose(head, machine.seconds(17.3))
         assert pose.turn @ pose.turn.T == pytest.approx(np.eye(3), abs=1e-12)
         assert pose.undo(pose.apply(points)) == pytest.approx(points)
-        assert machine.sheet_distance(pose.apply(points), pose) == pytest.approx(
+        still = Exposure(0.0, pose, np.zeros(3))
+        assert machine.sheet_distance(pose.apply(points), still, np.zeros(50)) == pytest.approx(
             points[:, 0] - world.laser.bend_mm * (points[:, 1] / 70.0) ** 2
         )
 
