@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.syntax_lock import SYNTAX_LOCK
 from schemas.base.errors import DamagedError
 
 Array = NDArray[np.generic]
@@ -28,7 +29,7 @@ def pack(**arrays: Array) -> bytes:
 def unpack(data: bytes) -> dict[str, NDArray[Any]]:
     """Restore the arrays of `pack`; DamagedError if `data` is not such an archive."""
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+        with SYNTAX_LOCK, np.load(io.BytesIO(data), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except (ValueError, OSError, zipfile.BadZipFile) as error:
         raise DamagedError(f"expected packed arrays ({error})") from None

@@ -1,9 +1,12 @@
 """Arrays as bytes and back."""
 
+import gc
 import io
 import pickle
 import subprocess
 import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -50,3 +53,29 @@ def test_torn_archives_are_damaged() -> None:
     for length in (4, 50, len(whole) // 2, len(whole) - 1):
         with pytest.raises(DamagedError, match="expected packed arrays"):
             unpack(whole[:length])
+
+
+@pytest.fixture
+def busy_collector() -> Iterator[None]:
+    """Garbage is collected after every few objects, and other threads run meanwhile."""
+    interval, thresholds = sys.getswitchinterval(), gc.get_threshold()
+    sys.setswitchinterval(1e-6)
+    gc.set_threshold(30, 1, 1)
+    gc.callbacks.append(run_for_a_while)
+    yield
+    gc.callbacks.remove(run_for_a_while)
+    gc.set_threshold(*thresholds)
+    sys.setswitchinterval(interval)
+
+
+def run_for_a_while(*_: object) -> None:
+    sum(range(300))
+
+
+@pytest.mark.usefixtures("busy_collector")
+def test_threads_unpack_at_the_same_time() -> None:
+    """Python 3.11 counts the depth of syntax trees, such as `numpy.load` builds, once for all threads."""
+    data = pack(points=np.zeros(3, POINT_DTYPE), vertices=np.zeros((3, 3)))
+    with ThreadPoolExecutor(8) as threads:
+        found = list(threads.map(lambda _: list(unpack(data)), range(500)))
+    assert found == [["points", "vertices"]] * 500

@@ -21,6 +21,7 @@ from pipelines.engine.actions.libraries import versions_that_count
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import FileState, file_state, is_settled, sha256
 from pipelines.engine.files.seal import UNSEALING_ERRORS, sealed, unsealed
+from pipelines.syntax_lock import SYNTAX_LOCK
 from schemas.base.errors import Fault
 from schemas.base.model import canonical_json
 
@@ -154,7 +155,8 @@ def _text(name: str, _: FileState) -> str:
 
 
 def _tree(name: str) -> ast.Module:
-    return ast.parse(_file(name).read_bytes())
+    with SYNTAX_LOCK:
+        return ast.parse(_file(name).read_bytes())
 
 
 def _file(name: str) -> Path:
