@@ -3,18 +3,29 @@
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Protocol
 
 from footscan.calibration.travel.body import Body
 from footscan.recordings.scans import RecordedScan
 from pipelines.arrays import pack
 from pipelines.engine.actions.step import Failure, Input, Step, Value
+from pipelines.engine.files.file_digests import FileDigests
 from pipelines.engine.pool import Threads
 from pipelines.engine.workspace import Workspace
-from pipelines.scan import STEPS, CalibrationFile, scan_steps
+from pipelines.scan import STEPS, CalibrationFile, ScanCalibration, scan_steps
 from schemas.base.errors import DamagedError, Fault, RefusedInput
 from schemas.base.model import canonical_json
 from schemas.calibration import Calibration
 from schemas.parameters.scan import ScanParameters
+
+
+class WholeCalibration(ScanCalibration, Protocol):
+    """A calibration of which also the whole can be had."""
+
+    @property
+    def whole(self) -> Input:
+        """All of it."""
+
 
 OF_CAMERA = ("ingest", "background", "extract")
 """Kinds of a scan's steps that the film of a body takes."""
@@ -38,7 +49,7 @@ def calibrate_travel(
         A step could not be run to its end.
     """
     with TemporaryDirectory(prefix="footscan-") as temporary, Workspace(cache or Path(temporary)) as workspace:
-        steps = travel_steps(film, calibration, head_of_camera, body, workspace)
+        steps = travel_steps(film, calibration, head_of_camera, body, workspace.digests)
         with workspace.lease():
             outcomes = workspace.run(steps, Threads(workers), lambda _: None)
             end = outcomes[steps[-1].name]
@@ -54,20 +65,30 @@ def calibrate_travel(
 
 def travel_steps(
     film: RecordedScan,
-    calibration: CalibrationFile,
+    calibration: WholeCalibration,
     head_of_camera: Mapping[int, int],
     body: Body,
-    workspace: Workspace,
+    digests: FileDigests,
 ) -> list[Step]:
     """Build the steps from the films of a body to the calibration, the result of the last step, of kind `planes`."""
-    all_steps = scan_steps(film, calibration, ScanParameters(), workspace.digests)
+    all_steps = scan_steps(film, calibration, ScanParameters(), digests)
     steps = [step for step in all_steps if step.kind in OF_CAMERA]
     inputs: dict[str, Input] = {
         "calibration": calibration.whole,
-        "body": Value(pack(vertices=body.vertices, faces=body.faces)),
-        "heads": Value(canonical_json({str(camera): head for camera, head in sorted(head_of_camera.items())}).encode()),
+        "body": body_value(body),
+        "heads": heads_value(head_of_camera),
     }
     for step in all_steps:
         if step.kind == "map":
             inputs |= {f"{name}-{step.camera}": of for name, of in step.inputs.items() if name != "calibration"}
     return [*steps, Step(film.name, "planes", f"{STEPS}.laser_planes", None, inputs)]
+
+
+def body_value(body: Body) -> Value:
+    """A body as an input of a step."""
+    return Value(pack(vertices=body.vertices, faces=body.faces))
+
+
+def heads_value(head_of_camera: Mapping[int, int]) -> Value:
+    """The heads of the cameras as an input of a step."""
+    return Value(canonical_json({str(camera): head for camera, head in sorted(head_of_camera.items())}).encode())

@@ -122,8 +122,16 @@ def simulate_world(
     points: Annotated[
         bool, typer.Option("--points", help="Write the stripe points of each camera (CSV) instead of films.")
     ] = False,
+    body: Annotated[
+        Path | None,
+        typer.Option(help="Film this body (mesh, mm) instead of the subject, for `footscan calibrate travel`."),
+    ] = None,
 ) -> None:
     """Draw a whole world, and film it: a calibrated scan, with the true surface and the true measures beside it."""
+    import numpy as np
+
+    from footscan.mesh.formats.files import read_mesh
+    from footscan.virtual.optics.scene import Mesh
     from footscan.virtual.worlds.draw import draw_world
     from pipelines.cli.terminal.progress import frame_progress
     from pipelines.worlds.export import write_films, write_points
@@ -132,13 +140,19 @@ def simulate_world(
 
     if (seed is None) == (world is None):
         raise RefusedInput("simulate world", "expected one of --seed and --world")
+    if points and body is not None:
+        raise RefusedInput("simulate world", "expected one of --points and --body")
+    shape = None
+    if body is not None:
+        vertices, faces = read_mesh(body)
+        shape = Mesh(vertices, faces.astype(np.int64))
     _check_empty(out)
     whole = read_json(world, World) if world is not None else draw_world(seed or 0)
     if points:
         write_points(whole, out)
     else:
         with frame_progress("filming") as progress:
-            write_films(whole, out, progress)
+            write_films(whole, out, progress, shape)
     message(f"{out}: world {whole.seed}")
 
 

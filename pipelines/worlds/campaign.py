@@ -6,6 +6,7 @@ from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from footscan.calibration.travel.body import Body
 from footscan.recordings.scans import read_scan
 from pipelines.arrays import unpack
 from pipelines.engine.actions.code import code_identity
@@ -35,9 +36,17 @@ OnWorld = Callable[[WorldOutcome], None]
 
 
 def run_worlds(
-    worlds: Sequence[World], kind: WorldKind, parameters: ScanParameters, out: Path, pool: Pool, on_world: OnWorld
+    worlds: Sequence[World],
+    kind: WorldKind,
+    parameters: ScanParameters,
+    out: Path,
+    pool: Pool,
+    on_world: OnWorld,
+    body: Body | None = None,
 ) -> list[WorldOutcome]:
     """Run worlds, whose seeds differ, and return what came of each, in their order.
+
+    body : each scanner also films it, to calibrate where its laser planes lie; without it the chart is all there is.
 
     A world whose code, parameters and description are those of an earlier run is not run again.
 
@@ -46,7 +55,7 @@ def run_worlds(
     Fault
         A step failed for a reason that is not the world's: the disk, or the memory.
     """
-    files = {world.seed: out / OUTCOMES / f"{world_key(world, kind, parameters)}.json" for world in worlds}
+    files = {world.seed: out / OUTCOMES / f"{world_key(world, kind, parameters, body)}.json" for world in worlds}
     outcomes: dict[int, WorldOutcome] = {}
     for seed, file in files.items():
         if (outcome := _read(file)) is not None:
@@ -54,16 +63,16 @@ def run_worlds(
             on_world(outcome)
     missing = iter([world for world in worlds if world.seed not in outcomes])
     while window := list(islice(missing, WORLDS_AT_ONCE * pool.count)):
-        for seed, outcome in _run_window(window, kind, parameters, out, pool):
+        for seed, outcome in _run_window(window, kind, parameters, out, pool, body):
             write_atomically(files[seed], outcome.model_dump_json().encode())
             outcomes[seed] = outcome
             on_world(outcome)
     return [outcomes[world.seed] for world in worlds]
 
 
-def world_key(world: World, kind: WorldKind, parameters: ScanParameters) -> str:
+def world_key(world: World, kind: WorldKind, parameters: ScanParameters, body: Body | None = None) -> str:
     """The key of what comes of a world: its description, the parameters, and the code of all steps."""
-    steps = point_steps(world, parameters)
+    steps = point_steps(world, parameters, body)
     if kind == "points":
         return graph_key(steps)
     codes = {name: code_identity(f"{STEPS}.{name}").digest for name in OF_FILMS}
@@ -85,19 +94,30 @@ def graph_key(steps: Sequence[Step]) -> str:
 
 
 def _run_window(
-    worlds: Sequence[World], kind: WorldKind, parameters: ScanParameters, out: Path, pool: Pool
+    worlds: Sequence[World],
+    kind: WorldKind,
+    parameters: ScanParameters,
+    out: Path,
+    pool: Pool,
+    body: Body | None,
 ) -> Iterator[tuple[int, WorldOutcome]]:
     out.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix="worlds-", dir=out) as folder, Workspace(Path(folder) / "cache") as workspace:
         graphs: dict[int, list[Step]] = {}
         if kind == "points":
-            graphs = {world.seed: point_steps(world, parameters) for world in worlds}
+            graphs = {world.seed: point_steps(world, parameters, body) for world in worlds}
         else:
             films = [film_step(world, Path(folder) / str(world.seed)) for world in worlds]
-            _check(workspace.run(films, pool, lambda _: None))
-            for world, film in zip(worlds, films, strict=True):
-                scan = read_scan(film.places["folder"])
-                graphs[world.seed] = filmed_steps(world, scan, parameters, workspace.digests)
+            bodies = (
+                []
+                if body is None
+                else [film_step(world, Path(folder) / f"{world.seed}-body", body) for world in worlds]
+            )
+            _check(workspace.run([*films, *bodies], pool, lambda _: None))
+            for number, world in enumerate(worlds):
+                scan = read_scan(films[number].places["folder"])
+                shown = None if body is None else (read_scan(bodies[number].places["folder"]), body)
+                graphs[world.seed] = filmed_steps(world, scan, parameters, workspace.digests, shown)
         ends = workspace.run([step for graph in graphs.values() for step in graph], pool, lambda _: None)
         _check(ends)
         for seed, graph in graphs.items():

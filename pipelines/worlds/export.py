@@ -8,6 +8,7 @@ import numpy as np
 from footscan.calibration.chart.chart import read_chart
 from footscan.calibration.chart.from_chart import calibrate_chart
 from footscan.virtual.filming.record import write_yaml
+from footscan.virtual.optics.scene import Mesh
 from footscan.virtual.worlds.film.record import CALIBRATION, CHART, record_world, write_world
 from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, machine_of
 from footscan.virtual.worlds.stripes import world_stripes
@@ -23,15 +24,19 @@ COLUMNS = ("frame", "i", "j", "width", "peak", "score")
 FORMAT = ("%d", "%.3f", "%.3f", "%.2f", "%.1f", "%.3f")
 
 
-def write_films(world: World, folder: Path, progress: Callable[[int, int], None] | None = None) -> None:
+def write_films(
+    world: World, folder: Path, progress: Callable[[int, int], None] | None = None, body: Mesh | None = None
+) -> None:
     """Film a world into a scan folder that is ready to run: its chart is calibrated.
+
+    body : closed mesh, mm, that is filmed in place of the world's subject, to calibrate where the laser planes lie.
 
     Raises
     ------
     RefusedInput
         As in `calibrate_chart`; the films are there.
     """
-    record_world(world, folder, progress=progress)
+    record_world(world, folder, body=body, progress=progress)
     chart = folder / CHART
     source = Source(name=CHART, sha256=sha256(chart.read_bytes()))
     calibration, _ = calibrate_chart(

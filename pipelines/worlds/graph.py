@@ -5,12 +5,14 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
+from footscan.calibration.travel.body import Body
 from footscan.recordings.scans import SCAN_FILE, RecordedScan
 from footscan.virtual.worlds.film.record import PATIENT
-from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, machine_of
+from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Machine, machine_of
 from pipelines.engine.actions.step import Input, Output, Step, Value
 from pipelines.engine.files.file_digests import FileDigests
 from pipelines.scan import STEPS, reconstruction_steps, scan_steps
+from pipelines.travel_job import body_value, heads_value, travel_steps
 from schemas.base.model import canonical_json
 from schemas.campaign import WorldKind
 from schemas.frames import FrameManifest
@@ -21,10 +23,17 @@ from schemas.world import World
 
 RESULTS = {"cleaned": "clean", "fused": "fuse", "oriented": "orient", "surface": "surface", "measures": "measure"}
 """Results of a reconstruction that are compared with the truth, and the kinds of their steps."""
+NUMBERED_HEADS = {camera: head + 1 for camera, head in HEAD_OF_CAMERA.items()}
+"""Calibrations count heads from 1."""
 
 
 class WorldGraph:
-    """The steps of a world; also the calibration of its scanner, as the steps of a scan take it."""
+    """The steps of a world; also the calibration of its scanner, as the steps of a scan take it.
+
+    Attributes
+    ----------
+    whole : the calibration.
+    """
 
     def __init__(self, world: World) -> None:
         """Begin with the steps that compute the world's truth and its chart, and calibrate from it."""
@@ -32,7 +41,7 @@ class WorldGraph:
         self.name = f"{PATIENT}/{world.seed}"
         self.steps: list[Step] = []
         self.drawn = self.add("world", "world_points", {}, world)
-        self._calibration = self.add("calibration", "world_calibration", {"world": self.drawn}, CalibrationParameters())
+        self.whole: Input = self.add("calibration", "world_calibration", {"world": self.drawn}, CalibrationParameters())
 
     def add(
         self,
@@ -49,20 +58,27 @@ class WorldGraph:
     @property
     def source(self) -> Output:
         """Name and digest of the calibration."""
-        return self.add(
-            "calibration-source", "calibration_source", {"calibration": self._calibration, "name": _value("")}
-        )
+        return self.add("calibration-source", "calibration_source", {"calibration": self.whole, "name": _value("")})
 
     def camera(self, camera: int) -> Output:
         """The map of one camera."""
-        inputs: dict[str, Input] = {"calibration": self._calibration, "camera": _value(camera)}
+        inputs: dict[str, Input] = {"calibration": self.whole, "camera": _value(camera)}
         return self.add("camera-map", "camera_map", inputs, None, camera)
 
     def cameras(self, ids: frozenset[int]) -> Output:
         """The calibration with the maps of these cameras only."""
-        return self.add(
-            "camera-maps", "camera_maps", {"calibration": self._calibration, "cameras": _value(sorted(ids))}
-        )
+        return self.add("camera-maps", "camera_maps", {"calibration": self.whole, "cameras": _value(sorted(ids))})
+
+    def film_body(self, machine: Machine, body: Body) -> None:
+        """Add what a film of a body shows to the calibration, without pictures."""
+        shape: dict[str, Input] = {"body": body_value(body)}
+        filmed = self.add("body", "world_body", shape, self.world)
+        planes: dict[str, Input] = {"calibration": self.whole, **shape, "heads": heads_value(NUMBERED_HEADS)}
+        for camera in machine.cameras:
+            seen: dict[str, Input] = {"world": filmed, "camera": _value(camera)}
+            planes[f"stripe-{camera}"] = self.add("body-stripe", "world_stripe", seen, None, camera)
+            planes[f"manifest-{camera}"], planes[f"travel-{camera}"] = _frames(machine, camera)
+        self.whole = self.add("planes", "laser_planes", planes)
 
     def compare(self, kind: WorldKind, results: dict[str, Input]) -> list[Step]:
         """Add the last step, of kind `outcome`, and return the steps that it needs."""
@@ -76,19 +92,23 @@ class WorldGraph:
         return kept[::-1]
 
 
-def point_steps(world: World, parameters: ScanParameters) -> list[Step]:
-    """Build the steps of a world without pictures, in topological order; the last one compares with the truth."""
+def point_steps(world: World, parameters: ScanParameters, body: Body | None = None) -> list[Step]:
+    """Build the steps of a world without pictures, in topological order; the last one compares with the truth.
+
+    body : is filmed to calibrate, after the chart.
+    """
     graph, machine = WorldGraph(world), machine_of(world)
+    if body is not None:
+        graph.film_body(machine, body)
     points: dict[str, Input] = {}
     for camera in machine.cameras:
-        head = HEAD_OF_CAMERA[camera]
         stripe = graph.add("stripe", "world_stripe", {"world": graph.drawn, "camera": _value(camera)}, None, camera)
-        travel = Travel(start_mm=0.0, step_mm=machine.step_mm(head))
+        manifest, travel = _frames(machine, camera)
         mapped: dict[str, Input] = {
             "stripe": stripe,
-            "manifest": _manifest(machine.frames(head), machine.size),
+            "manifest": manifest,
             "calibration": graph.camera(camera),
-            "travel": _value(travel.model_dump(mode="json")),
+            "travel": travel,
         }
         points[f"points-{camera}"] = graph.add("map", "map_points", mapped, parameters.mapping, camera)
     maps = graph.cameras(frozenset(machine.cameras))
@@ -96,17 +116,37 @@ def point_steps(world: World, parameters: ScanParameters) -> list[Step]:
     return graph.compare("points", {name: getattr(made, name) for name in RESULTS})
 
 
-def film_step(world: World, folder: Path) -> Step:
-    """The step that films a world into a scan folder."""
+def film_step(world: World, folder: Path, body: Body | None = None) -> Step:
+    """The step that films a world into a scan folder: its subject, or else the body to calibrate with."""
     name = f"{PATIENT}/{world.seed}"
+    inputs: dict[str, Input] = {} if body is None else {"body": body_value(body)}
     return Step(
-        name, "film", f"{STEPS}.world_film", world, places={"folder": folder}, writes=folder / SCAN_FILE
-    )  # fmt: skip
+        name,
+        "film" if body is None else "film-body",
+        f"{STEPS}.world_film",
+        world,
+        inputs,
+        places={"folder": folder},
+        writes=folder / SCAN_FILE,
+    )
 
 
-def filmed_steps(world: World, scan: RecordedScan, parameters: ScanParameters, digests: FileDigests) -> list[Step]:
-    """Build the steps from the films of a world to what came of it, in topological order."""
+def filmed_steps(
+    world: World,
+    scan: RecordedScan,
+    parameters: ScanParameters,
+    digests: FileDigests,
+    body: tuple[RecordedScan, Body] | None = None,
+) -> list[Step]:
+    """Build the steps from the films of a world to what came of it, in topological order.
+
+    body : film of a body, and the body, to calibrate after the chart.
+    """
     graph = WorldGraph(world)
+    if body is not None:
+        made = travel_steps(body[0], graph, NUMBERED_HEADS, body[1], digests)
+        graph.steps += made
+        graph.whole = Output(made[-1].name)
     made = scan_steps(scan, graph, parameters, digests)
     graph.steps += made
     results: dict[str, Input] = {name: Output(f"{graph.name}/{kind}") for name, kind in RESULTS.items()}
@@ -115,6 +155,13 @@ def filmed_steps(world: World, scan: RecordedScan, parameters: ScanParameters, d
 
 def _value(content: object) -> Value:
     return Value(canonical_json(content).encode())
+
+
+def _frames(machine: Machine, camera: int) -> tuple[Input, Input]:
+    """Manifest and travel of a camera's frames."""
+    head = HEAD_OF_CAMERA[camera]
+    travel = Travel(start_mm=0.0, step_mm=machine.step_mm(head))
+    return _manifest(machine.frames(head), machine.size), _value(travel.model_dump(mode="json"))
 
 
 def _manifest(frames: int, size: tuple[int, int]) -> Value:

@@ -21,7 +21,7 @@ from schemas.world import (
     WorldSubject,
 )
 
-ROOM, LASER, HEADS, CAMERAS, GLASS, SUBJECT = range(100, 106)
+ROOM, LASER, HEADS, CAMERAS, GLASS, SUBJECT, ASSEMBLED = range(100, 107)
 """Numbers of the parts' generators."""
 HEAD_COUNT = 3
 TRAVEL_MM = 400.0
@@ -48,6 +48,53 @@ def draw_world(seed: int) -> World:
         cameras=_cameras(_generator(seed, CAMERAS), subject.kind),
         glass=_glass(_generator(seed, GLASS)),
         subject=subject,
+    )
+
+
+def draw_assembled(seed: int) -> World:
+    """Draw a scanner that was assembled at home and has no other error: what a film of a body can show of it.
+
+    Heads are off by up to 3 mm and 1 degree about each axis, their travels by 0.5 %, sheets are bent by up to 0.5 mm,
+    and the shutters take up to 33 ms from the first row to the last. The feet differ too.
+
+    Examples
+    --------
+    >>> draw_assembled(7).heads[0].ripple_mm
+    0.0
+    """
+    random, subject = _generator(seed, ASSEMBLED), _generator(seed, SUBJECT)
+
+    def head() -> WorldHead:
+        yaw, pitch, roll = (_even(random, -1.0, 1.0) for _ in range(3))
+        return WorldHead(
+            offset_mm=_even(random, -3.0, 3.0),
+            yaw_deg=yaw,
+            pitch_deg=pitch,
+            roll_deg=roll,
+            travel_scale=_even(random, -0.005, 0.005),
+        )
+
+    foot = WorldSubject(
+        side="right" if _happens(subject, 0.5) else "left",
+        shape_seed=int(subject.integers(2**31)),
+        length_mm=_even(subject, 220.0, 295.0),
+        arch_mm=_even(subject, 6.0, 20.0),
+        y_mm=_even(subject, -8.0, 8.0),
+        turn_deg=_even(subject, -8.0, 8.0),
+    )
+    cameras = WorldCameras(step_mm=2.0, frames=200, rolling_shutter_ms=_even(random, 0.0, 33.0))
+    laser = WorldLaser(bend_mm=_even(random, -0.5, 0.5))
+    return World(seed=seed, laser=laser, heads=(head(), head(), head()), cameras=cameras, subject=foot)
+
+
+def as_designed(world: World) -> World:
+    """The world of `draw_assembled` with an ideal scanner."""
+    return world.model_copy(
+        update={
+            "laser": world.laser.model_copy(update={"bend_mm": 0.0}),
+            "heads": (WorldHead(), WorldHead(), WorldHead()),
+            "cameras": world.cameras.model_copy(update={"rolling_shutter_ms": 0.0}),
+        }
     )
 
 

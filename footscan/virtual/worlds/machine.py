@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from footscan.compiled import compiled
 from footscan.virtual.optics.scanner import HEIGHT, WIDTH, Camera, Laser, standard_scanner
 from footscan.virtual.worlds.draw import TRAVEL_MM
-from schemas.world import World, WorldHead
+from schemas.world import World, WorldHead, WorldSubject
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +30,8 @@ SEEN_HEADS_MM = 60.0
 """Stripes of other heads that are farther away are out of the picture."""
 BEND_HALF_MM = 70.0
 """The sagitta of a bent sheet is measured over twice this length."""
+BODY = WorldSubject(kind="cast", albedo=0.7, scatter_mm=0.1)
+"""A body that stands still; its form is given apart."""
 TREMOR_HZ, SWAY_HZ = (8.0, 12.0), (0.2, 0.8)
 """Physiological tremor (R. J. Elble, 1996) and postural sway; frequencies in between are rare."""
 
@@ -162,12 +164,13 @@ class Machine:
 
 
 def when_calibrated(machine: Machine) -> Machine:
-    """The scanner as it was when it was calibrated, with heads that travel one after the other over a still object."""
-    world = machine.world
-    still = world.subject.model_copy(update={"tremor_mm": 0.0, "sway_mm": 0.0, "shift_mm": (0.0, 0.0)})
-    world = world.model_copy(update={"subject": still})
+    """The scanner as it was when it was calibrated, with heads that travel one after the other over a matt body."""
     return replace(
-        machine, world=world, cameras=machine.calibrated, plate=Pose(np.eye(3), np.zeros(3)), one_by_one=True
+        machine,
+        world=machine.world.model_copy(update={"subject": BODY}),
+        cameras=machine.calibrated,
+        plate=Pose(np.eye(3), np.zeros(3)),
+        one_by_one=True,
     )
 
 

@@ -20,6 +20,10 @@ AXIS_TOE = 2
 """The toe whose tip the axis of all measures runs to: an object without it has none of them by definition."""
 NAIL_MM = 7.0
 """Half the length of the nail of toe 1; those of the others are shorter. Chosen by hand."""
+BODY_TURN_DEG, BODY_TURN_SPREAD_DEG, BODY_SPREAD_MM = 20.0, 5.0, 5.0
+"""A body stands at about this angle to the travel, as somebody puts it by hand. Chosen by hand."""
+LONGEST_EDGE_MM = 8.0
+"""Longest edge of a body's mesh: the light on a face is that of its corners. Chosen by hand."""
 SCAN_HEIGHT = "scan_height"
 """Height at which a scan ends, which is no measure of the foot."""
 
@@ -50,6 +54,33 @@ def make_subject(subject: WorldSubject, resolution_mm: float = 2.0) -> Subject:
     centred = replace(foot, vertices=foot.vertices - middle, landmarks=tips)
     standing = placed(centred, TRAVEL_MM / 2.0, subject.y_mm, subject.turn_deg)
     return Subject(Mesh(standing.vertices, standing.faces.astype(np.int64)), measures, _nails(standing, subject))
+
+
+def make_body(body: Mesh, seed: int) -> Subject:
+    """Place a body, a closed mesh with Z = 0 at its foot, by hand in the middle of the travel."""
+    random = np.random.default_rng([seed, 320])
+    cos, sin = cos_sin(BODY_TURN_DEG + random.uniform(-BODY_TURN_SPREAD_DEG, BODY_TURN_SPREAD_DEG))
+    x, y = np.array([TRAVEL_MM / 2.0, 0.0]) + random.uniform(-BODY_SPREAD_MM, BODY_SPREAD_MM, 2)
+    finer, split = body.vertices, body.faces
+    while _longest_edge(finer, split) > LONGEST_EDGE_MM:
+        finer, split = _halved(finer, split)
+    turned = np.column_stack([cos * finer[:, 0] - sin * finer[:, 1], sin * finer[:, 0] + cos * finer[:, 1]])
+    place = np.column_stack([turned + np.array([x, y]), finer[:, 2]])
+    return Subject(Mesh(place, split), {}, np.empty((0, 4)))
+
+
+def _longest_edge(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
+    return float(np.linalg.norm(vertices[faces] - vertices[np.roll(faces, 1, axis=1)], axis=2).max())
+
+
+def _halved(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The mesh with a vertex in the middle of each edge, and four faces in place of each."""
+    pairs = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    edges, number = np.unique(pairs, axis=0, return_inverse=True)
+    ab, bc, ca = number.reshape(3, -1) + len(vertices)
+    a, b, c = faces.T
+    parts = [np.column_stack(corners) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+    return np.concatenate([vertices, vertices[edges].mean(axis=1)]), np.concatenate(parts)
 
 
 def _nails(foot: Foot, subject: WorldSubject) -> NDArray[np.float64]:

@@ -8,11 +8,11 @@ import yaml
 from footscan.virtual.filming.film import write_film
 from footscan.virtual.filming.processes import shoot_in_order
 from footscan.virtual.filming.record import film_name, write_stl, write_yaml
-from footscan.virtual.optics.scene import SKIN, Scene
+from footscan.virtual.optics.scene import SKIN, Mesh, Scene
 from footscan.virtual.worlds.chart import world_chart
 from footscan.virtual.worlds.film.camera_film import CameraFilm
-from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Machine, machine_of
-from footscan.virtual.worlds.subject import Subject, make_subject
+from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Machine, machine_of, when_calibrated
+from footscan.virtual.worlds.subject import Subject, make_body, make_subject
 from schemas.world import World
 
 FRAMES_A_TASK = 16
@@ -25,13 +25,21 @@ CALIBRATION = "calibration.json"
 
 
 def record_world(
-    world: World, folder: Path, *, progress: Callable[[int, int], None] | None = None, workers: int = 2
+    world: World,
+    folder: Path,
+    *,
+    body: Mesh | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    workers: int = 2,
 ) -> None:
     """Film a world into `folder`, which is created; scan.yaml is written last.
 
-    progress : called with the number of frames done and in total. workers : number of processes; 1 is this one alone.
+    body : closed mesh, mm, Z = 0 at its foot, that is filmed in place of the world's subject, as its scanner was when
+    it was calibrated. progress : called with the number of frames done and in total. workers : number of processes; 1
+    is this one alone.
     """
-    machine, subject = machine_of(world), make_subject(world.subject)
+    studio = _Studio(world, body)
+    machine, subject = studio.machine, studio.subject
     folder.mkdir(parents=True, exist_ok=True)
     write_world(machine, subject, folder)
     counts = {camera: machine.frames(HEAD_OF_CAMERA[camera]) for camera in machine.cameras}
@@ -43,7 +51,7 @@ def record_world(
         for camera, count in counts.items()
         for first in range(0, count, FRAMES_A_TASK)
     ]
-    for camera, part in shoot_in_order(_Studio, (world,), tasks, workers):
+    for camera, part in shoot_in_order(_Studio, (world, body), tasks, workers):
         pictures += part
         done += len(part)
         if len(pictures) == counts[camera]:
@@ -57,8 +65,8 @@ def record_world(
         for camera, head in ((camera, HEAD_OF_CAMERA[camera]) for camera in machine.cameras)
     ]
     scan = {
-        "format": "footscan.scan/1", "patient": PATIENT, "scan": f"{world.seed}", "side": world.subject.side,
-        "truth": "truth.stl", "calibration": CALIBRATION, "cameras": cameras,
+        "format": "footscan.scan/1", "patient": PATIENT, "scan": f"{world.seed}" + ("-body" if body else ""),
+        "side": world.subject.side, "truth": "truth.stl", "calibration": CALIBRATION, "cameras": cameras,
     }  # fmt: skip
     write_yaml(folder / "scan.yaml", scan)
 
@@ -74,13 +82,19 @@ def write_world(machine: Machine, subject: Subject, folder: Path) -> None:
 class _Studio:
     """The world that a process films; its camera is kept until another one is requested."""
 
-    def __init__(self, world: World) -> None:
-        self._machine, self._subject = machine_of(world), make_subject(world.subject)
-        self._scene = Scene(self._subject.mesh, SKIN)
+    def __init__(self, world: World, body: Mesh | None) -> None:
+        self.machine = machine_of(world)
+        if body is None:
+            self.subject = make_subject(world.subject)
+        else:
+            self.machine, self.subject = when_calibrated(self.machine), make_body(body, world.seed)
+        self._scene: Scene | None = None
         self._film: tuple[int, CameraFilm] | None = None
 
     def shoot(self, camera: int, frames: range) -> list[bytes]:
         """Return the JPEG pictures of frames."""
+        if self._scene is None:
+            self._scene = Scene(self.subject.mesh, SKIN)
         if self._film is None or self._film[0] != camera:
-            self._film = camera, CameraFilm(self._machine, self._subject, camera, self._scene)
+            self._film = camera, CameraFilm(self.machine, self.subject, camera, self._scene)
         return [self._film[1].jpeg(frame) for frame in frames]
