@@ -100,8 +100,8 @@ def _doubts(made: BoardCalibration) -> list[str]:
     if error is None or error <= LARGE_MM:
         return []
     return [
-        f"camera {made.camera.camera}: held-out error {error:.2f} mm, expected {LARGE_MM:g} mm at most: glass before the "
-        "camera, a board that is not flat, or pictures of one pose between which the board moved"
+        f"camera {made.camera.camera}: held-out error {error:.2f} mm, expected {LARGE_MM:g} mm at most: glass before "
+        "the camera, a board that is not flat, or pictures of one pose between which the board moved"
     ]
 
 

@@ -72,11 +72,10 @@ class RecordedChessboard:
     def pictures(self, camera: BoardCamera) -> Iterator[Pictures]:
         """The pictures of a camera, pose by pose; RefusedInput if one is torn."""
         for number, picture in enumerate(camera.pictures):
-            named = {name: path for name, path in self._named(camera, number, picture)}
+            named = dict(self._named(camera, number, picture))
             pixels = {path: _pixels(path) for path in dict.fromkeys(named.values())}
-            board, laser, off = (pixels.get(named.get(name, Path())) for name in ("board", "laser", "off"))
-            assert board is not None
-            yield Pictures(picture, board, laser, off)
+            laser, off = (pixels[named[name]] if name in named else None for name in ("laser", "off"))
+            yield Pictures(picture, pixels[named["board"]], laser, off)
 
     def _paths(self, camera: BoardCamera) -> list[Path]:
         return [

@@ -71,7 +71,7 @@ def find_corners(image: Rgb, board: Board) -> Floats | None:
     """
     import cv2
 
-    grey = cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY)
+    grey = np.asarray(cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY), np.uint8)
     flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
     found, corners = cv2.findChessboardCornersSB(grey, board.shape, flags=flags)
     if not found:  # the older detector finds some boards that are seen slantwise
@@ -133,4 +133,4 @@ def _square_brightness(grid: Floats, grey: NDArray[np.uint8]) -> Floats:
     i = np.clip(np.rint(middles[..., 0]).astype(int), 1, columns - 2)
     j = np.clip(np.rint(middles[..., 1]).astype(int), 1, rows - 2)
     around = [grey[j + dj, i + di].astype(np.float64) for dj in (-1, 0, 1) for di in (-1, 0, 1)]
-    return np.mean(around, axis=0)
+    return np.asarray(np.mean(around, axis=0))

@@ -62,7 +62,7 @@ class Pinhole:
 
     def pixels(self, points: Floats) -> Floats:
         """Project `points` (N, 3), mm, camera frame, to pixels (N, 2)."""
-        return self._distorted(points[:, :2] / points[:, 2:]) * self.focal_px + np.asarray(self.centre_px)
+        return np.asarray(self._distorted(points[:, :2] / points[:, 2:]) * self.focal_px + np.asarray(self.centre_px))
 
     def directions(self, pixels: Floats) -> Floats:
         """Directions (N, 3), camera frame, in which the camera sees at `pixels` (N, 2); their z is 1.

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,15 +92,16 @@ def _with_stripes(
     """The views that fit one camera, with the stripe on each board; appends to `remarks`."""
     fitted = fit_pinhole([(view.points, view.pixels) for view in views], image_px)
     middle = float(np.median(fitted.errors_px))
-    kept = fitted.errors_px <= max(POOR * middle, POOR_PX)
+    largest = max(POOR * middle, POOR_PX)
+    kept = fitted.errors_px <= largest
     if not kept.all():
-        for number in np.flatnonzero(~kept):
-            remarks.append(
-                f"{views[number].name}: the corners lie {fitted.errors_px[number]:.2f} px off, in the middle picture "
-                f"{middle:.2f} px; left out"
-            )
-        views = [views[number] for number in np.flatnonzero(kept)]
-        stripes = [stripes[number] for number in np.flatnonzero(kept)]
+        remarks += [
+            f"{view.name}: the corners lie {error:.2f} px off, in the middle picture {middle:.2f} px; left out"
+            for view, error in zip(views, fitted.errors_px, strict=True)
+            if error > largest
+        ]
+        views = list(compress(views, kept))
+        stripes = list(compress(stripes, kept))
         fitted = fit_pinhole([(view.points, view.pixels) for view in views], image_px)
     used = []
     for view, stripe, pose in zip(views, stripes, fitted.poses, strict=True):

@@ -70,7 +70,7 @@ def record_chessboard(
             picture = {"board": f"cam{camera_id}/{number:02d}.jpg"}
             (folder / picture["board"]).write_bytes(cameraman.jpeg(board, number, laser=False))
             if number < with_laser:
-                picture["laser"] = f"cam{camera_id}/{number:02d}-laser.jpg"
+                picture["laser"], picture["off"] = f"cam{camera_id}/{number:02d}-laser.jpg", picture["board"]
                 (folder / picture["laser"]).write_bytes(cameraman.jpeg(board, number, laser=True))
             if number == held:
                 picture["place"] = place
