@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from footscan.calibration.chessboard.camera_fit import Glass
 from footscan.calibration.chessboard.corners import Board
 from footscan.calibration.chessboard.from_pictures import BoardCalibration, calibrate_camera
 from footscan.calibration.chessboard.pinhole import Pose, UndeterminedPinholeError
@@ -47,6 +48,7 @@ def calibrate_chessboard(
     """
     document = recorded.document
     board = Board(document.squares, document.square_mm)
+    glass = None if document.glass is None else Glass(document.glass.thickness_mm, document.glass.index)
     places = {name: _pose(place) for name, place in document.places.items()}
     sizes = [recorded.size(camera).px for camera in document.cameras]  # all refused before any is searched
     made: list[BoardCalibration] = []
@@ -57,7 +59,7 @@ def calibrate_chessboard(
             views, remarks = usable_views(shots, board, image_px)
         except UndeterminedPinholeError as undetermined:
             raise RefusedInput(recorded.file, str(undetermined), field=f"camera {camera.id}") from None
-        made.append(calibrate_camera(camera.id, views, image_px, str(recorded.file)))
+        made.append(calibrate_camera(camera.id, views, image_px, glass, str(recorded.file)))
         warnings += remarks + _doubts(made[-1])
         if progress is not None:
             progress(number + 1, len(document.cameras))

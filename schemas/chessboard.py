@@ -54,6 +54,14 @@ class BoardPlace(Document):
         return self
 
 
+class GlassPlate(Document):
+    """The plate that feet stand on; boards are held above it, and its upper face is Z = 0."""
+
+    thickness_mm: Annotated[float, Field(ge=0.1, le=100)]
+    index: Annotated[float, Field(ge=1, le=2.5)] = 1.52
+    """Refractive index; that of soda-lime glass by default."""
+
+
 class BoardPicture(Document):
     """One pose of the board before a camera."""
 
@@ -99,6 +107,8 @@ class Chessboard(Document):
     """Side of a square, measured over many."""
     place_sd_mm: Annotated[float, Field(ge=0, le=10)] = 0.2
     """Standard deviation of the corners of a placed board from where they should be."""
+    glass: GlassPlate | None = None
+    """Cameras below it look through it; None if there is none between any camera and the boards."""
     places: Annotated[dict[str, BoardPlace], Field(min_length=1, max_length=100)]
     cameras: Annotated[list[BoardCamera], Field(min_length=1)]
 

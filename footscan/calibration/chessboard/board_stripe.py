@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.chessboard.corners import Board
-from footscan.calibration.chessboard.pinhole import Pinhole, Pose
+from footscan.calibration.chessboard.pane import Sight
+from footscan.calibration.chessboard.pinhole import Pose
+from footscan.calibration.chessboard.sheet import Plane
 from footscan.robust import MAD_TO_SD, TUKEY
 from footscan.stripe.extract import extract_stripe
 from footscan.stripe.points import StripePoints
@@ -50,7 +52,7 @@ def find_stripe(picture: Rgb, off: Rgb | None) -> StripePoints:
     return extract_stripe(picture, ExtractionParameters(), off)
 
 
-def on_board(points: StripePoints, board: Board, pinhole: Pinhole, pose: Pose, spacing_px: float) -> BoardStripe | None:
+def on_board(points: StripePoints, board: Board, sight: Sight, pose: Pose, spacing_px: float) -> BoardStripe | None:
     """Select the points of the stripe that lie on one line on the white squares of a board.
 
     On black squares the stripe is dim, and at their edges it is displaced. Of several lines the one with the most
@@ -67,7 +69,7 @@ def on_board(points: StripePoints, board: Board, pinhole: Pinhole, pose: Pose, s
     pixels = np.column_stack([points["i"], points["j"]]).astype(np.float64)
     if not len(pixels):
         return None
-    places = board_places(pixels, pinhole, pose)
+    places = pose.undo(board_points(pixels, sight, pose))[:, :2]
     cell = np.floor(places / board.square_mm).astype(np.intp) + 1
     white = board.is_white(cell[:, 0], cell[:, 1])
     within = places / board.square_mm - np.floor(places / board.square_mm)
@@ -79,16 +81,10 @@ def on_board(points: StripePoints, board: Board, pinhole: Pinhole, pose: Pose, s
     return BoardStripe(pixels[chosen], cell[chosen, 1] * board.squares[0] + cell[chosen, 0])
 
 
-def board_places(pixels: Floats, pinhole: Pinhole, pose: Pose) -> Floats:
-    """The places (N, 2), mm, board frame, that are seen at `pixels` (N, 2)."""
-    return pose.undo(board_points(pixels, pinhole, pose))[:, :2]
-
-
-def board_points(pixels: Floats, pinhole: Pinhole, pose: Pose) -> Floats:
+def board_points(pixels: Floats, sight: Sight, pose: Pose) -> Floats:
     """The points (N, 3), mm, camera frame, of a board in its pose that are seen at `pixels` (N, 2)."""
-    directions = pinhole.directions(pixels)
     normal = pose.rotation[:, 2]
-    return directions * ((normal @ pose.translation) / (directions @ normal))[:, np.newaxis]
+    return Plane(normal, float(normal @ pose.translation)).meet(*sight.rays(pixels))
 
 
 def _on_one_line(places: Floats) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.chessboard.camera_fit import BoardView, CameraFit, fit_camera, pose_of_view
+from footscan.calibration.chessboard.camera_fit import BoardView, CameraFit, Glass, fit_camera
 from footscan.calibration.chessboard.pinhole import UndeterminedPinholeError
 from footscan.calibration.chessboard.sheet import UndeterminedPlaneError, across_travel
 from footscan.calibration.models.fit import ModelFit, UndeterminedError, fit
@@ -62,7 +62,7 @@ class BoardCalibration:
 
 
 def calibrate_camera(
-    camera_id: int, views: Sequence[BoardView], image_px: tuple[int, int], source: str
+    camera_id: int, views: Sequence[BoardView], image_px: tuple[int, int], glass: Glass | None, source: str
 ) -> BoardCalibration:
     """Calibrate a camera from views of the board.
 
@@ -75,6 +75,7 @@ def calibrate_camera(
     Parameters
     ----------
     views : as `usable_views` finds them.
+    glass : on which feet stand; None if no camera looks through it.
     source : names the pictures in messages.
 
     Raises
@@ -84,7 +85,7 @@ def calibrate_camera(
     """
     field = f"camera {camera_id}"
     try:
-        whole = fit_camera(views, image_px)
+        whole = fit_camera(views, image_px, glass)
         sheet = np.array(across_travel(whole.plane.seen_from(whole.scanner), MIDDLE_Z_MM))
     except (UndeterminedPinholeError, UndeterminedPlaneError) as undetermined:
         raise RefusedInput(source, str(undetermined), field=field) from None
@@ -99,7 +100,7 @@ def calibrate_camera(
     if not np.isfinite(whole.world(pixels)).all():
         raise RefusedInput(source, "the laser plane passes through the camera, expected it before it", field=field)
     model, fitted, misfit = _fitted_map(whole, pixels, image_px, (source, field))
-    folds = [_without(views, number, image_px, model, pixels) for number in range(_fold_count(views))]
+    folds = [_without(views, number, image_px, glass, model, pixels) for number in range(_fold_count(views))]
     known = [fold for fold in folds if fold is not None]
     complete = len(known) == len(folds) > 1
     covariance = _jackknife(np.array([fold.parameters for fold in known])) if complete else None
@@ -154,19 +155,24 @@ def _may_be_left_out(views: Sequence[BoardView]) -> list[int]:
 
 
 def _without(
-    views: Sequence[BoardView], fold: int, image_px: tuple[int, int], model: HomographyModel, pixels: Floats
+    views: Sequence[BoardView],
+    fold: int,
+    image_px: tuple[int, int],
+    glass: Glass | None,
+    model: HomographyModel,
+    pixels: Floats,
 ) -> _Fold | None:
     """Calibrate without the part number `fold`; None if the other pictures do not determine everything."""
     out = set(_may_be_left_out(views)[fold :: _fold_count(views)])
     try:
-        rest = fit_camera([view for number, view in enumerate(views) if number not in out], image_px)
+        rest = fit_camera([view for number, view in enumerate(views) if number not in out], image_px, glass)
         sheet = np.array(across_travel(rest.plane.seen_from(rest.scanner), MIDDLE_Z_MM))
         world = rest.world(pixels)
         if not np.isfinite(world).all():
             return None
         parameters = fit(model, of_points(pixels, world, np.arange(len(pixels))), robust=False).parameters
         parts = [
-            model.world(parameters, stripe.pixels) - rest.board_world(stripe.pixels, pose_of_view(view, rest.pinhole))
+            model.world(parameters, stripe.pixels) - rest.board_world(stripe.pixels, rest.pose_of(view))
             for number, view in enumerate(views)
             if number in out and (stripe := view.stripe) is not None
         ]

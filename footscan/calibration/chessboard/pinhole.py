@@ -106,13 +106,16 @@ class PinholeFit:
     """(V,) distance of each view's corners from where they are projected to, root mean square."""
 
 
-def fit_pinhole(views: Sequence[tuple[Floats, Floats]], image_px: tuple[int, int]) -> PinholeFit:
+def fit_pinhole(
+    views: Sequence[tuple[Floats, Floats]], image_px: tuple[int, int], start: Pinhole | None = None
+) -> PinholeFit:
     """Fit a pinhole to the corners of a board in several poses.
 
     Parameters
     ----------
     views : corners of the board (N, 3), mm, board frame, and their pixels (N, 2); one pair a picture.
     image_px : columns and rows of the pictures.
+    start : from which the fit starts; needed if the corners of a board do not lie in one plane.
 
     Raises
     ------
@@ -127,7 +130,10 @@ def fit_pinhole(views: Sequence[tuple[Floats, Floats]], image_px: tuple[int, int
         _, matrix, distortion, turns, shifts, spreads, _, errors = cv2.calibrateCameraExtended(
             [points.astype(np.float32) for points, _ in views],
             [pixels.astype(np.float32).reshape(-1, 1, 2) for _, pixels in views],
-            image_px, None, None, flags=cv2.CALIB_FIX_K3,
+            image_px,
+            None if start is None else start.matrix,
+            None if start is None else np.array(start.distortion),
+            flags=cv2.CALIB_FIX_K3 | (0 if start is None else cv2.CALIB_USE_INTRINSIC_GUESS),
         )  # fmt: skip
     except cv2.error:
         raise UndeterminedPinholeError("the poses of the board do not determine the camera") from None

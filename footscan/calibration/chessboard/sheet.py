@@ -34,10 +34,10 @@ class Plane:
     distance: float
     """mm."""
 
-    def meet(self, directions: Floats) -> Floats:
-        """Where rays from the origin along `directions` (N, 3) meet the plane, (N, 3) mm; NaN behind the origin."""
-        depth = self.distance / (directions @ self.normal)
-        return directions * np.where(depth > 0.0, depth, np.nan)[:, np.newaxis]
+    def meet(self, origins: Floats, directions: Floats) -> Floats:
+        """Where rays from `origins` (N, 3), mm, along `directions` (N, 3) meet the plane, (N, 3) mm; NaN behind."""
+        depth = (self.distance - origins @ self.normal) / (directions @ self.normal)
+        return origins + directions * np.where(depth > 0.0, depth, np.nan)[:, np.newaxis]
 
     def seen_from(self, frame: Pose) -> "Plane":
         """The same plane in the frame that `frame` leads from to this one.

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from footscan.calibration.chessboard.board_stripe import find_stripe, on_board
 from footscan.calibration.chessboard.camera_fit import BoardView
 from footscan.calibration.chessboard.corners import Board, find_corners, spacing_px
+from footscan.calibration.chessboard.pane import Sight
 from footscan.calibration.chessboard.pinhole import Pose, fit_pinhole
 from footscan.stripe.points import StripePoints
 
@@ -105,7 +106,7 @@ def _with_stripes(
         fitted = fit_pinhole([(view.points, view.pixels) for view in views], image_px)
     used = []
     for view, stripe, pose in zip(views, stripes, fitted.poses, strict=True):
-        found = None if stripe is None else on_board(stripe, board, fitted.pinhole, pose, view.spacing_px)
+        found = None if stripe is None else on_board(stripe, board, Sight(fitted.pinhole), pose, view.spacing_px)
         if stripe is not None and found is None:
             remarks.append(f"{view.name}: no stripe across white squares of the board; its stripe is left out")
         used.append(replace(view, stripe=found))

@@ -11,6 +11,7 @@ from footscan.virtual.chessboard.picture import BoardCameraman
 from footscan.virtual.chessboard.poses import held_poses, in_view
 from footscan.virtual.chessboard.printed_board import PrintedBoard
 from footscan.virtual.filming.record import CAMERAS, write_yaml
+from footscan.virtual.optics.glass import REFRACTIVE_INDEX, THICKNESS_MM
 from footscan.virtual.optics.scanner import standard_scanner
 from schemas.chessboard import Chessboard
 from schemas.parameters.simulation import SimulationSettings
@@ -82,6 +83,7 @@ def record_chessboard(
         "format": "footscan.chessboard/1",
         "squares": list(SQUARES),
         "square_mm": SQUARE_MM,
+        "glass": {"thickness_mm": THICKNESS_MM, "index": REFRACTIVE_INDEX},
         "places": {name: _as_document(board) for name, board in _places().items()},
         "cameras": listed,
     }

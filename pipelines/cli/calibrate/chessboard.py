@@ -55,11 +55,11 @@ def _rows(made: "ChessboardCalibration") -> list[list[str]]:
     for one in made.cameras:
         camera = one.camera
         held_out = "-" if camera.held_out_rms_mm is None else f"{camera.held_out_rms_mm:.3f}"
+        focal, stripes = one.fit.sight.pinhole.focal_px[0], len(one.fit.stripe_mm)
+        errors = [f"{camera.rms_mm:.3f}", held_out, f"{camera.worst_mm:.3f}", f"{one.misfit_mm:.3f}"]
         rows.append(
-            [str(camera.camera), str(one.views), str(len(one.fit.stripe_mm)), f"{one.fit.pinhole.focal_px[0]:.1f}",
-             f"{one.corners_px:.3f}", f"{camera.rms_mm:.3f}", held_out, f"{camera.worst_mm:.3f}",
-             f"{one.misfit_mm:.3f}"]
-        )  # fmt: skip
+            [str(camera.camera), str(one.views), str(stripes), f"{focal:.1f}", f"{one.corners_px:.3f}", *errors]
+        )
     return rows
 
 
@@ -72,7 +72,7 @@ def _json(made: "ChessboardCalibration") -> dict[str, object]:
                 "stripes": len(one.fit.stripe_mm),
                 "corners_px": one.corners_px,
                 "misfit_mm": one.misfit_mm,
-                "pinhole": asdict(one.fit.pinhole),
+                "pinhole": asdict(one.fit.sight.pinhole),
             }
             for camera, one in zip(made.calibration.cameras, made.cameras, strict=True)
         ],
