@@ -64,6 +64,11 @@ def calibrate_chessboard(
         if progress is not None:
             progress(number + 1, len(document.cameras))
     heads = _heads(document.cameras)
+    warnings += [
+        f"camera {camera.id}: its head is not known, expected `head` beside `id`: no laser plane is written"
+        for camera in document.cameras
+        if camera.on_head is None
+    ]
     planes = head_planes(made, heads, document.place_sd_mm, document.diagonal_mm) if heads else {}
     along = laser_planes(planes, heads)
     calibration = Calibration(

@@ -12,7 +12,7 @@ FARTHEST_MM = 1000.0
 DIRECTION_ERROR = 1e-3
 """Bound of the length and of the angle of given directions, so that 0.7071 is exact enough."""
 
-Squares = Annotated[int, Field(ge=3, le=60)]
+Squares = Annotated[int, Field(ge=4, le=60)]
 Millimetres = Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)]
 Vector = tuple[Millimetres, Millimetres, Millimetres]
 

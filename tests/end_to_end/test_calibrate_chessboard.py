@@ -1,5 +1,6 @@
 """`footscan calibrate chessboard` on pictures of the virtual scanner, and on folders that break the format."""
 
+import copy
 import json
 import shutil
 from collections.abc import Callable
@@ -122,11 +123,11 @@ def test_stripe_and_board_may_be_one_picture(change: Callable[..., Path]) -> Non
         (lambda d: d["places"]["front"].update(along=[0, 2, 0]), "places.front.along: has length 2"),
         (lambda d: d["places"]["front"].update(down=[0, 1, 0]), "expected directions at right angles"),
         (lambda d: d["cameras"][0]["pictures"][-1].update(place="table"), "camera 1: place: expected one of"),
-        (lambda d: d["cameras"][0]["pictures"][-1].pop("place"), "camera 1: expected at least one picture with a place"),
+        (lambda d: d["cameras"][0]["pictures"][-1].pop("place"), "expected at least one picture with a place"),
         (lambda d: d["cameras"][0]["pictures"][0].update(board="gone.jpg"), "gone.jpg: "),
         (lambda d: d["cameras"][0]["pictures"][0].update(board="chessboard.yaml"), "expected a JPEG or PNG image"),
-        (lambda d: d["cameras"][0]["pictures"][0].update(board="../x.jpg"), "cameras.0"),
-        (lambda d: d["cameras"].append(d["cameras"][0]), "camera 1 is listed twice"),
+        (lambda d: d["cameras"][0]["pictures"][0].update(board="../x.jpg"), "camera 1: pictures.0.board: "),
+        (lambda d: d["cameras"].append(copy.deepcopy(d["cameras"][0])), "camera 1 is listed twice"),
         (lambda d: d["cameras"][0]["pictures"][0].pop("laser"), "off: expected a picture with the laser"),
         (lambda d: d["places"]["front"].update(along=[1, 0, 0]), "laser plane would be turned by"),
     ],
