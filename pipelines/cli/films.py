@@ -112,6 +112,23 @@ def simulate_capture(
     message(f"{out}: filmed the reference object in {placed}, chart in {out / 'chart.csv'}")
 
 
+@simulate.command("chessboard")
+def simulate_chessboard(
+    out: Out,
+    light: RoomLight = "ambient",
+    seed: Seed = 1,
+    scanner_seed: ScannerSeed = 1,
+) -> None:
+    """Take pictures of a chessboard with each camera, with and without the laser."""
+    from footscan.virtual.chessboard.record import record_chessboard
+    from pipelines.cli.terminal.progress import frame_progress
+
+    _check_empty(out)
+    with frame_progress("poses") as progress:
+        record_chessboard(out, settings=_settings(light, seed, scanner_seed), progress=progress)
+    message(f"{out}: pictures of a chessboard by 8 cameras")
+
+
 @simulate.command("world")
 def simulate_world(
     out: Out,

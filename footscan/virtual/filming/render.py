@@ -86,7 +86,7 @@ def light_on_sensor(
     """
     share = min(surface.halo * settings.halo, HALO_LIMIT)
     glow, veil = _glow(stripe, coverage, share, settings.halo)
-    line = _line(stripe * (1.0 - share), settings, random)
+    line = stripe_on_sensor(stripe * (1.0 - share), settings, random)
     room_flicker, white_flicker, red_flicker = 1.0 + settings.flicker * random.normal(0.0, (0.02, 0.15, 0.15))
     albedo = np.array(surface.albedo, dtype=np.float32)
     flickers = np.maximum(np.array([room_flicker, white_flicker, red_flicker]), 0.0).astype(np.float32)
@@ -114,7 +114,7 @@ def _glow(stripe: Floats, coverage: Singles, share: float, veil: float) -> tuple
     return glow.astype(np.float32), (0.012 * veil * lens).astype(np.float32)
 
 
-def _line(stripe: Floats, settings: SimulationSettings, random: np.random.Generator) -> Singles:
+def stripe_on_sensor(stripe: Floats, settings: SimulationSettings, random: np.random.Generator) -> Singles:
     """The stripe through the lens, with speckle: the grain of coherent light on the sensor, about a pixel wide."""
     line = np.zeros((HEIGHT, WIDTH), dtype=np.float32)
     rows, columns = np.flatnonzero(stripe.any(axis=1)), np.flatnonzero(stripe.any(axis=0))

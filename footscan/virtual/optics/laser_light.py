@@ -9,7 +9,7 @@ from footscan.compiled import compiled
 from footscan.virtual.optics.glass import directions_from_below, exits_above, reflectance
 from footscan.virtual.optics.scanner import FAN_DEGREES, HEIGHT, WIDTH, Laser
 from footscan.virtual.optics.scene import Hits, Scene
-from footscan.virtual.optics.texture import Texture
+from footscan.virtual.optics.texture import Reflectance
 from footscan.virtual.optics.views import View
 from footscan.virtual.portable import cos_sin, dot, exp
 from schemas.parameters.simulation import SimulationSettings
@@ -31,7 +31,7 @@ DARK = 1e-4
 
 
 def stripe_picture(
-    scene: Scene, x: float, lasers: tuple[Laser, ...], view: View, texture: Texture, settings: SimulationSettings
+    scene: Scene, x: float, lasers: tuple[Laser, ...], view: View, texture: Reflectance, settings: SimulationSettings
 ) -> Floats:
     """Laser light that each pixel receives along `view` with the laser plane at X = `x`, mm.
 

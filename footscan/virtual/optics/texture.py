@@ -1,6 +1,7 @@
 """Uneven colour of a surface: a smooth random field in space, so that it stays where it is while the heads travel."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,13 @@ SPACING_MM = 1.5
 """Distance of the grid's points. Chosen by hand."""
 _CELLS = 80
 """Points of the grid along each axis: the field repeats after 120 mm and takes 2 MB."""
+
+
+class Reflectance(Protocol):
+    """How much light the places of a surface reflect."""
+
+    def at(self, points: Floats) -> Floats:
+        """Factor of brightness, (N,), at `points` (N, 3) mm, scanner frame."""
 
 
 @dataclass(frozen=True)
