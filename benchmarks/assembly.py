@@ -48,11 +48,10 @@ def _compare(worlds: Sequence[World], folder: Path) -> None:
     for name, outcomes in runs.items():
         lengths, ratios = np.abs(_errors(outcomes, "foot_length")), _means(outcomes) / baseline
         silent = sum(len(outcome.silent_errors) for outcome in outcomes)
-        print(
-            f"  {name:16} surface {_spread(_means(outcomes))} mm, ratio {_spread(ratios)}, "
-            f"foot length off by {_spread(lengths)} mm, {int(np.sum(lengths > 0.15))} beyond 0.15, silent errors {silent}"
-        )
+        print(f"  {name:16} surface {_spread(_means(outcomes))} mm, ratio {_spread(ratios)}")
+        print(f"  {'':16} foot length off by {_spread(lengths)} mm, {int(np.sum(lengths > 0.15))} beyond 0.15")
         print(f"  {'':16} errors of foot length", " ".join(f"{e:+.2f}" for e in _errors(outcomes, "foot_length")))
+        print(f"  {'':16} silent errors {silent}")
 
 
 def _means(outcomes: Sequence[WorldOutcome]) -> np.ndarray:

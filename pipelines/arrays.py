@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.syntax_lock import SYNTAX_LOCK
+from footscan.syntax_lock import SYNTAX_LOCK
 from schemas.base.errors import DamagedError
 
 Array = NDArray[np.generic]

@@ -17,11 +17,11 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+from footscan.syntax_lock import SYNTAX_LOCK
 from pipelines.engine.actions.libraries import versions_that_count
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import FileState, file_state, is_settled, sha256
 from pipelines.engine.files.seal import UNSEALING_ERRORS, sealed, unsealed
-from pipelines.syntax_lock import SYNTAX_LOCK
 from schemas.base.errors import Fault
 from schemas.base.model import canonical_json
 
