@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.points import PLANE_MM
+from footscan.surface.tip import tip_beyond
 
 BEHIND_MM = 0.3
 """A tip no farther than this behind the last stripe is lit by the edge of the laser sheet, or just by its middle. The
@@ -25,6 +26,11 @@ NEAREST_STEPS = 0.01
 """Bounds the weight of a tip that lies nearly in the last stripe."""
 SECTIONS = 4
 """Sections used: three locate the tip, and the outermost stripe is tested against them."""
+
+LEAST_IN_PLANES = 0.8
+"""Share of a cloud's points in planes of constant X from which its ends are judged by sections. Chosen by hand."""
+STRAY = 10
+"""Fewer points than this before all others are strays, and do not say where a scattered cloud ends. Chosen by hand."""
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -64,7 +70,8 @@ def travel_ends(points: Floats, step_mm: float) -> tuple[Mask, tuple[TravelEnd, 
 
     Parameters
     ----------
-    points : (N, 3) float64, mm, scanner frame, in stripe planes of constant X
+    points : (N, 3) float64, mm, scanner frame; where they do not lie in stripe planes of constant X, the tip is that
+        of a quadric, see `tip_beyond`
     step_mm : distance from one stripe plane to the next
 
     Returns
@@ -86,6 +93,8 @@ def travel_ends(points: Floats, step_mm: float) -> tuple[Mask, tuple[TravelEnd, 
     0
     """
     grazing = np.zeros(len(points), np.bool_)
+    if not _in_planes(points, step_mm):
+        return grazing, (_scattered_end(points, -1, step_mm), _scattered_end(points, 1, step_mm))
     ends = []
     for outermost, outward in ((points[:, 0].min(), -1), (points[:, 0].max(), 1)):
         tips, spots = list[float | None](), list[float | None]()
@@ -109,6 +118,18 @@ def travel_ends(points: Floats, step_mm: float) -> tuple[Mask, tuple[TravelEnd, 
             )
         )
     return grazing, (ends[0], ends[1])
+
+
+def _in_planes(points: Floats, step_mm: float) -> bool:
+    """True if the points lie in planes of constant X at even distances."""
+    steps = (points[:, 0] - points[:, 0].min()) / step_mm
+    return bool(np.mean(np.abs(steps - np.rint(steps)) * step_mm < PLANE_MM) > LEAST_IN_PLANES)
+
+
+def _scattered_end(points: Floats, outward: int, step_mm: float) -> TravelEnd:
+    x = outward * points[:, 0]
+    last = float(np.sort(x)[-min(STRAY, len(x))])
+    return TravelEnd(outward, outward * last, 0.0, step_mm, tip_beyond(points[x <= last], outward))
 
 
 def drawn_to_tips(vertices: Floats, ends: tuple[TravelEnd, TravelEnd]) -> Floats:

@@ -1,7 +1,8 @@
 """Points of another head's laser: where two laser planes are millimetres apart, a camera sees two stripes on one skin.
 
-The stripe of the other head is mapped as if it lay in the plane of the camera's own head, which displaces it. In the
-plane in which it lies, the cameras of the other head have seen it too.
+The stripe of the other head is mapped as if it lay in the plane of the camera's own head, which displaces it. Each
+camera looks from elsewhere, so stripes that are mapped in the plane in which they lie coincide, and displaced ones do
+not: a point is assigned to the laser in whose plane more cameras saw it in the same frame.
 """
 
 from collections.abc import Mapping
@@ -13,72 +14,240 @@ from scipy.spatial import KDTree
 from footscan.calibration.models.laser_plane import x_in_plane
 from footscan.cloud.points import coordinates
 from footscan.cloud.views import View
+from footscan.compiled import compiled
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 LEAST_MM = 0.25
 """Distance in X between two planes from which a stripe of the other one is displaced more than by noise. Chosen by
 hand."""
-CONFIRMED_MM = 0.4
-"""A camera sees a place if it has a point this near; stripes are sampled every 0.3 mm. Chosen by hand."""
-CLOSE = 0.3
-"""A point is of another laser if it is brought this near, in units of the way that it is moved, to what the cameras of
-that head saw. A point of its own laser is moved off the skin, except where the camera looks along it. Chosen by
+FARTHEST_MM = 20.0
+"""Distance in X beyond which a camera does not see the other stripe beside its own one: heads that travel one after the
+other. Chosen by hand."""
+AGREE_MM = 0.1
+"""Distance, as a standard deviation, between the stripes of two cameras on one skin. Chosen by hand."""
+BETTER = 0.25
+"""A point is of another laser if its support there exceeds that in its own plane by this many cameras. Chosen by
 hand."""
+CONFIRMED = 0.25
+"""Support, in cameras, from which a point is confirmed. Chosen by hand."""
+AROUND_MM, FEWEST = 2.5, 8
+"""Points within this distance make the skin at a place, if they are so many. Chosen by hand."""
+BROAD = 0.2
+"""Ratio of the extents of those points from which they make a plane, and not a line. Chosen by hand."""
+CLOSE = 0.3
+"""A point that no other camera confirms is of another laser if it is brought this near to the skin, in units of the way
+that it is moved. Chosen by hand."""
+LINKED_MM = 1.0
+"""Distance up to which successive points are of one stripe; they are sampled every 0.3 mm. Chosen by hand."""
+SMOOTHED = 5
+"""Points on each side of a point along its stripe whose support counts as its own. Chosen by hand."""
+ROUNDS = 3
+"""Rounds of assignment; from the second on, only points of a laser support others of it. Chosen by hand."""
+CELL_MM, CELLS = 1.0, 512
+"""Cells in which neighbours are searched, a side. Those beyond are folded back: it costs time, no correctness."""
 
 
-def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> NDArray[np.bool_]:
+def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Mask:
     """Select the points (N,) of `POINT_DTYPE` that are stripes of another head's laser.
 
-    Cameras whose calibration does not say where their laser plane lies are left as they are.
+    A point that no other camera confirms is of the laser of most points of its stripe. Where none of them is confirmed,
+    it is selected if it lies on the skin that the confirmed points make in the plane of the other laser, and off it in
+    its own one: there the skin has met the other laser, but not yet its own one. Cameras whose calibration does not say
+    where their laser plane lies are left as they are.
     """
     strange = np.zeros(len(points), np.bool_)
-    heads: dict[int, list[int]] = {}
-    for camera, view in views.items():
-        if view.plane is not None:
-            heads.setdefault(view.plane.head, []).append(camera)
-    if len(heads) < 2:
+    heads = {camera: view.plane.head for camera, view in views.items() if view.plane is not None}
+    known = np.flatnonzero(np.isin(points["camera"], list(heads)))
+    if len(set(heads.values())) < 2 or not len(known):
         return strange
-    xyz = coordinates(points)
-    of_camera = {camera: np.flatnonzero(points["camera"] == camera) for cameras in heads.values() for camera in cameras}
-    of_head = {head: _tree(xyz, [of_camera[camera] for camera in cameras]) for head, cameras in heads.items()}
-    for head, cameras in heads.items():
-        for camera in cameras:
-            own = of_camera[camera]
-            if not len(own):
-                continue
-            for other_head in heads:
-                if other_head != head:
-                    moved, apart = _in_other_plane(points[own], views[camera], views[heads[other_head][0]])
-                    there = _distances(of_head[other_head], moved)
-                    way = np.linalg.norm(moved - xyz[own], axis=1)
-                    strange[own] |= (there < np.minimum(CONFIRMED_MM, CLOSE * way)) & (apart > LEAST_MM)
+    known = known[np.lexsort([points[name][known] for name in ("source", "camera", "frame")])]
+    strange[known] = _assigned(points[known], views, heads)
     return strange
 
 
-def _in_other_plane(points: NDArray[np.void], view: View, other: View) -> tuple[Floats, Floats]:
-    """Where points (N,) lie if they were seen in the plane of another head, (N, 3) mm, and how far the planes are
-    apart there, (N,) mm."""
+def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mapping[int, int]) -> Mask:
+    """The same for points by frame, camera and source."""
+    numbers = sorted(set(heads.values()))
+    own: Ints = np.array([numbers.index(heads[number]) for number in points["camera"].tolist()])
+    planes = _planes_by_frame(points, own, len(numbers))
+    places = np.full((len(numbers), len(points), 2), np.nan)
+    apart = np.full((len(numbers), len(points)), np.inf)
+    for camera, view in views.items():
+        rows = np.flatnonzero(points["camera"] == camera)
+        for number, head in enumerate(numbers):
+            if len(rows):
+                other = views[next(one for one in heads if heads[one] == head)]
+                places[number, rows], apart[number, rows] = _in_plane(points[rows], view, other, planes[number, rows])
+    linked = _linked(points)
+    ends = np.diff(points["frame"], prepend=points["frame"][0] - 1, append=points["frame"][-1] + 1)
+    frames = np.flatnonzero(ends)
+    laser = own.copy()
+    seen_by = points["camera"].astype(np.int64)
+    support, at_own = np.zeros(apart.shape), np.zeros(len(points))
+    for turn in range(ROUNDS):
+        for number in range(len(numbers)):
+            counts = np.isfinite(places[number, :, 0]) & ((laser == number) | (turn == 0))
+            support[number] = _smoothed(_support(places[number], seen_by, counts, linked, frames), linked)
+        at_own = np.take_along_axis(support, own[None], axis=0)[0]
+        may_be = np.where((apart > LEAST_MM) & (apart < FARTHEST_MM), support - BETTER, -np.inf)
+        best = np.argmax(may_be, axis=0)
+        laser = np.where(np.take_along_axis(may_be, best[None], axis=0)[0] > at_own, best, own)
+    strange = np.asarray(laser != own)
+    decided = strange | (at_own > CONFIRMED)
+    strange = np.where(decided, strange, _vote(strange, decided, linked))
+    return strange | _met_other_laser(points, np.flatnonzero(~decided & ~strange), decided & ~strange, places, planes)
+
+
+def _vote(strange: Mask, decided: Mask, linked: Mask) -> Mask:
+    """What most of the points (N,) that are decided say of the stripe of each point; false where none says anything."""
+    stripe = np.concatenate([[0], np.cumsum(~linked[:-1])])
+    most: Mask = 2 * np.bincount(stripe, strange & decided) > np.bincount(stripe, decided)
+    return most[stripe]
+
+
+def _met_other_laser(
+    points: NDArray[np.void], doubtful: NDArray[np.intp], confirmed: Mask, places: Floats, planes: Floats
+) -> Mask:
+    """Select those of the `doubtful` points that lie on the skin if they are of another laser, and off it if not.
+
+    confirmed : (N,) points that make the skin. places, planes : of each point in the plane of each head
+    """
+    strange = np.zeros(len(points), np.bool_)
+    if not confirmed.any() or not doubtful.size:
+        return strange
+    xyz = coordinates(points)
+    skin = KDTree(xyz[confirmed])
+    own = _heights(skin, xyz[doubtful])
+    for head_places, plane in zip(places, planes, strict=True):
+        x = xyz[doubtful, 0] + plane[doubtful] - points["plane"][doubtful]
+        there = np.column_stack([x, head_places[doubtful]])
+        way = np.linalg.norm(there - xyz[doubtful], axis=1)
+        known = (way > LEAST_MM) & (way < FARTHEST_MM)  # false for NaN
+        height = np.full(len(doubtful), np.inf)
+        height[known] = _heights(skin, there[known])
+        strange[doubtful] |= (height < CLOSE * way) & (height < own)
+    return strange
+
+
+def _heights(skin: KDTree, places: Floats) -> Floats:
+    """Distances (N,) of places (N, 3) from the plane through the points around them; infinite where there are few."""
+    heights = np.full(len(places), np.inf)
+    for n, place in enumerate(places):
+        near = skin.data[skin.query_ball_point(place, AROUND_MM)]
+        if len(near) >= FEWEST:
+            middle = near.mean(axis=0)
+            _, extents, axes = np.linalg.svd(near - middle, full_matrices=False)
+            if extents[1] > BROAD * extents[0]:
+                heights[n] = abs((place - middle) @ axes[2])
+    return heights
+
+
+def _planes_by_frame(points: NDArray[np.void], own: Ints, heads: int) -> Floats:
+    """X of the laser plane of each head in the frame of each point, (heads, N) mm; NaN if it is not known."""
+    frame = points["frame"] - points["frame"][0]
+    count = int(frame[-1]) + 1
+    by_frame = np.full((heads, count), np.nan)
+    for number in range(heads):
+        of_head = own == number
+        by_frame[number, frame[of_head]] = points["plane"][of_head]
+    planes = np.full((heads, len(points)), np.nan)
+    for number in range(heads):
+        for head in range(heads):
+            both = by_frame[number] - by_frame[head]
+            if np.isfinite(both).any():  # heads that travel together are always about as far apart
+                way = np.where(np.isfinite(both), both, np.nanmedian(both))
+                rows = own == head
+                planes[number, rows] = points["plane"][rows] + way[frame[rows]]
+    return planes
+
+
+def _in_plane(points: NDArray[np.void], view: View, other: View, plane_x: Floats) -> tuple[Floats, Floats]:
+    """Y and Z of points (N,) if they were seen in the plane of another head, (N, 2) mm, and how far the two planes are
+    apart there along X, (N,) mm."""
     assert view.plane is not None
     assert other.plane is not None
-    xyz, x = coordinates(points), points["plane"].astype(np.float64)
-    nothing = np.zeros(len(points))
-    there, here = (x_in_plane(plane, x, xyz[:, 1:], nothing, nothing) for plane in (other.plane, view.plane))
-    apart = there - here
+    xyz, x, nothing = coordinates(points), points["plane"].astype(np.float64), np.zeros(len(points))
+    turned = [
+        x_in_plane(plane.model_copy(update={"offset_mm": 0.0, "scale": 0.0}), nothing, xyz[:, 1:], nothing, nothing)
+        for plane in (other.plane, view.plane)
+    ]
+    apart = plane_x - x + turned[0] - turned[1]
     sight = view.centre - np.column_stack([nothing, xyz[:, 1:]])
-    return xyz + (apart / sight[:, 0])[:, None] * sight, np.abs(apart)
+    return xyz[:, 1:] + (apart / sight[:, 0])[:, None] * sight[:, 1:], np.abs(apart)
 
 
-def _tree(xyz: Floats, parts: list[NDArray[np.intp]]) -> KDTree | None:
-    rows = np.concatenate([np.empty(0, np.intp), *parts])
-    return KDTree(xyz[rows]) if len(rows) else None
+def _linked(points: NDArray[np.void]) -> Mask:
+    """Whether each point and the next one are of one stripe, (N,)."""
+    gap = np.hypot(np.diff(points["y"]), np.diff(points["z"]))
+    same = (np.diff(points["frame"]) == 0) & (np.diff(points["camera"].astype(np.int64)) == 0)
+    return np.append(same & (gap < LINKED_MM), False)
 
 
-def _distances(tree: KDTree | None, places: Floats) -> Floats:
-    """Distances (N,) of the nearest points of a tree, mm; infinite beyond those that matter."""
-    if tree is None:
-        return np.full(len(places), np.inf)
-    finite = np.isfinite(places).all(axis=1)
-    distance = np.full(len(places), np.inf)
-    distance[finite] = tree.query(places[finite], distance_upper_bound=CONFIRMED_MM)[0]
-    return distance
+def _smoothed(support: Floats, linked: Mask) -> Floats:
+    """The mean (N,) over neighbours along the stripe."""
+    stripe = np.concatenate([[0], np.cumsum(~linked[:-1])])
+    total, count = support.copy(), np.ones(len(support))
+    for way in range(1, SMOOTHED + 1):
+        same = stripe[way:] == stripe[:-way]
+        for here, there in ((slice(None, -way), slice(way, None)), (slice(way, None), slice(None, -way))):
+            total[here] += np.where(same, support[there], 0.0)
+            count[here] += same
+    return np.asarray(total / count)
+
+
+@compiled
+def _support(places: Floats, camera: Ints, counts: Mask, linked: Mask, frames: Ints) -> Floats:
+    """How many other cameras saw each place (N, 2) in its frame; a camera counts less the farther its stripe is.
+
+    Of those points only that count; `frames` (F + 1,) bounds the frames.
+    """
+    support = np.zeros(len(places))
+    first, following = np.full((CELLS, CELLS), -1), np.full(len(places), -1)
+    for f in range(len(frames) - 1):
+        for k in range(frames[f], frames[f + 1]):
+            if counts[k]:
+                a, b = int(places[k, 0] // CELL_MM) % CELLS, int(places[k, 1] // CELL_MM) % CELLS
+                following[k], first[a, b] = first[a, b], k
+        for k in range(frames[f], frames[f + 1]):
+            if not np.isnan(places[k, 0]):
+                for squared in _nearest(places, k, (camera, linked, counts), (first, following)):
+                    if squared < CELL_MM**2:
+                        support[k] += np.exp(-0.5 * squared / AGREE_MM**2)
+        for k in range(frames[f], frames[f + 1]):
+            if counts[k]:
+                first[int(places[k, 0] // CELL_MM) % CELLS, int(places[k, 1] // CELL_MM) % CELLS] = -1
+    return support
+
+
+@compiled
+def _nearest(places: Floats, k: int, columns: tuple[Ints, Mask, Mask], cells: tuple[Ints, Ints]) -> Floats:
+    """Squared distance, (256,) mm^2, of place k from the stripe of each other camera, where it is below a cell."""
+    camera, linked, counts = columns
+    first, following = cells
+    nearest = np.full(256, np.inf)
+    a, b = int(places[k, 0] // CELL_MM), int(places[k, 1] // CELL_MM)
+    for da in range(-1, 2):
+        for db in range(-1, 2):
+            n = first[(a + da) % CELLS, (b + db) % CELLS]
+            while n >= 0:
+                if camera[n] != camera[k]:
+                    squared = _squared_distance(places, k, n, linked[n] and counts[n + 1])
+                    nearest[camera[n]] = min(nearest[camera[n]], squared)
+                n = following[n]
+    return nearest
+
+
+@compiled
+def _squared_distance(places: Floats, k: int, n: int, to_next: bool) -> float:
+    """Of place k from place n, or from the line between n and the next one."""
+    y, z = places[k, 0] - places[n, 0], places[k, 1] - places[n, 1]
+    if to_next:
+        v, w = places[n + 1, 0] - places[n, 0], places[n + 1, 1] - places[n, 1]
+        length = v * v + w * w
+        if length > 0.0:
+            share = min(max((y * v + z * w) / length, 0.0), 1.0)
+            y, z = y - share * v, z - share * w
+    return float(y * y + z * z)

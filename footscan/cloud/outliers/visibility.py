@@ -70,6 +70,8 @@ class Eyes(NamedTuple):
     """(S, 3): the sides of all outlines, camera by camera, as `_sides` returns them."""
     bounds: NDArray[np.int64]
     """(C + 1,): where the sides of each camera begin."""
+    heads: NDArray[np.int64]
+    """(C,): cameras of one head see one laser plane; 0 where no film has shown the planes, which then count as one."""
 
 
 def sight_of(
@@ -114,7 +116,8 @@ def ask_others(
     centres = np.array([np.full(3, np.nan) if view is None else view.centre for view in views])
     sides = [_sides(view) for view in views]
     bounds = np.concatenate([[0], np.cumsum([len(side) for side in sides])])
-    return _ask(xyz, camera, voxel, Eyes(centres, np.concatenate(sides), bounds), voxels, sight)
+    heads = np.array([0 if view is None or view.plane is None else view.plane.head for view in views])
+    return _ask(xyz, camera, voxel, Eyes(centres, np.concatenate(sides), bounds, heads), voxels, sight)
 
 
 def _sides(view: View | None) -> Floats:
@@ -177,7 +180,7 @@ def _ask(
     sight: Sight,
 ) -> NDArray[np.uint8]:
     """The answers of `ask_others`."""
-    centres, sides, bounds = eyes
+    centres, sides, bounds, heads = eyes
     origin, size, number, _, place = voxels
     seen, normals, films, solid = sight
     is_witness = _witnesses(xyz, camera, voxel, eyes, voxels, sight)
@@ -196,9 +199,12 @@ def _ask(
             answers[n] = DENIED
             continue
         normal, facing = _towards(normals[v], line)
+        goes_on = _goes_on(number, place[v])
         for b in range(len(centres)):
             if b == camera[n] or not films[place[v, 0], b] or not is_witness[b]:
                 continue
+            if heads[b] != heads[camera[n]] and not goes_on:
+                continue  # a plane beside that of the point may pass the tip of a toe
             if not _inside(y, z, sides[bounds[b] : bounds[b + 1]]):
                 continue
             if _sees_behind(x, y, z, centres[b], b, origin, size, number, seen):
@@ -249,7 +255,7 @@ def _witnesses(
     xyz: Floats, camera: NDArray[np.uint8], voxel: Ints, eyes: Eyes, voxels: Voxels, sight: Sight
 ) -> NDArray[np.bool_]:
     """(C,) True for cameras that see most of what they should see of the surface that two others agree on."""
-    centres, sides, bounds = eyes
+    centres, sides, bounds, _ = eyes
     _, _, number, _, place = voxels
     seen, normals, films, solid = sight
     should, does = np.zeros(len(centres)), np.zeros(len(centres))
@@ -289,6 +295,17 @@ def cameras_around(number: Ints, seen: NDArray[np.uint64], place: Ints) -> NDArr
     for v in range(len(place)):
         near[v] = cameras_near(number, seen, place[v])
     return near
+
+
+@compiled
+def _goes_on(number: Ints, place: Ints) -> bool:
+    """True if there are points on both sides of a cell along the travel."""
+    behind, before = False, False
+    for j in range(place[1] - 1, place[1] + 2):
+        for k in range(place[2] - 1, place[2] + 2):
+            behind |= number[place[0] - 1, j, k] != EMPTY
+            before |= number[place[0] + 1, j, k] != EMPTY
+    return behind and before
 
 
 @compiled

@@ -19,12 +19,12 @@ def slope(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return 30.0 + 0.3 * (x - 50.0) + 0.1 * y
 
 
-def scene() -> tuple[np.ndarray, np.ndarray]:
+def scene(views: dict[int, View] = VIEWS) -> tuple[np.ndarray, np.ndarray]:
     """A slope that three cameras see in their planes. Camera 3 also sees the stripe of head 1: True for its points."""
     parts, strange = [], []
     for frame in range(20):
         y = np.arange(-30.0, 30.0, 0.3)
-        for camera, view in VIEWS.items():
+        for camera, view in views.items():
             assert view.plane is not None
             x = np.full(len(y), 2.0 * frame + view.plane.offset_mm)
             own = np.column_stack([x, y, slope(x, y)])
@@ -53,6 +53,6 @@ def test_nothing_is_known_without_planes() -> None:
 
 
 def test_planes_that_coincide_hide_nothing() -> None:
-    points, _ = scene()
     same = {camera: replace(view, plane=LaserPlane(head=camera, sd=[0.0] * 7)) for camera, view in VIEWS.items()}
-    assert not is_of_other_laser(points, same).any()
+    points, strange = scene(same)
+    assert not is_of_other_laser(points[~strange], same).any()
