@@ -42,6 +42,8 @@ CLOSE = 0.3
 that it is moved. Chosen by hand."""
 LINKED_MM = 1.0
 """Distance up to which successive points are of one stripe; they are sampled every 0.3 mm. Chosen by hand."""
+FEW = 0.1
+"""Share of the points of another head below which a head has not met the skin yet, or no longer. Chosen by hand."""
 SMOOTHED = 5
 """Points on each side of a point along its stripe whose support counts as its own. Chosen by hand."""
 ROUNDS = 3
@@ -53,10 +55,10 @@ CELL_MM, CELLS = 1.0, 512
 def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Mask:
     """Select the points (N,) of `POINT_DTYPE` that are stripes of another head's laser.
 
-    A point that no other camera confirms is of the laser of most points of its stripe. Where none of them is confirmed,
-    it is selected if it lies on the skin that the confirmed points make in the plane of the other laser, and off it in
-    its own one: there the skin has met the other laser, but not yet its own one. Cameras whose calibration does not say
-    where their laser plane lies are left as they are.
+    A point that no other camera confirms is of the laser of most points of its stripe, or of another head if hardly
+    anything is confirmed of its own one in this frame. Where that says nothing, it is selected if it lies on the skin
+    that the confirmed points make in the plane of the other laser, and off it in its own one. Cameras whose calibration
+    does not say where their laser plane lies are left as they are.
     """
     strange = np.zeros(len(points), np.bool_)
     heads = {camera: view.plane.head for camera, view in views.items() if view.plane is not None}
@@ -97,15 +99,31 @@ def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mappin
         laser = np.where(np.take_along_axis(may_be, best[None], axis=0)[0] > at_own, best, own)
     strange = np.asarray(laser != own)
     decided = strange | (at_own > CONFIRMED)
-    strange = np.where(decided, strange, _vote(strange, decided, linked))
+    strange = np.where(
+        decided, strange, _vote(strange, decided, linked) | _not_yet_met(points, own, decided & ~strange)
+    )
     return strange | _met_other_laser(points, np.flatnonzero(~decided & ~strange), decided & ~strange, places, planes)
 
 
 def _vote(strange: Mask, decided: Mask, linked: Mask) -> Mask:
     """What most of the points (N,) that are decided say of the stripe of each point; false where none says anything."""
     stripe = np.concatenate([[0], np.cumsum(~linked[:-1])])
-    most: Mask = 2 * np.bincount(stripe, strange & decided) > np.bincount(stripe, decided)
-    return most[stripe]
+    most = 2 * np.bincount(stripe, strange & decided) > np.bincount(stripe, decided)
+    return np.asarray(most[stripe])
+
+
+def _not_yet_met(points: NDArray[np.void], head: Ints, confirmed: Mask) -> Mask:
+    """Select the points (N,) of frames in which hardly a point of their head is confirmed, but many of another are.
+
+    Heads of which hardly a frame is confirmed have too few cameras to say so.
+    """
+    frame = points["frame"] - points["frame"][0]
+    counts = np.zeros((int(head.max()) + 1, int(frame[-1]) + 1))
+    np.add.at(counts, (head[confirmed], frame[confirmed]), 1.0)
+    filled = counts > 0.0
+    says = filled.sum(axis=1) > 0.5 * filled.any(axis=0).sum()
+    few = (counts < FEW * counts.max(axis=0)) & says[:, None]
+    return np.asarray(few[head, frame])
 
 
 def _met_other_laser(

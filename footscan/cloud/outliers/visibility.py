@@ -40,8 +40,6 @@ HIDDEN_CELLS = 5.0
 by hand."""
 FARTHEST_BEHIND = 0.5
 """Distance behind a point that is searched, in distances of the camera from the laser plane: a bound of time."""
-
-
 SAMPLED = 8
 """Every so many points are asked whether a camera is a witness: a bound of time."""
 WITNESS_SHARE = 0.5
@@ -71,7 +69,7 @@ class Eyes(NamedTuple):
     bounds: NDArray[np.int64]
     """(C + 1,): where the sides of each camera begin."""
     heads: NDArray[np.int64]
-    """(C,): cameras of one head see one laser plane; 0 where no film has shown the planes, which then count as one."""
+    """(C,): those of the cameras; 0 where no film has shown the laser planes, which then count as one."""
 
 
 def sight_of(
@@ -172,19 +170,13 @@ class Line(NamedTuple):
 
 @compiled
 def _ask(
-    xyz: Floats,
-    camera: NDArray[np.uint8],
-    voxel: Ints,
-    eyes: Eyes,
-    voxels: Voxels,
-    sight: Sight,
+    xyz: Floats, camera: NDArray[np.uint8], voxel: Ints, eyes: Eyes, voxels: Voxels, sight: Sight
 ) -> NDArray[np.uint8]:
     """The answers of `ask_others`."""
     centres, sides, bounds, heads = eyes
     origin, size, number, _, place = voxels
     seen, normals, films, solid = sight
-    is_witness = _witnesses(xyz, camera, voxel, eyes, voxels, sight)
-    near = cameras_around(number, seen, place)
+    is_witness, near = _witnesses(xyz, camera, voxel, eyes, voxels, sight), cameras_around(number, seen, place)
     answers = np.zeros(len(xyz), np.uint8)
     for n in range(len(xyz)):
         x, y, z = xyz[n]

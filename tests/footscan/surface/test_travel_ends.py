@@ -131,3 +131,14 @@ def test_cap_does_not_fold_over_however_far_it_is_drawn_back() -> None:
     moved = drawn_to_tips(vertices, ends)
     assert moved[:, 0].max() == pytest.approx(2.0 + STEP)
     assert (np.diff(moved[:, 0]) > 0).all()
+
+
+@pytest.mark.parametrize("beyond", [0.3, 1.5])
+def test_planes_between_each_other_tell_the_tip_too(beyond: float) -> None:
+    """Two heads whose planes are 0.9 mm apart, and a few points before all others that are none of the surface."""
+    strays = np.array([[-1.0, y, 2.0] for y in range(5)])
+    points = np.concatenate([rings(beyond), rings(beyond + 0.9), strays])
+    _, (start, end) = travel_ends(points, STEP)
+    assert start.last_mm == pytest.approx(beyond)
+    assert start.tip_mm == pytest.approx(beyond, abs=0.02)
+    assert end.limit == pytest.approx(beyond + 0.9 + 8 * STEP)

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from footscan.virtual.worlds.draw import draw_world
+from footscan.calibration.travel.body import Body, standard_body
+from footscan.virtual.worlds.draw import as_designed, draw_assembled, draw_world
 from pipelines.engine.pool import Threads
 from pipelines.worlds import campaign
 from pipelines.worlds.campaign import run_worlds, world_key
@@ -45,6 +46,21 @@ def test_a_world_without_errors_is_measured_as_it_is(outcomes: dict[int, WorldOu
     errors = {name: measure.error for name, measure in nominal.measures.items()}
     assert errors["foot_length"] == pytest.approx(0.0, abs=1.0)
     assert errors["instep_girth"] == pytest.approx(0.0, abs=1.0)
+
+
+def test_a_body_shows_where_the_planes_lie(tmp_path: Path) -> None:
+    """Heads that are off by millimetres: with the film of the body the surface is nearly that of an ideal scanner."""
+    assembled = draw_assembled(4)
+    off = assembled.model_copy(update={"cameras": assembled.cameras.model_copy(update={"step_mm": 4.0})})
+
+    def surface_mm(world: World, body: Body | None = None) -> float:
+        [outcome] = run_worlds([world], "points", ScanParameters(), tmp_path, Threads(2), lambda _: None, body)
+        assert outcome.surface is not None
+        return outcome.surface.mean
+
+    ideal, chart, both = surface_mm(as_designed(off)), surface_mm(off), surface_mm(off, standard_body())
+    assert chart > 5.0 * ideal
+    assert both < 2.5 * ideal
 
 
 def test_a_world_without_light_is_refused_rightly(outcomes: dict[int, WorldOutcome]) -> None:

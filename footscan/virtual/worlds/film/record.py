@@ -1,6 +1,7 @@
 """Records the scan of a world: films, scan.yaml, the true surface, the chart of its scanner, its description."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import yaml
@@ -41,7 +42,7 @@ def record_world(
     studio = _Studio(world, body)
     machine, subject = studio.machine, studio.subject
     folder.mkdir(parents=True, exist_ok=True)
-    write_world(machine, subject, folder)
+    write_world(replace(machine, world=world), subject, folder)
     counts = {camera: machine.frames(HEAD_OF_CAMERA[camera]) for camera in machine.cameras}
     done, total = 0, sum(counts.values())
     pictures: list[bytes] = []

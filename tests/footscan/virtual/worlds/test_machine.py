@@ -5,7 +5,7 @@ import pytest
 
 from footscan.virtual.optics.scanner import standard_scanner
 from footscan.virtual.worlds.draw import draw_world
-from footscan.virtual.worlds.machine import HEAD_CENTRE, Exposure, machine_of, moved_camera
+from footscan.virtual.worlds.machine import HEAD_CENTRE, Exposure, machine_of, moved_camera, when_calibrated
 from schemas.world import Knock, World, WorldCameras, WorldGlass, WorldHead, WorldLaser, WorldSubject
 
 NOMINAL = World(seed=5)
@@ -105,3 +105,13 @@ def test_two_lower_lasers_shine_at_the_same_place() -> None:
     for laser in (one, other):
         position, axis = np.array(laser.position), np.array(laser.axis)
         assert position - axis * position[2] / axis[2] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+
+
+def test_a_scanner_that_is_calibrated_has_not_been_knocked_and_shows_one_laser() -> None:
+    world = next(world for world in map(draw_world, range(99)) if world.cameras.knocked and world.glass.height_mm)
+    now, then = machine_of(world), when_calibrated(machine_of(world))
+    knocked = world.cameras.knocked[0].camera
+    if knocked in now.cameras:
+        assert not np.array_equal(now.cameras[knocked].position, then.cameras[knocked].position)
+    assert then.heads_near(1, 2.0) == [1]
+    assert then.plate.shift == pytest.approx(np.zeros(3))

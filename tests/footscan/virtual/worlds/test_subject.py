@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import ConvexHull
 
+from footscan.virtual.optics.scene import Mesh
 from footscan.virtual.worlds.draw import draw_world
-from footscan.virtual.worlds.subject import make_subject
+from footscan.virtual.worlds.subject import make_body, make_subject
 from schemas.world import Deformity, WorldSubject
 
 
@@ -69,3 +71,18 @@ def test_definitions_in_mm_do_not_grow_with_a_foot(length_mm: float) -> None:
     low = mesh.vertices[(mesh.vertices[:, 2] <= 40.0) & (mesh.vertices[:, 2] >= 2.0)]
     along = (low[:, 0] - heel) / length_mm
     assert subject.measures["heel_breadth"] == pytest.approx(np.ptp(low[(along >= 0.1) & (along <= 0.2), 1]), abs=0.5)
+
+
+def test_a_body_stands_in_the_middle_and_keeps_its_form() -> None:
+    corners = np.array([[x, y, z] for x in (-40.0, 40.0) for y in (-20.0, 20.0) for z in (0.0, 50.0)])
+    box = Mesh(corners, ConvexHull(corners).simplices.astype(np.int64))
+    body = make_body(box, seed=5)
+    low, high = body.mesh.vertices.min(axis=0), body.mesh.vertices.max(axis=0)
+    assert (low[2], high[2]) == (0.0, 50.0)
+    assert (low + high)[:2] / 2.0 == pytest.approx([200.0, 0.0], abs=5.0)
+    edges = body.mesh.vertices[body.mesh.faces] - body.mesh.vertices[np.roll(body.mesh.faces, 1, axis=1)]
+    assert np.linalg.norm(edges, axis=2).max() <= 8.0
+    _, counts = np.unique(np.sort(body.mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)), axis=0, return_counts=True)
+    assert set(counts) == {2}
+    far = np.linalg.norm(body.mesh.vertices[:, :2] - (low + high)[:2] / 2.0, axis=1).max()
+    assert far == pytest.approx(np.hypot(40.0, 20.0))
