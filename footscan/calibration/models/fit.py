@@ -31,8 +31,8 @@ step; and the ratio of each damping to the next."""
 CONVERGED, CONVERGED_MM2 = 1e-12, 1e-24
 """Decrease of the squares at which a minimisation ends: relative, and absolute."""
 COARSE = 1e-4
-"""The relative decrease with weights that are not final. The next step would move the parameters by some 0.1 % of their
-standard deviation."""
+"""The relative decrease where weights follow the residuals. The next step would move the maps of virtual cameras by
+less than 1e-5 mm, the next weights by more."""
 
 
 @dataclass(frozen=True)
@@ -65,15 +65,10 @@ class UndeterminedError(Exception):
     """The observations do not determine the parameters."""
 
 
-def fit(model: Model, observations: Observations, *, robust: bool, start: Floats | None = None) -> ModelFit:
+def fit(model: Model, observations: Observations, *, robust: bool) -> ModelFit:
     """Fit a model by least squares of the distances from the observed lines (Levenberg-Marquardt).
 
     Each block counts as one observation, however many pixels it has. With `robust`, outliers lose their weight.
-
-    Parameters
-    ----------
-    start : (P,) parameters of a fit to about the same observations, near which the result is; default: the solution
-        without outliers is computed first.
 
     Raises
     ------
@@ -96,12 +91,7 @@ def fit(model: Model, observations: Observations, *, robust: bool, start: Floats
         raise UndeterminedError(f"{observations.independent} observations for {model.unknowns} unknowns")
     problem = _Problem.of(model, observations)
     share = observations.share
-    if start is None:
-        place = problem.at(model.start(observations.pixels, observations.normals, observations.offsets))
-        place = _minimise(problem, share, place, COARSE if robust else CONVERGED)
-    else:
-        place = problem.at(start)
-    place, condition = _estimate(problem, share, place, robust=robust)
+    place, condition = _estimate(problem, share, problem.start(observations), robust=robust)
     remoteness = _remoteness(place.residuals, share) if robust else np.zeros(len(share))
     covariance = _covariance(observations, place.jacobian, place.residuals, remoteness, problem.precision)
     return ModelFit(model, place.parameters, covariance, condition, place.residuals)
@@ -112,25 +102,25 @@ def predict(fitted: ModelFit, observations: Observations) -> Floats:
     return observations.across(fitted.model.world(fitted.parameters, observations.pixels))
 
 
-def predict_without(fitted: ModelFit, observations: Observations, fold: NDArray[np.intp], *, robust: bool) -> Floats:
-    """Residuals (N,), mm, of the observations of each `fold` (N,) under the model fitted to the other folds.
+def predict_without(model: Model, observations: Observations, fold: NDArray[np.intp], *, robust: bool) -> Floats:
+    """Residuals (N,), mm, of the observations of each `fold` (N,) under a fit to the other folds.
 
-    Each of these fits starts at `fitted`, a fit to all observations. A block lies in one fold.
+    A block lies in one fold.
 
     Raises
     ------
     UndeterminedError
         The other folds do not determine the unknowns.
     """
-    problem, share = _Problem.of(fitted.model, observations), observations.share
-    whole = problem.at(fitted.parameters)
+    problem, share = _Problem.of(model, observations), observations.share
     residuals = np.empty(len(observations))
     for number in range(int(fold.max()) + 1):
-        rest = np.where(fold == number, 0.0, share)
-        if round(rest.sum()) < fitted.model.unknowns:  # the shares of a block add up to 1
-            raise UndeterminedError(f"too few observations for {fitted.model.unknowns} unknowns")
-        place, _ = _estimate(problem, rest, whole, robust=robust)
-        residuals[fold == number] = place.residuals[fold == number]
+        own = fold == number
+        rest = np.where(own, 0.0, share)
+        if (independent := round(rest.sum())) < model.unknowns:  # the shares of a block add up to 1
+            raise UndeterminedError(f"{independent} observations for {model.unknowns} unknowns")
+        start = problem.start(observations.part(~own))
+        residuals[own] = _estimate(problem, rest, start, robust=robust)[0].residuals[own]
     return residuals
 
 
@@ -167,20 +157,22 @@ class _Problem(NamedTuple):
         across, jacobian = self.model.linearised(parameters, self.basis, self.normals)
         return _Place(parameters, across - self.offsets, jacobian)
 
+    def start(self, observations: Observations) -> _Place:
+        """Where a fit to these or to a part of the observations starts."""
+        return self.at(self.model.start(observations.pixels, observations.normals, observations.offsets))
+
     def cost(self, weights: Floats, place: _Place) -> float:
         """The weighted squares, those of the prior included, mm^2."""
         return float(np.sum(weights * place.residuals**2) + np.sum(self.precision * place.parameters**2))
 
 
 def _estimate(problem: _Problem, share: Floats, place: _Place, *, robust: bool) -> tuple[_Place, float]:
-    """The least weighted squares near a `place`, and the condition number; observations of no `share` have no part."""
-    weights = share
-    if robust:
-        for _ in range(ROUNDS):
-            weights = share * (1.0 - _remoteness(place.residuals, share)) ** 2
-            place = _minimise(problem, weights, place, COARSE)
-    else:
-        place = _minimise(problem, weights, place, CONVERGED)
+    """The least weighted squares from a `place`, and the condition number; observations of no `share` have no part."""
+    weights, converged = share, COARSE if robust else CONVERGED
+    place = _minimise(problem, weights, place, converged)
+    for _ in range(ROUNDS if robust else 0):
+        weights = share * (1.0 - _remoteness(place.residuals, share)) ** 2
+        place = _minimise(problem, weights, place, converged)
     normal, _ = _normal_equations(place.jacobian, weights, place.residuals)
     condition = _condition(normal + np.diag(problem.precision))
     if not (condition < WORST_CONDITION and np.abs(place.parameters).max() <= LARGEST):

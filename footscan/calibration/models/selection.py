@@ -170,7 +170,7 @@ def held_out_residuals(fitted: ModelFit, observations: Observations, *, robust: 
     if fold.max(initial=0) == 0:
         return None
     try:
-        return predict_without(fitted, observations, fold, robust=robust)
+        return predict_without(fitted.model, observations, fold, robust=robust)
     except UndeterminedError:
         return None
 
