@@ -223,15 +223,24 @@ def _minimise(problem: _Problem, weights: Floats, place: _Place, converged: floa
 
 @compiled
 def _normal_equations(jacobian: Floats, weights: Floats, residuals: Floats) -> tuple[Floats, Floats]:
-    """J^T W J and J^T W r, without BLAS, whose sums depend on the number of its threads."""
-    unknowns = jacobian.shape[1]
+    """J^T W J and J^T W r, without BLAS, whose sums depend on the number of its threads.
+
+    Four rows are added at a time: each number of the sum is then loaded and stored once for all four.
+    """
+    count, unknowns = jacobian.shape
     normal, gradient = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
-    for n in range(jacobian.shape[0]):
+    for n in range(0, count, 4):
+        rest = max(0, 4 - (count - n))  # the last rows may be fewer: those before stand in for them, without weight
+        a, b, c, d = n, n + 1 if rest < 3 else n, n + 2 if rest < 2 else n, n + 3 if rest < 1 else n
+        w_b, w_c, w_d = (weights[b] if b > n else 0.0, weights[c] if c > n else 0.0, weights[d] if d > n else 0.0)
         for p in range(unknowns):
-            weighted = weights[n] * jacobian[n, p]
-            gradient[p] += weighted * residuals[n]
+            by_a, by_b = weights[a] * jacobian[a, p], w_b * jacobian[b, p]
+            by_c, by_d = w_c * jacobian[c, p], w_d * jacobian[d, p]
+            gradient[p] += by_a * residuals[a] + by_b * residuals[b] + by_c * residuals[c] + by_d * residuals[d]
             for q in range(p + 1):
-                normal[p, q] += weighted * jacobian[n, q]
+                normal[p, q] += (
+                    by_a * jacobian[a, q] + by_b * jacobian[b, q] + by_c * jacobian[c, q] + by_d * jacobian[d, q]
+                )
     for p in range(unknowns):
         for q in range(p):
             normal[q, p] = normal[p, q]
