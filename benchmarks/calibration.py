@@ -37,7 +37,7 @@ from schemas.parameters.simulation import SimulationSettings
 Floats = NDArray[np.float64]
 
 PLACEMENTS = (5, 1)
-ROUNDS = 5
+ROUNDS = 3
 GRID_MM = 2.0
 BASELINE = "five clicks, quadratic"
 THESIS_CORNERS_MM = {
