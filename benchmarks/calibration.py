@@ -6,16 +6,21 @@ CAPTURE is a folder that the virtual scanner filmed with its standard settings; 
 filmed in its first five placements, and in the first alone. What judges is the scanner's own projection, which no
 calibration has seen: points of a grid in the laser plane are projected by the true camera and mapped back. All
 calibrations of a camera are judged by the same points, those in the region that the stripe supports.
+
+Last, the processor time of calibrating with nothing cached is held beside that of decoding the frames and extracting
+the stripe.
 """
 
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from benchmarks.compare import interleave, print_ratios
 from footscan.calibration.chart.chart import Chart, read_chart
 from footscan.calibration.chart.from_chart import calibrate_chart
 from footscan.calibration.models.maps import is_supported, to_world
@@ -24,6 +29,7 @@ from footscan.virtual.optics.scanner import VOLUME_MM, Camera, standard_scanner
 from footscan.virtual.stage.reference import standard_reference
 from pipelines.capture_job import CaptureCalibration, calibrate_capture
 from pipelines.recordings.captures import read_capture
+from pipelines.steps import capture_stripe
 from schemas.calibration import Calibration, CameraCalibration, Source
 from schemas.parameters.calibration import CalibrationParameters, CaptureCalibrationParameters
 from schemas.parameters.simulation import SimulationSettings
@@ -31,6 +37,7 @@ from schemas.parameters.simulation import SimulationSettings
 Floats = NDArray[np.float64]
 
 PLACEMENTS = (5, 1)
+ROUNDS = 3
 GRID_MM = 2.0
 BASELINE = "five clicks, quadratic"
 THESIS_CORNERS_MM = {
@@ -80,6 +87,19 @@ def _compare(folder: Path) -> None:
     print(f"\nPlacements: {len(stripe.departures_mm)}. Clicks of each camera: {clicks}")
     _print_cameras(errors, {trial.camera: trial.model for trial in stripe.trials if trial.status == "chosen"})
     _print_all(errors)
+    runs = {
+        "decoding and extraction (baseline)": lambda: _extract(folder),
+        "calibrating": lambda: _from_stripe(folder, "auto"),
+    }
+    print_ratios("Processor time", interleave(runs, ROUNDS, time.process_time), 1, "capture")
+
+
+def _extract(folder: Path) -> None:
+    """Find the stripe in all frames of a capture."""
+    capture = read_capture(folder)
+    for camera in capture.document.cameras:
+        places = {"film": capture.film(camera), "capture": capture.file}
+        capture_stripe.run({"film": b""}, CaptureCalibrationParameters().extraction, places)
 
 
 def _from_clicks(charts: dict[int, Chart], model: str) -> Calibration:

@@ -11,16 +11,21 @@ from numpy.typing import NDArray
 ROUNDS = 7
 
 
-def interleave(runs: Mapping[str, Callable[[], object]], rounds: int = ROUNDS) -> dict[str, list[float]]:
-    """Seconds that each of `runs` took in each round; every round calls all of them, after one that is not timed."""
+def interleave(
+    runs: Mapping[str, Callable[[], object]], rounds: int = ROUNDS, clock: Callable[[], float] = time.perf_counter
+) -> dict[str, list[float]]:
+    """Seconds that each of `runs` took in each round; every round calls all of them, after one that is not timed.
+
+    The `clock` may be that of the processor time of all threads, `time.process_time`.
+    """
     for run in runs.values():
         run()
     seconds: dict[str, list[float]] = {name: [] for name in runs}
     for _ in range(rounds):
         for name, run in runs.items():
-            start = time.perf_counter()
+            start = clock()
             run()
-            seconds[name].append(time.perf_counter() - start)
+            seconds[name].append(clock() - start)
     return seconds
 
 

@@ -1,6 +1,7 @@
 """Robust least-squares fit of a model's parameters, with their covariance."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,9 @@ REGULARISATION, FIRST_DAMPING, DAMPING_FACTOR = 1e-14, 1e-6, 10.0
 step; and the ratio of each damping to the next."""
 CONVERGED, CONVERGED_MM2 = 1e-12, 1e-24
 """Decrease of the squares at which a minimisation ends: relative, and absolute."""
+COARSE = 1e-4
+"""The relative decrease where weights follow the residuals. The next step would move the maps of virtual cameras by
+less than 1e-5 mm, the next weights by more."""
 
 
 @dataclass(frozen=True)
@@ -85,102 +89,158 @@ def fit(model: Model, observations: Observations, *, robust: bool) -> ModelFit:
     """
     if observations.independent < model.unknowns:
         raise UndeterminedError(f"{observations.independent} observations for {model.unknowns} unknowns")
+    problem = _Problem.of(model, observations)
     share = observations.share
-    start = model.start(observations.pixels, observations.normals, observations.offsets)
-    weights = share
-    parameters = _minimise(model, observations, weights, start)
-    for _ in range(ROUNDS if robust else 0):
-        weights = share * (1.0 - _remoteness(_residuals(model, observations, parameters))) ** 2
-        parameters = _minimise(model, observations, weights, parameters)
-    jacobian = _jacobian(model, observations, parameters)
-    normal, _ = _normal_equations(jacobian, weights, np.zeros(len(weights)))
-    condition = _condition(normal + np.diag(model.prior_precision()))
-    if not (condition < WORST_CONDITION and np.abs(parameters).max() <= LARGEST):
-        raise UndeterminedError("the arrangement of the data does not determine all unknowns")
-    residuals = _residuals(model, observations, parameters)
-    remoteness = _remoteness(residuals) if robust else np.zeros(len(residuals))
-    covariance = _covariance(observations, jacobian, residuals, remoteness, model.prior_precision())
-    return ModelFit(model, parameters, covariance, condition, residuals)
+    place, condition = _estimate(problem, share, problem.start(observations), robust=robust)
+    remoteness = _remoteness(place.residuals, share) if robust else np.zeros(len(share))
+    covariance = _covariance(observations, place.jacobian, place.residuals, remoteness, problem.precision)
+    return ModelFit(model, place.parameters, covariance, condition, place.residuals)
 
 
 def predict(fitted: ModelFit, observations: Observations) -> Floats:
     """Residuals (N,), mm, of observations under a fit to the same or to other observations."""
-    return _residuals(fitted.model, observations, fitted.parameters)
+    return observations.across(fitted.model.world(fitted.parameters, observations.pixels))
 
 
-def _residuals(model: Model, observations: Observations, parameters: Floats) -> Floats:
-    return observations.across(model.world(parameters, observations.pixels))
+def predict_without(model: Model, observations: Observations, fold: NDArray[np.intp], *, robust: bool) -> Floats:
+    """Residuals (N,), mm, of the observations of each `fold` (N,) under a fit to the other folds.
+
+    A block lies in one fold.
+
+    Raises
+    ------
+    UndeterminedError
+        The other folds do not determine the unknowns.
+    """
+    problem, share = _Problem.of(model, observations), observations.share
+    residuals = np.empty(len(observations))
+    for number in range(int(fold.max()) + 1):
+        own = fold == number
+        rest = np.where(own, 0.0, share)
+        if (independent := round(rest.sum())) < model.unknowns:  # the shares of a block add up to 1
+            raise UndeterminedError(f"{independent} observations for {model.unknowns} unknowns")
+        start = problem.start(observations.part(~own))
+        residuals[own] = _estimate(problem, rest, start, robust=robust)[0].residuals[own]
+    return residuals
 
 
-def _jacobian(model: Model, observations: Observations, parameters: Floats) -> Floats:
-    return _along(observations.normals, model.by_parameters(parameters, observations.pixels))
+class _Place(NamedTuple):
+    """A problem at some parameters."""
+
+    parameters: Floats
+    """(P,)."""
+    residuals: Floats
+    """(N,) mm."""
+    jacobian: Floats
+    """(N, P) their derivatives by the parameters."""
 
 
-def _remoteness(residuals: Floats) -> Floats:
-    """(residual / least residual without weight)^2, 1 at most; the weight of Tukey's biweight is (1 - that)^2."""
-    spread = max(MAD_TO_SD * float(np.median(np.abs(residuals))), LEAST_SPREAD_MM)
-    return np.asarray(np.clip((residuals / (TUKEY * spread)) ** 2, None, 1.0))
+class _Problem(NamedTuple):
+    """The observations as a fit needs them."""
+
+    model: Model
+    basis: Floats
+    """(N, K) of the model."""
+    normals: Floats
+    """(N, 2)."""
+    offsets: Floats
+    """(N,) mm."""
+    precision: Floats
+    """(P,) of the model's prior."""
+
+    @staticmethod
+    def of(model: Model, observations: Observations) -> "_Problem":
+        basis = model.basis(observations.pixels)
+        return _Problem(model, basis, observations.normals, observations.offsets, model.prior_precision())
+
+    def at(self, parameters: Floats) -> _Place:
+        across, jacobian = self.model.linearised(parameters, self.basis, self.normals)
+        return _Place(parameters, across - self.offsets, jacobian)
+
+    def start(self, observations: Observations) -> _Place:
+        """Where a fit to these or to a part of the observations starts."""
+        return self.at(self.model.start(observations.pixels, observations.normals, observations.offsets))
+
+    def cost(self, weights: Floats, place: _Place) -> float:
+        """The weighted squares, those of the prior included, mm^2."""
+        return float(np.sum(weights * place.residuals**2) + np.sum(self.precision * place.parameters**2))
 
 
-def _minimise(model: Model, observations: Observations, weights: Floats, start: Floats) -> Floats:
-    """The parameters of the least weighted squares; steps that do not lower the squares are damped and repeated."""
-    precision = model.prior_precision()
+def _estimate(problem: _Problem, share: Floats, place: _Place, *, robust: bool) -> tuple[_Place, float]:
+    """The least weighted squares from a `place`, and the condition number; observations of no `share` have no part."""
+    weights, converged = share, COARSE if robust else CONVERGED
+    place = _minimise(problem, weights, place, converged)
+    for _ in range(ROUNDS if robust else 0):
+        weights = share * (1.0 - _remoteness(place.residuals, share)) ** 2
+        place = _minimise(problem, weights, place, converged)
+    normal, _ = _normal_equations(place.jacobian, weights, place.residuals)
+    condition = _condition(normal + np.diag(problem.precision))
+    if not (condition < WORST_CONDITION and np.abs(place.parameters).max() <= LARGEST):
+        raise UndeterminedError("the arrangement of the data does not determine all unknowns")
+    return place, condition
 
-    def cost_of(parameters: Floats) -> tuple[float, Floats]:
-        residuals = _residuals(model, observations, parameters)
-        return float(np.sum(weights * residuals**2) + np.sum(precision * parameters**2)), residuals
 
-    parameters = start
-    cost, residuals = cost_of(parameters)
+def _remoteness(residuals: Floats, share: Floats) -> Floats:
+    """(residual / least residual without weight)^2, 1 at most; the weight of Tukey's biweight is (1 - that)^2.
+
+    The spread is that of the observations that have a `share` (N,).
+    """
+    spread = max(MAD_TO_SD * float(np.median(np.abs(residuals[share > 0.0]))), LEAST_SPREAD_MM)
+    return np.asarray(np.minimum((residuals / (TUKEY * spread)) ** 2, 1.0))
+
+
+def _minimise(problem: _Problem, weights: Floats, place: _Place, converged: float) -> _Place:
+    """The place of the least weighted squares; steps that do not lower the squares are damped and repeated.
+
+    It ends with the step that lowers the squares by no more than the share `converged`.
+    """
+    cost = problem.cost(weights, place)
     if not np.isfinite(cost):
         raise UndeterminedError("no homography maps the pixels near their world points")
     damping = 0.0
     for _ in range(STEPS):
-        jacobian = _jacobian(model, observations, parameters)
-        normal, gradient = _normal_equations(jacobian, weights, residuals)
-        normal += np.diag(precision)
-        gradient += precision * parameters
-        scale = np.sqrt(np.diagonal(normal))
-        scale[scale == 0.0] = 1.0
-        scaled = normal / np.outer(scale, scale)
+        normal, gradient = _normal_equations(place.jacobian, weights, place.residuals)
+        diagonal = np.diagonal(normal) + problem.precision
+        scale = np.where(diagonal > 0.0, np.sqrt(diagonal), 1.0)
+        scaled = (normal + np.diag(problem.precision)) / np.outer(scale, scale)
+        gradient = (gradient + problem.precision * place.parameters) / scale
         for _ in range(ATTEMPTS):
             damped = scaled + max(damping, REGULARISATION) * np.eye(len(scale))
-            step = -np.linalg.solve(damped, gradient / scale) / scale
-            lower, moved = cost_of(parameters + step)
+            moved = problem.at(place.parameters - np.linalg.solve(damped, gradient) / scale)
+            lower = problem.cost(weights, moved)
             if lower <= cost:
                 break
             damping = max(DAMPING_FACTOR * damping, FIRST_DAMPING)
         else:
-            return parameters
-        parameters, residuals = parameters + step, moved
+            return place
+        place = moved
         damping = 0.0 if damping <= FIRST_DAMPING else damping / DAMPING_FACTOR
-        if cost - lower <= CONVERGED * cost + CONVERGED_MM2:
+        if cost - lower <= converged * cost + CONVERGED_MM2:
             break
         cost = lower
-    return parameters
-
-
-@compiled
-def _along(normals: Floats, by_parameters: Floats) -> Floats:
-    """(N, P) components along the normals (N, 2) of derivatives (N, 2, P)."""
-    along = np.empty((by_parameters.shape[0], by_parameters.shape[2]))
-    for n in range(along.shape[0]):
-        for p in range(along.shape[1]):
-            along[n, p] = normals[n, 0] * by_parameters[n, 0, p] + normals[n, 1] * by_parameters[n, 1, p]
-    return along
+    return place
 
 
 @compiled
 def _normal_equations(jacobian: Floats, weights: Floats, residuals: Floats) -> tuple[Floats, Floats]:
-    """J^T W J and J^T W r, without BLAS, whose sums depend on the number of its threads."""
-    unknowns = jacobian.shape[1]
+    """J^T W J and J^T W r, without BLAS, whose sums depend on the number of its threads.
+
+    Four rows are added at a time: each number of the sum is then loaded and stored once for all four.
+    """
+    count, unknowns = jacobian.shape
     normal, gradient = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
-    for n in range(jacobian.shape[0]):
+    for n in range(0, count, 4):
+        rest = max(0, 4 - (count - n))  # the last rows may be fewer: those before stand in for them, without weight
+        a, b, c, d = n, n + 1 if rest < 3 else n, n + 2 if rest < 2 else n, n + 3 if rest < 1 else n
+        w_b, w_c, w_d = (weights[b] if b > n else 0.0, weights[c] if c > n else 0.0, weights[d] if d > n else 0.0)
         for p in range(unknowns):
-            weighted = weights[n] * jacobian[n, p]
-            gradient[p] += weighted * residuals[n]
+            by_a, by_b = weights[a] * jacobian[a, p], w_b * jacobian[b, p]
+            by_c, by_d = w_c * jacobian[c, p], w_d * jacobian[d, p]
+            gradient[p] += by_a * residuals[a] + by_b * residuals[b] + by_c * residuals[c] + by_d * residuals[d]
             for q in range(p + 1):
-                normal[p, q] += weighted * jacobian[n, q]
+                normal[p, q] += (
+                    by_a * jacobian[a, q] + by_b * jacobian[b, q] + by_c * jacobian[c, q] + by_d * jacobian[d, q]
+                )
     for p in range(unknowns):
         for q in range(p):
             normal[q, p] = normal[p, q]

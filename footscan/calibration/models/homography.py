@@ -93,18 +93,19 @@ class HomographyModel:
 
     def by_parameters(self, parameters: Floats, pixels: Floats) -> Floats:
         """Derivatives (N, 2, P) of `world` by the parameters."""
+        basis = self.basis(pixels)
+        along_y_and_z = (np.tile(axis, (len(pixels), 1)) for axis in np.eye(2))
+        return np.stack([self.linearised(parameters, basis, axis)[1] for axis in along_y_and_z], axis=1)
+
+    def basis(self, pixels: Floats) -> Floats:
+        """The coordinates u and v of `pixels` (N, 2), px, and the terms of the correction, (N, 2 + T)."""
         uv = self._normalised(pixels)
-        ideal = self._ideal(parameters, uv)
-        plane, depth = project(_matrix(parameters), ideal)
-        jacobian = np.zeros((len(uv), 2, self.unknowns))
-        _fill_by_matrix(jacobian, ideal, plane, depth)
-        if self.distorted:
-            _fill_by_lens(jacobian, slopes(_matrix(parameters), plane, depth), _distortion_terms(uv))
-        if self.correction is not None:
-            matrix = self._correction_matrix(uv)
-            jacobian[:, 0, self._corrected : self._corrected + matrix.shape[1]] = matrix
-            jacobian[:, 1, self._corrected + matrix.shape[1] :] = matrix
-        return jacobian
+        return uv if self.correction is None else np.column_stack([uv, self._correction_matrix(uv)])
+
+    def linearised(self, parameters: Floats, basis: Floats, normals: Floats) -> tuple[Floats, Floats]:
+        """The components of `world` along `normals` (N, 2), (N,) mm, and their derivatives (N, P) by the parameters."""
+        linearised: tuple[Floats, Floats] = _linearised(parameters, basis, normals, self.distorted)
+        return linearised
 
     def by_pixels(self, parameters: Floats, pixels: Floats) -> Floats:
         """Derivatives (N, 2, 2) of `world` by i and j, mm/px."""
@@ -312,21 +313,35 @@ def _through_lens(uv: Floats, distortion: Floats, lens: Floats) -> Floats:
 
 
 @compiled
-def _fill_by_matrix(jacobian: Floats, ideal: Floats, plane: Floats, depth: Floats) -> None:
-    """Write the derivatives of the places on the plane (N, 2) by the matrix into `jacobian` (N, 2, P)."""
-    for n in range(len(ideal)):
-        x, y, unit = ideal[n, 0] / depth[n], ideal[n, 1] / depth[n], 1.0 / depth[n]
-        for k in range(2):
-            jacobian[n, k, 3 * k], jacobian[n, k, 3 * k + 1], jacobian[n, k, 3 * k + 2] = x, y, unit
-            jacobian[n, k, 6], jacobian[n, k, 7] = -plane[n, k] * x, -plane[n, k] * y
-
-
-@compiled
-def _fill_by_lens(jacobian: Floats, by_ideal: Floats, distortion: Floats) -> None:
-    """Write the derivatives by k1, k2, p1 and p2 into `jacobian` (N, 2, P)."""
-    for n in range(len(jacobian)):
-        for k in range(2):
-            for t in range(4):
-                jacobian[n, k, MATRIX + t] = (
-                    by_ideal[n, k, 0] * distortion[n, 0, t] + by_ideal[n, k, 1] * distortion[n, 1, t]
-                )
+def _linearised(parameters: Floats, basis: Floats, normals: Floats, distorted: bool) -> tuple[Floats, Floats]:
+    """The result of `HomographyModel.linearised`."""
+    h, corrected, count = parameters, MATRIX + 4 * distorted, basis.shape[1] - 2
+    across, jacobian = np.empty(len(basis)), np.empty((len(basis), len(parameters)))
+    for n in range(len(basis)):
+        u, v, n_y, n_z = basis[n, 0], basis[n, 1], normals[n, 0], normals[n, 1]
+        x, y, r2 = u, v, u * u + v * v
+        if distorted:
+            radial = h[8] * r2 + h[9] * r2 * r2
+            x += u * radial + h[10] * 2.0 * u * v + h[11] * (r2 + 2.0 * u * u)
+            y += v * radial + h[10] * (r2 + 2.0 * v * v) + h[11] * 2.0 * u * v
+        depth = h[6] * x + h[7] * y + 1.0
+        if abs(depth) < HORIZON:
+            depth = HORIZON
+        unit = 1.0 / depth
+        along_x, along_y, along = n_y * h[0] + n_z * h[3], n_y * h[1] + n_z * h[4], n_y * h[2] + n_z * h[5]
+        across[n] = (along_x * x + along_y * y + along) * unit
+        x, y = x * unit, y * unit
+        row = jacobian[n]
+        row[0], row[1], row[2], row[3], row[4], row[5] = n_y * x, n_y * y, n_y * unit, n_z * x, n_z * y, n_z * unit
+        row[6], row[7] = -across[n] * x, -across[n] * y
+        if distorted:
+            by_x, by_y = (along_x - across[n] * h[6]) * unit, (along_y - across[n] * h[7]) * unit
+            row[8] = (by_x * u + by_y * v) * r2
+            row[9] = row[8] * r2
+            row[10] = by_x * 2.0 * u * v + by_y * (r2 + 2.0 * v * v)
+            row[11] = by_x * (r2 + 2.0 * u * u) + by_y * 2.0 * u * v
+        for t in range(count):
+            row[corrected + t] = n_y * basis[n, 2 + t]
+            row[corrected + count + t] = n_z * basis[n, 2 + t]
+            across[n] += row[corrected + t] * h[corrected + t] + row[corrected + count + t] * h[corrected + count + t]
+    return across, jacobian

@@ -56,6 +56,15 @@ class PolynomialModel:
         jacobian[:, 1, matrix.shape[1] :] = matrix
         return jacobian
 
+    def basis(self, pixels: Floats) -> Floats:
+        """The terms (N, T) of `pixels` (N, 2), px, for `linearised`."""
+        return design_matrix(*self._normalised(pixels), self.order)
+
+    def linearised(self, parameters: Floats, basis: Floats, normals: Floats) -> tuple[Floats, Floats]:
+        """The components of `world` along `normals` (N, 2), (N,) mm, and their derivatives (N, P) by the parameters."""
+        jacobian = np.concatenate([normals[:, :1] * basis, normals[:, 1:] * basis], axis=1)
+        return sum_terms(jacobian, parameters[np.newaxis])[:, 0], jacobian
+
     def by_pixels(self, parameters: Floats, pixels: Floats) -> Floats:
         """Derivatives (N, 2, 2) of `world` by i and j, mm/px."""
         by_u, by_v = derivatives(*self._normalised(pixels), self.order)

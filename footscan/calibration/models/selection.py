@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.models.fit import ModelFit, UndeterminedError, fit, predict
+from footscan.calibration.models.fit import ModelFit, UndeterminedError, fit, predict_without
 from footscan.calibration.models.homography import HomographyModel, image_frame
 from footscan.calibration.models.maps import Model
 from footscan.calibration.models.observations import Observations
@@ -166,18 +166,13 @@ def held_out_residuals(fitted: ModelFit, observations: Observations, *, robust: 
 
     None if the other folds do not determine the model.
     """
-    residuals = np.empty(len(observations))
     fold = _folds(observations.group)
     if fold.max(initial=0) == 0:
         return None
-    for number in range(int(fold.max()) + 1):
-        held_out = fold == number
-        try:
-            rest = fit(fitted.model, observations.part(~held_out), robust=robust)
-        except UndeterminedError:
-            return None
-        residuals[held_out] = predict(rest, observations.part(held_out))
-    return residuals
+    try:
+        return predict_without(fitted.model, observations, fold, robust=robust)
+    except UndeterminedError:
+        return None
 
 
 def rms(distances: Floats) -> float:
