@@ -41,7 +41,7 @@ FAINTEST = 0.01
 """Smallest peak that 8 bits show, in units of the white."""
 ONE_MOMENT_MM = 0.02
 """Travel within one exposure row by row up to which all rows count as one moment: less than noise. Chosen by hand."""
-ROUNDS = 2
+ROW_STEPS = 2
 """Steps to the row in which a point is seen, which depends on how far the head has moved until that row is exposed.
 Each step divides the error by 70 or more."""
 TATTOO_PLACE, TATTOO_SPREAD = np.array([200.0, 0.0, 60.0]), np.array([50.0, 25.0, 20.0])
@@ -137,7 +137,7 @@ def _row_share(camera: Camera, way: Floats, points: Floats, rows: int) -> Floats
     share = _middle(points)
     if not way.any():
         return share
-    for _ in range(ROUNDS):
+    for _ in range(ROW_STEPS):
         row = camera.project(points - (share - 0.5)[:, None] * way)[:, 1]
         share = np.clip(np.nan_to_num(row + 0.5, nan=0.5 * rows) / rows, 0.0, 1.0)
     return share

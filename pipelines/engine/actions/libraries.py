@@ -4,7 +4,20 @@ import importlib.metadata
 from functools import cache
 
 COMPUTING = frozenset(
-    {"PIL", "av", "llvmlite", "matplotlib", "numba", "numpy", "open3d", "optuna", "scipy", "simplejpeg", "skimage"}
+    {
+        "PIL",
+        "av",
+        "cv2",
+        "llvmlite",
+        "matplotlib",
+        "numba",
+        "numpy",
+        "open3d",
+        "optuna",
+        "scipy",
+        "simplejpeg",
+        "skimage",
+    }
 )
 """Libraries that compute, decode or draw. Their versions are in the keys of the steps that reach them."""
 
@@ -34,6 +47,7 @@ COMPANIONS = {"numba": ("llvmlite",)}
 DISTRIBUTIONS = {
     "PIL": ("pillow",),
     "skimage": ("scikit-image",),
+    "cv2": ("opencv-python-headless", "opencv-python"),
     "open3d": ("open3d-cpu", "open3d"),
 }
 """Names of the distributions of a module, if they differ from its name."""
