@@ -21,10 +21,13 @@ def _no_opposites(stands: list[Stand]) -> list[Stand]:
     return stands
 
 
+Stands = Annotated[list[Stand], AfterValidator(_no_opposites)]
+
+
 class CaptureCamera(CameraSource):
     """One camera of a capture."""
 
-    stands: Annotated[list[Stand], AfterValidator(_no_opposites)] | None = None
+    stands: Stands | None = None
     """Sides of the object on which the camera stands: front (+X) or behind, left (+Y) or right, above or below. Any of
     them may be left out; where all are absent, the camera's number says it."""
 

@@ -6,7 +6,8 @@ from pydantic import AwareDatetime, Field, model_validator
 
 from schemas.base.model import Document, Pseudonym
 from schemas.frames import Sha256
-from schemas.rig import HeadNumber, Millimetres, Milliseconds, RigLatency, Share
+from schemas.rig import MOST_HEADS, HeadNumber, Millimetres, Milliseconds, RigLatency, Share
+from schemas.scan import CameraId
 
 Count = Annotated[int, Field(ge=0)]
 Deviation = Annotated[float, Field(ge=0)]
@@ -25,8 +26,8 @@ class RecordedBoard(Document):
     """Number of position reports while the heads travelled."""
     report_sd_s: Deviation
     """Standard deviation of the time that such a report stands for, root mean square."""
-    lost_steps_mm: tuple[float, float, float] | None = None
-    """How far heads 1, 2, 3 were off along X after the last travel, felt at their home switches; to 0.1 mm."""
+    lost_steps_mm: Annotated[tuple[float, ...], Field(min_length=1, max_length=MOST_HEADS)] | None = None
+    """How far heads 1, 2, ... were off along X after the last travel, felt at their home switches; to 0.1 mm."""
 
 
 class RecordedPass(Document):
@@ -64,7 +65,7 @@ class LeftOut(Document):
 class RecordedCamera(Document):
     """One camera's part."""
 
-    id: Annotated[int, Field(ge=1, le=64)]
+    id: CameraId
     device: Text
     """Its stable name or URL."""
     name: Text | None = None

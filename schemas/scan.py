@@ -10,6 +10,8 @@ from pydantic import Field, model_validator
 from schemas.base.model import Document, Pseudonym, RelativePath, Side
 from schemas.laser import Laser
 
+CameraId = Annotated[int, Field(ge=1, le=64)]
+
 
 class Travel(Document):
     """X of frame k is `start_mm` + k * `step_mm`."""
@@ -21,7 +23,7 @@ class Travel(Document):
 class CameraSource(Document):
     """The place of the frames of one camera."""
 
-    id: Annotated[int, Field(ge=1, le=64)]
+    id: CameraId
     file: RelativePath
     """An AVI film, or a folder of PNG or JPEG frames in name order."""
 

@@ -1,1 +1,1 @@
-"""The scanner itself: heads and lasers over a serial line, eight cameras, and the clocks that bring them together."""
+"""The scanner itself: heads and lasers over a serial line, cameras, and the clocks that bring them together."""

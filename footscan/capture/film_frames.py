@@ -62,7 +62,7 @@ class FilmFrames:
 
 
 def motion_of_head(log: PositionLog, head: int, travel: Travel) -> HeadMotion:
-    """The motion of head 1, 2 or 3 on a travel."""
+    """The motion of head 1, 2, ... on a travel."""
     entries = log.between(travel.begin_seconds - MARGIN_SECONDS, travel.end_seconds + MARGIN_SECONDS)
     seconds = np.array([entry.seconds for entry in entries], np.float64)
     sd = np.array([entry.seconds_sd for entry in entries], np.float64)

@@ -25,7 +25,8 @@ from schemas.frames import GROUP, FrameManifest
 from schemas.scan import Scan
 
 WAITING_FRAMES = 400
-"""Most frames that wait for the disk, a bound of memory: 10 MB, the frames of eight cameras in three seconds."""
+"""Most frames that wait for the disk, a bound of memory: 10 MB, the frames of eight cameras in three
+seconds."""
 SPARE = 1.3
 """Free space needed, as a multiple of the expected size: JPEG pictures of a bright room are larger. Chosen by hand."""
 LEAST_FREE_BYTES = 50_000_000

@@ -21,10 +21,10 @@ JOG_MM_PER_S = 20.0
 SHINE_SECONDS = 4.0
 SHINE_POWER = 0.5
 """Speed of a jog; duration and share of the laser power of a look at the stripe; all chosen by hand."""
-SCAN_BYTES = 40_000 * 8 * 400
-"""Largest size of a scan with laser-off frames: bytes per frame x cameras x frames."""
+CAMERA_BYTES = 40_000 * 400
+"""Largest size of a camera's part of a scan with laser-off frames: bytes per frame x frames."""
 LEAST_SCANS, FEW_SCANS = 2, 20
-"""The disk is bad below, and a warning is shown below, this many times `SCAN_BYTES`; chosen by hand."""
+"""The disk is bad below, and a warning is shown below, this many times the size of a scan; chosen by hand."""
 LEVELS: dict[str, Level] = {"lost": "bad", "closed": "bad", "alarm": "bad", "door": "warning", "held": "warning"}
 CABLE = "check its cable and hub, then connect again"
 
@@ -131,19 +131,23 @@ class LiveAdapter:
         if begins:
             self._before_pass = {camera: stream.received for camera, stream in self._scanner.deck.health().items()}
 
+    @property
+    def _head_numbers(self) -> range:
+        return range(1, len(self._scanner.rig.heads) + 1)
+
     def _board(self) -> Iterator[Device]:
         try:
             heads = self._scanner.heads
         except FootscanError:
             yield Device("Controller", "bad", "not connected", "check its USB cable and its power, then connect")
-            yield from (Device(f"Head {head}", "unknown", "position unknown") for head in (1, 2, 3))
+            yield from (Device(f"Head {head}", "unknown", "position unknown") for head in self._head_numbers)
             return
         state = heads.state
         door = "" if heads.board.watches_door else "; it has no input for a lid: opening a lid stops nothing"
         level = LEVELS.get(state.name, "ok" if heads.board.watches_door else "warning")
         yield Device("Controller", level, f"{state.words}{door}", state.remedy)
         reports = heads.log.between(time.monotonic() - REPORT_SECONDS, float("inf"))
-        for head in (1, 2, 3):
+        for head in self._head_numbers:
             if not heads.board.homed:
                 yield Device(f"Head {head}", "warning", "position unknown", "home the heads")
             elif reports:
@@ -179,9 +183,10 @@ class LiveAdapter:
         existing = next(folder for folder in (self._archive, *self._archive.absolute().parents) if folder.exists())
         free = shutil.disk_usage(existing).free
         words = f"{free / 1e9:.1f} GB are free for scans"
-        if free < LEAST_SCANS * SCAN_BYTES:
-            return Device("Disk", "bad", words, f"make room: a scan takes up to {SCAN_BYTES / 1e9:.1f} GB")
-        return Device("Disk", "warning" if free < FEW_SCANS * SCAN_BYTES else "ok", words)
+        scan_bytes = CAMERA_BYTES * len(self._scanner.rig.cameras)
+        if free < LEAST_SCANS * scan_bytes:
+            return Device("Disk", "bad", words, f"make room: a scan takes up to {scan_bytes / 1e9:.1f} GB")
+        return Device("Disk", "warning" if free < FEW_SCANS * scan_bytes else "ok", words)
 
     def _is_held(self) -> bool:
         try:

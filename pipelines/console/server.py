@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, BinaryIO, Literal, TypeVar
+from typing import Annotated, BinaryIO, TypeVar
 
 import uvicorn
 from pydantic import Field, ValidationError
@@ -39,6 +39,7 @@ from pipelines.console.scanner import Side
 from pipelines.console.stopping import stop_asked
 from schemas.base.errors import Fault, FootscanError, RefusedInput
 from schemas.base.model import Document, Pseudonym
+from schemas.rig import HeadNumber
 
 _Made = TypeVar("_Made")
 
@@ -74,7 +75,7 @@ class JogRequest(Document):
     """The body of an order to move heads by hand."""
 
     mm: Annotated[float, Field(ge=-500, le=500)]
-    head: Literal[1, 2, 3] | None = None
+    head: HeadNumber | None = None
 
 
 class ConsoleServer(uvicorn.Server):

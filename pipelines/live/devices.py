@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from footscan.capture.board.heads import Head
+from footscan.capture.board.carriages import Head
 from footscan.capture.cameras.devices import CameraDevice, list_cameras
 from footscan.capture.cameras.source import CameraSource
 from footscan.capture.cameras.usb_bus import Pass, UsbCamera, plan_passes
@@ -27,10 +27,11 @@ class SerialPort:
     """Description that the adapter reports."""
 
 
-def heads_of(rig: Rig) -> tuple[Head, Head, Head]:
-    """Offset and direction of the rails of the three heads."""
-    one, two, three = (Head(head.offset_mm, head.direction) for head in rig.heads)
-    return one, two, three
+def heads_of(rig: Rig) -> list[Head]:
+    """Offset, direction and axis of each head."""
+    return [
+        Head(head.offset_mm, head.direction, rig.axis_of(number) - 1) for number, head in enumerate(rig.heads, start=1)
+    ]
 
 
 def sources_of(rig: Rig) -> dict[int, CameraSource]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from footscan.capture.board.heads import Heads
-from footscan.capture.board.position_log import Triple
 from footscan.capture.cameras.usb_bus import Pass
 from footscan.capture.cameras.video_controls import FixedControl
 from footscan.capture.film_frames import CameraTiming, FilmFrames
@@ -36,8 +35,8 @@ class ScanStory:
     """Filmed passes, in the order of `passes`."""
     fixed: dict[int, list[FixedControl]] = field(default_factory=dict)
     """Result of fixing the settings of each camera."""
-    lost_steps_mm: Triple | None = None
-    """Position errors of heads 1, 2, 3 after the last travel, by their home switches."""
+    lost_steps_mm: tuple[float, ...] | None = None
+    """Position errors of heads 1, 2, ... after the last travel, by their home switches."""
 
     def timing(self, camera: RigCamera) -> CameraTiming:
         """Timing of a camera in the light of the scan."""

@@ -9,8 +9,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from footscan.capture.board.heads import HEADS, SLACK_MM, Heads
-from footscan.capture.board.position_log import Triple
+from footscan.capture.board.heads import SLACK_MM, Heads
 from footscan.capture.cameras.deck import CameraDeck
 from footscan.capture.cameras.stream import CapturedFrame
 from footscan.capture.cameras.usb_bus import Pass
@@ -104,7 +103,7 @@ class LiveScanner:
             self.heads.home()
             self._board.tell("idle")
 
-    def jog(self, by_mm: float, mm_per_s: float, head: int | None = None) -> tuple[float, float, float]:
+    def jog(self, by_mm: float, mm_per_s: float, head: int | None = None) -> tuple[float, ...]:
         """Move all heads, or one, with the lasers off; returns their X, mm, when they stand."""
         with self._at_work("idle", "moving"):
             self._connect_board()
@@ -118,7 +117,7 @@ class LiveScanner:
                 while heads.state.name == "jogging" and time.monotonic() < limit:
                     time.sleep(WATCH_SECONDS)
                     x_mm = heads.position_mm()
-                moves = [by_mm if head in {None, each} else 0.0 for each in HEADS]
+                moves = [by_mm if moved else 0.0 for moved in heads.carriages.carried(head)]
                 if any(abs(x - start - by) > SLACK_MM for x, start, by in zip(x_mm, before, moves, strict=True)):
                     places = ", ".join(f"{x:.2f}" for x in x_mm)
                     raise Fault(f"the heads were stopped at X = {places} mm before they reached their target")
@@ -313,7 +312,7 @@ class LiveScanner:
             self.heads.home()
             self._refuse_stopped()
 
-    def _check_steps(self) -> Triple:
+    def _check_steps(self) -> tuple[float, ...]:
         """Check that the heads lost no steps: films with wrong positions are worthless. Returns the errors, mm."""
         self._board.tell("filming", "checking that the heads lost no steps")
         lost_mm = self.heads.lost_steps_mm()

@@ -109,10 +109,15 @@ def _placed(story: ScanStory, camera: RigCamera, filmed: FilmedPass, heads: Head
     if (tally := filmed.films.get(film_name(camera.id))) is None:
         raise Finding("gave no frame on the travel")
     motion = motion_of_head(heads.log, camera.on_head, filmed.travel)
-    ends = (story.plan.start_mm, story.plan.end_mm)
+    ends = _ends(story, heads.carriages.aside_mm(camera.on_head))
     return place_frames(
         tally, filmed.times[camera.id], filmed.travel, motion, story.timing(camera), ends, LARGEST_SD_MM
     )
+
+
+def _ends(story: ScanStory, aside_mm: float) -> tuple[float, float]:
+    """Begin and end of the film of a head that stands aside of its carriage, X in mm."""
+    return story.plan.start_mm + aside_mm, story.plan.end_mm + aside_mm
 
 
 def _store_camera(
@@ -141,7 +146,7 @@ def _background(
         return {}, 0
     times, timing = filmed.times[camera.id], story.timing(camera)
     if filmed.back is not None:
-        ends = (story.plan.start_mm, story.plan.end_mm)
+        ends = _ends(story, heads.carriages.aside_mm(camera.on_head))
         motion = motion_of_head(heads.log, camera.on_head, filmed.back)
         back = place_frames(tally, times, filmed.back, motion, timing, ends, LARGEST_SD_MM)
         return nearest_frames(film, back), len(film.x_mm)

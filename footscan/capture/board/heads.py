@@ -1,4 +1,4 @@
-"""The three range-sensor heads and their lasers in world coordinates: homing, travels, light, and a log of positions.
+"""The range-sensor heads and their lasers in world coordinates: homing, travels, light, and a log of positions.
 
 Light is tied to motion. `lasers` sets the power of the next travels; the board emits it only while the heads move
 (M4 in laser mode), so that standing heads are dark, even if the host has failed. `shine` lights heads that stand, by
@@ -7,20 +7,19 @@ letting them creep.
 
 import math
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import NamedTuple, Self
 
+from footscan.capture.board.carriages import AXIS_LETTERS, Carriages, Head
 from footscan.capture.board.controller import Controller
-from footscan.capture.board.position_log import HeadPosition, PositionLog, Triple
+from footscan.capture.board.position_log import HeadPosition, PositionLog
 from footscan.capture.board.state import BoardState
 from footscan.capture.grbl.report import Report
 from footscan.capture.grbl.status_poll import TimedReport
 from schemas.base.errors import Fault, RefusedInput
-from schemas.rig import RigBoard
+from schemas.rig import AXES, RigBoard
 
-HEADS = (1, 2, 3)
 SLACK_MM = 0.05
 """Largest distance of a reported position from its target: rounding to steps and to the decimals of the report."""
 STEPS_LOST_MM = 0.3
@@ -40,24 +39,6 @@ DWELL = "G4P0.01"
 """A dwell; the board answers it when all motion before it has ended."""
 
 
-@dataclass(frozen=True)
-class Head:
-    """Rail of a head: world X of its laser plane = `offset_mm` + `direction` x machine position."""
-
-    offset_mm: float = -20.0
-    """World X at which its home switch trips; from the calibration, it aligns the heads."""
-    direction: int = -1
-    """-1 if X increases away from the home switch, where machine positions decrease; 1 if X decreases."""
-
-    def world(self, machine_mm: float) -> float:
-        """Convert a machine position to world X, mm."""
-        return self.offset_mm + self.direction * machine_mm
-
-    def machine(self, world_mm: float) -> float:
-        """Convert world X to a machine position, mm."""
-        return (world_mm - self.offset_mm) * self.direction
-
-
 class Travel(NamedTuple):
     """Begin and end of a travel."""
 
@@ -74,13 +55,13 @@ class Heads:
         self,
         port: str,
         setup: RigBoard | None = None,
-        heads: Sequence[Head] = (Head(), Head(), Head()),
+        heads: Sequence[Head] = (Head(axis=0), Head(axis=1), Head(axis=2)),
         *,
         patience_seconds: float = 2.0,
     ) -> None:
         """Connect to the board at `port`, which must be set up as `setup`; raises the errors of `Controller`."""
         self.setup = setup or RigBoard()
-        self.heads = tuple(heads)
+        self.carriages = Carriages(heads)
         self.log = PositionLog()
         """Positions of the heads from all reports while they are homed."""
         self._power = 0.0
@@ -114,17 +95,13 @@ class Heads:
 
     @property
     def reach_mm(self) -> tuple[float, float]:
-        """Lowest and highest world X that all heads can reach, mm."""
-        ends = [
-            sorted((head.world(-self.setup.pull_off_mm), head.world(-travel)))
-            for head, travel in zip(self.heads, self.setup.travel_mm, strict=True)
-        ]
-        return max(low for low, _ in ends), min(high for _, high in ends)
+        """Lowest and highest world X that all carriages can reach, mm."""
+        return self.carriages.reach_mm(self.setup)
 
-    def position_mm(self) -> Triple:
-        """Return the present world X of heads 1, 2, 3 as the firmware counts it, mm; Fault if they are not homed."""
+    def position_mm(self) -> tuple[float, ...]:
+        """Return the present world X of heads 1, 2, ... as the firmware counts it, mm; Fault if they are not homed."""
         self._need_home()
-        return self._world(self.board.status().report)
+        return self.carriages.world(self._machine(self.board.status().report))
 
     def home(self) -> None:
         """Find the home switches, then align all heads at one X next to them; Fault if a head fails."""
@@ -132,7 +109,7 @@ class Heads:
         self.board.home(self._homing_limit())
         self._restore_limits()
         low, high = self.reach_mm
-        at = self._world(self.board.status().report)
+        at = self.carriages.leading(self._machine(self.board.status().report))
         self.travel_to(low if abs(at[0] - low) < abs(at[0] - high) else high)
 
     def lasers(self, power: float) -> None:
@@ -166,7 +143,7 @@ class Heads:
         """Move all heads to `x_mm` with the lasers off, and wait; default speed: full speed."""
         speed = mm_per_s or min(self.setup.max_mm_per_s)
         self._check_travel(x_mm, x_mm, speed)
-        at = self._world(self.board.status().report)
+        at = self.carriages.leading(self._machine(self.board.status().report))
         farthest = max(at, key=lambda x: abs(x - x_mm))
         if abs(farthest - x_mm) < SLACK_MM / 2.0:
             now = time.monotonic()
@@ -183,36 +160,37 @@ class Heads:
             expected = f"expected a power up to 1 and up to {LONGEST_SHINE_SECONDS:g} s"
             raise RefusedInput("lasers", f"{expected}, found {power:g} and {seconds:g} s", field="shine")
         self._need_home()
-        report = self.board.status().report
-        x, at = self._world(report), report.machine_mm
-        assert at is not None
+        at = self._machine(self.board.status().report)
+        x = self.carriages.leading(at)
         by = CREEP_MM_PER_S * seconds
         way = by if max(x) + by <= self.reach_mm[1] else -by
-        target = [start + head.direction * way for start, head in zip(at, self.heads, strict=True)]
-        feed = CREEP_MM_PER_S * math.sqrt(3.0)
+        target = {axis: at[axis] + head.direction * way for axis, head in self.carriages.leaders.items()}
+        feed = CREEP_MM_PER_S * math.sqrt(len(target))
         begin = time.monotonic()
         self._go_machine(target, feed, power, seconds)
         end = time.monotonic()
-        self._go_machine(at, 10.0 * feed, 0.0)
+        self._go_machine({axis: at[axis] for axis in target}, 10.0 * feed, 0.0)
         return Travel(begin, end)
 
     def jog(self, by_mm: float, mm_per_s: float, head: int | None = None) -> None:
         """Begin to move all heads, or one, by `by_mm` along X in the dark, as with a hand-held controller.
 
-        A jog of homed heads beyond their reach is refused. `stop_jog` ends a jog.
+        Heads of one carriage move together. A jog of homed heads beyond their reach is refused. `stop_jog` ends a jog.
         """
         self._check_speed(mm_per_s)
-        moved = HEADS if head is None else (head,)
-        if not set(moved) <= set(HEADS):
-            raise RefusedInput("jog", f"expected 1, 2 or 3, found {head}", field="head")
-        if self.board.homed:
-            low, high = self.reach_mm
-            for number, at in zip(HEADS, self.position_mm(), strict=True):
-                if number in moved and not low - SLACK_MM <= at + by_mm <= high + SLACK_MM:
-                    raise RefusedInput("jog", _out_of_reach(at + by_mm, low, high), field=f"head {number}")
-        by = [
-            frame.direction * by_mm if number in moved else 0.0 for number, frame in zip(HEADS, self.heads, strict=True)
-        ]
+        if head is not None and not 1 <= head <= len(self.carriages.heads):
+            raise RefusedInput("jog", f"expected 1 to {len(self.carriages.heads)}, found {head}", field="head")
+        by = [0.0] * AXES
+        present = self.position_mm() if self.board.homed else None
+        low, high = self.reach_mm
+        moved = self.carriages.carried(head)
+        for number, leader in enumerate(self.carriages.heads, start=1):
+            if self.carriages.leaders[leader.axis] is not leader or not moved[number - 1]:
+                continue
+            target = low if present is None else present[number - 1] + by_mm
+            if not low - SLACK_MM <= target <= high + SLACK_MM:
+                raise RefusedInput("jog", _out_of_reach(target, low, high), field=f"head {number}")
+            by[leader.axis] = leader.direction * by_mm
         self.board.jog((by[0], by[1], by[2]), mm_per_s)
 
     def stop_jog(self) -> None:
@@ -231,8 +209,8 @@ class Heads:
         """End a travel, with the light off and the position kept; the call that made the travel raises Fault."""
         self.board.stop()
 
-    def lost_steps_mm(self) -> Triple:
-        """Measure the displacement of each home switch since homing, mm along X; Fault beyond the tolerance.
+    def lost_steps_mm(self) -> tuple[float, ...]:
+        """Measure how far each head is off by its home switch since homing, mm along X; Fault beyond the tolerance.
 
         The firmware counts the steps that it gives, and does not notice steps that a motor loses. The heads return to
         their home switches, search for them in steps of 0.1 mm, and the positions are compared. A head that never
@@ -241,28 +219,29 @@ class Heads:
         switches the limits on.
         """
         low, high = self.reach_mm
-        home = low if abs(self.heads[0].world(0.0) - low) < abs(self.heads[0].world(0.0) - high) else high
+        tripped_at = self.carriages.heads[0].world(0.0)
+        home = low if abs(tripped_at - low) < abs(tripped_at - high) else high
         slow = self.setup.homing_slow_mm_per_s
         try:
             self.travel_to(home)
-            self._go_machine([-FEELER_MM] * 3, slow, 0.0)
+            self._go_machine(dict.fromkeys(self.carriages.leaders, -FEELER_MM), slow, 0.0)
             self.board.change(SOFT_LIMITS, 0)
             self.board.change(HARD_LIMITS, 0)
             tripped = self._feel_switches()
             self.board.change(SOFT_LIMITS, 1)  # before the way back, hard ones behind it: leaving a switch trips them
-            self._go_machine([-self.setup.pull_off_mm] * 3, slow, 0.0)
+            self._go_machine(dict.fromkeys(self.carriages.leaders, -self.setup.pull_off_mm), slow, 0.0)
             self.board.change(HARD_LIMITS, 1)
             self.travel_to(home)
         except BaseException:
             self.board.doubt_home()
             raise
-        lost = [math.inf if at is None else head.direction * at for head, at in zip(self.heads, tripped, strict=True)]
-        wrong = [f"head {one} {_off(by)}" for one, by in zip(HEADS, lost, strict=True) if abs(by) > STEPS_LOST_MM]
+        lost = tuple(head.direction * tripped[head.axis] for head in self.carriages.heads)
+        wrong = [f"head {number} {_off(by)}" for number, by in enumerate(lost, start=1) if abs(by) > STEPS_LOST_MM]
         if wrong:
             self.board.doubt_home()
             remedy = "see what holds them, then home the heads again"
             raise Fault(f"heads are not where their steps say: {', '.join(wrong)}; {remedy}")
-        return lost[0], lost[1], lost[2]
+        return lost
 
     def _restore_limits(self) -> None:
         """Switch the limits on that an interrupted search for the switches left off."""
@@ -274,11 +253,10 @@ class Heads:
     def _run(self, begin_mm: float, end_mm: float, mm_per_s: float, power: float) -> Travel:
         """Move all heads straight to `end_mm`; `mm_per_s` is the speed of a head that starts at `begin_mm`."""
         self._need_home()
-        at = self.board.status().report.machine_mm
-        assert at is not None
-        target = [head.machine(end_mm) for head in self.heads]
-        along = [abs(b - a) for a, b in zip(at, target, strict=True)]
-        # The feed is the speed in the space of the three axes: for three equal ones, sqrt(3) times their speed.
+        at = self._machine(self.board.status().report)
+        target = {axis: head.machine(end_mm) for axis, head in self.carriages.leaders.items()}
+        along = [abs(end - at[axis]) for axis, end in target.items()]
+        # The feed is the speed in the space of the axes that move: for three equal ones, sqrt(3) times their speed.
         feed = mm_per_s * math.hypot(*along) / max(*along, 1e-9)
         seconds = abs(end_mm - begin_mm) / mm_per_s + 2.0 * mm_per_s / min(self.setup.mm_per_s2)
         began = time.monotonic()
@@ -288,25 +266,29 @@ class Heads:
         self._check_light(power, seconds)
         return Travel(began, ended)
 
-    def _go_machine(self, target: Sequence[float], feed_mm_per_s: float, power: float, seconds: float = 5.0) -> None:
-        """Move to machine positions and check that the heads arrived.
+    def _go_machine(
+        self, target: Mapping[int, float], feed_mm_per_s: float, power: float, seconds: float = 5.0
+    ) -> None:
+        """Move axes to machine positions, by index of the axis, and check that the heads arrived.
 
         The line that ends the light is in the buffer of the board before the motion begins. It waits for the end of
         the motion only if there is light; the dwell behind it always does: its answer says that the heads stand.
         """
         self.board.overrides_away()
-        words = "".join(f"{axis}{at:.3f}" for axis, at in zip("XYZ", target, strict=True))
+        words = "".join(f"{AXIS_LETTERS[axis]}{at:.3f}" for axis, at in sorted(target.items()))
         light = [f"M4{self._s_word(power)}"] if power else []
         lines = ["G21G90G94M5", *light, f"G53G1{words}F{60.0 * feed_mm_per_s:.1f}", "M5", DWELL]
         self.board.stream(lines, limit_seconds=seconds)
         report = self.board.status().report
         arrived = report.machine_mm is not None and all(
-            abs(a - b) <= SLACK_MM for a, b in zip(report.machine_mm, target, strict=True)
+            abs(report.machine_mm[axis] - at) <= SLACK_MM for axis, at in target.items()
         )
         if report.state != "Idle" or not arrived:
             self.board.stop()
-            stand = "nowhere known" if report.machine_mm is None else ", ".join(f"{at:.2f}" for at in report.machine_mm)
-            wanted = ", ".join(f"{at:.2f}" for at in target)
+            stand = "nowhere known"
+            if report.machine_mm is not None:
+                stand = ", ".join(f"{report.machine_mm[axis]:.2f}" for axis in sorted(target))
+            wanted = ", ".join(f"{at:.2f}" for _, at in sorted(target.items()))
             raise Fault(f"the heads did not go where they were sent ({wanted}), they stand at {stand}; try again")
 
     def _check_light(self, power: float, seconds: float) -> None:
@@ -316,23 +298,23 @@ class Heads:
             powers = f"sent S{wanted}, put out S{self._brightest:g}"
             raise Fault(f"the lasers were not as bright as they should be on this travel ({powers}); try again")
 
-    def _feel_switches(self) -> list[float | None]:
-        """Search for the machine position at which each home switch trips, mm; None if it does not trip.
+    def _feel_switches(self) -> dict[int, float]:
+        """Search for the machine position at which the home switch of each axis trips, mm; infinite if it does not.
 
         No limit stops a head here, so each step is a short line of its own: a byte that is lost or doubled turns it
         into a step of a millimetre at most.
         """
-        tripped: list[float | None] = [None, None, None]
-        feed = 60.0 * self.setup.homing_slow_mm_per_s * math.sqrt(3.0)
-        step = "".join(f"{axis}{FEELER_STEP_MM:g}".replace("0.", ".") for axis in "XYZ")
+        tripped = dict.fromkeys(sorted(self.carriages.leaders), math.inf)
+        feed = 60.0 * self.setup.homing_slow_mm_per_s * math.sqrt(len(tripped))
+        step = "".join(f"{AXIS_LETTERS[axis]}{FEELER_STEP_MM:g}".replace("0.", ".") for axis in tripped)
         for _ in range(round(2.0 * FEELER_MM / FEELER_STEP_MM)):
             self.board.send(f"G91G1{step}F{feed:.0f}")
             self.board.send(DWELL, limit_seconds=1.0)
             report = self.board.status().report
-            for index, axis in enumerate("XYZ"):
-                if axis in report.pins and tripped[index] is None and report.machine_mm is not None:
-                    tripped[index] = report.machine_mm[index] - FEELER_STEP_MM / 2.0
-            if None not in tripped:
+            for axis, at in tripped.items():
+                if AXIS_LETTERS[axis] in report.pins and math.isinf(at) and report.machine_mm is not None:
+                    tripped[axis] = report.machine_mm[axis] - FEELER_STEP_MM / 2.0
+            if not any(map(math.isinf, tripped.values())):
                 break
         return tripped
 
@@ -359,17 +341,18 @@ class Heads:
         Grbl searches for a switch over 1.5 times the travel, and again over 5 times the pull-off.
         """
         s = self.setup
-        search = (len(HEADS) - 1 + 1.5) * max(s.travel_mm) / s.homing_mm_per_s
-        return search + len(HEADS) * (5.0 * s.pull_off_mm / s.homing_slow_mm_per_s + 2.0)
+        search = (AXES - 1 + 1.5) * max(s.travel_mm) / s.homing_mm_per_s
+        return search + AXES * (5.0 * s.pull_off_mm / s.homing_slow_mm_per_s + 2.0)
 
     def _s_word(self, power: float) -> str:
         return f"S{round(power * self.setup.full_power)}"
 
-    def _world(self, report: Report) -> Triple:
+    @staticmethod
+    def _machine(report: Report) -> Sequence[float]:
+        """Machine positions of the axes, mm."""
         if report.machine_mm is None:
             raise Fault("the board does not report machine positions, expected $10=1")
-        x = [head.world(at) for head, at in zip(self.heads, report.machine_mm, strict=True)]
-        return x[0], x[1], x[2]
+        return report.machine_mm
 
     def _log(self, timed: TimedReport) -> None:
         """Log a report, in the thread that reads the line."""
@@ -378,7 +361,9 @@ class Heads:
         if not self.board.homed or timed.report.machine_mm is None or timed.uncertain_seconds > WELL_TIMED_SECONDS:
             return
         moving = timed.report.state in ("Run", "Jog") or (timed.report.state, timed.report.substate) == ("Hold", 1)
-        entry = HeadPosition(timed.seconds, self._world(timed.report), timed.uncertain_seconds, moving)
+        entry = HeadPosition(
+            timed.seconds, self.carriages.world(timed.report.machine_mm), timed.uncertain_seconds, moving
+        )
         # A lost byte can leave a report that looks whole: a jump that no head can make counts only if it is repeated.
         if self._suspect is None or self._can_follow(self._suspect, entry):
             self.log.add(entry)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Triple = tuple[float, float, float]
 
 KEPT = 100_000
 """Number of entries that are kept: more than an hour at 20 a second. A bound of memory."""
@@ -21,8 +20,8 @@ class HeadPosition(NamedTuple):
 
     seconds: float
     """`time.monotonic()` of the host at this position: the middle of the possible interval."""
-    x_mm: Triple
-    """World X of heads 1, 2, 3 from the step counts of the firmware."""
+    x_mm: tuple[float, ...]
+    """World X of heads 1, 2, ... from the step counts of the firmware."""
     uncertain_seconds: float
     """Half the width of that interval: half the time between query and answer, less the transmission of the bytes."""
     is_moving: bool
@@ -34,7 +33,7 @@ class HeadPosition(NamedTuple):
 
 
 class PositionLog:
-    """Reports in the order of time; may be read while it grows. Axes X, Y, Z are heads 1, 2, 3."""
+    """Reports in the order of time; may be read while it grows."""
 
     def __init__(self) -> None:
         self._entries: list[HeadPosition] = []
@@ -61,10 +60,12 @@ class PositionLog:
             return self._entries[first:last]
 
     def arrays(self, begin: float = -math.inf, end: float = math.inf) -> tuple[Floats, Floats, Floats]:
-        """Return seconds (N,), X of the heads (N, 3) in mm, and standard deviations of seconds (N,) in an interval."""
+        """Return seconds (N,), X of the heads (N, H) in mm, and standard deviations of seconds (N,) in an interval."""
         entries = self.between(begin, end)
         return (
             np.array([entry.seconds for entry in entries], dtype=np.float64),
-            np.array([entry.x_mm for entry in entries], dtype=np.float64).reshape(-1, 3),
+            np.array([entry.x_mm for entry in entries], dtype=np.float64).reshape(
+                len(entries), len(entries[0].x_mm) if entries else 0
+            ),
             np.array([entry.seconds_sd for entry in entries], dtype=np.float64),
         )

@@ -2,7 +2,7 @@
 
 An isochronous camera reserves time on its bus for the largest packet it may send, in every microframe, whatever it
 then sends. Many webcams ask for their largest setting at any size and rate: two of those do not go together on a USB 2
-bus, though the films of all eight would fill a tenth of it. The host refuses the camera that is one too many.
+bus, though the films of eight would fill a tenth of it. The host refuses the camera that is one too many.
 """
 
 from collections.abc import Sequence

@@ -18,10 +18,12 @@ Floats = NDArray[np.float64]
 CAMERAS = (
     (230, 159, 0), (86, 180, 233), (0, 158, 115), (240, 228, 66),
     (0, 114, 178), (213, 94, 0), (204, 121, 167), (120, 120, 120),
+    (136, 34, 85), (51, 34, 136), (153, 153, 51), (170, 68, 153),
 )  # fmt: skip
-"""RGB of cameras 1 to 8, distinct for colour-blind readers (Okabe and Ito, "Color universal design", 2008).
+"""RGB of cameras 1 to 12. Those of the first eight are distinct for colour-blind readers (Okabe and Ito, "Color
+universal design", 2008), the others follow P. Tol's muted scheme ("Colour schemes", 2021).
 
-Camera 9 has the colour of camera 1 again."""
+Camera 13 has the colour of camera 1 again."""
 SURE, UNSURE = np.array([253, 231, 37], np.float64), np.array([68, 1, 84], np.float64)
 """RGB of a certain and of an uncertain point."""
 _MIDDLE = np.array([33, 145, 140], np.float64)

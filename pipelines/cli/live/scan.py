@@ -149,7 +149,7 @@ def home(
 
 
 def jog(
-    heads: Annotated[Literal["all", "1", "2", "3"], typer.Argument(help="Which.")],
+    heads: Annotated[Literal["all", "1", "2", "3", "4"], typer.Argument(help="Which.")],
     mm: Annotated[float, typer.Argument(help="Distance along X, mm; write -- before a negative one.")],
     rig: RigFile = None,
     speed: Speed = 20.0,
@@ -249,7 +249,7 @@ def _json(result: "LiveResult") -> dict[str, Any]:
     }
 
 
-def _print_heads(x_mm: tuple[float, float, float], as_json: bool) -> None:
+def _print_heads(x_mm: tuple[float, ...], as_json: bool) -> None:
     if as_json:
         print_json({"x_mm": list(x_mm)})
     else:

@@ -34,8 +34,7 @@ _MAIN = """\
 <div class="row"><button id="connect" type="button">Connect</button><button id="home" type="button">Home heads</button>
 <button id="shine" type="button">Show the stripe</button></div>
 <details><summary>Move heads by hand</summary><fieldset class="jog"><legend>Along the travel, lasers off</legend>
-<label>Which <select id="jog-head"><option value="">all heads</option><option value="1">head 1</option>
-<option value="2">head 2</option><option value="3">head 3</option></select></label>
+<label>Which <select id="jog-head"><option value="">all heads</option></select></label>
 <div class="row"><button type="button" data-jog="-50">−50 mm</button><button type="button" data-jog="-5">−5 mm</button>
 <button type="button" data-jog="5">+5 mm</button><button type="button" data-jog="50">+50 mm</button></div>
 </fieldset></details></section>

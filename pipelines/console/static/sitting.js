@@ -117,6 +117,15 @@
     }
   }
 
+  // The heads that may be moved alone are those that the scanner reports.
+  function showHeads(devices) {
+    const heads = devices.map(part => /^Head (\d+)$/.exec(part.name)).filter(found => found).map(found => found[1]);
+    const which = element("jog-head");
+    if (which.dataset.heads === String(heads)) return;
+    which.dataset.heads = String(heads);
+    which.replaceChildren(new Option("all heads", ""), ...heads.map(head => new Option(`head ${head}`, head)));
+  }
+
   // One picture after another, so as not to overload a slow line; less often while the scanner films.
   async function lookOn() {
     for (let turn = 0; ; turn++) {
@@ -162,6 +171,7 @@
     element("do").hidden = !now.do;
     showSitting(now.sitting);
     showDevices(now.devices);
+    showHeads(now.devices);
     showCameras(now);
     const why = hindrance(now), there = now.state.name === "disconnected" ? "Connect the scanner first." : "";
     for (const id of ["connect", "new-person"]) allow(element(id), why);

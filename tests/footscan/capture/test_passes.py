@@ -14,7 +14,7 @@ import pytest
 import simplejpeg
 
 from footscan.capture import frame_positions
-from footscan.capture.board.heads import Head, Heads
+from footscan.capture.board.heads import Heads
 from footscan.capture.cameras.deck import CameraDeck
 from footscan.capture.cameras.source import CameraSource
 from footscan.capture.cameras.stream import CapturedFrame
@@ -112,7 +112,7 @@ def bench(tmp_path: Path, faults: Mapping[int, Sequence[StreamFault]] | None = N
         )
         sources = {camera: CameraSource(streams.url(camera), frames_per_second=RATE) for camera in CAMERAS}
         deck = stack.enter_context(CameraDeck(sources))
-        heads = stack.enter_context(Heads(board.port, SETTINGS, (Head(),) * 3))
+        heads = stack.enter_context(Heads(board.port, SETTINGS))
         recording = stack.enter_context(ScanRecording(tmp_path / "archive/P1/S1", 1000))
         assert deck.open_only(CAMERAS) == {}
         heads.home()

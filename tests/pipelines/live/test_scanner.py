@@ -3,7 +3,7 @@
 import datetime
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,7 +30,7 @@ from pipelines.live.storing import ScanName, next_scan_name
 from schemas.base.errors import Fault, Finding, RefusedInput
 from schemas.base.json_files import read_json
 from schemas.recording import Recording
-from schemas.rig import Rig, RigCamera, RigLatency, RigTravel
+from schemas.rig import Rig, RigCamera, RigHead, RigLatency, RigTravel
 
 pytestmark = pytest.mark.real_time  # cameras stream while heads move
 
@@ -70,16 +70,27 @@ class Bench:
 
 
 @pytest.fixture
-def bench(pristine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    # A busy host times frames badly and reports it; the accuracy of positions is not tested here.
+def lenient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy host times frames badly and reports it; the accuracy of positions is not tested here."""
     monkeypatch.setattr(storing, "LARGEST_SD_MM", 5.0)
     monkeypatch.setattr(frame_positions, "LARGEST_SD_MM", 5.0)
+
+
+@pytest.fixture
+def bench(pristine: Path, tmp_path: Path, lenient: None) -> Iterator[Bench]:  # noqa: ARG001
     with open_bench(pristine, tmp_path) as one:
         yield one
 
 
+THREE_HEADS = (RigHead(), RigHead(), RigHead())
+TWO_CAMERAS = {1: 1, 5: 3}
+
+
 @contextmanager
-def open_bench(pristine: Path, home: Path) -> Iterator[Bench]:
+def open_bench(
+    pristine: Path, home: Path, heads: tuple[RigHead, ...] = THREE_HEADS, on_head: Mapping[int, int] = TWO_CAMERAS
+) -> Iterator[Bench]:
+    """A scanner with these heads; `on_head` has the head of each camera."""
     films = {}
     for camera in (1, 5):
         film = open_film(pristine / f"archive/P0001/S1/cam{camera}.avi")
@@ -89,17 +100,24 @@ def open_bench(pristine: Path, home: Path) -> Iterator[Bench]:
         def picture(camera: int, seconds: float) -> bytes:
             if not board.laser_at(seconds):
                 return DARK
-            x = board.position_at(seconds)[0 if camera == 1 else 2]
-            return films[camera][int(np.clip(round(x / STEP_MM), 0, len(films[camera]) - 1))]
+            head = on_head[camera]
+            axis = heads[head - 1].axis or head
+            x = board.position_at(seconds)[axis - 1]
+            film = films[1 if axis == 1 else 5]
+            return film[int(np.clip(round(x / STEP_MM), 0, len(film) - 1))]
 
-        with VirtualStreams((1, 5), picture, free_running(RATE), latency_s=LATENCY_S) as streams:
+        with VirtualStreams(tuple(on_head), picture, free_running(RATE), latency_s=LATENCY_S) as streams:
             latency = RigLatency(seconds=LATENCY_S, sd_s=0.001, frame_sd_s=0.002)
             rig = Rig(
                 format="footscan.rig/1",
                 scanner="bench",
                 port=board.port,
                 board=quick_rig.QUICK,
-                cameras=[RigCamera(id=c, device=streams.url(c), latency=latency) for c in (1, 5)],
+                heads=heads,
+                cameras=[
+                    RigCamera(id=camera, device=streams.url(camera), head=head, latency=latency)
+                    for camera, head in on_head.items()
+                ],
                 travel=RigTravel(start_mm=0.0, length_mm=LENGTH_MM, mm_per_s=60.0),
                 frames_per_second=RATE,
             )
@@ -138,6 +156,42 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
     assert result.measured.kind in {None, "finding"}
     assert result.measured.folder == results / "P7/2026-11-20-R"
     assert next_scan_name(bench.home / "archive", "P7", "right", DAY) == "2026-11-20-R-2"
+
+
+@pytest.mark.usefixtures("lenient")
+def test_two_cameras_on_two_heads_leave_the_third_axis_where_it_is(pristine: Path, tmp_path: Path) -> None:
+    with open_bench(pristine, tmp_path, (RigHead(), RigHead()), {1: 1, 2: 2}) as bench:
+        bench.scanner.home()
+        before = bench.board.position_at(time.monotonic())[2]
+        result = bench.scanner.scan(bench.order())
+        assert bench.board.position_at(time.monotonic())[2] == before
+        recording = read_json(result.stored.place / "recording.json", Recording)
+        assert recording.board.lost_steps_mm == pytest.approx((0.0, 0.0), abs=0.06)
+        assert [(camera.id, camera.head) for camera in recording.cameras] == [(1, 1), (2, 2)]
+        assert bench.scanner.jog(3.0, 50.0, 2)[1] == pytest.approx(bench.scanner.heads.position_mm()[0] + 3.0, abs=0.1)
+        with pytest.raises(RefusedInput, match="head: expected 1 to 2, found 3"):
+            bench.scanner.jog(3.0, 50.0, 3)
+
+
+@pytest.mark.usefixtures("lenient")
+def test_twelve_cameras_on_four_heads_of_which_two_share_an_axis(pristine: Path, tmp_path: Path) -> None:
+    heads = (*THREE_HEADS, RigHead(axis=3, offset_mm=-38.0))  # 18 mm behind head 3
+    on_head = {camera: 1 + camera % 4 for camera in range(1, 13)}
+    with open_bench(pristine, tmp_path, heads, on_head) as bench:
+        result = bench.scanner.scan(bench.order())
+        assert result.stored.left_out == {}
+        recording = read_json(result.stored.place / "recording.json", Recording)
+        assert {camera.id: camera.head for camera in recording.cameras} == on_head
+        assert recording.passes[0].cameras == list(on_head)
+        assert recording.board.lost_steps_mm == pytest.approx((0.0,) * 4, abs=0.06)
+        for camera in read_scan(result.stored.place).document.cameras:
+            x = read_positions(result.stored.place / str(camera.positions))
+            aside = -18.0 if on_head[camera.id] == 4 else 0.0
+            assert aside <= x[0] < aside + 4 * 3.0
+            assert aside + LENGTH_MM - 4 * 3.0 < x[-1] <= aside + LENGTH_MM
+        places = bench.scanner.jog(4.0, 50.0, 4)
+        assert places[3] == pytest.approx(places[2] - 18.0, abs=0.01)  # the carriage moves both
+        assert places[2] == pytest.approx(places[0] + 4.0, abs=0.1)
 
 
 def test_a_head_that_was_held_costs_the_scan(bench: Bench) -> None:

@@ -15,20 +15,20 @@ SURFACE = FootSurface(
     cut_mm=None,
     truth_distance=None,
 )
-CLOUD = make_points(VERTICES[:3] + 0.1, camera=np.array([1, 2, 9]), sigma=np.array([0.0, 0.05, 0.1]))
+CLOUD = make_points(VERTICES[:3] + 0.1, camera=np.array([1, 2, 13]), sigma=np.array([0.0, 0.05, 0.1]))
 MESH = MeshQuality(vertices=4, triangles=2, open_edges=0, non_manifold_edges=0, components=1, holes=0)
 
 
 def test_cameras_and_uncertainty_are_those_of_the_nearest_point_and_filled_is_grey() -> None:
     colourings = {colouring.name: colouring for colouring in foot_colourings(SURFACE, MESH, CLOUD)}
     assert list(colourings) == ["Measured and filled", "Camera", "Uncertainty"]
-    # The ninth camera has the colour of the first.
+    # Camera 13 has the colour of the first.
     assert colourings["Camera"].colours.tolist() == [list(CAMERAS[0]), list(CAMERAS[1]), list(CAMERAS[0]), list(CUT)]
     uncertain = colourings["Uncertainty"].colours
     assert uncertain[0].tolist() == SURE.tolist()
     assert uncertain[2].tolist() == UNSURE.tolist()
     assert uncertain[3].tolist() == list(CUT)
-    for camera in (1, 2, 9):
+    for camera in (1, 2, 13):
         assert f"Camera {camera}</span>" in colourings["Camera"].meaning
 
 
