@@ -15,6 +15,7 @@ from footscan.cloud.fusion.fuse import fuse
 from footscan.cloud.mapping import map_stripe, refuse_other_size
 from footscan.cloud.normals import estimate_normals
 from footscan.cloud.outliers.remove import remove_outliers
+from footscan.cloud.points import of_cameras
 from footscan.cloud.views import views_of
 from footscan.frames.film import open_background, open_film
 from footscan.frames.image import Rgb
@@ -65,18 +66,27 @@ class OpenScan:
 
     @cached_property
     def points(self) -> Mapping[int, NDArray[np.void]]:
-        """By camera, the (N,) world points of `footscan.cloud.points.POINT_DTYPE`: x, y, z in mm, scanner frame..."""
+        """By camera, the (N,) world points of `footscan.cloud.points.POINT_DTYPE`: x, y, z in mm, scanner frame...
+
+        A camera that sees two lasers has each point twice: by the map of either, until the cloud is cleaned.
+        """
         return {camera: self._points(camera) for camera in self.cameras}
 
-    @cached_property
+    @property
     def cloud(self) -> NDArray[np.void]:
         """(N,) points of all cameras, cleaned and fused, as `points`; Finding where none is left."""
+        return of_cameras(self._fused)
+
+    @cached_property
+    def _fused(self) -> NDArray[np.void]:
+        """`cloud` with the numbers of views."""
         together = np.concatenate(list(self.points.values()))
         if not len(together):
             raise Finding("no stripe in any camera, expected a foot in the films")
-        filmed = {camera: self._x_of_frame(camera) for camera in self.cameras}
+        placed = {camera: self._x_of_frame(camera) for camera in self.cameras}
         for camera, lost in self._lost.items():
-            filmed[camera][lost] = np.nan
+            placed[camera][lost] = np.nan
+        filmed = {one.view: placed[one.camera] + one.ahead_mm for one in self._used.cameras}
         kept, _ = remove_outliers(together, views_of(self._used.cameras), self.parameters.outliers, filmed)
         if not len(kept):
             raise Finding("every point is an outlier, expected a foot in the control volume")
@@ -86,7 +96,7 @@ class OpenScan:
     def normals(self) -> NDArray[np.float64]:
         """(N, 3) outward unit normals of the points of `cloud`."""
         return np.asarray(
-            estimate_normals(self.cloud, views_of(self._used.cameras), self.parameters.normals), np.float64
+            estimate_normals(self._fused, views_of(self._used.cameras), self.parameters.normals), np.float64
         )
 
     @cached_property
@@ -102,7 +112,7 @@ class OpenScan:
     @cached_property
     def _used(self) -> Calibration:
         """The calibration of the cameras that filmed it."""
-        cameras = [self.calibration.camera(camera, self.recorded.file) for camera in self.cameras]
+        cameras = [one for camera in self.cameras for one in self.calibration.maps(camera, self.recorded.file)]
         return self.calibration.model_copy(update={"cameras": cameras})
 
     def _film(self, camera: int) -> CameraFilm:
@@ -123,10 +133,11 @@ class OpenScan:
         return extract_film(noting_lost(pixel_frames(film), lost), parameters, backgrounds)
 
     def _points(self, camera: int) -> NDArray[np.void]:
-        model = self.calibration.camera(camera, self.recorded.file)
-        film = open_film(self.recorded.film(self._film(camera)))
-        refuse_other_size(model, film.size, film.path)
-        return map_stripe(self.stripes[camera], model, self._x_of_frame(camera), self.parameters.mapping)
+        film, parts = open_film(self.recorded.film(self._film(camera))), []
+        for model in self.calibration.maps(camera, self.recorded.file):
+            refuse_other_size(model, film.size, film.path)
+            parts.append(map_stripe(self.stripes[camera], model, self._x_of_frame(camera), self.parameters.mapping))
+        return np.concatenate(parts)
 
     def _x_of_frame(self, camera: int) -> NDArray[np.float64]:
         film = self._film(camera)

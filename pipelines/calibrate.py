@@ -14,6 +14,7 @@ from pipelines.scan import STEPS, source_files
 from pipelines.version import SOFTWARE
 from schemas.base.errors import RefusedInput
 from schemas.base.model import canonical_json
+from schemas.calibration import view_name
 from schemas.mounting import CaptureCamera, mounting_of
 from schemas.parameters.calibration import CaptureCalibrationParameters
 from schemas.reference import Capture, ReferenceObject
@@ -28,9 +29,9 @@ class CaptureInputs:
     document: Capture
     reference: ReferenceObject
     paths: Mapping[int, Path]
-    """The film of each camera."""
+    """The film of each view, by its number as in `schemas.calibration.view_number`."""
     films: Mapping[int, Mapping[str, Input]]
-    """Inputs of each camera's stripe step: its `film`. For a capture yet to be filmed, `film` is the step that lists
+    """Inputs of each view's stripe step: its `film`. For a capture yet to be filmed, `film` is the step that lists
     the digests of all films, and `file` the name of the camera's film."""
     names: list[str]
     """All files within the capture's folder: capture.yaml, the reference object, the films."""
@@ -46,15 +47,15 @@ def recorded_inputs(capture: RecordedCapture, digests: FileDigests) -> CaptureIn
     RefusedInput
         Two cameras have the same film.
     """
-    paths = {camera.id: capture.film(camera) for camera in capture.document.cameras}
+    paths = {camera.view: capture.film(camera) for camera in capture.document.cameras}
     films: dict[int, dict[str, Input]] = {}
     cameras: dict[tuple[str, ...], int] = {}
     for camera, path in paths.items():
         frames = tuple(digests.of(file)[0] for file in film_files(path))
         other = cameras.setdefault(frames, camera)
         if other != camera:
-            problem = f"has the same film as camera {other}, expected its own"
-            raise RefusedInput(capture.file, problem, field=f"camera {camera}")
+            problem = f"has the same film as camera {view_name(other)}, expected its own"
+            raise RefusedInput(capture.file, problem, field=f"camera {view_name(camera)}")
         films[camera] = {"film": source_files(path, digests)}
     digests_by_name = {file.relative_to(capture.folder).as_posix(): digests.of(file)[0] for file in capture.files}
     listed = Value(canonical_json(digests_by_name).encode())
@@ -69,14 +70,20 @@ def camera_steps(name: str, capture: CaptureInputs, parameters: CaptureCalibrati
     steps: list[Step] = []
     document = {"capture": capture.file}
     for camera in capture.document.cameras:
-        film = {"film": capture.paths[camera.id], **document}
+        film = {"film": capture.paths[camera.view], **document}
         stripe = _step(
-            name, "stripe", "capture_stripe", parameters.extraction, capture.films[camera.id], camera.id, places=film
+            name,
+            "stripe",
+            "capture_stripe",
+            parameters.extraction,
+            capture.films[camera.view],
+            camera.view,
+            places=film,
         )
         views: dict[str, Input] = {
             "stripe": Output(stripe.name), "reference": _reference(capture), "camera": _camera(camera)
         }  # fmt: skip
-        steps += [stripe, _step(name, "recognise", "recognise", None, views, camera.id)]
+        steps += [stripe, _step(name, "recognise", "recognise", None, views, camera.view)]
     inputs = {"reference": _reference(capture), **_views(name, capture)}
     return [*steps, _step(name, "place", "place", parameters.placement, inputs, places=document)]
 
@@ -87,10 +94,12 @@ def fit_steps(name: str, capture: CaptureInputs, parameters: CaptureCalibrationP
         _step(
             name, "fit", "fit", parameters.fit,
             {
-                "poses": Output(f"{name}/{poses}"), "reference": _reference(capture), "camera": _camera(camera),
-                "stripe": Output(f"{name}/stripe-{camera.id}"), "recognised": Output(f"{name}/recognise-{camera.id}"),
+                "poses": Output(f"{name}/{poses}"), "reference": _reference(capture),
+                "camera": _camera(camera, capture.document.ahead_mm(camera)),
+                "stripe": Output(f"{name}/stripe-{camera.view}"),
+                "recognised": Output(f"{name}/recognise-{camera.view}"),
             },
-            camera.id, places={"capture": capture.file},
+            camera.view, places={"capture": capture.file},
         )
         for camera in capture.document.cameras
     ]  # fmt: skip
@@ -114,7 +123,7 @@ def calibration_steps(
     steps += fit_steps(name, capture, parameters, poses)
     about = {"files": capture.names, "reference": Path(capture.document.reference).name, "software": SOFTWARE}
     last_inputs: dict[str, Input] = {
-        **{f"fit-{camera.id}": Output(f"{name}/fit-{camera.id}") for camera in capture.document.cameras},
+        **{f"fit-{camera.view}": Output(f"{name}/fit-{camera.view}") for camera in capture.document.cameras},
         **views,
         "reference": _reference(capture),
         "digests": capture.digests,
@@ -146,8 +155,9 @@ class CaptureOfScan:
 
     def camera(self, camera: int) -> Output:
         """The map of one camera; RefusedInput if the capture lacks the camera."""
-        if camera not in self.capture.paths:
-            problem = f"has no camera {camera}, expected one of {', '.join(map(str, self.capture.paths))}"
+        known = dict.fromkeys(one.id for one in self.capture.document.cameras)
+        if camera not in known:
+            problem = f"has no camera {camera}, expected one of {', '.join(map(str, known))}"
             raise RefusedInput(self.capture.file, problem, field="cameras")
         return self._part("camera-map", "camera_map", {"camera": Value(canonical_json(camera).encode())}, camera)
 
@@ -178,8 +188,8 @@ def _step(
 def _views(name: str, capture: CaptureInputs) -> dict[str, Input]:
     views: dict[str, Input] = {}
     for camera in capture.document.cameras:
-        views[f"stripe-{camera.id}"] = Output(f"{name}/stripe-{camera.id}")
-        views[f"recognised-{camera.id}"] = Output(f"{name}/recognise-{camera.id}")
+        views[f"stripe-{camera.view}"] = Output(f"{name}/stripe-{camera.view}")
+        views[f"recognised-{camera.view}"] = Output(f"{name}/recognise-{camera.view}")
     return views
 
 
@@ -187,6 +197,9 @@ def _reference(capture: CaptureInputs) -> Value:
     return Value(canonical_json(capture.reference.model_dump(mode="json")).encode())
 
 
-def _camera(camera: CaptureCamera) -> Value:
+def _camera(camera: CaptureCamera, ahead_mm: float | None = None) -> Value:
     mounting = mounting_of(camera)
-    return Value(canonical_json({"id": camera.id, "mounting": [mounting.x, mounting.y, mounting.z]}).encode())
+    content: dict[str, object] = {"id": camera.view, "mounting": [mounting.x, mounting.y, mounting.z]}
+    if ahead_mm is not None:
+        content["laser"] = [camera.id, camera.laser, ahead_mm]
+    return Value(canonical_json(content).encode())

@@ -106,19 +106,19 @@ def check_calibration(
         steps = camera_steps(job.name, job.inputs, parameters)
         results = job.run([*steps, *fit_steps(job.name, job.inputs, parameters, "place")])
         drifts = []
-        for camera in sorted(calibration.cameras, key=lambda calibrated: calibrated.camera):
-            if camera.camera in job.cameras:
+        for camera in sorted(calibration.cameras, key=lambda calibrated: calibrated.view):
+            if camera.view in job.cameras:
                 drifts.append(_drift(job, results, camera, tolerance_mm))
             else:
-                drifts.append(Drift(camera.camera, "not in the capture"))
-        calibrated_ids = {camera.camera for camera in calibration.cameras}
+                drifts.append(Drift(camera.view, "not in the capture"))
+        calibrated_ids = {camera.view for camera in calibration.cameras}
         uncalibrated_ids = sorted(set(job.cameras) - calibrated_ids)
         return drifts + [Drift(number, "not in the calibration") for number in uncalibrated_ids]
 
 
 def picture_of(capture: RecordedCapture, refused: RefusedCapture) -> bytes:
     """Draw the evidence for which a capture was refused, as PNG."""
-    films = {camera.id: capture.film(camera) for camera in capture.document.cameras}
+    films = {camera.view: capture.film(camera) for camera in capture.document.cameras}
     shown = [
         (evidence, next(pixel_frames(open_film(films[evidence.camera]), [evidence.frame]), None))
         for evidence in refused.evidence
@@ -137,7 +137,7 @@ class _Job:
 
     @property
     def cameras(self) -> list[int]:
-        """Numbers of the cameras."""
+        """Numbers of the views."""
         return list(self.inputs.paths)
 
     def run(self, steps: Sequence[Step]) -> dict[str, bytes]:
@@ -184,7 +184,7 @@ def _fit(job: _Job, results: Mapping[str, bytes], camera: int) -> Mapping[str, N
 
 
 def _drift(job: _Job, results: Mapping[str, bytes], calibrated: CameraCalibration, tolerance_mm: float) -> Drift:
-    camera = calibrated.camera
+    camera = calibrated.view
     stripe, recognised_edges = (unpack(results[f"{job.name}/{kind}-{camera}"]) for kind in ("stripe", "recognise"))
     recognised = seen_by(camera, stripe, recognised_edges)[1]
     if not isinstance(recognised, Recognised):

@@ -16,7 +16,7 @@ from pipelines.engine.actions.step import Input, Output, SourceFile, Step, Value
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
 from schemas.base.model import Document, Side, canonical_json
-from schemas.calibration import Calibration, Source
+from schemas.calibration import Calibration, Source, maps_to_json
 from schemas.parameters.foot import FootParameters
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm
@@ -42,7 +42,7 @@ class ScanCalibration(Protocol):
         """Name and digest of the calibration."""
 
     def camera(self, camera: int) -> Input:
-        """The map of one camera; RefusedInput if there is none."""
+        """The maps of one camera, one for each laser that it sees; RefusedInput if there is none."""
 
     def cameras(self, ids: frozenset[int]) -> Input:
         """The calibration with the maps of these cameras only."""
@@ -61,25 +61,25 @@ class CalibrationFile:
     @property
     def source(self) -> Value:
         """Name and digest of the calibration."""
-        return self._cached("source", lambda: Source(name=self.path.name, sha256=self.digest))
+        return self._cached("source", lambda: _text(Source(name=self.path.name, sha256=self.digest)))
 
     @property
     def whole(self) -> Value:
         """All of it."""
-        return self._cached("whole", lambda: self.content)
+        return self._cached("whole", lambda: _text(self.content))
 
     def camera(self, camera: int) -> Value:
-        """The map of one camera; RefusedInput if there is none."""
-        return self._cached(camera, lambda: self.content.camera(camera, self.path))
+        """The maps of one camera; RefusedInput if there is none."""
+        return self._cached(camera, lambda: maps_to_json(self.content.maps(camera, self.path)))
 
     def cameras(self, ids: frozenset[int]) -> Value:
         """The calibration with the maps of these cameras only."""
         maps = [camera for camera in self.content.cameras if camera.camera in ids]
-        return self._cached(ids, lambda: self.content.model_copy(update={"cameras": maps}))
+        return self._cached(ids, lambda: _text(self.content.model_copy(update={"cameras": maps})))
 
-    def _cached(self, part: object, make: Callable[[], Document]) -> Value:
+    def _cached(self, part: object, make: Callable[[], str]) -> Value:
         if part not in self._parts:
-            self._parts[part] = _document(make(), self.path)
+            self._parts[part] = Value(make().encode(), self.path)
         return self._parts[part]
 
 
@@ -249,7 +249,11 @@ def _travel(scan: RecordedScan, camera: CameraFilm) -> dict[str, Value]:
 
 
 def _document(document: Document, path: Path) -> Value:
-    return Value(canonical_json(document.model_dump(mode="json")).encode(), path)
+    return Value(_text(document).encode(), path)
+
+
+def _text(document: Document) -> str:
+    return canonical_json(document.model_dump(mode="json"))
 
 
 def _name(scan: RecordedScan) -> Value:

@@ -6,19 +6,22 @@ any of the models with their covariance and their sources. Version 4, the curren
 laser plane lies along the travel. Older files are migrated when they are read.
 """
 
+import json
 import math
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AwareDatetime, Field, model_validator
+from pydantic import AwareDatetime, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from schemas.base.errors import RefusedInput
 from schemas.base.image_size import FRAME_SIZE, ImageSize
 from schemas.base.json_files import parse_json, read_text, validate
-from schemas.base.model import Document
+from schemas.base.model import Document, canonical_json
 from schemas.base.units import Point
 from schemas.calibration_history import CalibrationV1, CalibrationV2, migrate_v1, migrate_v2
+from schemas.scan import MOST_CAMERA, LaserNumber
 
 VERSION = 4
 _FAMILY = "footscan.calibration/"
@@ -99,14 +102,14 @@ class LaserPlane(Document):
     x + offset_mm + yaw Y + pitch (Z - 57) + bend_mm (Y / 70)^2 + scale (x - x_mm)
     + step (delay_frames + shutter_frames row),
 
-    with x the place of its head by the travel when the frame was taken, `step` the way to the next frame, and `row` the
-    place in the picture: -0.5 at the upper border, 0.5 at the lower one.
+    with x the place of its head by the travel when the frame was taken, plus `ahead_mm` of the laser, `step` the way to
+    the next frame, and `row` the place in the picture: -0.5 at the upper border, 0.5 at the lower one.
     """
 
     head: Annotated[int, Field(ge=1, le=64)]
-    """Cameras of one head see one plane."""
+    """Cameras of one head see one plane for each of its lasers."""
     offset_mm: Number = 0.0
-    """Along X, relative to the mean of all heads."""
+    """Along X, relative to the mean of the planes of all heads."""
     yaw: Number = 0.0
     """Turn about Z, mm per mm."""
     pitch: Number = 0.0
@@ -129,10 +132,51 @@ Residual = tuple[Number, Number, Number, Number]
 """A pixel (i, j), and the error of its mapped place in Y and in Z, mm."""
 
 
+def view_number(camera: int, laser: int = 1) -> int:
+    """Number a view: what one camera sees in the plane of one laser. That of laser 1 has the camera's own number.
+
+    >>> view_number(5), view_number(5, laser=2)
+    (5, 69)
+    """
+    return camera + MOST_CAMERA * (laser - 1)
+
+
+def camera_of_view(view: int) -> int:
+    """Return the camera of the number of a view.
+
+    >>> camera_of_view(69), laser_of_view(69)
+    (5, 2)
+    """
+    return (view - 1) % MOST_CAMERA + 1
+
+
+def laser_of_view(view: int) -> int:
+    """Return the laser of the number of a view."""
+    return (view - 1) // MOST_CAMERA + 1
+
+
+def view_name(view: int) -> str:
+    """Name a view by its camera and, if it is not the first one, its laser.
+
+    >>> view_name(5), view_name(69)
+    ('5', '5 (laser 2)')
+    """
+    return name_of(camera_of_view(view), laser_of_view(view))
+
+
+def name_of(camera: int, laser: int) -> str:
+    """Name a camera and, if it is not the first one, its laser."""
+    return f"{camera}" if laser == 1 else f"{camera} (laser {laser})"
+
+
 class CameraCalibration(Document):
-    """The map of one camera, its uncertainty, and its region of support."""
+    """The map of one camera in the plane of one laser, its uncertainty, and its region of support."""
 
     camera: Annotated[int, Field(ge=1)]
+    laser: LaserNumber = 1
+    """Number of the laser among those of its head. A camera that sees two has a map for each."""
+    ahead_mm: Annotated[float, Field(ge=-200, le=200)] = 0.0
+    """X of the laser's plane minus X of the camera's head, by the construction of the head; `plane` has the rest."""
     image_px: tuple[Side, Side] | None = None
     """Columns and rows of the images that the map is valid for; None if unknown."""
     map: PixelMap
@@ -155,6 +199,31 @@ class CameraCalibration(Document):
     """Residuals of the fit at each control point, or across each stretch of an edge; empty if unknown."""
     plane: LaserPlane | None = None
     """None if no film has shown it: the plane is where the travel says, at right angles to it."""
+
+    @property
+    def view(self) -> int:
+        """Number of the view, as in `view_number`."""
+        return view_number(self.camera, self.laser)
+
+    @property
+    def name(self) -> str:
+        """The camera and, if it is not the first one, the laser."""
+        return name_of(self.camera, self.laser)
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A calibration of one laser a camera is written as it was before there were two: older readers take it."""
+        document: dict[str, Any] = write(self)
+        for name in ("laser", "ahead_mm"):
+            if document.get(name) == type(self).model_fields[name].default:
+                del document[name]
+        return document
+
+    @model_validator(mode="after")
+    def _is_numbered(self) -> Self:
+        if self.laser > 1 and self.camera > MOST_CAMERA:
+            raise ValueError(f"camera: expected 1 to {MOST_CAMERA} for laser {self.laser}, found {self.camera}")
+        return self
 
     @property
     def image_size(self) -> ImageSize:
@@ -180,6 +249,7 @@ class PairAgreement(Document):
     """The distance between two cameras' places of the same edges."""
 
     cameras: tuple[int, int]
+    """Numbers of the cameras; larger by 64 for their views of laser 2."""
     places: Annotated[int, Field(ge=1)]
     """Number of stretches of edges that both cameras saw."""
     rms_mm: float
@@ -214,17 +284,21 @@ class _Calibration(Document):
 
     @model_validator(mode="after")
     def _unique(self) -> Self:
-        ids = [camera.camera for camera in self.cameras]
-        if len(set(ids)) != len(ids):
-            raise ValueError(f"expected each camera once, found {ids}")
+        names = [camera.name for camera in self.cameras]
+        if len(set(names)) != len(names):
+            raise ValueError(f"expected each camera once for each of its lasers, found {', '.join(names)}")
         return self
 
     def camera(self, camera_id: int, source: Path | str = "calibration") -> CameraCalibration:
-        """The map of one camera, or a refusal that lists the cameras of the calibration."""
-        for camera in self.cameras:
-            if camera.camera == camera_id:
-                return camera
-        known = ", ".join(str(camera.camera) for camera in self.cameras)
+        """The map of one camera, for its first laser, or a refusal that lists the cameras of the calibration."""
+        return self.maps(camera_id, source)[0]
+
+    def maps(self, camera_id: int, source: Path | str = "calibration") -> list[CameraCalibration]:
+        """The maps of one camera, by laser, or a refusal that lists the cameras of the calibration."""
+        maps = [camera for camera in self.cameras if camera.camera == camera_id]
+        if maps:
+            return sorted(maps, key=lambda camera: camera.laser)
+        known = ", ".join(str(number) for number in dict.fromkeys(camera.camera for camera in self.cameras))
         raise RefusedInput(source, f"has no camera {camera_id}, expected one of {known}", field="cameras")
 
 
@@ -238,6 +312,29 @@ class Calibration(_Calibration):
     """The content of a calibration file, in its current version."""
 
     format: Literal["footscan.calibration/4"] = "footscan.calibration/4"
+
+
+def with_offsets(calibration: Calibration, offsets_mm: Mapping[int, Mapping[int, float]]) -> Calibration:
+    """The calibration with the offsets of lasers from their heads, by camera and laser, where it has none."""
+    cameras = [
+        camera
+        if camera.ahead_mm
+        else camera.model_copy(update={"ahead_mm": offsets_mm.get(camera.camera, {}).get(camera.laser, 0.0)})
+        for camera in calibration.cameras
+    ]
+    return calibration.model_copy(update={"cameras": cameras})
+
+
+def maps_to_json(maps: Sequence[CameraCalibration]) -> str:
+    """The maps of one camera as JSON text: one map, or a list of several."""
+    documents = [camera.model_dump(mode="json") for camera in maps]
+    return canonical_json(documents[0] if len(documents) == 1 else documents)
+
+
+def maps_from_json(text: str | bytes) -> list[CameraCalibration]:
+    """The maps of one camera from the text of `maps_to_json`."""
+    value = json.loads(text)
+    return [CameraCalibration.model_validate(one) for one in (value if isinstance(value, list) else [value])]
 
 
 def parameter_count(pixel_map: PolynomialMap | HomographyMap) -> int:

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field
 
-from schemas.scan import CameraSource
+from schemas.calibration import view_number
+from schemas.scan import CameraSource, LaserNumber
 
 Stand = Literal["front", "behind", "left", "right", "above", "below"]
 Sign = Literal[-1, 0, 1]
@@ -30,6 +31,15 @@ class CaptureCamera(CameraSource):
     stands: Stands | None = None
     """Sides of the object on which the camera stands: front (+X) or behind, left (+Y) or right, above or below. Any of
     them may be left out; where all are absent, the camera's number says it."""
+    laser: LaserNumber = 1
+    """Number of the laser that shines in this film, among those of the camera's head; the others are covered."""
+    x_mm: Annotated[float, Field(ge=-1e4, le=1e4)] | None = None
+    """Where the plane of this laser stands; default: where that of the capture does."""
+
+    @property
+    def view(self) -> int:
+        """Number of the view, as in `schemas.calibration.view_number`."""
+        return view_number(self.id, self.laser)
 
 
 @dataclass(frozen=True)
@@ -53,7 +63,7 @@ class Mounting:
 def mounting_of(camera: CaptureCamera) -> Mounting:
     """Where `camera` stands, by what its capture says or else by the numbering of the scanner's cameras."""
     if camera.stands is None:
-        return _by_number(camera.id)
+        return mounting_by_number(camera.id)
     x, y, z = (_sign(camera.stands, *pair) for pair in _OPPOSITES)
     return Mounting(x, y, z)
 
@@ -64,7 +74,7 @@ def _sign(stands: list[Stand], positive: Stand, negative: Stand) -> Sign:
     return -1 if negative in stands else 0
 
 
-def _by_number(camera_id: int) -> Mounting:
+def mounting_by_number(camera_id: int) -> Mounting:
     """1 and 2 stand left above, 3 and 4 right above, 5 and 6 left below, 7 and 8 right below; odd ones in front."""
     if camera_id > 8:
         return Mounting(0, 0, 0)

@@ -7,8 +7,9 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from schemas.base.model import Document, RelativePath
+from schemas.calibration import view_name, view_number
 from schemas.mounting import CaptureCamera
-from schemas.scan import unique_ids
+from schemas.scan import each_once
 
 EXTENT_MM = (10.0, 1000.0)
 FARTHEST_MM = 1000.0
@@ -61,13 +62,17 @@ class Capture(Document):
     format: Literal["footscan.capture/1"]
     reference: RelativePath
     x_mm: float
-    """Where the laser plane stands."""
+    """Where the laser plane stands; that of the first laser, of heads that have two."""
     cameras: Annotated[list[CaptureCamera], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _unique(self) -> Self:
-        unique_ids(self.cameras)
+        each_once([view_name(view_number(camera.id, camera.laser)) for camera in self.cameras])
         return self
+
+    def ahead_mm(self, camera: CaptureCamera) -> float:
+        """X of the plane of a film's laser minus X of the first one."""
+        return 0.0 if camera.x_mm is None else camera.x_mm - self.x_mm
 
 
 def _check_size(corners: list[Pair]) -> None:

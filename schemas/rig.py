@@ -6,7 +6,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from schemas.base.model import Document, Pseudonym, RelativePath
 from schemas.mounting import Stands
-from schemas.scan import CameraId
+from schemas.scan import MOST_LASERS, CameraId, LaserNumber
 
 AXES = 3
 """Number of axes of a Grbl 1.1 board that it moves together."""
@@ -14,11 +14,8 @@ MOST_HEADS = 4
 """Two on each side of the foot, or one and three: more than a rail has room for is not foreseen. Chosen by hand."""
 MOST_CAMERAS = 12
 """Largest number of cameras of a scanner that was tried: on the virtual board, and in worlds. Chosen by hand."""
-MOST_LASERS = 2
-"""Largest number of laser planes of one head: the thesis's Table 3-1 has two below."""
 
 HeadNumber = Annotated[int, Field(ge=1, le=MOST_HEADS)]
-LaserNumber = Annotated[int, Field(ge=1, le=MOST_LASERS)]
 Millimetres = Annotated[float, Field(ge=-1e4, le=1e4)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Milliseconds = Annotated[float, Field(gt=0, le=1000)]

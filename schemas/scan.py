@@ -10,7 +10,10 @@ from pydantic import Field, model_validator
 from schemas.base.model import Document, Pseudonym, RelativePath, Side
 from schemas.laser import Laser
 
-CameraId = Annotated[int, Field(ge=1, le=64)]
+MOST_CAMERA, MOST_LASERS = 64, 2
+"""Largest number of a camera; largest number of laser planes of one head: the thesis's Table 3-1 has two below."""
+CameraId = Annotated[int, Field(ge=1, le=MOST_CAMERA)]
+LaserNumber = Annotated[int, Field(ge=1, le=MOST_LASERS)]
 
 
 class Travel(Document):
@@ -60,7 +63,7 @@ class Scan(Document):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        unique_ids(self.cameras)
+        each_once([str(camera.id) for camera in self.cameras])
         for camera in self.cameras:
             if self.travel is None and camera.travel is None and camera.positions is None:
                 raise ValueError(f"camera {camera.id} has no travel, expected travel or positions")
@@ -77,9 +80,8 @@ class Scan(Document):
             return None
 
 
-def unique_ids(cameras: Sequence[CameraSource]) -> None:
-    """Refuse two cameras with the same id."""
-    ids = [camera.id for camera in cameras]
-    for camera_id in ids:
-        if ids.count(camera_id) > 1:
-            raise ValueError(f"camera {camera_id} is listed twice, expected each id once")
+def each_once(cameras: Sequence[str]) -> None:
+    """Refuse a name of a camera that is listed twice."""
+    for name in cameras:
+        if cameras.count(name) > 1:
+            raise ValueError(f"camera {name} is listed twice, expected each id once")

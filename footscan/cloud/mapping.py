@@ -27,12 +27,13 @@ def map_stripe(
     """Map stripe points to world points.
 
     Y and Z follow from the pixel by the camera's calibration, X from the position of the head and, if the calibration
-    says it, from the place and the turn of its laser plane.
+    says it, from the place and the turn of its laser plane. A camera that sees two lasers is mapped by both of its
+    maps; `outliers.which_laser` then finds out in which plane each point lies.
 
     Parameters
     ----------
     stripe : (N,) points of one camera, in their order along the stripe; frame, i, j, width and sigma (px) are used
-    x_of_frame : (F,) float64, X of the laser plane in each frame, mm, scanner frame
+    x_of_frame : (F,) float64, X of the head in each frame, mm, scanner frame
 
     Returns
     -------
@@ -64,7 +65,7 @@ def map_stripe(
         raise RefusedInput(f"camera {camera.camera}", problem, field="positions")
     pixels = np.column_stack([stripe["i"], stripe["j"]]).astype(np.float64)
     yz = to_world(camera, pixels)
-    x = plane = x_of_frame[frame]
+    x = plane = x_of_frame[frame] + camera.ahead_mm
     if camera.plane is not None:
         step = np.gradient(x_of_frame)[frame] if len(x_of_frame) > 1 else np.zeros(len(frame))
         row = row_share(pixels[:, 1], camera.image_size)
@@ -72,7 +73,7 @@ def map_stripe(
         x = x_in_plane(camera.plane, x, yz, step, row)
     return make_points(
         np.column_stack([x, yz]),
-        camera=camera.camera,
+        camera=camera.view,
         frame=frame,
         source=np.arange(len(pixels)),
         supported=_supported(camera, pixels, parameters),

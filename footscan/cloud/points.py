@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from schemas.scan import MOST_CAMERA
+
 PLANE_MM = 0.25
 """Distance in X up to which stripe planes count as one plane. Chosen by hand."""
 
@@ -29,7 +31,7 @@ x, y, z : mm, scanner frame
 plane : X of its laser plane, mm: that of all points of a stripe, even if the plane is turned
 source : row of the stripe point that it was mapped from
 frame : number of that point's frame
-camera : number of the camera
+camera : number of the camera, or of its view as in `schemas.calibration.view_number` until the cloud has normals
 supported : True if the calibration supports its pixel
 sigma : expected standard deviation of its place, mm, along the normal of the surface within the laser plane
 cameras : number of cameras whose points were averaged to it
@@ -94,6 +96,22 @@ def _frame_steps(frame: NDArray[np.int32], x: NDArray[np.float32]) -> NDArray[np
     """Distances in mm from each frame of one camera to its next frame that has points."""
     _, number, counts = np.unique(frame, return_inverse=True, return_counts=True)
     return np.abs(np.diff(np.bincount(number, x.astype(np.float64)) / counts))
+
+
+def camera_numbers(points: NDArray[np.void]) -> NDArray[np.int64]:
+    """(N,) numbers of the cameras of `points`, of whichever of their views.
+
+    >>> camera_numbers(make_points(np.zeros((2, 3)), camera=np.array([5, 69]))).tolist()
+    [5, 5]
+    """
+    return np.asarray((points["camera"].astype(np.int64) - 1) % MOST_CAMERA + 1)
+
+
+def of_cameras(points: NDArray[np.void]) -> NDArray[np.void]:
+    """A copy of `points` with the numbers of their cameras instead of those of views."""
+    numbered = points.copy()
+    numbered["camera"] = camera_numbers(points)
+    return numbered
 
 
 def coordinates(points: NDArray[np.void]) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ STEPS_A_SIDE = 16
 
 @dataclass(frozen=True)
 class View:
-    """The view of one camera in the frame of its head: X counts from the laser plane, Y and Z are the scanner's."""
+    """The view of one camera: X counts from the plane of the laser that it sees, Y and Z are the scanner's."""
 
     centre: Floats
     """(3,) position, mm."""
@@ -28,6 +28,10 @@ class View:
     counterclockwise; (0, 2) if it is not known."""
     plane: LaserPlane | None = None
     """Where the laser plane lies; None if no film has shown it."""
+    camera: int = 0
+    """Number of the camera, which may have a second view; 0: that of the view."""
+    ahead_mm: float = 0.0
+    """X of the laser's plane minus X of the head, by its construction."""
 
 
 def views_of(cameras: Iterable[CameraCalibration]) -> dict[int, View]:
@@ -35,7 +39,7 @@ def views_of(cameras: Iterable[CameraCalibration]) -> dict[int, View]:
 
     Returns
     -------
-    Camera -> view.
+    View, numbered as in `schemas.calibration.view_number`, -> the view itself.
 
     Examples
     --------
@@ -47,11 +51,12 @@ def views_of(cameras: Iterable[CameraCalibration]) -> dict[int, View]:
     >>> print(view.centre.round(3) + 0.0, view.outline.max(axis=0).round(3))
     [300.   0.   0.] [159.75 119.75]
     """
-    calibrations = {camera.camera: camera for camera in cameras}
+    calibrations = {camera.view: camera for camera in cameras}
     centres = camera_centres(calibrations.values())
     return {
-        camera: View(centre, _outline(calibrations[camera]), calibrations[camera].plane)
-        for camera, centre in centres.items()
+        number: View(centre, _outline(camera), camera.plane, camera.camera, camera.ahead_mm)
+        for number, centre in centres.items()
+        for camera in (calibrations[number],)
     }
 
 

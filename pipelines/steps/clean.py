@@ -27,13 +27,14 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
         No camera has a point, or all points are outliers.
     """
     del places
-    views = views_of(Calibration.model_validate_json(inputs["calibration"]).cameras)
+    calibrated = Calibration.model_validate_json(inputs["calibration"]).cameras
+    views = views_of(calibrated)
     cameras = sorted((name for name in inputs if name.startswith("points-")), key=lambda name: int(name[7:]))
     mapped = {int(name[7:]): unpack(inputs[name]) for name in cameras}
     points = np.concatenate([of_camera["points"] for of_camera in mapped.values()])
     if not len(points):
         raise Finding("no stripe in any camera, expected a foot in the films")
-    filmed = {camera: of_camera["x_of_frame"] for camera, of_camera in mapped.items()}
+    filmed = {one.view: mapped[one.camera]["x_of_frame"] + one.ahead_mm for one in calibrated if one.camera in mapped}
     kept, removed = remove_outliers(points, views, parameters, filmed)
     if not len(kept):
         raise Finding("every point is an outlier, expected a foot in the control volume")

@@ -4,12 +4,17 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from footscan.calibration.travel.body import Body
 from footscan.calibration.travel.from_film import CameraTravel, with_laser_planes
+from footscan.cloud.mapping import map_stripe
+from footscan.cloud.outliers.which_laser import choose_lasers
 from footscan.frames.travel import x_of_frames
 from pipelines.arrays import unpack
 from schemas.calibration import Calibration
 from schemas.frames import FrameManifest
+from schemas.parameters.mapping import MappingParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
@@ -36,5 +41,22 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
             x = x_of_frames(inputs.get(f"travel-{camera}"), inputs.get(f"positions-{camera}"), frames)
             films[camera] = CameraTravel(unpack(inputs[name])["stripe"], x)
     calibration = Calibration.model_validate_json(inputs["calibration"])
+    films = _by_laser(calibration, films)
     made, _ = with_laser_planes(calibration, films, heads, Body(shape["vertices"], shape["faces"]))
     return (made.model_dump_json(indent=2) + "\n").encode()
+
+
+def _by_laser(calibration: Calibration, films: Mapping[int, CameraTravel]) -> dict[int, CameraTravel]:
+    """The films of all views: of a camera that sees two lasers, the points of each."""
+    maps = [one.model_copy(update={"plane": None}) for camera in sorted(films) for one in calibration.maps(camera)]
+    if all(one.laser == 1 for one in maps):
+        return dict(films)
+    mapped = [(films[one.camera], one) for one in maps]
+    points = np.concatenate(
+        [map_stripe(film.stripe, one, film.x_of_frame, MappingParameters()) for film, one in mapped]
+    )
+    choice = choose_lasers(points)
+    real = points[~choice.other & ~choice.unassigned]
+    return {
+        one.view: film._replace(stripe=film.stripe[real["source"][real["camera"] == one.view]]) for film, one in mapped
+    }

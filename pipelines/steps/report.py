@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from footscan.cloud.outliers.remove import NO_POINT
+from footscan.cloud.points import of_cameras
 from footscan.frames.array import IngestedFrames
 from footscan.frames.reader import pixel_frames
 from footscan.report.sample_frames import FrameSample
@@ -33,6 +35,8 @@ def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping
     surface = unpack(inputs["surface"])
     about = json.loads(inputs["about"])
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
+    points = np.concatenate([unpack(inputs[f"points-{camera}"])["points"] for camera in ids])
+    codes = unpack(inputs["clean"])["codes"]
     page = scan_page(
         title=ScanTitle(about["patient"], about["scan"], parameters.side),
         surface=FootSurface(
@@ -43,8 +47,8 @@ def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping
             truth_distance=unpack(inputs["verified"])["vertex_distance"] if "verified" in inputs else None,
         ),
         points=ScanPoints(
-            points=np.concatenate([unpack(inputs[f"points-{camera}"])["points"] for camera in ids]),
-            codes=unpack(inputs["clean"])["codes"],
+            points=of_cameras(points[codes != NO_POINT]),
+            codes=codes[codes != NO_POINT],
             cloud=unpack(inputs["oriented"])["cloud"],
         ),
         measures=Measures.model_validate_json(inputs["measures"]),

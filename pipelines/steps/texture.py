@@ -23,8 +23,10 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     points, colours = [], []
     for name in sorted((name for name in inputs if name.startswith("colours-")), key=lambda name: int(name[8:])):
         of_camera = unpack(inputs[name])
-        points.append(unpack(inputs[f"points-{name[8:]}"])["points"][of_camera["seen"]])
-        colours.append(of_camera["colours"][of_camera["seen"]])
+        mapped = unpack(inputs[f"points-{name[8:]}"])["points"]
+        seen = of_camera["seen"][mapped["source"]]
+        points.append(mapped[seen])
+        colours.append(of_camera["colours"][mapped["source"][seen]])
     if not any(map(len, points)):
         return pack()
     colours_of_vertices = vertex_colours(

@@ -229,7 +229,7 @@ SQUARE = [[0, 0], [9, 0], [9, 9], [0, 9]]
         ("cameras.0.region_px", [[1e308, 0], [0, 1e308], [-1e308, 0]], "cameras.0.region_px.0.0: input should be less"),
         ("cameras.0.image_px", [640, 0], "cameras.0.image_px.1: input should be greater than or equal to 1, found '0'"),
         ("cameras.0.points", -1, "cameras.0.points: input should be greater than or equal to 0, found '-1'"),
-        ("cameras.1.camera", 1, "expected each camera once, found [1, 1]"),
+        ("cameras.1.camera", 1, "expected each camera once for each of its lasers, found 1, 1"),
         ("cameras", [], "cameras: list should have at least 1 item"),
         ("created", "2026-11-20T08:30:00", "created: input should have timezone info"),
         ("created", "yesterday", "created: input should be a valid datetime"),

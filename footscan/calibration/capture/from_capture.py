@@ -22,7 +22,7 @@ from footscan.calibration.models.fit import UndeterminedError
 from footscan.calibration.models.homography import HomographyModel, image_frame
 from footscan.calibration.models.selection import ModelTrial, candidates, requested_models, select
 from schemas.base.errors import RefusedInput
-from schemas.calibration import Calibration, CameraCalibration, Source
+from schemas.calibration import Calibration, CameraCalibration, Source, view_name
 from schemas.mounting import Mounting
 from schemas.parameters.calibration import CalibrationParameters
 
@@ -39,6 +39,7 @@ class CameraView:
     """The stripe of one camera over the reference object."""
 
     camera: int
+    """Number of the camera, or of its view of a second laser as in `schemas.calibration.view_number`."""
     image_px: tuple[int, int]
     """Columns and rows."""
     stripes: Sequence[Floats]
@@ -60,7 +61,7 @@ class Recognised:
     @property
     def doubts(self) -> list[str]:
         """Possible mistakes in the capture, a line each."""
-        camera = f"camera {self.view.camera}"
+        camera = f"camera {view_name(self.view.camera)}"
         doubts = [f"{camera}: frame {number} cannot be decoded and is not used" for number in self.view.lost]
         doubts += [
             f"{camera}: the object is not recognised in frame {number}, which is not used"
@@ -156,7 +157,7 @@ def calibrate_view(
     fitted, trials = select(tried, observations, view.camera, robust=True)
     if fitted is None:
         reason = trials[0].remark or "no data can be held out"
-        raise RefusedInput(source, f"no model can be judged: {reason}", field=f"camera {view.camera}")
+        raise RefusedInput(source, f"no model can be judged: {reason}", field=f"camera {view_name(view.camera)}")
     chosen = next(trial for trial in trials if trial.status == "chosen")
     calibration = calibrated(fitted, observations, chosen, view.image_px)
     return CalibratedView(calibration, trials, points, list(corners_in(calibration, view.stripes, edges, poses)))
@@ -164,11 +165,11 @@ def calibrate_view(
 
 def assemble(views: Sequence[CalibratedView], sources: list[Source], software: str, warnings: list[str]) -> Calibration:
     """Assemble the calibration of all cameras, with the agreement of each pair of them."""
-    cameras = {view.calibration.camera: view.calibration for view in views}
+    cameras = {view.calibration.view: view.calibration for view in views}
     return Calibration(
         sources=sources,
         software=software,
         warnings=warnings,
         cameras=[cameras[camera] for camera in sorted(cameras)],
-        pairs=pair_agreements(cameras, {view.calibration.camera: view.points for view in views}),
+        pairs=pair_agreements(cameras, {view.calibration.view: view.points for view in views}),
     )

@@ -14,7 +14,7 @@ from footscan.calibration.models.fit import UndeterminedError
 from footscan.calibration.models.maps import to_pixels
 from footscan.calibration.models.region import region_of
 from schemas.base.errors import RefusedInput
-from schemas.calibration import CameraCalibration
+from schemas.calibration import CameraCalibration, view_name
 
 Floats = NDArray[np.float64]
 
@@ -136,7 +136,7 @@ def refuse_unrecognised(views: Mapping[int, CameraView], reasons: Mapping[int, s
     others = f" (nor by {_cameras(sorted(reasons)[1:])})" if len(reasons) > 1 else ""
     shown = [Evidence(camera, number, stripe, *_NOTHING) for number, stripe in enumerate(views[camera].stripes)]
     problem = f"the reference object is not recognised: {reasons[camera]}{others}"
-    raise RefusedCapture(source, problem, field=f"camera {camera}", evidence=shown)
+    raise RefusedCapture(source, problem, field=f"camera {view_name(camera)}", evidence=shown)
 
 
 def refuse_contradictions(recognised: Mapping[int, Recognised], source: str) -> None:
@@ -162,12 +162,12 @@ def refuse_contradictions(recognised: Mapping[int, Recognised], source: str) -> 
         others = f", and {_cameras([c for c in wrong if c != camera])} likewise" if len(wrong) > 1 else ""
         cause = f"by its number or `stands`{others}: is this its film?"
     shown = [Evidence(number, 0, result.view.stripes[0], *_NOTHING) for number, result in wrong.items()]
-    raise RefusedCapture(source, f"{first.contradiction}, {cause}", field=f"camera {camera}", evidence=shown)
+    raise RefusedCapture(source, f"{first.contradiction}, {cause}", field=f"camera {view_name(camera)}", evidence=shown)
 
 
 def _cameras(numbers: Iterable[int]) -> str:
     """The cameras in words."""
-    listed = ", ".join(map(str, sorted(numbers)))
+    listed = ", ".join(map(view_name, sorted(numbers)))
     return f"cameras {listed}" if "," in listed else f"camera {listed}"
 
 

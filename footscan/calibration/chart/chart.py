@@ -11,6 +11,8 @@ from schemas.base.errors import RefusedInput
 from schemas.base.image_size import FRAME_SIZE, SMALLEST_FRAME, ImageSize
 from schemas.base.limits import refuse_beyond
 from schemas.base.units import LengthUnit
+from schemas.calibration import name_of, view_number
+from schemas.scan import MOST_CAMERA, MOST_LASERS
 from schemas.tables import finite, read_records
 
 LARGEST_SIDE = 16384
@@ -24,6 +26,8 @@ _WORLD: dict[LengthUnit, tuple[str, str, str]] = {
 }
 _SIZE = ("width_px", "height_px")
 """Optional columns: the size of the camera's images."""
+_LASER = "laser"
+"""Optional column: the number of the laser that the point lies in, among those of the camera's head."""
 _CAMERA = re.compile(r"[1-9][0-9]{0,8}")
 
 
@@ -41,12 +45,25 @@ class Chart:
     """(N, 2): column i and row j, px, the centre of the top-left pixel at (0, 0)."""
     size: ImageSize = FRAME_SIZE
     """Of the camera's images."""
+    laser: int = 1
+    """Number of the laser in whose plane the points lie."""
+
+    @property
+    def view(self) -> int:
+        """Number of the view, as in `schemas.calibration.view_number`."""
+        return view_number(self.camera, self.laser)
+
+    @property
+    def name(self) -> str:
+        """The camera and, if it is not the first one, the laser."""
+        return name_of(self.camera, self.laser)
 
 
 @dataclass(frozen=True)
 class _Row:
     line: int
     camera: int
+    laser: int
     point: str
     world: tuple[float, float, float]
     pixel: tuple[float, float]
@@ -58,11 +75,11 @@ def read_chart(path: Path) -> dict[int, Chart]:
 
     Columns are `camera,point,x_cm,y_cm,z_cm,i,j`, or `_mm` instead of `_cm`, in any order, one control point a
     row. The optional columns `width_px,height_px` have the size of the camera's images; without them it is that of the
-    scanner's own cameras.
+    scanner's own cameras. The optional column `laser` has the number of the laser, of cameras that see two.
 
     Returns
     -------
-    Camera -> chart, by ascending number.
+    View, as numbered by `schemas.calibration.view_number`, -> chart, by ascending number.
 
     Raises
     ------
@@ -80,7 +97,8 @@ def read_chart(path: Path) -> dict[int, Chart]:
     sizes: dict[int, ImageSize] = {}
     for line, cells in records:
         row = _row(path, line, cells, unit, columns)
-        first = seen.setdefault((row.camera, row.point), line)
+        view = view_number(row.camera, row.laser)
+        first = seen.setdefault((view, row.point), line)
         if first != line:
             problem = f"camera {row.camera} has {row.point!r} in line {first} already, expected each point once"
             raise RefusedInput(path, problem, field=f"line {line}, column point")
@@ -91,7 +109,10 @@ def read_chart(path: Path) -> dict[int, Chart]:
         refuse_beyond("chart_points", len(rows), path)
     if not rows:
         raise RefusedInput(path, "has a header but no control point, expected at least one row")
-    return {camera: _chart(camera, unit, rows) for camera in sorted({row.camera for row in rows})}
+    by_view: dict[int, list[_Row]] = {}
+    for row in rows:
+        by_view.setdefault(view_number(row.camera, row.laser), []).append(row)
+    return {view: _chart(unit, by_view[view]) for view in sorted(by_view)}
 
 
 def _columns(path: Path, line: int, header: list[str]) -> tuple[LengthUnit, dict[str, int]]:
@@ -103,7 +124,7 @@ def _columns(path: Path, line: int, header: list[str]) -> tuple[LengthUnit, dict
         raise RefusedInput(path, "mixes cm and mm, expected one unit for x, y and z", field=where)
     unit = units[0] if units else "mm"
     expected = _header(unit) if units else f"{_header('cm')} or {_header('mm')}"
-    valid_names = {"camera", "point", "i", "j", *_WORLD[unit], *_SIZE}
+    valid_names = {"camera", "point", "i", "j", *_WORLD[unit], *_SIZE, _LASER}
     if len(header) == 1:
         raise RefusedInput(path, f"one column, expected {expected}, with commas between them", field=where)
     for name in header:
@@ -152,16 +173,23 @@ def _row(path: Path, line: int, cells: list[str], unit: LengthUnit, columns: dic
             if not number(column).is_integer() or not least <= number(column) <= LARGEST_SIDE:
                 raise refuse(column, f"a whole number from {least} to {LARGEST_SIDE}")
         size = ImageSize(rows=int(number(_SIZE[1])), columns=int(number(_SIZE[0])))
-    return _Row(line, int(camera), point, (x, y, z), (number("i"), number("j")), size)
+    laser = 1
+    if _LASER in columns:
+        if int(camera) > MOST_CAMERA:
+            raise refuse("camera", f"a whole number from 1 to {MOST_CAMERA} in a chart with lasers")
+        if not 1 <= number(_LASER) <= MOST_LASERS or not number(_LASER).is_integer():
+            raise refuse(_LASER, f"a whole number from 1 to {MOST_LASERS}")
+        laser = int(number(_LASER))
+    return _Row(line, int(camera), laser, point, (x, y, z), (number("i"), number("j")), size)
 
 
-def _chart(camera: int, unit: LengthUnit, rows: list[_Row]) -> Chart:
-    own = [row for row in rows if row.camera == camera]
+def _chart(unit: LengthUnit, own: list[_Row]) -> Chart:
     return Chart(
-        camera=camera,
+        camera=own[0].camera,
         points=tuple(row.point for row in own),
         world=np.array([row.world for row in own]),
         unit=unit,
         pixels=np.array([row.pixel for row in own]),
         size=own[0].size,
+        laser=own[0].laser,
     )

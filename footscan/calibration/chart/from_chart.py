@@ -39,7 +39,8 @@ def calibrate_chart(
 
     Parameters
     ----------
-    charts : camera -> chart.
+    charts : view -> chart, as `read_chart` returns them. The X of the points of a laser that is not the first one, less
+        that of the first one's, says how far its plane is ahead.
     source : names the chart in messages and in the calibration.
 
     Returns
@@ -53,11 +54,23 @@ def calibrate_chart(
     """
     cameras: list[CameraCalibration] = []
     trials: list[ModelTrial] = []
-    for camera_id in sorted(charts):
-        camera, tried = _calibrate_camera(charts[camera_id], parameters, source.name)
-        cameras.append(camera)
+    for view in sorted(charts):
+        camera, tried = _calibrate_camera(charts[view], parameters, source.name)
+        cameras.append(of_laser(camera, charts[view].camera, charts[view].laser, _ahead_mm(view, charts)))
         trials += tried
     return Calibration(sources=[source], software=software, cameras=cameras), trials
+
+
+def _ahead_mm(view: int, charts: Mapping[int, Chart]) -> float:
+    """X of the points of a view minus X of the points of the first laser, mm; 0 if one of the two is not charted."""
+    first = [_x_mm(chart) for chart in charts.values() if chart.laser == 1]
+    if charts[view].laser == 1 or not first:
+        return 0.0
+    return round(float(np.median(_x_mm(charts[view])) - np.median(np.concatenate(first))), 6)
+
+
+def _x_mm(chart: Chart) -> NDArray[np.float64]:
+    return MILLIMETRES[chart.unit] * chart.world[:, 0]
 
 
 def compare_models(chart: Chart, source: str = "chart") -> list[ModelTrial]:
@@ -70,7 +83,7 @@ def compare_models(chart: Chart, source: str = "chart") -> list[ModelTrial]:
     """
     _refuse_poor(chart, source)
     observations = observe(chart)
-    tried = select(candidates(observations.pixels, chart.size.px), observations, chart.camera, robust=False)[1]
+    tried = select(candidates(observations.pixels, chart.size.px), observations, chart.view, robust=False)[1]
     return [_thesis_trial(chart, observations), *tried]
 
 
@@ -87,12 +100,12 @@ def _calibrate_camera(
     if parameters.model == "quadratic":
         return _quadratic(chart, observations)
     tried = requested_models(candidates(chart.pixels, chart.size.px), parameters)
-    fitted, trials = select(tried, observations, chart.camera, robust=False)
+    fitted, trials = select(tried, observations, chart.view, robust=False)
     if fitted is None and len(tried) == 1:  # a single requested model is used even if its error is unknown
-        fitted, _ = try_model(tried[0], observations, chart.camera, robust=False)
+        fitted, _ = try_model(tried[0], observations, chart.view, robust=False)
     if fitted is None:
         reasons = "; ".join(f"{trial.model}: {trial.remark or 'no point can be held out'}" for trial in trials[:1])
-        raise RefusedInput(source, f"no model can be judged: {reasons}", field=f"camera {chart.camera}")
+        raise RefusedInput(source, f"no model can be judged: {reasons}", field=f"camera {chart.name}")
     chosen = next((trial for trial in trials if trial.status == "chosen"), trials[0])
     return calibrated(fitted, observations, chosen, chart.size.px), trials
 
@@ -101,10 +114,10 @@ def _refuse_poor(chart: Chart, source: str) -> None:
     """Refuse control points that do not determine any model."""
     if len(chart.points) < FEWEST_POINTS:
         problem = f"{len(chart.points)} control points, expected at least {FEWEST_POINTS}"
-        raise RefusedInput(source, problem, field=f"camera {chart.camera}")
+        raise RefusedInput(source, problem, field=f"camera {chart.name}")
     if not region_of(chart.pixels):
         problem = "the pixels of all control points lie on one line, expected them to cover a region of the image"
-        raise RefusedInput(source, problem, field=f"camera {chart.camera}")
+        raise RefusedInput(source, problem, field=f"camera {chart.name}")
 
 
 def calibrated(
@@ -129,6 +142,11 @@ def calibrated(
     )
 
 
+def of_laser(calibration: CameraCalibration, camera: int, laser: int, ahead_mm: float) -> CameraCalibration:
+    """The map of a view as that of a camera and a laser, whose plane stands ahead of the head by `ahead_mm`."""
+    return calibration.model_copy(update={"camera": camera, "laser": laser, "ahead_mm": ahead_mm})
+
+
 def _residuals(model: Model, parameters: NDArray[np.float64], observations: Observations) -> list[Residual]:
     """The residual at each place, in an order that does not depend on that of the observations."""
     ordered = observations.sorted()
@@ -141,7 +159,7 @@ def _quadratic(chart: Chart, observations: Observations) -> tuple[CameraCalibrat
     """Calibrate by the model of the thesis; its held-out error is that of the normalised polynomial of second order."""
     second_order = CalibrationParameters(model="polynomial", order=QUADRATIC)
     (normalised,) = requested_models(candidates(chart.pixels, chart.size.px), second_order)
-    _, trial = try_model(normalised, observations, chart.camera, robust=False)
+    _, trial = try_model(normalised, observations, chart.view, robust=False)
     result = fit_quadratic(chart)
     parameters = _in_mm(result)
     world = MILLIMETRES[chart.unit] * chart.world[:, 1:]
@@ -182,7 +200,7 @@ def _thesis_trial(chart: Chart, observations: Observations) -> ModelTrial:
     worst = int(held_out.argmax())
     determined = observations.independent <= 2 * terms(QUADRATIC)
     return ModelTrial(
-        camera=chart.camera,
+        camera=chart.view,
         model="quadratic of the thesis",
         unknowns=2 * terms(QUADRATIC),
         observations=observations.independent,
@@ -211,7 +229,7 @@ def _in_mm(result: QuadraticFit) -> NDArray[np.float64]:
 def _part(chart: Chart, chosen: NDArray[np.bool_]) -> Chart:
     """The points of a chart selected by `chosen` (N,)."""
     names = tuple(name for name, taken in zip(chart.points, chosen, strict=True) if taken)
-    return Chart(chart.camera, names, chart.world[chosen], chart.unit, chart.pixels[chosen])
+    return replace(chart, points=names, world=chart.world[chosen], pixels=chart.pixels[chosen])
 
 
 def _groups(chart: Chart) -> NDArray[np.intp]:

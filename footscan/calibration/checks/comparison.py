@@ -25,6 +25,7 @@ class CameraComparison:
     """One camera in two calibrations, A and B; differences are B minus A over the pixels for which both hold."""
 
     camera: int
+    """Number of the camera, or of its view of a second laser as in `schemas.calibration.view_number`."""
     model_a: str | None
     """None if A has no such camera."""
     model_b: str | None
@@ -53,8 +54,8 @@ class CameraComparison:
 
 def compare_calibrations(a: Calibration, b: Calibration) -> list[CameraComparison]:
     """Compare all cameras of both calibrations, in the order of their numbers."""
-    in_a = {camera.camera: camera for camera in a.cameras}
-    in_b = {camera.camera: camera for camera in b.cameras}
+    in_a = {camera.view: camera for camera in a.cameras}
+    in_b = {camera.view: camera for camera in b.cameras}
     return [_compare(number, in_a.get(number), in_b.get(number)) for number in sorted(in_a | in_b)]
 
 

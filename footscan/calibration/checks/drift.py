@@ -32,6 +32,7 @@ class Drift:
     """The drift of one camera. Lengths are in mm, and None without a comparison."""
 
     camera: int
+    """Number of the camera, or of its view of a second laser as in `schemas.calibration.view_number`."""
     verdict: Verdict
     points: int = 0
     """Number of compared points: of today's stripe on the object, in the region that data support."""
@@ -50,7 +51,7 @@ def drift_of(calibration: CameraCalibration, today: CalibratedView, tolerance_mm
     calibration's error across an edge is measured. The error along an edge is that of the affine field that fits the
     errors across all edges best.
     """
-    camera = calibration.camera
+    camera = calibration.view
     points = today.points.part(is_supported(calibration, today.points.pixels, MARGIN_PX))
     if len(points) < FEWEST_POINTS:
         remark = f"{len(points)} of {len(today.points)} points of the stripe lie where data support the calibration"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from footscan.calibration.models.homography import project
 from footscan.calibration.models.maps import grid_over, model_of, to_world
 from schemas.calibration import CameraCalibration, HomographyMap
-from schemas.mounting import CaptureCamera, mounting_of
+from schemas.mounting import mounting_by_number
 
 Floats = NDArray[np.float64]
 
@@ -38,21 +38,22 @@ of growth. Chosen by hand."""
 
 
 def camera_centres(cameras: Iterable[CameraCalibration]) -> dict[int, Floats]:
-    """Find the position of each camera, by `camera_centre` or else by the mounting that belongs to its number.
+    """Find the position of each view's camera, by `camera_centre` or else by the mounting that belongs to its number.
 
     Returns
     -------
-    Camera -> position (3,), mm, as in `camera_centre`; without the cameras whose position remains unknown.
+    View -> position (3,), mm, as in `camera_centre`, X from the plane of the view's laser; without the cameras whose
+    position remains unknown.
     """
     centres = {}
     for camera in cameras:
         centre = camera_centre(camera)
         if centre is None:
-            stands = mounting_of(CaptureCamera(id=camera.camera, file="unknown"))
+            stands = mounting_by_number(camera.camera)
             direction = np.array([stands.x, stands.y, stands.z], np.float64)
             centre = TYPICAL_MM * direction / np.linalg.norm(direction) if direction.any() else None
         if centre is not None:
-            centres[camera.camera] = centre
+            centres[camera.view] = centre
     return centres
 
 

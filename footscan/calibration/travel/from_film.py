@@ -42,8 +42,9 @@ def with_laser_planes(
     Parameters
     ----------
     calibration : with the maps of the cameras
-    films : camera -> its film
-    head_of_camera : camera -> number of its head
+    films : view, as numbered by `schemas.calibration.view_number`, -> its film: of a camera that sees two lasers, two
+        films with the stripe points of each
+    head_of_camera : camera -> number of its head; each laser of a head has a plane of its own
 
     Returns
     -------
@@ -55,18 +56,20 @@ def with_laser_planes(
         A camera hardly saw the body, or the points do not lie on it.
     """
     cameras = sorted(films)
-    heads = sorted({head_of_camera[camera] for camera in cameras})
-    maps = {camera: calibration.camera(camera).model_copy(update={"plane": None}) for camera in cameras}
+    calibrated = {camera.view: camera for camera in calibration.cameras}
+    maps = {view: calibrated[view].model_copy(update={"plane": None}) for view in cameras}
+    sheets = {view: (head_of_camera[camera.camera], camera.laser) for view, camera in maps.items()}
+    numbers = sorted(set(sheets.values()))
     centres = camera_centres(maps.values())
     parts = []
     for index, camera in enumerate(cameras):
         part = _points(index, maps[camera], films[camera], centres.get(camera, np.full(3, np.nan)))
         if len(part.x) < FEWEST:
-            raise Finding(f"camera {camera} saw {len(part.x)} points of the body, expected {FEWEST} at least")
+            raise Finding(f"camera {maps[camera].name} saw {len(part.x)} points of the body, expected {FEWEST}")
         parts.append(part)
     points = TravelPoints(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
-    fit = fit_travel(points, [heads.index(head_of_camera[camera]) for camera in cameras], body)
-    planes = {camera: _plane(fit, index, head_of_camera[camera]) for index, camera in enumerate(cameras)}
+    fit = fit_travel(points, [numbers.index(sheets[view]) for view in cameras], body)
+    planes = {camera: _plane(fit, index, sheets[camera][0]) for index, camera in enumerate(cameras)}
     warnings = [*calibration.warnings]
     if fit.rms_mm > LARGEST_RMS_MM:
         warnings.append(
@@ -75,9 +78,7 @@ def with_laser_planes(
         )
     document = calibration.model_copy(
         update={
-            "cameras": [
-                camera.model_copy(update={"plane": planes.get(camera.camera)}) for camera in calibration.cameras
-            ],
+            "cameras": [camera.model_copy(update={"plane": planes.get(camera.view)}) for camera in calibration.cameras],
             "body_rms_mm": round(fit.rms_mm, 5),
             "warnings": warnings,
         }
@@ -94,7 +95,7 @@ def _points(index: int, camera: CameraCalibration, film: CameraTravel, centre: F
     sight = centre - np.column_stack([np.zeros(len(yz)), yz])
     return TravelPoints(
         np.full(len(yz), index),
-        film.x_of_frame[stripe["frame"]],
+        film.x_of_frame[stripe["frame"]] + camera.ahead_mm,
         np.gradient(film.x_of_frame)[stripe["frame"]],
         row_share(pixels[:, 1], camera.image_size),
         yz,

@@ -13,6 +13,7 @@ from footscan.cloud.fusion.merge import merge
 from footscan.cloud.fusion.stripes import Floats, Stripes, sort_stripes
 from footscan.cloud.outliers.alone import is_off_alone
 from footscan.cloud.outliers.off_surface import is_off_shared_surface
+from schemas.calibration import view_name
 from schemas.fusion import FusionReport, PairDisagreement
 from schemas.parameters.fusion import FusionParameters
 
@@ -78,7 +79,7 @@ def fuse(points: NDArray[np.void] | Iterable[NDArray[np.void]], parameters: Fusi
         corrections=corrected.corrections,
         contradicted={camera: count + int(lonely[camera]) for camera, count in merged.contradicted.items()},
         warnings=[
-            f"camera {camera} deviates from the others by {away:.2f} mm, expected "
+            f"camera {view_name(camera)} deviates from the others by {away:.2f} mm, expected "
             f"{parameters.largest_correction_mm:g} mm at most: it was moved since the calibration, or its travel is "
             "not what the scan says"
             for camera, away in sorted(corrected.too_far.items())

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from footscan.calibration.models.laser_plane import x_in_plane
-from footscan.cloud.points import coordinates
+from footscan.cloud.points import camera_numbers, coordinates
 from footscan.cloud.views import View
 from footscan.compiled import compiled
+from schemas.calibration import laser_of_view, view_number
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -61,13 +62,18 @@ def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Ma
     does not say where their laser plane lies are left as they are.
     """
     strange = np.zeros(len(points), np.bool_)
-    heads = {camera: view.plane.head for camera, view in views.items() if view.plane is not None}
+    heads = {number: _sheet(number, view.plane.head) for number, view in views.items() if view.plane is not None}
     known = np.flatnonzero(np.isin(points["camera"], list(heads)))
     if len(set(heads.values())) < 2 or not len(known):
         return strange
     known = known[np.lexsort([points[name][known] for name in ("source", "camera", "frame")])]
     strange[known] = _assigned(points[known], views, heads)
     return strange
+
+
+def _sheet(number: int, head: int) -> int:
+    """Number the laser plane of view `number`: a head may have two, which are as different as those of two heads."""
+    return view_number(head, laser_of_view(number))
 
 
 def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mapping[int, int]) -> Mask:
@@ -87,12 +93,12 @@ def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mappin
     ends = np.diff(points["frame"], prepend=points["frame"][0] - 1, append=points["frame"][-1] + 1)
     frames = np.flatnonzero(ends)
     laser = own.copy()
-    seen_by = points["camera"].astype(np.int64)
+    seen_by = camera_numbers(points)
     support, at_own = np.zeros(apart.shape), np.zeros(len(points))
     for turn in range(ROUNDS):
         for number in range(len(numbers)):
             counts = np.isfinite(places[number, :, 0]) & ((laser == number) | (turn == 0))
-            support[number] = _smoothed(_support(places[number], seen_by, counts, linked, frames), linked)
+            support[number] = smoothed(_support(places[number], seen_by, counts, linked, frames), linked)
         at_own = np.take_along_axis(support, own[None], axis=0)[0]
         may_be = np.where((apart > LEAST_MM) & (apart < FARTHEST_MM), support - BETTER, -np.inf)
         best = np.argmax(may_be, axis=0)
@@ -204,7 +210,7 @@ def _linked(points: NDArray[np.void]) -> Mask:
     return np.append(same & (gap < LINKED_MM), False)
 
 
-def _smoothed(support: Floats, linked: Mask) -> Floats:
+def smoothed(support: Floats, linked: Mask) -> Floats:
     """The mean (N,) over neighbours along the stripe."""
     stripe = np.concatenate([[0], np.cumsum(~linked[:-1])])
     total, count = support.copy(), np.ones(len(support))

@@ -15,15 +15,18 @@ from footscan.cloud.outliers.levels import is_far, is_off_median
 from footscan.cloud.outliers.off_surface import is_off_surface
 from footscan.cloud.outliers.other_laser import is_of_other_laser
 from footscan.cloud.outliers.support import END, ISOLATED, UNCONFIRMED, judge_segments
+from footscan.cloud.outliers.which_laser import choose_lasers
+from footscan.cloud.points import camera_numbers
 from footscan.cloud.views import View
 from schemas.parameters.outliers import OutlierParameters
 
 Mask = NDArray[np.bool_]
 
-REASONS = ("volume", "extrapolated", "end", "isolated", "unconfirmed", "glass", "clutter", "median")
+REASONS = ("volume", "extrapolated", "end", "isolated", "unconfirmed", "glass", "clutter", "median", "laser")
 """Reasons to drop a point; the code of a reason is its position here, counted from 1."""
-KEPT = 0
-"""Code of a point that is kept."""
+KEPT, NO_POINT = 0, 255
+"""Codes of a point that is kept, and of one that there is not: the place of a stripe point in the plane of a laser that
+did not draw it."""
 NO_FOOT = ("isolated", "unconfirmed", "clutter")
 """Reasons that say of a point that it is not the foot."""
 ROUNDS = 3
@@ -63,6 +66,7 @@ def remove_outliers(
 
     They are dropped in this order:
 
+    - stripe points of which it is not known which of two lasers drew them ("laser");
     - points outside the control volume ("volume"), and points that the calibration does not support ("extrapolated");
     - the foot's mirror image and the glass itself ("glass"), then static objects, and all that is seen where no foot is
       ("clutter"): they would confirm each other;
@@ -78,10 +82,11 @@ def remove_outliers(
 
     Parameters
     ----------
-    points : (N,) of `POINT_DTYPE`, mm, scanner frame, of all cameras
-    views : camera -> view; only cameras listed here are expected to confirm what another camera saw
-    filmed : camera -> X of the frames that it has, mm: a camera that saw nothing there denies what others saw. Of a
-        camera that is missing here only frames with points count
+    points : (N,) of `POINT_DTYPE`, mm, scanner frame, of all cameras; those of cameras that see two lasers twice, once
+        for each of their views
+    views : number -> view; only cameras listed here are expected to confirm what another camera saw
+    filmed : view -> X of its laser plane in the frames that it has, mm: a camera that saw nothing there denies what
+        others saw. Of a camera that is missing here only frames with points count
 
     Returns
     -------
@@ -95,7 +100,9 @@ def remove_outliers(
     >>> print(len(kept), removed.counts[3]["volume"])
     0 1
     """
-    codes = np.zeros(len(points), np.uint8)
+    choice = choose_lasers(points)
+    codes = np.where(choice.other, NO_POINT, KEPT).astype(np.uint8)
+    codes[choice.unassigned] = 1 + REASONS.index("laser")
 
     def drop(reason: str, select: Callable[[NDArray[np.void]], Mask]) -> None:
         """Drop what `select` selects among the points that are left."""
@@ -107,7 +114,7 @@ def remove_outliers(
         drop("isolated", lambda left: is_far(left, parameters.nearest_mm))
         drop("volume", lambda left: _outside(left, volume))
         drop("median", lambda left: is_off_median(left, parameters.median_mm))
-        return points[codes == KEPT], Removed(codes, _count(points["camera"], codes), [])
+        return points[codes == KEPT], Removed(codes, _count(camera_numbers(points), codes), [])
     drop("volume", lambda left: _outside(left, volume))
     if parameters.drop_unsupported:
         drop("extrapolated", lambda left: ~left["supported"])
@@ -123,8 +130,9 @@ def remove_outliers(
     if body is not None:
         drop("clutter", is_apart)
     drop("clutter", lambda left: is_island(left, parameters.island_gap_steps, parameters.island_share))
-    counts = _count(points["camera"], codes)
-    warnings = [*_warnings(points["camera"], counts), *_cut_warnings(points, codes, parameters, views)]
+    camera = camera_numbers(points)
+    counts = _count(camera, codes)
+    warnings = [*_warnings(camera[codes != NO_POINT], counts), *_cut_warnings(points, codes, parameters, views)]
     return points[codes == KEPT], Removed(codes, counts, warnings)
 
 
@@ -149,20 +157,20 @@ def _drop_by_segment(
 
 
 def _cluttered(camera: NDArray[np.uint8], codes: NDArray[np.uint8]) -> list[int]:
-    """Cameras that see much in the planes of the foot that is not the foot, as far as it was judged."""
-    shares = _shares(camera, _count(camera, codes), ("isolated", "unconfirmed"))
+    """Views that see much in the planes of the foot that is not the foot, as far as it was judged."""
+    shares = _shares(camera[codes != NO_POINT], _count(camera, codes), ("isolated", "unconfirmed"))
     return [number for number, share in shares.items() if share > CLUTTERED]
 
 
 def _shares(
-    camera: NDArray[np.uint8], counts: Mapping[int, Mapping[str, int]], reasons: Iterable[str]
+    camera: NDArray[np.integer], counts: Mapping[int, Mapping[str, int]], reasons: Iterable[str]
 ) -> dict[int, float]:
     """Camera -> share of its points that were dropped for one of these reasons."""
     points, chosen = np.bincount(camera), tuple(reasons)
     return {number: sum(of[reason] for reason in chosen) / int(points[number]) for number, of in counts.items()}
 
 
-def _warnings(camera: NDArray[np.uint8], counts: Mapping[int, Mapping[str, int]]) -> Iterator[str]:
+def _warnings(camera: NDArray[np.integer], counts: Mapping[int, Mapping[str, int]]) -> Iterator[str]:
     much = {number: share for number, share in _shares(camera, counts, NO_FOOT).items() if share > MUCH}
     if much:
         yield (
@@ -205,14 +213,15 @@ def control_volume(
 ) -> NDArray[np.float64]:
     """Limits in X, Y and Z (3, 2), mm, of what can be the foot: those of the parameters, or those of the scanner.
 
-    The scanner reaches along X from the first frame to the last, and in Y and Z as far as any camera's calibration.
-    Where that is not known, the volume is not limited.
+        The scanner reaches along X from the first frame to the last, and in Y and Z as far as any camera's calibration.
+        Where that is not known, the volume is not limited.
 
-    >>> from footscan.cloud.views import View
-    >>> view = View(np.zeros(3), np.array([[-90.0, 0.0], [90.0, 0.0], [0.0, 100.0]]))
-    >>> limits = control_volume({1: view}, OutlierParameters(z_mm=(-20.0, 110.0)), {1: np.array([2.0, 300.0])})
-    >>> print(limits.tolist())
-    [[-3.0, 305.0], [-100.0, 100.0], [-20.0, 110.0]]
+        >>> from footscan.cloud.points import camera_numbers
+    from footscan.cloud.views import View
+        >>> view = View(np.zeros(3), np.array([[-90.0, 0.0], [90.0, 0.0], [0.0, 100.0]]))
+        >>> limits = control_volume({1: view}, OutlierParameters(z_mm=(-20.0, 110.0)), {1: np.array([2.0, 300.0])})
+        >>> print(limits.tolist())
+        [[-3.0, 305.0], [-100.0, 100.0], [-20.0, 110.0]]
     """
     limits = np.tile([-math.inf, math.inf], (3, 1))
     places = [x[np.isfinite(x)] for x in (filmed or {}).values()]
@@ -259,8 +268,8 @@ def _cut_warnings(
             top[number] = view.outline[:, 1].max()
     cut = np.isin(code, [1 + REASONS.index(reason) for reason in ("volume", "extrapolated")]) & of_foot[stripe]
     cut &= ordered["z"] < top[ordered["camera"]] - REGION_MARGIN_MM
-    kept = np.bincount(ordered["camera"], code == KEPT)
-    beyond = np.bincount(ordered["camera"], cut)
+    camera = camera_numbers(ordered)
+    kept, beyond = np.bincount(camera, code == KEPT), np.bincount(camera, cut)
     shares = beyond / np.maximum(beyond + kept, 1)
     much = {int(camera): float(shares[camera]) for camera in np.flatnonzero(shares > parameters.largest_cut)}
     if much:
@@ -270,7 +279,8 @@ def _cut_warnings(
         )
 
 
-def _count(camera: NDArray[np.uint8], codes: NDArray[np.uint8]) -> dict[int, dict[str, int]]:
+def _count(camera: NDArray[np.integer], codes: NDArray[np.uint8]) -> dict[int, dict[str, int]]:
+    camera, codes = camera[codes != NO_POINT], codes[codes != NO_POINT]
     cameras, index = np.unique(camera, return_inverse=True)
     counts = np.zeros((len(cameras), len(REASONS) + 1), np.int64)
     np.add.at(counts, (index, codes), 1)

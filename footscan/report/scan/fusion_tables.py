@@ -1,6 +1,7 @@
 """Tables of the fusion: disagreement of the cameras on the same skin, and the corrections that moved them."""
 
 from footscan.report.markup import number, table, text, words
+from schemas.calibration import view_name
 from schemas.fusion import CameraCorrection, FusionReport
 
 
@@ -11,7 +12,7 @@ def disagreement_table(report: FusionReport) -> str:
     headings = ["Cameras", "Places", *(f"{name} {when}, mm" for name in _FIGURES for when in ("before", "after"))]
     rows = [
         [
-            " and ".join(map(str, pair.cameras)),
+            " and ".join(map(view_name, pair.cameras)),
             number(pair.points),
             *(number(getattr(when, name), 3) for name in _FIGURES.values() for when in (pair.before, pair.after)),
         ]
@@ -37,7 +38,7 @@ def warnings_list(report: FusionReport) -> str:
 def _row(correction: CameraCorrection, contradicted: int) -> list[str]:
     held_out = (correction.held_out_before_mm, correction.held_out_after_mm)
     return [
-        str(correction.camera),
+        view_name(correction.camera),
         text(words(correction.kind)),
         number(correction.largest_mm, 3),
         *("–" if value is None else number(value, 3) for value in held_out),

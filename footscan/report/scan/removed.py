@@ -21,6 +21,7 @@ _COLOURS = {
     "glass": (0, 90, 170),
     "clutter": (0, 158, 115),
     "median": (240, 228, 66),
+    "laser": (136, 34, 85),
 }
 """All but the first are distinct for colour-blind readers (Okabe and Ito, "Color universal design", 2008)."""
 _KEPT_COLOUR, _GROUND, _GLASS = (190, 197, 204), (255, 255, 255), (221, 226, 231)

@@ -85,9 +85,12 @@ def capture(
 def _write_chart(file: Path, made: "CaptureCalibration") -> None:
     from pipelines.engine.files.atomic import write_atomically
 
-    lines = ["camera,point,x_mm,y_mm,z_mm,i,j\n"]
+    maps = {camera.view: camera for camera in made.calibration.cameras}
+    has_lasers = any(camera.laser > 1 for camera in maps.values())
+    lines = ["camera,point,x_mm,y_mm,z_mm,i,j" + ",laser" * has_lasers + "\n"]
     for number, corner in enumerate(made.corners, start=1):
-        (i, j), (y, z) = corner.pixel, corner.world_mm
-        lines.append(f"{corner.camera},{number},{made.x_mm:g},{y:.4f},{z:.4f},{i:.3f},{j:.3f}\n")
+        (i, j), (y, z), seen = corner.pixel, corner.world_mm, maps[corner.camera]
+        place = f"{made.x_mm + seen.ahead_mm:g},{y:.4f},{z:.4f},{i:.3f},{j:.3f}"
+        lines.append(f"{seen.camera},{number},{place}" + f",{seen.laser}" * has_lasers + "\n")
     write_atomically(file, "".join(lines).encode())
     message(f"{file}: {len(made.corners)} corners")

@@ -119,11 +119,12 @@ def _calibration_json(
 ) -> list[dict[str, Any]]:
     documents = []
     for camera in calibration.cameras:
-        own = [trial for trial in trials if trial.camera == camera.camera]
+        own = [trial for trial in trials if trial.camera == camera.view]
         chosen = next((trial for trial in own if trial.status == "chosen"), own[0])
         documents.append(
             {
                 "camera": camera.camera,
+                **({} if camera.laser == 1 else {"laser": camera.laser, "ahead_mm": camera.ahead_mm}),
                 "model": chosen.model,
                 "unknowns": chosen.unknowns,
                 "points": camera.points,
@@ -131,7 +132,7 @@ def _calibration_json(
                 "held_out_rms_mm": camera.held_out_rms_mm,
                 "worst_mm": camera.worst_mm,
                 "map": camera.map.model_dump(mode="json"),
-                "models": _trials_json(charts[camera.camera], own),
+                "models": _trials_json(charts[camera.view], own),
                 "warnings": _warnings_json(warnings, camera.camera),
             }
         )
@@ -140,7 +141,7 @@ def _calibration_json(
 
 def _trials_json(chart: "Chart", trials: "list[ModelTrial]") -> list[dict[str, Any]]:
     """The trials of one camera as JSON, with the name of the worst point."""
-    documents = [asdict(trial) for trial in trials if trial.camera == chart.camera]
+    documents = [asdict(trial) for trial in trials if trial.camera == chart.view]
     for document in documents:
         worst = document["worst_point"]
         document["worst_point"] = None if worst is None else chart.points[worst]

@@ -30,8 +30,10 @@ def tell_calibration(calibration: "Calibration", out: Path | None) -> None:
 
 def print_pairs(pairs: "list[PairAgreement]") -> None:
     """Print how far apart two cameras place the edges that both see."""
+    from schemas.calibration import view_name
+
     rows = [
-        [f"{pair.cameras[0]} and {pair.cameras[1]}", str(pair.places), f"{pair.rms_mm:.3f}", f"{pair.worst_mm:.3f}"]
+        [" and ".join(map(view_name, pair.cameras)), str(pair.places), f"{pair.rms_mm:.3f}", f"{pair.worst_mm:.3f}"]
         for pair in pairs
     ]
     if rows:

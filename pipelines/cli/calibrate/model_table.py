@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from pipelines.cli.terminal.output import print_line, print_table
+from schemas.calibration import view_name
 
 if TYPE_CHECKING:
     from footscan.calibration.models.selection import ModelTrial
@@ -26,7 +27,7 @@ def print_trials(trials: "Sequence[ModelTrial]") -> None:
         print_table(f"All {len(cameras)} cameras choose the same model", COLUMNS, rows)
     else:
         rows = [
-            [str(trial.camera) if number == 0 else "", *_row(trial.model, [trial])]
+            [view_name(trial.camera) if number == 0 else "", *_row(trial.model, [trial])]
             for camera in cameras
             for number, trial in enumerate(trial for trial in tried if trial.camera == camera)
         ]

@@ -40,7 +40,7 @@ def travel(
     from pipelines.scan import CalibrationFile
     from pipelines.travel_job import calibrate_travel
     from schemas.base.errors import RefusedInput
-    from schemas.calibration import read_calibration
+    from schemas.calibration import read_calibration, with_offsets
     from schemas.rig import USUAL_HEADS
 
     film = read_scan(folder)
@@ -50,18 +50,21 @@ def travel(
     keep_inputs([out], maps, film.file, *([] if body is None else [body]))
     shape = standard_body() if body is None else _body(body)
     heads = dict(USUAL_HEADS)
+    content = read_calibration(maps)
     if rig is not None:
-        heads = {camera.id: camera.on_head for camera in read_rig(rig).cameras}
+        described = read_rig(rig)
+        heads = {camera.id: camera.on_head for camera in described.cameras}
+        content = with_offsets(content, {camera.id: described.lasers_of(camera) for camera in described.cameras})
     for camera in film.document.cameras:
         if camera.id not in heads:
             raise RefusedInput(rig or "--rig", f"says no head of camera {camera.id}, expected one", field="cameras")
-    known = CalibrationFile(maps, read_calibration(maps), sha256(maps.read_bytes()))
+    known = CalibrationFile(maps, content, sha256(maps.read_bytes()))
     made = calibrate_travel(film, known, heads, shape, cores(), cache)
     write_calibration(made, out)
     if as_json:
         print_json(
             {
-                "planes": {str(camera.camera): camera.plane and camera.plane.model_dump() for camera in made.cameras},
+                "planes": {camera.name: camera.plane and camera.plane.model_dump() for camera in made.cameras},
                 "body_rms_mm": made.body_rms_mm,
                 "warnings": made.warnings,
             }
@@ -90,7 +93,7 @@ def print_planes(calibration: "Calibration") -> None:
             f"{factor * value:+.{digits}f} ± {factor * sd:.{digits}f}"
             for (value, factor, digits), sd in zip(figures, plane.sd, strict=True)
         ]
-        rows.append([str(camera.camera), str(plane.head), *cells])
+        rows.append([camera.name, str(plane.head), *cells])
     columns = ["camera", "head", "X mm", "yaw °", "pitch °", "bend mm", "travel %", "delay frames", "shutter frames"]
     print_table("Laser planes", columns, rows)
 
