@@ -15,7 +15,7 @@ from footscan.virtual.optics.scene import SKIN, Scene
 from footscan.virtual.optics.texture import random_texture
 from footscan.virtual.worlds.draw import draw_world
 from footscan.virtual.worlds.film.camera_film import CameraFilm
-from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, machine_of
+from footscan.virtual.worlds.machine import machine_of
 from footscan.virtual.worlds.stripes import world_stripes
 from footscan.virtual.worlds.subject import Subject, make_subject
 from schemas.parameters.simulation import SimulationSettings
@@ -52,7 +52,7 @@ def _compare_pictures(world: World, subject: Subject, cameras: list[int]) -> Non
     def of_the_world() -> None:
         for camera, film in films.items():
             for place in PLACES:
-                film.jpeg(int(place * machine.frames(HEAD_OF_CAMERA[camera])))
+                film.jpeg(int(place * machine.frames(machine.head_of[camera])))
 
     runs = {"standard virtual scanner": of_the_standard_scanner, "world": of_the_world}
     seconds = interleave(runs, 3)

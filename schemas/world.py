@@ -4,19 +4,20 @@ A scalar is one quantity that a report can set against an error. Details that ta
 things in the room, follow from the world's seed.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from schemas.base.model import Document, Side
 from schemas.parameters.simulation import Seed
+from schemas.rig import MOST_CAMERAS
+from schemas.scan import CameraId
 
 Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=0, le=50)]
 Positive = Annotated[float, Field(gt=0, le=1e4)]
 NotNegative = Annotated[float, Field(ge=0, le=1e4)]
 Signed = Annotated[float, Field(ge=-1e3, le=1e3)]
-CameraId = Annotated[int, Field(ge=1, le=8)]
 Kind = Literal["foot", "cast", "last"]
 Covering = Literal["none", "white sock", "black sock", "patterned sock"]
 Toe = Annotated[int, Field(ge=1, le=5)]
@@ -63,6 +64,9 @@ class WorldLaser(Document):
     """Sagitta of the sheet over 140 mm."""
     speckle: Share = 0.12
     lower_lasers: Annotated[int, Field(ge=1, le=2)] = 1
+    lower_apart_mm: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """How far ahead of the first lower laser's plane that of the second one is, along X. At 0 both light one plane,
+    from two sides."""
 
 
 class WorldHead(Document):
@@ -95,6 +99,20 @@ class Knock(Document):
     camera: CameraId
     mm: tuple[Signed, Signed, Signed]
     turn_deg: tuple[Signed, Signed, Signed]
+
+
+class WorldRig(Document):
+    """Other cameras than the standard eight: they stand at random about the foot, those above first."""
+
+    above: Annotated[int, Field(ge=0, le=MOST_CAMERAS)] = 4
+    """Those on the upper heads, on either side in turn."""
+    below: Annotated[int, Field(ge=0, le=MOST_CAMERAS)] = 4
+
+    @model_validator(mode="after")
+    def _are_some(self) -> Self:
+        if not 1 <= self.above + self.below <= MOST_CAMERAS:
+            raise ValueError(f"expected 1 to {MOST_CAMERAS} cameras, found {self.above + self.below}")
+        return self
 
 
 class WorldCameras(Document):
@@ -196,5 +214,7 @@ class World(Document):
     laser: WorldLaser = WorldLaser()
     heads: tuple[WorldHead, WorldHead, WorldHead] = (WorldHead(), WorldHead(), WorldHead())
     cameras: WorldCameras = WorldCameras()
+    rig: WorldRig | None = None
+    """None: the standard eight cameras."""
     glass: WorldGlass = WorldGlass()
     subject: WorldSubject = WorldSubject()

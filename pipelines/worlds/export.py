@@ -10,7 +10,7 @@ from footscan.calibration.chart.from_chart import calibrate_chart
 from footscan.virtual.filming.record import write_yaml
 from footscan.virtual.optics.scene import Mesh
 from footscan.virtual.worlds.film.record import CALIBRATION, CHART, record_world, write_world
-from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, machine_of
+from footscan.virtual.worlds.machine import machine_of
 from footscan.virtual.worlds.stripes import world_stripes
 from footscan.virtual.worlds.subject import make_subject
 from pipelines.engine.files.atomic import write_atomically
@@ -53,7 +53,7 @@ def write_points(world: World, folder: Path) -> None:
     machine, subject = machine_of(world), make_subject(world.subject)
     folder.mkdir(parents=True, exist_ok=True)
     write_world(machine, subject, folder)
-    steps = {camera: machine.step_mm(HEAD_OF_CAMERA[camera]) for camera in machine.cameras}
+    steps = {camera: machine.step_mm(machine.head_of[camera]) for camera in machine.cameras}
     travels = {f"cam{camera}": {"start_mm": 0.0, "step_mm": step} for camera, step in steps.items()}
     write_yaml(folder / "travels.yaml", travels)
     for camera, points in world_stripes(machine, subject).items():

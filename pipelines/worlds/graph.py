@@ -8,7 +8,7 @@ from pydantic import BaseModel
 from footscan.calibration.travel.body import Body
 from footscan.recordings.scans import SCAN_FILE, RecordedScan
 from footscan.virtual.worlds.film.record import PATIENT
-from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Machine, machine_of
+from footscan.virtual.worlds.machine import Machine, machine_of
 from pipelines.engine.actions.step import Input, Output, Step, Value
 from pipelines.engine.files.file_digests import FileDigests
 from pipelines.scan import STEPS, reconstruction_steps, scan_steps
@@ -23,8 +23,6 @@ from schemas.world import World
 
 RESULTS = {"cleaned": "clean", "fused": "fuse", "oriented": "orient", "surface": "surface", "measures": "measure"}
 """Results of a reconstruction that are compared with the truth, and the kinds of their steps."""
-NUMBERED_HEADS = {camera: head + 1 for camera, head in HEAD_OF_CAMERA.items()}
-"""Calibrations count heads from 1."""
 
 
 class WorldGraph:
@@ -73,7 +71,7 @@ class WorldGraph:
         """Add what a film of a body shows to the calibration, without pictures."""
         shape: dict[str, Input] = {"body": body_value(body)}
         filmed = self.add("body", "world_body", shape, self.world)
-        planes: dict[str, Input] = {"calibration": self.whole, **shape, "heads": heads_value(NUMBERED_HEADS)}
+        planes: dict[str, Input] = {"calibration": self.whole, **shape, "heads": heads_value(_numbered_heads(machine))}
         for camera in machine.cameras:
             seen: dict[str, Input] = {"world": filmed, "camera": _value(camera)}
             planes[f"stripe-{camera}"] = self.add("body-stripe", "world_stripe", seen, None, camera)
@@ -144,7 +142,7 @@ def filmed_steps(
     """
     graph = WorldGraph(world)
     if body is not None:
-        made = travel_steps(body[0], graph, NUMBERED_HEADS, body[1], digests)
+        made = travel_steps(body[0], graph, _numbered_heads(machine_of(world)), body[1], digests)
         graph.steps += made
         graph.whole = Output(made[-1].name)
     made = scan_steps(scan, graph, parameters, digests)
@@ -153,13 +151,18 @@ def filmed_steps(
     return graph.compare("films", results)
 
 
+def _numbered_heads(machine: Machine) -> dict[int, int]:
+    """The head of each camera; calibrations count heads from 1."""
+    return {camera: head + 1 for camera, head in machine.head_of.items()}
+
+
 def _value(content: object) -> Value:
     return Value(canonical_json(content).encode())
 
 
 def _frames(machine: Machine, camera: int) -> tuple[Input, Input]:
     """Manifest and travel of a camera's frames."""
-    head = HEAD_OF_CAMERA[camera]
+    head = machine.head_of[camera]
     travel = Travel(start_mm=0.0, step_mm=machine.step_mm(head))
     return _manifest(machine.frames(head), machine.size), _value(travel.model_dump(mode="json"))
 

@@ -8,6 +8,7 @@ laser plane, at +X, where the toes point; even ones behind it, at -X; the axis o
 
 from dataclasses import dataclass
 from math import cos, radians, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,14 +131,35 @@ def _lasers() -> tuple[Laser, ...]:
     return laser(205.0, 138.0, 45.0), laser(-205.0, 138.0, 45.0), laser(0.0, -190.0, 0.0)
 
 
+class Stand(NamedTuple):
+    """Where a camera stands, and how it looks at the laser plane."""
+
+    below: bool
+    left: bool
+    """On the +Y side."""
+    front: bool
+    """At +X."""
+    elevation_degrees: float
+    """Of the direction to the camera within the laser plane, about X, from the horizontal upwards."""
+    angle_degrees: float = VIEW_ANGLE_DEGREES
+    """Angle between the camera's axis and the laser plane."""
+
+
 def _camera(seed: int, camera_id: int, distortion: float) -> Camera:
     below = camera_id > 4
-    left = camera_id in (1, 2, 5, 6)
-    front = camera_id % 2 == 1
-    elevation = radians(_LOWER_ELEVATION if below else _UPPER_ELEVATION)
+    elevation = _LOWER_ELEVATION if below else _UPPER_ELEVATION
+    return standing_camera(
+        seed, camera_id, Stand(below, camera_id in (1, 2, 5, 6), camera_id % 2 == 1, elevation), distortion
+    )
+
+
+def standing_camera(seed: int, camera_id: int, stand: Stand, distortion: float = 1.0) -> Camera:
+    """The camera of a scanner's `seed` that stands as `stand` says, but for the errors of its mounting."""
+    below, left, front = stand.below, stand.left, stand.front
+    elevation = radians(stand.elevation_degrees)
     distance, focal = (250.0, 1010.0) if below else (300.0, 1150.0)
 
-    angle = radians(VIEW_ANGLE_DEGREES)
+    angle = radians(stand.angle_degrees)
     side = 1.0 if left else -1.0
     target = np.array([0.0, side * 4.0, 16.0]) if below else np.array([0.0, side * 20.0, 50.0])
     outward = np.array(

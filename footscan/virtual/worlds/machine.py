@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from footscan.compiled import compiled
 from footscan.virtual.optics.scanner import HEIGHT, WIDTH, Camera, Laser, standard_scanner
 from footscan.virtual.worlds.draw import TRAVEL_MM
+from footscan.virtual.worlds.rig import LEFT_HEAD, LOWER_HEAD, RIGHT_HEAD, cameras_of
 from schemas.world import World, WorldHead, WorldSubject
 
 Floats = NDArray[np.float64]
 
-HEAD_OF_CAMERA = {1: 0, 2: 0, 3: 1, 4: 1, 5: 2, 6: 2, 7: 2, 8: 2}
-LOWER_HEAD = 2
 SECOND_LASER_MM = 70.0
-"""Distance in Y of two lower lasers from the middle: the thesis's Table 3-1 has four lasers in all."""
+"""Distance in Y from the middle of two lower lasers that light one plane: the thesis's Table 3-1 has four lasers in
+all."""
 HEAD_CENTRE = np.array([0.0, 0.0, 57.0])
 """Point of a head about which it is turned, head frame: the middle of the scan volume."""
 PLATE_CENTRE = np.array([TRAVEL_MM / 2.0, 0.0, 0.0])
@@ -70,6 +70,21 @@ class Exposure(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Sheet:
+    """A plane of light of one head."""
+
+    head: int
+    lasers: tuple[Laser, ...]
+    """Those that light it, in its frame: X = 0 is the plane."""
+    ahead_mm: float = 0.0
+    """X of the plane in the head's frame."""
+
+    def pose(self, of_head: Pose) -> Pose:
+        """The frame of the sheet, from that of its head."""
+        return Pose(of_head.turn, of_head.shift + self.ahead_mm * of_head.turn[:, 0])
+
+
+@dataclass(frozen=True)
 class Machine:
     """The scanner of a world."""
 
@@ -78,8 +93,10 @@ class Machine:
     """The cameras of the world, head frame, as they stand during the scan."""
     calibrated: dict[int, Camera]
     """The same, as they stood when the scanner was calibrated."""
-    lasers: tuple[tuple[Laser, ...], tuple[Laser, ...], tuple[Laser, ...]]
-    """Lasers of each head, head frame."""
+    head_of: dict[int, int]
+    """The head of each camera, counted from 0."""
+    sheets: tuple["Sheet", ...]
+    """The sheets of light: those of heads 0, 1, 2 in their order, then second ones of a head."""
     size: tuple[int, int]
     """(rows, columns) of a picture."""
     jitter: Floats
@@ -120,11 +137,22 @@ class Machine:
         last = self.pose(head, seconds + self.world.cameras.rolling_shutter_ms / 1000.0)
         return Exposure(seconds, first, last.shift - first.shift)
 
-    def heads_near(self, head: int, seconds: float) -> list[int]:
-        """The heads whose stripes the cameras of a head may see."""
+    def sheets_near(self, head: int, seconds: float) -> list[int]:
+        """The sheets whose stripes the cameras of a head may see."""
         own = self.reported_x(head, seconds)
         near = [other for other in range(3) if abs(self.reported_x(other, seconds) - own) <= SEEN_HEADS_MM]
-        return [head] if self.one_by_one else near
+        heads = [head] if self.one_by_one else near
+        return [number for number, sheet in enumerate(self.sheets) if sheet.head in heads]
+
+    def sheet(self, number: int, seconds: float) -> Exposure:
+        """The exposure of the frame that begins at a time, for a sheet: that of its head, ahead of it."""
+        sheet = self.sheets[number]
+        exposure = self.exposure(sheet.head, seconds)
+        return exposure._replace(pose=sheet.pose(exposure.pose))
+
+    def sheets_of(self, camera: int) -> list["Sheet"]:
+        """The sheets of a camera's own head."""
+        return [sheet for sheet in self.sheets if sheet.head == self.head_of[camera]]
 
     def calibration_pose(self, head: int) -> Pose:
         """Head frame to scanner frame when the reference object was filmed, at X = 0 by the travel."""
@@ -176,10 +204,10 @@ def when_calibrated(machine: Machine) -> Machine:
 
 def machine_of(world: World) -> Machine:
     """Build the scanner of a world. Its mounting and its lenses follow from the world's seed."""
-    standard = standard_scanner(world.seed)
+    placed = cameras_of(world)
     columns, rows = map(int, world.cameras.size.split("x"))
     thickness = world.glass.thickness_mm
-    present = [camera for camera in standard.cameras if camera.id not in world.cameras.missing]
+    present = [camera for number, (camera, _) in placed.items() if number not in world.cameras.missing]
     calibrated = {camera.id: _resized(replace(camera, plate_mm=thickness), rows, columns) for camera in present}
     knocks = {knock.camera: knock for knock in world.cameras.knocked}
     cameras = dict(calibrated)
@@ -189,10 +217,15 @@ def machine_of(world: World) -> Machine:
         cameras[camera_id] = replace(
             camera, position=camera.position + np.array(knock.mm), rotation=camera.rotation @ turn.T
         )
-    left, right, below = (replace(laser, plate_mm=thickness) for laser in standard.lasers)
+    left, right, below = (replace(laser, plate_mm=thickness) for laser in standard_scanner(world.seed).lasers)
     lower: tuple[Laser, ...] = (below,)
-    if world.laser.lower_lasers == 2:
+    second: tuple[Sheet, ...] = ()
+    if world.laser.lower_lasers == 2 and world.laser.lower_apart_mm:
+        second = (Sheet(LOWER_HEAD, (below,), world.laser.lower_apart_mm),)
+    elif world.laser.lower_lasers == 2:
         lower = tuple(_aside(below, side * SECOND_LASER_MM) for side in (1.0, -1.0))
+    first = (Sheet(LEFT_HEAD, (left,)), Sheet(RIGHT_HEAD, (right,)), Sheet(LOWER_HEAD, lower))
+    head_of = {camera.id: placed[camera.id][1] for camera in present}
     random = np.random.default_rng([world.seed, 200])
     slowest = min(head.speed for head in world.heads)
     frames = int(TRAVEL_MM / (world.cameras.step_mm * slowest)) + 2
@@ -204,7 +237,7 @@ def machine_of(world: World) -> Machine:
     tilt = _turn(world.glass.tilt_x_deg, world.glass.tilt_y_deg, 0.0)
     lift = PLATE_CENTRE - tilt @ PLATE_CENTRE + np.array([0.0, 0.0, world.glass.height_mm])
     return Machine(
-        world, cameras, calibrated, ((left,), (right,), lower), (rows, columns), jitter, phases, Pose(tilt, lift)
+        world, cameras, calibrated, head_of, first + second, (rows, columns), jitter, phases, Pose(tilt, lift)
     )
 
 

@@ -16,7 +16,7 @@ from footscan.virtual.optics.laser_light import FAN_EDGE_DEGREES, FOCUS_MM, beam
 from footscan.virtual.optics.scanner import FAN_DEGREES, WIDTH, Camera, Laser
 from footscan.virtual.optics.scene import SKIN, Scene
 from footscan.virtual.portable import cos_sin
-from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Exposure, Machine, moved_camera, moved_laser
+from footscan.virtual.worlds.machine import Exposure, Machine, moved_camera, moved_laser
 from footscan.virtual.worlds.section import Cut, CutMesh
 from footscan.virtual.worlds.subject import Subject
 from schemas.world import World
@@ -69,7 +69,7 @@ class _Seen(NamedTuple):
 
 
 class _Lit(NamedTuple):
-    """The lit part of a head's stripe on the subject."""
+    """The lit part of a sheet's stripe on the subject."""
 
     cut: Cut
     light: Floats
@@ -86,7 +86,7 @@ def world_stripes(machine: Machine, subject: Subject) -> dict[int, NDArray[np.vo
     for frame in range(max(machine.frames(head) for head in range(3))):
         lit: dict[int, _Lit] = {}
         for camera in machine.cameras:
-            if frame < machine.frames(HEAD_OF_CAMERA[camera]):
+            if frame < machine.frames(machine.head_of[camera]):
                 seen = _seen_in_frame(machine, camera, frame, cut_mesh, scene, lit)
                 if len(seen.light):
                     parts[camera].append(_measured(seen, frame, machine.world, machine, random[camera]))
@@ -102,14 +102,14 @@ def _seen_in_frame(
 ) -> _Seen:
     """All stripes in one frame; rows that are exposed later see heads that have travelled on.
 
-    `lit` keeps the stripes of each head for the other cameras, where all rows are of one moment.
+    `lit` keeps the stripes of each sheet for the other cameras, where all rows are of one moment.
     """
-    head = HEAD_OF_CAMERA[camera_id]
+    head = machine.head_of[camera_id]
     own = machine.exposure(head, machine.seconds(frame))
     camera = moved_camera(machine.cameras[camera_id], own.middle)
     parts = []
-    for other in machine.heads_near(head, own.seconds):
-        sheet = machine.exposure(other, own.seconds)
+    for other in machine.sheets_near(head, own.seconds):
+        sheet = machine.sheet(other, own.seconds)
         if max(np.abs(own.way).max(), np.abs(sheet.way).max()) > ONE_MOMENT_MM:
             distance = _distance_by_rows(machine, camera, own.way, sheet, cut_mesh)
             stripe = _lit_stripe(machine, other, sheet, cut_mesh.cut(distance), scene)
@@ -147,10 +147,10 @@ def _middle(points: Floats) -> Floats:
     return np.full(len(points), 0.5)
 
 
-def _lit_stripe(machine: Machine, head: int, sheet: Exposure, cut: Cut, scene: Scene) -> _Lit:
-    """The lit part of a head's stripe on the subject; the light is that of the middle of the exposure."""
+def _lit_stripe(machine: Machine, number: int, sheet: Exposure, cut: Cut, scene: Scene) -> _Lit:
+    """The lit part of a sheet's stripe on the subject; the light is that of the middle of the exposure."""
     light = np.zeros(len(cut.points))
-    for laser in machine.lasers[head]:
+    for laser in machine.sheets[number].lasers:
         light += _irradiance(moved_laser(laser, sheet.middle), cut, scene)
     lit = light > 0.0
     cut = Cut(cut.points[lit], cut.normals[lit])
@@ -266,7 +266,7 @@ def _across(pixels: Floats) -> Floats:
 def _clutter(machine: Machine, camera_id: int, random: np.random.Generator) -> list[NDArray[np.void]]:
     """Points that are no stripe of the subject: glints of three kinds, and things of the room that drift past."""
     world, rows, columns = machine.world, *machine.size
-    head = HEAD_OF_CAMERA[camera_id]
+    head = machine.head_of[camera_id]
     frames = machine.frames(head)
     drift_px = 3.8 * columns / WIDTH * machine.step_mm(head) * 0.7  # a thing as far away as the foot
     pieces = []

@@ -32,7 +32,7 @@ from footscan.virtual.worlds.film.scenery import (
     smudge,
     things_of,
 )
-from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Exposure, Machine, Pose, moved_camera, moved_laser
+from footscan.virtual.worlds.machine import Exposure, Machine, Pose, moved_camera, moved_laser
 from footscan.virtual.worlds.stripes import vertex_albedo
 from footscan.virtual.worlds.subject import Subject
 
@@ -157,7 +157,7 @@ class CameraFilm:
     def light(self, frame: int, random: np.random.Generator) -> Singles:
         """Light on the sensor at gain 1, (rows, columns, 3) float32, 1 being its white."""
         machine, world = self._machine, self._machine.world
-        moment = machine.exposure(HEAD_OF_CAMERA[self._id], machine.seconds(frame))
+        moment = machine.exposure(machine.head_of[self._id], machine.seconds(frame))
         camera = moved_camera(self._camera, moment.pose)
         raster = self._raster(camera, moment)
         pixels = self._pixels(raster)
@@ -204,14 +204,14 @@ class CameraFilm:
 
     def _put_details(self, light: Singles, camera: Camera, moment: Exposure, raster: Raster) -> None:
         """Put hairs and marks of the glass into the picture, and the laser's light on them."""
-        machine, own = self._machine, HEAD_OF_CAMERA[self._id]
+        machine = self._machine
         hairs = self._hairs[visible(self._hairs, camera, (raster, self._centres))]
         draw_hairs(hairs, camera, light)
         if camera.below_glass:
             draw_marks(self._marks, camera, light)
         caught = np.zeros((*machine.size, 1), np.float32)
-        for head in machine.heads_near(own, moment.seconds):
-            pose = moment.pose if head == own else machine.pose(head, moment.seconds)
+        for number in machine.sheets_near(machine.head_of[self._id], moment.seconds):
+            pose = machine.sheet(number, moment.seconds).pose
             lit_hairs(hairs, pose, camera, machine.world.laser.power, caught)
             sparkle(self._marks, pose, camera, machine.world.laser.power, raster, caught)
         add_light(light, caught[:, :, 0], self._laser_colour)
@@ -242,26 +242,26 @@ class CameraFilm:
         picture = np.zeros(rows * columns)
         row_share = (pixels.flat // columns) / rows
         reach = REACH_SIGMAS * float(np.hypot(world.laser.sigma_mm, 0.3)) + 1.0
-        for head in machine.heads_near(HEAD_OF_CAMERA[self._id], moment.seconds):
-            sheet = machine.exposure(head, moment.seconds)
+        for number in machine.sheets_near(machine.head_of[self._id], moment.seconds):
+            sheet = machine.sheet(number, moment.seconds)
             distance = machine.sheet_distance(pixels.points, sheet, row_share)
             near = np.flatnonzero(np.abs(distance) < reach)
             if len(near):
                 moved = sheet.way * row_share[near, None]
-                light = self._sheet_light(head, sheet.pose, moved, pixels, near, distance[near], camera)
+                light = self._sheet_light(number, sheet.pose, moved, pixels, near, distance[near], camera)
                 picture[pixels.flat[near]] += light
         return picture.reshape(rows, columns)
 
     def _sheet_light(
-        self, head: int, pose: Pose, moved: Floats, pixels: _Pixels, near: Ints, distance: Floats, camera: Camera
+        self, number: int, pose: Pose, moved: Floats, pixels: _Pixels, near: Ints, distance: Floats, camera: Camera
     ) -> Floats:
-        """Light of a head's lasers on the pixels `near` its sheet, at `distance` (N,) mm from its middle."""
+        """Light of a sheet's lasers on the pixels `near` its sheet, at `distance` (N,) mm from its middle."""
         world = self._machine.world
         points, normals = pixels.points[near] - moved, pixels.normals[near]
         sight = _towards(camera, points)
         footprint = 1.0 / (PX_PER_MM * np.clip(np.einsum("ij,ij->i", normals, sight), 0.1, 1.0))
         total = np.zeros(len(near))
-        for laser in self._machine.lasers[head]:
+        for laser in self._machine.sheets[number].lasers:
             moved_one = moved_laser(laser, pose)
             beams = beams_of(moved_one, points)
             cosine = np.maximum(np.einsum("ij,ij->i", normals, beams.towards), 0.0)

@@ -12,7 +12,7 @@ from footscan.virtual.filming.record import film_name, write_stl, write_yaml
 from footscan.virtual.optics.scene import SKIN, Mesh, Scene
 from footscan.virtual.worlds.chart import world_chart
 from footscan.virtual.worlds.film.camera_film import CameraFilm
-from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Machine, machine_of, when_calibrated
+from footscan.virtual.worlds.machine import Machine, machine_of, when_calibrated
 from footscan.virtual.worlds.subject import Subject, make_body, make_subject
 from schemas.world import World
 
@@ -43,7 +43,7 @@ def record_world(
     machine, subject = studio.machine, studio.subject
     folder.mkdir(parents=True, exist_ok=True)
     write_world(replace(machine, world=world), subject, folder)
-    counts = {camera: machine.frames(HEAD_OF_CAMERA[camera]) for camera in machine.cameras}
+    counts = {camera: machine.frames(machine.head_of[camera]) for camera in machine.cameras}
     done, total = 0, sum(counts.values())
     pictures: list[bytes] = []
     rows, columns = machine.size
@@ -63,7 +63,7 @@ def record_world(
             progress(done, total)
     cameras = [
         {"id": camera, "file": film_name(camera), "travel": {"start_mm": 0.0, "step_mm": machine.step_mm(head)}}
-        for camera, head in ((camera, HEAD_OF_CAMERA[camera]) for camera in machine.cameras)
+        for camera, head in machine.head_of.items()
     ]
     scan = {
         "format": "footscan.scan/1", "patient": PATIENT, "scan": f"{world.seed}" + ("-body" if body else ""),

@@ -100,7 +100,7 @@ def test_a_wide_picture_has_the_same_view() -> None:
 
 def test_two_lower_lasers_shine_at_the_same_place() -> None:
     machine = machine_of(NOMINAL.model_copy(update={"laser": WorldLaser(lower_lasers=2)}))
-    one, other = machine.lasers[2]
+    one, other = machine.sheets[2].lasers
     assert one.position[1] == -other.position[1] == 70.0
     for laser in (one, other):
         position, axis = np.array(laser.position), np.array(laser.axis)
@@ -113,5 +113,5 @@ def test_a_scanner_that_is_calibrated_has_not_been_knocked_and_shows_one_laser()
     knocked = world.cameras.knocked[0].camera
     if knocked in now.cameras:
         assert not np.array_equal(now.cameras[knocked].position, then.cameras[knocked].position)
-    assert then.heads_near(1, 2.0) == [1]
+    assert then.sheets_near(1, 2.0) == [1]
     assert then.plate.shift == pytest.approx(np.zeros(3))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Machine, machine_of, moved_camera
+from footscan.virtual.worlds.machine import Machine, machine_of, moved_camera
 from footscan.virtual.worlds.stripes import world_stripes
 from footscan.virtual.worlds.subject import Subject, make_subject
 from schemas.world import World, WorldCameras, WorldGlass, WorldHead, WorldLaser, WorldRoom, WorldSubject
@@ -26,7 +26,7 @@ def across_errors(machine: Machine, camera: int, points: np.ndarray) -> np.ndarr
     exact = np.full((len(points), 2), np.nan)
     for frame in np.unique(points["frame"]):
         here = points["frame"] == frame
-        pose = machine.pose(HEAD_OF_CAMERA[camera], machine.seconds(int(frame)))
+        pose = machine.pose(machine.head_of[camera], machine.seconds(int(frame)))
         exact[here] = moved_camera(machine.cameras[camera], pose).project(points["place"][here].astype(np.float64))
     return np.column_stack([points["i"], points["j"]]) - exact
 
@@ -43,7 +43,7 @@ def test_pixels_are_those_of_the_places_but_for_the_reported_noise(foot: Subject
 def test_places_lie_on_the_subject_in_the_plane_of_the_laser(foot: Subject) -> None:
     machine, found = stripes(foot)
     for camera, points in found.items():
-        x = machine.step_mm(HEAD_OF_CAMERA[camera]) * points["frame"]
+        x = machine.step_mm(machine.head_of[camera]) * points["frame"]
         assert points["place"][:, 0] == pytest.approx(x, abs=1e-3)
 
 

@@ -6,7 +6,7 @@ import pytest
 from footscan.virtual.optics.scene import SKIN, Scene
 from footscan.virtual.worlds.film.camera_film import CameraFilm
 from footscan.virtual.worlds.film.raster import NOTHING, project, rasterise
-from footscan.virtual.worlds.machine import HEAD_OF_CAMERA, Machine, machine_of, moved_camera
+from footscan.virtual.worlds.machine import Machine, machine_of, moved_camera
 from footscan.virtual.worlds.stripes import world_stripes
 from footscan.virtual.worlds.subject import Subject, make_subject
 from schemas.world import World, WorldCameras, WorldLaser, WorldRoom, WorldSubject
@@ -27,7 +27,7 @@ def machine(**parts: object) -> Machine:
 @pytest.mark.parametrize("camera", [1, 6])
 def test_pixels_show_the_point_that_a_ray_meets(foot: Subject, camera: int) -> None:
     here = machine()
-    pose = here.pose(HEAD_OF_CAMERA[camera], here.seconds(FRAME))
+    pose = here.pose(here.head_of[camera], here.seconds(FRAME))
     moved = moved_camera(here.cameras[camera], pose)
     raster = rasterise(project(foot.mesh.vertices, moved), foot.mesh.faces, here.size)
     rows, columns = np.nonzero(raster.face != NOTHING)
@@ -51,7 +51,7 @@ def stripe_errors(here: Machine, foot: Subject, camera: int) -> np.ndarray:
     red = light[:, :, 0].astype(np.float64)
     exact = world_stripes(here, foot)[camera]
     exact = exact[(exact["frame"] == FRAME) & np.isfinite(exact["place"][:, 0])]
-    pose = here.pose(HEAD_OF_CAMERA[camera], here.seconds(FRAME))
+    pose = here.pose(here.head_of[camera], here.seconds(FRAME))
     pixels = moved_camera(here.cameras[camera], pose).project(exact["place"].astype(np.float64))
     along = np.gradient(pixels, axis=0)
     errors = []
