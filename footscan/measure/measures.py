@@ -189,6 +189,7 @@ def measure_foot(
     reach_mm: float = 0.0,
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
+    doubt: str | None = None,
 ) -> Measures:
     """Measure a foot in any pose. A left foot is mirrored and measured as a right one.
 
@@ -203,6 +204,7 @@ def measure_foot(
     reach_mm : vertices in the same cube of this edge share their error, as on a smoothed surface; 0: independent errors
     filled : (V,) true for vertices that were filled, not measured
     calibration : name of a measure to (a, b): the reported value is a + b times the measured one
+    doubt : a reason for which all measures are uncertain
 
     Raises
     ------
@@ -230,7 +232,7 @@ def measure_foot(
             reach_mm=reach_mm,
             filled=filled,
             calibration=calibration,
-            doubt="; ".join(things) or None,
+            doubt="; ".join([*things, *([] if doubt is None else [doubt])]) or None,
         ),
         landmarks=_in_mesh(landmarks, foot.transform),
     )

@@ -6,12 +6,18 @@ from scipy.spatial import KDTree
 
 from footscan.measure.measures import measure_foot
 from footscan.mesh.mesh import Mesh
+from footscan.mesh.topology import vertex_normals
 from schemas.base.model import Side
 from schemas.measures import Measures
 
 ERROR_MM, ERROR_GROWS, REACH_MM = 0.03, 0.04, 10.0
 """Standard deviation of a measured vertex, its growth per mm into filled surface, and the edge of the cubes whose
 vertices share their error. Tuned on virtual feet: docs/surface.md."""
+DOWN, SOLE_MM = -0.7, 20.0
+"""The sole is what looks down, by the Z of its normal, up to this height above the lowest point. Chosen by hand."""
+MOST_UNSEEN = 0.5
+"""Share of the sole that may be filled. Of a virtual foot that four cameras see from below it is 0.02, of one that is
+seen from above alone 0.9: the foot then stands on a sole that was made up, and its frame follows that."""
 RELIABLE_MM = 5.0
 """Filled surface nearer than this to measured surface counts as measured: a smooth surface hardly errs there. Chosen by
 hand."""
@@ -22,7 +28,8 @@ def measure_scanned_foot(mesh: Mesh, side: Side) -> Measures:
 
     Parameters
     ----------
-    mesh : mm, scanner frame; without `filled`, all vertices count as measured
+    mesh : mm, scanner frame; without `filled`, all vertices count as measured. If most of the sole is filled, as with
+        cameras above alone, all measures are uncertain: each is taken in the foot's own frame, which rests on the sole.
 
     Raises
     ------
@@ -38,7 +45,16 @@ def measure_scanned_foot(mesh: Mesh, side: Side) -> Measures:
         errors_mm=ERROR_MM + ERROR_GROWS * gap_mm,
         reach_mm=REACH_MM,
         filled=gap_mm > RELIABLE_MM,
+        doubt=_unseen_sole(mesh, filled),
     )
+
+
+def _unseen_sole(mesh: Mesh, filled: NDArray[np.bool_]) -> str | None:
+    """Say that the sole was not seen, if it was not."""
+    normals = vertex_normals(mesh.vertices, mesh.faces) if mesh.normals is None else mesh.normals
+    is_sole = (normals[:, 2] < DOWN) & (mesh.vertices[:, 2] < mesh.vertices[:, 2].min() + SOLE_MM)
+    unseen = float(filled[is_sole].mean()) if is_sole.any() else 1.0
+    return f"{100 * unseen:.0f} % of the sole was filled, not measured" if unseen > MOST_UNSEEN else None
 
 
 def _gaps(vertices: NDArray[np.float64], filled: NDArray[np.bool_]) -> NDArray[np.float64]:

@@ -1,0 +1,34 @@
+"""Measures of a scanned foot: what was not seen is not reported as good."""
+
+import numpy as np
+import pytest
+
+from footscan.measure.scanned_foot import measure_scanned_foot
+from footscan.mesh.mesh import Mesh
+from footscan.mesh.topology import vertex_normals
+from footscan.virtual.foot.foot import make_foot
+
+
+@pytest.fixture(scope="module")
+def foot() -> Mesh:
+    made = make_foot()
+    return Mesh(made.vertices, made.faces)
+
+
+def with_filled(foot: Mesh, share: float) -> Mesh:
+    """The foot with this share of its sole filled, from the heel on."""
+    down = (vertex_normals(foot.vertices, foot.faces)[:, 2] < -0.7) & (foot.vertices[:, 2] < 20.0)
+    x = foot.vertices[:, 0]
+    return Mesh(foot.vertices, foot.faces, filled=down & (x <= np.quantile(x[down], share)))
+
+
+def test_a_foot_whose_sole_was_not_seen_has_no_good_measure(foot: Mesh) -> None:
+    measures = measure_scanned_foot(with_filled(foot, 1.0), "right").measures
+    assert "ok" not in {measure.status for measure in measures.values()}
+    assert "100 % of the sole was filled, not measured" in (measures["foot_length"].note or "")
+
+
+def test_a_foot_whose_sole_was_seen_has_good_measures(foot: Mesh) -> None:
+    seen = measure_scanned_foot(with_filled(foot, 0.1), "right").measures
+    assert seen["foot_length"].status == seen["instep_height"].status == "ok"
+    assert measure_scanned_foot(foot, "right").measures["arch_index"].status == "ok"
