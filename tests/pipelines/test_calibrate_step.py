@@ -84,6 +84,23 @@ def test_another_picture_in_a_film_runs_its_camera_and_what_all_share(capture: P
     assert failure.problem.startswith(f"{capture / 'capture.yaml'}: camera 5: sees the object from")
 
 
+def test_a_camera_has_a_map_for_each_laser(capture: Path, tmp_path: Path) -> None:
+    plain = calibrate_capture(read_capture(capture), PARAMETERS, 2, tmp_path / "cache").calibration
+    file = capture / "capture.yaml"
+    document = yaml.safe_load(file.read_text())
+    of_two = next(camera for camera in document["cameras"] if camera["id"] == 2)
+    # What camera 2 sees stands for what camera 1 sees with the second laser on.
+    of_two |= {"id": 1, "laser": 2, "x_mm": document["x_mm"] + 12.0, "stands": ["behind", "left", "above"]}
+    file.write_text(yaml.safe_dump(document))
+    made = calibrate_capture(read_capture(capture), PARAMETERS, 2, tmp_path / "cache").calibration
+    assert [camera.name for camera in made.cameras] == ["1", "5", "1 (laser 2)"]
+    first, second = made.maps(1)
+    assert (first.laser, first.ahead_mm, second.laser, second.ahead_mm) == (1, 0.0, 2, 12.0)
+    assert first.map == plain.camera(1).map
+    assert second.map == plain.camera(2).map
+    assert Calibration.model_validate_json(made.model_dump_json()) == made
+
+
 def test_one_film_for_two_cameras_is_refused(capture: Path, tmp_path: Path) -> None:
     shutil.copy(capture / "cam1.avi", capture / "cam2.avi")
     with pytest.raises(RefusedInput, match=r"capture\.yaml: camera 2: has the same film as camera 1"):

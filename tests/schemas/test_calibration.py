@@ -289,3 +289,21 @@ def test_version_3_does_not_say_where_the_laser_planes_lie() -> None:
     assert all(camera.plane is None for camera in read_calibration(FROZEN / "calibration-3.json").cameras)
     planes = [camera.plane for camera in read_calibration(FROZEN / "calibration-4.json").cameras]
     assert [plane.head for plane in planes if plane is not None] == [1, 1]
+
+
+def test_a_camera_may_have_a_map_for_each_of_two_lasers() -> None:
+    content = (
+        frozen("4") if (FROZEN / "calibration-4.json").exists() else changed("3", "format", "footscan.calibration/4")
+    )
+    first = content["cameras"][0]
+    content["cameras"] = [first, {**first, "laser": 2, "ahead_mm": 12.0}]
+    calibration = calibration_from_json(json.dumps(content), "calibration.json")
+    number = first["camera"]
+    assert [camera.view for camera in calibration.maps(number)] == [number, number + 64]
+    assert calibration.camera(number).laser == 1
+    written = json.loads(calibration.model_dump_json())["cameras"]
+    assert [(camera.get("laser"), camera.get("ahead_mm")) for camera in written] == [(None, None), (2, 12.0)]
+    content["cameras"] = [first, {**first, "laser": 3}]
+    assert "cameras.1.laser: " in refusal(content)
+    content["cameras"] = [first, {**first, "laser": 2}, {**first, "laser": 2}]
+    assert refusal(content).startswith("expected each camera once for each of its lasers")

@@ -107,6 +107,26 @@ def test_sizes_that_no_camera_has(tmp_path: Path, rows: str, problem: str) -> No
         read_chart(path)
 
 
+def test_a_camera_that_sees_two_lasers(tmp_path: Path) -> None:
+    path = tmp_path / "chart.csv"
+    head = "camera,point,x_mm,y_mm,z_mm,i,j,laser\n"
+    path.write_text(head + "5,a,0,1,2,3,4,1\n5,a,12,1,2,30,4,2\n6,a,0,1,2,3,4,1\n")
+    charts = read_chart(path)
+    assert {view: (chart.camera, chart.laser, chart.name) for view, chart in charts.items()} == {
+        5: (5, 1, "5"),
+        6: (6, 1, "6"),
+        69: (5, 2, "5 (laser 2)"),
+    }
+    assert charts[69].world.tolist() == [[12.0, 1.0, 2.0]]
+    for row, problem in (
+        ("5,a,0,1,2,3,4,3", "column laser: expected a whole number from 1 to 2"),
+        ("65,a,0,1,2,3,4,1", "column camera: expected a whole number from 1 to 64"),
+    ):
+        path.write_text(head + row + "\n")
+        with pytest.raises(RefusedInput, match=problem):
+            read_chart(path)
+
+
 def test_one_side_alone_is_no_size(tmp_path: Path) -> None:
     path = tmp_path / "chart.csv"
     path.write_text("camera,point,x_mm,y_mm,z_mm,i,j,width_px\n1,a,0,1,2,3,4,1280\n")

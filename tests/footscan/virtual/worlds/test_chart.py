@@ -8,7 +8,7 @@ import pytest
 
 from footscan.virtual.worlds.chart import world_chart
 from footscan.virtual.worlds.machine import machine_of
-from schemas.world import World, WorldCameras, WorldHead
+from schemas.world import World, WorldCameras, WorldHead, WorldLaser
 
 
 def rows_of(world: World) -> list[dict[str, float]]:
@@ -23,6 +23,17 @@ def test_corners_are_where_the_camera_sees_them() -> None:
     assert {row["camera"] for row in rows} == set(range(1, 9))
     for row in rows:
         exact = machine.calibrated[int(row["camera"])].project(np.array([[0.0, row["y_mm"], row["z_mm"]]]))[0]
+        assert [row["i"], row["j"]] == pytest.approx(exact, abs=1e-3)
+
+
+def test_cameras_below_see_corners_in_both_planes() -> None:
+    world = World(seed=2, cameras=WorldCameras(corner_px=0.0), laser=WorldLaser(lower_lasers=2, lower_apart_mm=12.0))
+    machine, rows = machine_of(world), rows_of(world)
+    lasers = {camera: {row["laser"] for row in rows if row["camera"] == camera} for camera in range(1, 9)}
+    assert lasers == {camera: {1.0, 2.0} if camera > 4 else {1.0} for camera in range(1, 9)}
+    for row in rows:
+        assert row["x_mm"] == 12.0 * (row["laser"] - 1)
+        exact = machine.calibrated[int(row["camera"])].project(np.array([[row["x_mm"], row["y_mm"], row["z_mm"]]]))[0]
         assert [row["i"], row["j"]] == pytest.approx(exact, abs=1e-3)
 
 

@@ -47,6 +47,16 @@ def test_places_lie_on_the_subject_in_the_plane_of_the_laser(foot: Subject) -> N
         assert points["place"][:, 0] == pytest.approx(x, abs=1e-3)
 
 
+def test_cameras_below_see_the_stripes_of_two_planes(foot: Subject) -> None:
+    machine, found = stripes(foot, laser=WorldLaser(lower_lasers=2, lower_apart_mm=12.0))
+    for camera in (5, 6, 7, 8):
+        ahead = found[camera]["place"][:, 0] - machine.step_mm(2) * found[camera]["frame"]
+        near = [np.abs(ahead - plane) < 1e-3 for plane in (0.0, 12.0)]
+        assert (near[0] | near[1]).all()
+        assert min(one.mean() for one in near) > 0.3
+    assert min(len(found[camera]) for camera in (1, 2, 3, 4)) > 1000
+
+
 def test_a_faint_laser_in_a_bright_room_is_not_found(foot: Subject) -> None:
     def count(power: float, light: float) -> int:
         _, found = stripes(foot, laser=WorldLaser(power=power), room=WorldRoom(light=light))
