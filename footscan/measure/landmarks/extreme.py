@@ -107,7 +107,8 @@ def summit(points: Floats, axis: int, sign: int, window: Window, depth: float) -
     if np.count_nonzero(inside) < 3:
         return None
     centre, top = _start(np.column_stack([first[inside], second[inside]]), height[inside], depth)
-    near = height > top - 4 * depth - 2.0
+    farthest, reach = top, 4 * depth + 2.0
+    near = height > farthest - reach
     near &= (np.abs(first - centre[0]) < 2 * RADIUS_MM[2]) & (np.abs(second - centre[1]) < 2 * RADIUS_MM[2])
     position, height = np.column_stack([first[near], second[near]]), height[near]
     cap, fitted_cap = Cap(np.eye(2) / NEAR_MM, depth, LEAST_MISFIT_MM), None
@@ -117,7 +118,11 @@ def summit(points: Floats, axis: int, sign: int, window: Window, depth: float) -
             break
         factors, noise = fitted
         cap = fitted_cap = cap._replace(noise=noise)
-        moved, top = _highest(factors, centre, cap.spread, low, high)
+        moved, fitted_top = _highest(factors, centre, cap.spread, low, high)
+        if abs(fitted_top - farthest) > reach:  # few points bear it where it is highest: it has run away
+            fitted_cap = None
+            break
+        top = fitted_top
         settled, centre = bool(np.all(np.abs(moved - centre) < SETTLED_MM)), moved
         if settled:
             break
