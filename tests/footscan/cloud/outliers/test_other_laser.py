@@ -56,3 +56,13 @@ def test_planes_that_coincide_hide_nothing() -> None:
     same = {camera: replace(view, plane=LaserPlane(head=camera, sd=[0.0] * 7)) for camera, view in VIEWS.items()}
     points, strange = scene(same)
     assert not is_of_other_laser(points[~strange], same).any()
+
+
+def test_two_lasers_of_one_head_are_two_planes() -> None:
+    ahead = LaserPlane(head=2, offset_mm=8.5, sd=[0.0] * 7)
+    second = {camera + 64: replace(view, plane=ahead) for camera, view in VIEWS.items() if view.plane is LOWER}
+    views = {**VIEWS, **second}
+    points, strange = scene(views)
+    found = is_of_other_laser(points, views)
+    assert not found[~strange].any()
+    assert found[strange].mean() > 0.99
