@@ -107,8 +107,7 @@ def summit(points: Floats, axis: int, sign: int, window: Window, depth: float) -
     if np.count_nonzero(inside) < 3:
         return None
     centre, top = _start(np.column_stack([first[inside], second[inside]]), height[inside], depth)
-    farthest, reach = top, 4 * depth + 2.0
-    near = height > farthest - reach
+    near = height > top - 4 * depth - 2.0
     near &= (np.abs(first - centre[0]) < 2 * RADIUS_MM[2]) & (np.abs(second - centre[1]) < 2 * RADIUS_MM[2])
     position, height = np.column_stack([first[near], second[near]]), height[near]
     cap, fitted_cap = Cap(np.eye(2) / NEAR_MM, depth, LEAST_MISFIT_MM), None
@@ -118,11 +117,7 @@ def summit(points: Floats, axis: int, sign: int, window: Window, depth: float) -
             break
         factors, noise = fitted
         cap = fitted_cap = cap._replace(noise=noise)
-        moved, fitted_top = _highest(factors, centre, cap.spread, low, high)
-        if abs(fitted_top - farthest) > reach:  # few points bear it where it is highest: it has run away
-            fitted_cap = None
-            break
-        top = fitted_top
+        moved, top = _highest(factors, centre, cap.spread, low, high)
         settled, centre = bool(np.all(np.abs(moved - centre) < SETTLED_MM)), moved
         if settled:
             break
