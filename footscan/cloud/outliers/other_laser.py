@@ -6,6 +6,7 @@ not: a point is assigned to the laser in whose plane more cameras saw it in the 
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from footscan.calibration.models.laser_plane import x_in_plane
 from footscan.cloud.points import camera_numbers, coordinates
 from footscan.cloud.views import View
 from footscan.compiled import compiled
-from schemas.calibration import laser_of_view, view_number
+from schemas.calibration import LaserPlane, laser_of_view, view_number
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -59,9 +60,11 @@ def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Ma
     A point that no other camera confirms is of the laser of most points of its stripe, or of another head if hardly
     anything is confirmed of its own one in this frame. Where that says nothing, it is selected if it lies on the skin
     that the confirmed points make in the plane of the other laser, and off it in its own one. Cameras whose calibration
-    does not say where their laser plane lies are left as they are.
+    does not say where their laser plane lies are left as they are, unless the construction of a head says how far apart
+    two lasers are.
     """
     strange = np.zeros(len(points), np.bool_)
+    views = _with_planes(views)
     heads = {number: _sheet(number, view.plane.head) for number, view in views.items() if view.plane is not None}
     known = np.flatnonzero(np.isin(points["camera"], list(heads)))
     if len(set(heads.values())) < 2 or not len(known):
@@ -69,6 +72,13 @@ def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Ma
     known = known[np.lexsort([points[name][known] for name in ("source", "camera", "frame")])]
     strange[known] = _assigned(points[known], views, heads)
     return strange
+
+
+def _with_planes(views: Mapping[int, View]) -> Mapping[int, View]:
+    """The views; where no film has shown a plane, but one is ahead by construction, all heads count as aligned."""
+    if any(view.plane is not None for view in views.values()) or not any(view.ahead_mm for view in views.values()):
+        return views
+    return {number: replace(view, plane=LaserPlane(head=1, sd=[0.0] * 7)) for number, view in views.items()}
 
 
 def _sheet(number: int, head: int) -> int:

@@ -66,3 +66,16 @@ def test_two_lasers_of_one_head_are_two_planes() -> None:
     found = is_of_other_laser(points, views)
     assert not found[~strange].any()
     assert found[strange].mean() > 0.99
+
+
+def test_lasers_that_are_apart_by_construction_need_no_film_of_a_body() -> None:
+    points, strange = scene()
+    numbers = {1: 65, 2: 66, 3: 3}  # as if both planes were of one head, the upper one that of laser 2, 3 mm ahead
+    points["camera"] = np.vectorize(numbers.get)(points["camera"])
+    views = {
+        numbers[camera]: replace(view, plane=None, ahead_mm=3.0 if view.plane is UPPER else 0.0)
+        for camera, view in VIEWS.items()
+    }
+    found = is_of_other_laser(points, views)
+    assert found[strange].mean() > 0.99
+    assert not found[~strange].any()
