@@ -213,15 +213,14 @@ def control_volume(
 ) -> NDArray[np.float64]:
     """Limits in X, Y and Z (3, 2), mm, of what can be the foot: those of the parameters, or those of the scanner.
 
-        The scanner reaches along X from the first frame to the last, and in Y and Z as far as any camera's calibration.
-        Where that is not known, the volume is not limited.
+    The scanner reaches along X from the first frame to the last, and in Y and Z as far as any camera's calibration.
+    Where that is not known, the volume is not limited.
 
-        >>> from footscan.cloud.points import camera_numbers
-    from footscan.cloud.views import View
-        >>> view = View(np.zeros(3), np.array([[-90.0, 0.0], [90.0, 0.0], [0.0, 100.0]]))
-        >>> limits = control_volume({1: view}, OutlierParameters(z_mm=(-20.0, 110.0)), {1: np.array([2.0, 300.0])})
-        >>> print(limits.tolist())
-        [[-3.0, 305.0], [-100.0, 100.0], [-20.0, 110.0]]
+    >>> from footscan.cloud.views import View
+    >>> view = View(np.zeros(3), np.array([[-90.0, 0.0], [90.0, 0.0], [0.0, 100.0]]))
+    >>> limits = control_volume({1: view}, OutlierParameters(z_mm=(-20.0, 110.0)), {1: np.array([2.0, 300.0])})
+    >>> print(limits.tolist())
+    [[-3.0, 305.0], [-100.0, 100.0], [-20.0, 110.0]]
     """
     limits = np.tile([-math.inf, math.inf], (3, 1))
     places = [x[np.isfinite(x)] for x in (filmed or {}).values()]
