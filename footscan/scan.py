@@ -12,9 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.fusion.fuse import fuse
+from footscan.cloud.heads.find import find_heads
+from footscan.cloud.heads.planes import corrected
 from footscan.cloud.mapping import map_stripe, refuse_other_size
 from footscan.cloud.normals import estimate_normals
 from footscan.cloud.outliers.remove import remove_outliers
+from footscan.cloud.points import POINT_DTYPE
 from footscan.cloud.views import views_of
 from footscan.frames.film import open_background, open_film
 from footscan.frames.image import Rgb
@@ -29,6 +32,7 @@ from footscan.stripe.points import StripePoints
 from footscan.surface.surface_of_cloud import surface_of_cloud
 from schemas.base.errors import Finding, RefusedInput
 from schemas.calibration import Calibration, read_calibration
+from schemas.heads import HeadsReport
 from schemas.measures import Measures
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm, Travel
@@ -69,6 +73,12 @@ class OpenScan:
         return {camera: self._points(camera) for camera in self.cameras}
 
     @cached_property
+    def heads(self) -> HeadsReport:
+        """Where the heads were, beside where the calibration says."""
+        points = np.concatenate([np.empty(0, POINT_DTYPE), *self.points.values()])
+        return find_heads(points, views_of(self._used.cameras), self.parameters.heads)
+
+    @cached_property
     def cloud(self) -> NDArray[np.void]:
         """(N,) points of all cameras, cleaned and fused, as `points`; Finding where none is left."""
         together = np.concatenate(list(self.points.values()))
@@ -77,7 +87,8 @@ class OpenScan:
         filmed = {camera: self._x_of_frame(camera) for camera in self.cameras}
         for camera, lost in self._lost.items():
             filmed[camera][lost] = np.nan
-        kept, _ = remove_outliers(together, views_of(self._used.cameras), self.parameters.outliers, filmed)
+        together, views = corrected(together, views_of(self._used.cameras), self.heads)
+        kept, _ = remove_outliers(together, views, self.parameters.outliers, filmed)
         if not len(kept):
             raise Finding("every point is an outlier, expected a foot in the control volume")
         return fuse(kept, self.parameters.fusion).cloud
@@ -97,7 +108,8 @@ class OpenScan:
     @cached_property
     def measures(self) -> Measures:
         """The measures of the foot; Finding where the surface is no foot."""
-        return measure_scanned_foot(self.mesh, self.recorded.document.side)
+        doubts = [*filter(None, [self.heads.doubt])]
+        return measure_scanned_foot(self.mesh, self.recorded.document.side, doubts)
 
     @cached_property
     def _used(self) -> Calibration:

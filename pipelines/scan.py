@@ -107,21 +107,24 @@ def scan_steps(
     maps = calibration.cameras(frozenset(camera.id for camera in scan.document.cameras))
     foot = FootParameters(side=scan.document.side)
     made = reconstruction_steps(scan.name, points, maps, parameters, scan.document.side, steps)
-    cleaned, fused, oriented, mesh, measures = made
+    heads, cleaned, fused, oriented, mesh, measures = made
     verified: dict[str, Output] = {}
     if (truth := scan.truth) is not None:
         pair: dict[str, Input] = {"surface": mesh, "truth": source_files(truth, digests)}
         verified = {"verified": add(Step(scan.name, "verify", f"{STEPS}.verify", None, pair, places={"truth": truth}))}
     of_cameras = {**manifests, **stripes, **verified}
     quality_inputs: dict[str, Input] = {
-        "clean": cleaned, "fused": fused, "surface": mesh, "calibration": calibration.source, **of_cameras
+        "heads": heads, "clean": cleaned, "fused": fused, "surface": mesh, "calibration": calibration.source,
+        **of_cameras,
     }  # fmt: skip
     quality = add(Step(scan.name, "quality", f"{STEPS}.quality", None, quality_inputs))
     add(Step(scan.name, "cloud.ply", f"{STEPS}.cloud_ply", None, {"oriented": oriented}))
     add(Step(scan.name, "foot.stl", f"{STEPS}.foot_stl", foot, {"surface": mesh}))
     ply_inputs: dict[str, Input] = {"surface": mesh, "name": _name(scan)}
     if colours:
-        texture_inputs: dict[str, Input] = {"surface": mesh, "calibration": maps, **points, **colours}
+        texture_inputs: dict[str, Input] = {
+            "surface": mesh, "calibration": maps, "heads": heads, **points, **colours
+        }  # fmt: skip
         ply_inputs["texture"] = add(Step(scan.name, "texture", f"{STEPS}.texture", None, texture_inputs))
     add(Step(scan.name, "foot.ply", f"{STEPS}.foot_ply", foot, ply_inputs))
     report_inputs: dict[str, Input] = {
@@ -144,6 +147,7 @@ def scan_steps(
 class Reconstruction(NamedTuple):
     """The results of the steps from world points to measures."""
 
+    heads: Output
     cleaned: Output
     fused: Output
     oriented: Output
@@ -163,12 +167,13 @@ def reconstruction_steps(
         steps.append(Step(name, kind, f"{STEPS}.{kind}", own, inputs))
         return Output(steps[-1].name)
 
-    cleaned = add("clean", parameters.outliers, {**points, "calibration": maps})
+    heads = add("heads", parameters.heads, {**points, "calibration": maps})
+    cleaned = add("clean", parameters.outliers, {**points, "calibration": maps, "heads": heads})
     fused = add("fuse", parameters.fusion, {"clean": cleaned})
     oriented = add("orient", parameters.normals, {"fused": fused, "calibration": maps})
     surface = add("surface", parameters.surface, {"oriented": oriented})
-    measures = add("measure", FootParameters(side=side), {"surface": surface})
-    return Reconstruction(cleaned, fused, oriented, surface, measures)
+    measures = add("measure", FootParameters(side=side), {"surface": surface, "heads": heads})
+    return Reconstruction(heads, cleaned, fused, oriented, surface, measures)
 
 
 @dataclass(frozen=True)

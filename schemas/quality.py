@@ -7,6 +7,7 @@ from pydantic import Field
 from schemas.base.model import Document
 from schemas.calibration import Source
 from schemas.fusion import FusionReport
+from schemas.heads import HeadsReport
 from schemas.laser import Laser
 
 Count = Annotated[int, Field(ge=0)]
@@ -122,6 +123,8 @@ class Quality(Document):
     cameras: list[CameraQuality]
     warnings: list[str] = Field(default_factory=list)
     """Sentences on cameras much of whose points are not the foot."""
+    heads: HeadsReport = Field(default_factory=HeadsReport)
+    """Places of the heads along the travel, from the skin that cameras of two heads saw."""
     fusion: FusionReport = Field(default_factory=FusionReport)
     """Disagreement of the cameras about the same skin, and their corrections."""
     cloud_points: Count

@@ -1,5 +1,7 @@
 """Measures of a foot from this scanner, whose errors and filled parts are known."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
@@ -17,12 +19,13 @@ RELIABLE_MM = 5.0
 hand."""
 
 
-def measure_scanned_foot(mesh: Mesh, side: Side) -> Measures:
+def measure_scanned_foot(mesh: Mesh, side: Side, doubts: Sequence[str] = ()) -> Measures:
     """Measure a scanned surface; the uncertainties follow from the errors of the scanner.
 
     Parameters
     ----------
     mesh : mm, scanner frame; without `filled`, all vertices count as measured
+    doubts : as of `measure_foot`
 
     Raises
     ------
@@ -38,6 +41,7 @@ def measure_scanned_foot(mesh: Mesh, side: Side) -> Measures:
         errors_mm=ERROR_MM + ERROR_GROWS * gap_mm,
         reach_mm=REACH_MM,
         filled=gap_mm > RELIABLE_MM,
+        doubts=doubts,
     )
 
 

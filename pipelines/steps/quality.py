@@ -13,6 +13,7 @@ from pipelines.arrays import unpack
 from schemas.calibration import Source
 from schemas.frames import FrameManifest
 from schemas.fusion import FusionReport
+from schemas.heads import HeadsReport
 from schemas.laser import Laser
 from schemas.quality import CameraQuality, Comparison, Quality
 
@@ -20,8 +21,8 @@ from schemas.quality import CameraQuality, Comparison, Quality
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
     """Collect the quality figures of a scan, as quality.json.
 
-    `inputs`: `calibration` (its name and digest), `clean`, `fused`, `surface`, `manifest-N` and `stripe-N` of each
-    camera, and `verified` if the scan has a truth.
+    `inputs`: `calibration` (its name and digest), `heads`, `clean`, `fused`, `surface`, `manifest-N` and `stripe-N` of
+    each camera, and `verified` if the scan has a truth.
     """
     del parameters, places
     cleaned = unpack(inputs["clean"])
@@ -34,6 +35,7 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
         calibration=Source.model_validate_json(inputs["calibration"]),
         cameras=[_camera(camera, inputs, removed.get(str(camera), {})) for camera in ids],
         warnings=json.loads(cleaned["warnings"].tobytes()),
+        heads=HeadsReport.model_validate_json(inputs["heads"]),
         fusion=FusionReport.model_validate_json(fused["report"].tobytes()),
         cloud_points=len(fused["cloud"]),
         mesh=mesh_quality(surface["vertices"], surface["faces"], surface.get("filled"), cut_mm),

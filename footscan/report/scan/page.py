@@ -15,7 +15,7 @@ from footscan.report.page import page
 from footscan.report.sample_frames import FRAMES_SCRIPT, FrameSample, sample_frames
 from footscan.report.scan.coverage import coverage_plot
 from footscan.report.scan.foot_colours import FootSurface, foot_colourings
-from footscan.report.scan.fusion_tables import corrections_table, disagreement_table, warnings_list
+from footscan.report.scan.fusion_tables import corrections_table, disagreement_table, heads_table, warnings_list
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
 from footscan.report.scan.mesh_facts import mesh_facts
 from footscan.report.scan.missing import missing_list
@@ -105,7 +105,7 @@ def scan_page(
         section("Mesh", mesh_facts(quality.mesh, quality.cloud_points)),
         section("Cameras", _cameras_table(quality, cloud)),
         section("Removed points", _REMOVED_NOTE, *removed),
-        section("Agreement of the cameras", _AGREEMENT_NOTE, *_agreement(quality.fusion)),
+        section("Agreement of the cameras", _AGREEMENT_NOTE, heads_table(quality.heads), *_agreement(quality.fusion)),
         section("Stripe coverage", _COVERAGE_NOTE, coverage_plot(cloud, quality.cameras)),
         section("Calibration", _calibration(calibration, quality.calibration)),
         section("Provenance", table(["", ""], ([text(name), text(value)] for name, value in provenance.items()))),
