@@ -5,19 +5,19 @@ such as calibration.check-20261124T081502Z.json, because a scan has the last che
 """
 
 import datetime
-import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from footscan.recordings.calibration_checks import check_path, checks_of, earlier_path, for_cameras
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import sha256
 from pipelines.version import SOFTWARE
 from schemas.base.errors import RefusedInput
 from schemas.base.json_files import read_json, read_text
 from schemas.calibration import LARGEST, Source
-from schemas.calibration_check import CalibrationCheck, CameraCheck, verdict_in_all
+from schemas.calibration_check import CalibrationCheck, CameraCheck, ScanCheck, verdict_in_all
 
 if TYPE_CHECKING:
     from footscan.calibration.checks.drift import Drift
@@ -75,15 +75,9 @@ def store_check(calibration: Path, check: CalibrationCheck) -> Path:
     """
     path = check_path(calibration)
     if path.exists() and (earlier := read_json(path, CalibrationCheck)) != check:
-        name = f"{calibration.stem}.check-{earlier.checked.astimezone(datetime.UTC):%Y%m%dT%H%M%SZ}.json"
-        write_atomically(path.with_name(name), path.read_bytes())
+        write_atomically(earlier_path(calibration, earlier), path.read_bytes())
     write_atomically(path, (check.model_dump_json(indent=2) + "\n").encode())
     return path
-
-
-def check_path(calibration: Path) -> Path:
-    """The file of the last check of a calibration."""
-    return calibration.with_name(f"{calibration.stem}.check.json")
 
 
 def check_of(calibration: Path) -> CalibrationCheck | None:
@@ -94,28 +88,27 @@ def check_of(calibration: Path) -> CalibrationCheck | None:
     RefusedInput
         The calibration, or a check beside it, cannot be read or is damaged.
     """
-    checks = checks_of(calibration, sha256(read_text(calibration, "json_bytes").encode()))
+    digest = sha256(read_text(calibration, "json_bytes").encode())
+    checks = checks_of(calibration, digest)
     return checks[-1] if checks else None
 
 
-def checks_of(calibration: Path, calibration_sha256: str) -> list[CalibrationCheck]:
-    """All checks beside a calibration file that judge the calibration of that digest, the earliest first.
-
-    A check of another calibration, such as one that the file held before, does not count.
+def check_in_force(calibration: Path | None) -> CalibrationCheck | None:
+    """The check that a scan which begins now carries; None without a check, or without a calibration file.
 
     Raises
     ------
     RefusedInput
-        A check cannot be read or is damaged.
+        As in `check_of`.
     """
-    pattern = re.compile(rf"{re.escape(calibration.stem)}\.check(-\d{{8}}T\d{{6}}Z)?\.json")
-    try:
-        paths = sorted(path for path in calibration.parent.iterdir() if pattern.fullmatch(path.name))
-    except OSError as error:
-        raise RefusedInput(calibration.parent, f"cannot be listed ({error.strerror})") from None
-    checks = [read_json(path, CalibrationCheck) for path in paths]
-    judging = [check for check in checks if check.calibration_sha256 == calibration_sha256]
-    return sorted(judging, key=lambda check: check.checked)
+    return None if calibration is None or not calibration.exists() else check_of(calibration)
+
+
+def scanner_check(calibration: Path | None, cameras: Collection[int]) -> ScanCheck | None:
+    """What `check_in_force` says today of the cameras of a scanner; raises as it does."""
+    check = check_in_force(calibration)
+    today = datetime.datetime.now().astimezone().date()
+    return None if check is None else for_cameras(check, cameras, today)
 
 
 def _camera(drift: "Drift") -> CameraCheck:

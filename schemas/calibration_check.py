@@ -1,5 +1,6 @@
 """A check of a calibration: whether each camera still saw, on that day, what the calibration says. `*.check.json`."""
 
+import datetime
 from typing import Annotated, Literal, Self
 
 from pydantic import AwareDatetime, Field, model_validator
@@ -75,3 +76,75 @@ def verdict_in_all(cameras: list[CameraCheck]) -> Verdict:
     """The verdict of a check from those of its cameras: `drifted` before `unseen` before `steady`."""
     verdicts = {camera.verdict for camera in cameras}
     return "drifted" if "drifted" in verdicts else "unseen" if "unseen" in verdicts else "steady"
+
+
+class UnseenCamera(Document):
+    """A camera that a check could not judge."""
+
+    camera: Annotated[int, Field(ge=1)]
+    reason: Text
+
+
+class ScanCheck(Document):
+    """What the check of a calibration says of the cameras of one scan.
+
+    >>> check = ScanCheck(checked=datetime.date(2026, 11, 24), age_days=0, largest_mm=0.41, drifted=[3])
+    >>> check.doubt
+    'camera 3 had moved by 0.41 mm when the calibration was checked on 2026-11-24: calibrate anew'
+    >>> ScanCheck(checked=datetime.date(2026, 11, 24), age_days=3, largest_mm=0.04).summary()
+    'checked on 2026-11-24, 3 days before the scan: every camera was within 0.04 mm'
+    """
+
+    checked: datetime.date
+    """Day of the check, by the clock of the scanner."""
+    age_days: Annotated[int, Field(ge=0)] | None = None
+    """Days from the check to the scan; None if the day of the scan is unknown."""
+    largest_mm: Deviation | None = None
+    """Largest root mean square deviation of a camera, mm, to 0.01; None if no camera was seen."""
+    drifted: list[int] = Field(default_factory=list)
+    """Cameras beyond the tolerance."""
+    unseen: list[UnseenCamera] = Field(default_factory=list)
+    """Cameras that could not be checked."""
+
+    @model_validator(mode="after")
+    def _has_figure(self) -> Self:
+        if self.largest_mm is None and (self.drifted or not self.unseen):
+            raise ValueError("largest_mm: expected a figure unless no camera was seen")
+        return self
+
+    @property
+    def doubt(self) -> str | None:
+        """The reason not to rely on the calibration, a sentence without a full stop; None if all cameras are steady."""
+        checked = f"when the calibration was checked on {self.checked}"
+        doubts = []
+        if self.drifted:
+            up_to = "up to " if len(self.drifted) > 1 else ""
+            doubts.append(
+                f"{_named(self.drifted)} had moved by {up_to}{self.largest_mm:.2f} mm {checked}: calibrate anew"
+            )
+        if self.unseen:
+            reasons = "; ".join(dict.fromkeys(camera.reason for camera in self.unseen))
+            were = "were" if len(self.unseen) > 1 else "was"
+            names = _named([camera.camera for camera in self.unseen])
+            doubts.append(f"{names} {were} not seen {checked} ({reasons}): check again")
+        return "; ".join(doubts) or None
+
+    def summary(self, reckoned: str = "before the scan") -> str:
+        """When the calibration was checked, and with which result, a phrase; `reckoned` follows an age in days."""
+        days = self.age_days or 0
+        age = f", {days} day{'s' * (days > 1)} {reckoned}" if days else ""
+        return f"checked on {self.checked}{age}: {self._result}"
+
+    @property
+    def _result(self) -> str:
+        if self.doubt is None:
+            return f"every camera was within {self.largest_mm:.2f} mm"
+        parts = [f"{_named(self.drifted)} had moved"] if self.drifted else []
+        parts += [f"{_named([camera.camera for camera in self.unseen])} could not be judged"] if self.unseen else []
+        return ", ".join(parts)
+
+
+def _named(cameras: list[int]) -> str:
+    if len(cameras) == 1:
+        return f"camera {cameras[0]}"
+    return f"cameras {', '.join(map(str, cameras[:-1]))} and {cameras[-1]}"

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from footscan.calibration.checks.drift import Drift
-from pipelines.calibration_check import check_document, check_of, check_path, checks_of, store_check
+from footscan.recordings.calibration_checks import check_path, checks_of
+from pipelines.calibration_check import check_document, check_of, store_check
 from pipelines.engine.files.digest import sha256
 from pipelines.recordings.captures import RecordedCapture
 from schemas.base.errors import Fault, RefusedInput
