@@ -12,15 +12,15 @@ from schemas.calibration_check import CalibrationCheck, ScanCheck
 
 
 def check_path(calibration: Path) -> Path:
-    """The file of the last check of a calibration."""
-    return calibration.with_name(f"{calibration.stem}.check.json")
+    """The file of the last check of a calibration: beside the file itself, not beside a link to it."""
+    file = calibration.resolve()
+    return file.with_name(f"{file.stem}.check.json")
 
 
 def earlier_path(calibration: Path, check: CalibrationCheck) -> Path:
     """The file that keeps a check after a later one was made."""
-    return calibration.with_name(
-        f"{calibration.stem}.check-{check.checked.astimezone(datetime.UTC):%Y%m%dT%H%M%SZ}.json"
-    )
+    file = calibration.resolve()
+    return file.with_name(f"{file.stem}.check-{check.checked.astimezone(datetime.UTC):%Y%m%dT%H%M%SZ}.json")
 
 
 def checks_of(calibration: Path, calibration_sha256: str) -> list[CalibrationCheck]:
@@ -33,11 +33,12 @@ def checks_of(calibration: Path, calibration_sha256: str) -> list[CalibrationChe
     RefusedInput
         A check cannot be read or is damaged.
     """
-    pattern = re.compile(rf"{re.escape(calibration.stem)}\.check(-\d{{8}}T\d{{6}}Z)?\.json")
+    file = calibration.resolve()
+    pattern = re.compile(rf"{re.escape(file.stem)}\.check(-\d{{8}}T\d{{6}}Z)?\.json")
     try:
-        paths = sorted(path for path in calibration.parent.iterdir() if pattern.fullmatch(path.name))
+        paths = sorted(path for path in file.parent.iterdir() if pattern.fullmatch(path.name))
     except OSError as error:
-        raise RefusedInput(calibration.parent, f"cannot be listed ({error.strerror})") from None
+        raise RefusedInput(file.parent, f"cannot be listed ({error.strerror})") from None
     checks = [read_json(path, CalibrationCheck) for path in paths]
     judging = [check for check in checks if check.calibration_sha256 == calibration_sha256]
     return sorted(judging, key=lambda check: check.checked)
