@@ -1,5 +1,6 @@
 """Mesh to measures.json."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -17,11 +18,13 @@ from schemas.parameters.foot import FootParameters
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
     """Measure the foot, as measures.json.
 
-    `inputs`: `surface`, and `heads`, where they were. A foot that cannot be measured gives a document with the finding.
+    `inputs`: `surface`, `heads`, where they were, and `calibration-doubt`, a sentence, if a check of the calibration gave
+    reason for one. A foot that cannot be measured gives a document with the finding.
     """
     del places
     surface = unpack(inputs["surface"])
-    doubts = [*filter(None, [HeadsReport.model_validate_json(inputs["heads"]).doubt])]
+    checked = json.loads(inputs["calibration-doubt"]) if "calibration-doubt" in inputs else None
+    doubts = [*filter(None, [checked, HeadsReport.model_validate_json(inputs["heads"]).doubt])]
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface["filled"])
     try:
         measures = measure_scanned_foot(mesh, parameters.side, doubts)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from footscan.surface.quality import mesh_quality
 from pipelines.arrays import unpack
 from schemas.calibration import Source
+from schemas.calibration_check import ScanCheck
 from schemas.frames import FrameManifest
 from schemas.fusion import FusionReport
 from schemas.heads import HeadsReport
@@ -22,7 +23,7 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     """Collect the quality figures of a scan, as quality.json.
 
     `inputs`: `calibration` (its name and digest), `heads`, `clean`, `fused`, `surface`, `manifest-N` and `stripe-N` of
-    each camera, and `verified` if the scan has a truth.
+    each camera, `calibration-check` if the calibration was checked, and `verified` if the scan has a truth.
     """
     del parameters, places
     cleaned = unpack(inputs["clean"])
@@ -33,6 +34,7 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
     quality = Quality(
         calibration=Source.model_validate_json(inputs["calibration"]),
+        calibration_check=_check(inputs),
         cameras=[_camera(camera, inputs, removed.get(str(camera), {})) for camera in ids],
         warnings=json.loads(cleaned["warnings"].tobytes()),
         heads=HeadsReport.model_validate_json(inputs["heads"]),
@@ -61,6 +63,10 @@ def _camera(camera: int, inputs: Mapping[str, bytes], removed: dict[str, int]) -
 def _laser(extracted: Mapping[str, NDArray[Any]]) -> Laser | None:
     found = extracted["laser"].item() if "laser" in extracted else "auto"
     return None if found == "auto" else cast(Laser, found)
+
+
+def _check(inputs: Mapping[str, bytes]) -> ScanCheck | None:
+    return ScanCheck.model_validate_json(check) if (check := inputs.get("calibration-check")) is not None else None
 
 
 def _truth(inputs: Mapping[str, bytes]) -> Comparison | None:
