@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from footscan.cloud.fusion.fuse import fuse
 from footscan.cloud.mapping import map_stripe, refuse_other_size
 from footscan.cloud.normals import estimate_normals
-from footscan.cloud.outliers.remove import remove_outliers
+from footscan.cloud.outliers.remove import Removed, remove_outliers
 from footscan.cloud.views import views_of
 from footscan.frames.film import open_background, open_film
 from footscan.frames.image import Rgb
@@ -29,6 +29,7 @@ from footscan.stripe.points import StripePoints
 from footscan.surface.surface_of_cloud import surface_of_cloud
 from schemas.base.errors import Finding, RefusedInput
 from schemas.calibration import Calibration, read_calibration
+from schemas.glass import GlassPlane
 from schemas.measures import Measures
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm, Travel
@@ -71,16 +72,25 @@ class OpenScan:
     @cached_property
     def cloud(self) -> NDArray[np.void]:
         """(N,) points of all cameras, cleaned and fused, as `points`; Finding where none is left."""
+        kept, _ = self._cleaned
+        if not len(kept):
+            raise Finding("every point is an outlier, expected a foot in the control volume")
+        return fuse(kept, self.parameters.fusion).cloud
+
+    @property
+    def glass(self) -> GlassPlane:
+        """The glass during the scan, from the skin on it; Finding where there are no points."""
+        return self._cleaned[1].glass
+
+    @cached_property
+    def _cleaned(self) -> tuple[NDArray[np.void], Removed]:
         together = np.concatenate(list(self.points.values()))
         if not len(together):
             raise Finding("no stripe in any camera, expected a foot in the films")
         filmed = {camera: self._x_of_frame(camera) for camera in self.cameras}
         for camera, lost in self._lost.items():
             filmed[camera][lost] = np.nan
-        kept, _ = remove_outliers(together, views_of(self._used.cameras), self.parameters.outliers, filmed)
-        if not len(kept):
-            raise Finding("every point is an outlier, expected a foot in the control volume")
-        return fuse(kept, self.parameters.fusion).cloud
+        return remove_outliers(together, views_of(self._used.cameras), self.parameters.outliers, filmed)
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:
@@ -97,7 +107,7 @@ class OpenScan:
     @cached_property
     def measures(self) -> Measures:
         """The measures of the foot; Finding where the surface is no foot."""
-        return measure_scanned_foot(self.mesh, self.recorded.document.side)
+        return measure_scanned_foot(self.mesh, self.recorded.document.side, self.glass)
 
     @cached_property
     def _used(self) -> Calibration:

@@ -167,7 +167,7 @@ def reconstruction_steps(
     fused = add("fuse", parameters.fusion, {"clean": cleaned})
     oriented = add("orient", parameters.normals, {"fused": fused, "calibration": maps})
     surface = add("surface", parameters.surface, {"oriented": oriented})
-    measures = add("measure", FootParameters(side=side), {"surface": surface})
+    measures = add("measure", FootParameters(side=side), {"surface": surface, "clean": cleaned})
     return Reconstruction(cleaned, fused, oriented, surface, measures)
 
 

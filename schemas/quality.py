@@ -7,6 +7,7 @@ from pydantic import Field
 from schemas.base.model import Document
 from schemas.calibration import Source
 from schemas.fusion import FusionReport
+from schemas.glass import GlassPlane
 from schemas.laser import Laser
 
 Count = Annotated[int, Field(ge=0)]
@@ -122,6 +123,8 @@ class Quality(Document):
     cameras: list[CameraQuality]
     warnings: list[str] = Field(default_factory=list)
     """Sentences on cameras much of whose points are not the foot."""
+    glass: GlassPlane | None = None
+    """The glass during the scan, from the skin on it; null in files of earlier versions."""
     fusion: FusionReport = Field(default_factory=FusionReport)
     """Disagreement of the cameras about the same skin, and their corrections."""
     cloud_points: Count

@@ -9,6 +9,7 @@ from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from pipelines.arrays import unpack
 from schemas.base.errors import Finding
+from schemas.glass import GlassPlane
 from schemas.measures import Measures
 from schemas.parameters.foot import FootParameters
 
@@ -16,13 +17,14 @@ from schemas.parameters.foot import FootParameters
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
     """Measure the foot, as measures.json.
 
-    `inputs`: `surface`. A foot that cannot be measured gives a document with the finding.
+    `inputs`: `surface`, and `clean` for the glass. A foot that cannot be measured gives a document with the finding.
     """
     del places
     surface = unpack(inputs["surface"])
+    glass = GlassPlane.model_validate_json(unpack(inputs["clean"])["glass"].tobytes())
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface["filled"])
     try:
-        measures = measure_scanned_foot(mesh, parameters.side)
+        measures = measure_scanned_foot(mesh, parameters.side, glass)
     except Finding as finding:  # the other results are still of use
         unmoved = np.eye(4).tolist()
         measures = Measures(side=parameters.side, axis=None, transform=unmoved, measures={}, finding=str(finding))

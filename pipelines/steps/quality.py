@@ -13,6 +13,7 @@ from pipelines.arrays import unpack
 from schemas.calibration import Source
 from schemas.frames import FrameManifest
 from schemas.fusion import FusionReport
+from schemas.glass import GlassPlane
 from schemas.laser import Laser
 from schemas.quality import CameraQuality, Comparison, Quality
 
@@ -34,6 +35,7 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
         calibration=Source.model_validate_json(inputs["calibration"]),
         cameras=[_camera(camera, inputs, removed.get(str(camera), {})) for camera in ids],
         warnings=json.loads(cleaned["warnings"].tobytes()),
+        glass=GlassPlane.model_validate_json(cleaned["glass"].tobytes()),
         fusion=FusionReport.model_validate_json(fused["report"].tobytes()),
         cloud_points=len(fused["cloud"]),
         mesh=mesh_quality(surface["vertices"], surface["faces"], surface.get("filled"), cut_mm),
