@@ -23,7 +23,8 @@ from schemas.world import World
 
 FIRST, COUNT = 1, 20
 HEIGHT_MM, TILT_DEG = 2.0, 0.5
-"""Largest height and tilt of a plate that was taken out and put back: `docs/worlds.md`, and somewhat more."""
+"""Largest height and tilt of a plate that was taken out and put back: those of drawn worlds (`docs/worlds.md`), and a
+height of 0.5 mm more."""
 SHOWN = ("foot_length", "ball_girth", "instep_height", "arch_height", "arch_index")
 
 

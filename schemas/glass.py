@@ -33,6 +33,7 @@ class GlassPlane(Document):
     height_mm: float = 0.0
     """Z of the glass at X = Y = 0."""
     height_sd_mm: Deviation | None = None
+    """Null also where a tilt is not supported: the place is outside the contact."""
     tilt_x_deg: float = 0.0
     """Tilt about X: the glass rises with Y."""
     tilt_x_sd_deg: Deviation | None = None

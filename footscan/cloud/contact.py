@@ -178,8 +178,9 @@ def moved_warning(glass: GlassPlane, limit_mm: float) -> Iterator[str]:
     if not glass.corrected or glass.largest_mm <= limit_mm:
         return
     where = f"{abs(glass.below_foot_mm):.2f} mm {'above' if glass.below_foot_mm > 0 else 'below'} the calibrated glass"
-    tilts = [f"{tilt:.2f} degrees about {axis}" for axis, tilt in (("X", glass.tilt_x_deg), ("Y", glass.tilt_y_deg))]
-    is_tilted = glass.largest_mm - abs(glass.below_foot_mm) > limit_mm / 2.0
+    known = (("X", glass.tilt_x_deg, glass.tilt_x_sd_deg), ("Y", glass.tilt_y_deg, glass.tilt_y_sd_deg))
+    tilts = [f"{tilt:.2f} degrees about {axis}" for axis, tilt, sd in known if sd is not None]
+    is_tilted = bool(tilts) and glass.largest_mm - abs(glass.below_foot_mm) > limit_mm / 2.0
     tilted = f", tilted by {' and '.join(tilts)}" if is_tilted else ""
     yield f"The sole stands {where}{tilted}: the plate was moved since the calibration; calibrate anew"
 
@@ -338,7 +339,7 @@ def _document(mean: _Mean, ends: Floats, fitted: NDArray[np.bool_]) -> GlassPlan
     corners = [height + (np.array([x, y]) - mean.centre) @ [along, across] for x in ends[:, 0] for y in ends[:, 1]]
     return GlassPlane(
         height_mm=float(height - mean.centre @ [along, across]),
-        height_sd_mm=float(np.linalg.norm(deviations * [1.0, *mean.centre])),
+        height_sd_mm=float(np.linalg.norm(deviations * [1.0, *mean.centre])) if fitted.all() else None,
         tilt_x_deg=math.degrees(math.atan(across)),
         tilt_x_sd_deg=math.degrees(deviations[2]) if fitted[2] else None,
         tilt_y_deg=math.degrees(math.atan(-along)) + 0.0,

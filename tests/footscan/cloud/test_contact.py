@@ -111,7 +111,7 @@ def test_a_heel_alone_says_nothing_of_the_tilt_along_the_foot() -> None:
     glass = estimate_glass(points, VIEWS)
     assert glass.corrected
     assert "tilt_y" not in glass.supported
-    assert (glass.tilt_y_deg, glass.tilt_y_sd_deg) == (0.0, None)
+    assert (glass.tilt_y_deg, glass.tilt_y_sd_deg, glass.height_sd_mm) == (0.0, None, None)
     assert glass.below_foot_mm == pytest.approx(0.8, abs=0.05)
 
 
@@ -152,12 +152,14 @@ def test_ghosts_strays_and_marks_do_not_move_it() -> None:
 def test_warnings() -> None:
     assert list(moved_warning(GlassPlane(below_foot_mm=0.3, largest_mm=0.4, corrected=True), 0.5)) == []
     assert list(moved_warning(GlassPlane(below_foot_mm=9.0, largest_mm=9.0), 0.5)) == []
-    tilted = GlassPlane(below_foot_mm=-0.2, tilt_x_deg=0.4, tilt_y_deg=-0.1, largest_mm=0.9, corrected=True)
+    tilted = GlassPlane(below_foot_mm=-0.2, tilt_x_deg=0.4, tilt_x_sd_deg=0.02, largest_mm=0.9, corrected=True)
     (warning,) = moved_warning(tilted, 0.5)
     assert warning == (
-        "The sole stands 0.20 mm below the calibrated glass, tilted by 0.40 degrees about X and -0.10 degrees about Y: "
+        "The sole stands 0.20 mm below the calibrated glass, tilted by 0.40 degrees about X: "
         "the plate was moved since the calibration; calibrate anew"
     )
+    about_both = tilted.model_copy(update={"tilt_y_deg": -0.1, "tilt_y_sd_deg": 0.02})
+    assert "0.40 degrees about X and -0.10 degrees about Y" in next(moved_warning(about_both, 0.5))
 
 
 def test_heights_above_a_tilted_glass() -> None:
