@@ -238,7 +238,7 @@ def _contact(points: NDArray[np.void], guess: Floats, fitted: NDArray[np.bool_])
         residual = np.array([*-terms, 1.0])
         spread = float(residual @ sums @ residual) / max(float(sums[0, 0]), TINY)
         sigma = math.sqrt(min(max(spread, SIGMA_MM[0] ** 2), SIGMA_MM[1] ** 2))
-    if shares[0] < PROMINENT * shares[1] * 4.0 * sigma / BAND_MM:
+    if shares[0] <= PROMINENT * shares[1] * 4.0 * sigma / BAND_MM:
         return None
     pull = weights * (z - terms[0] - terms[1] * x - terms[2] * y)
     stripe = near["frame"] - near["frame"].min()

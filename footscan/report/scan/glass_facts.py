@@ -13,7 +13,7 @@ def glass_facts(glass: GlassPlane | None) -> str:
     if glass is None:
         return '<p class="note">Unknown: an earlier version made this quality.json.</p>'
     if not glass.supported:
-        return '<p class="note">No contact of the sole shows it: taken to be where it was calibrated.</p>'
+        return '<p class="note">Not known from the sole: taken to be where it was calibrated.</p>'
     terms = {
         "Height below the foot": (glass.below_foot_mm, glass.below_foot_sd_mm, "mm"),
         "Tilt about X": (glass.tilt_x_deg, glass.tilt_x_sd_deg, "°"),

@@ -185,7 +185,7 @@ def test_the_glass_stands_with_its_deviations(scan):
     assert facts["Tilt about Y"] == "not shown"
     assert (facts["Contact"], facts["Stripes on it"]) == ("52.3 cm²", "77")
     unknown = scan["quality"].model_copy(update={"glass": GlassPlane()})
-    assert "No contact of the sole shows it" in scan_page(**{**scan, "quality": unknown})
+    assert "Not known from the sole" in scan_page(**{**scan, "quality": unknown})
 
 
 def test_filled_parts_are_told_with_their_share(scan):
