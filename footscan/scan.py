@@ -17,7 +17,7 @@ from footscan.cloud.heads.find import find_heads
 from footscan.cloud.heads.planes import corrected
 from footscan.cloud.mapping import map_stripe, refuse_other_size
 from footscan.cloud.normals import estimate_normals
-from footscan.cloud.outliers.remove import remove_outliers
+from footscan.cloud.outliers.remove import Removed, remove_outliers
 from footscan.cloud.points import POINT_DTYPE
 from footscan.cloud.views import views_of
 from footscan.frames.film import open_background, open_film
@@ -36,6 +36,7 @@ from schemas.base.errors import Finding, RefusedInput
 from schemas.base.json_files import read_text
 from schemas.calibration import Calibration, calibration_from_json
 from schemas.calibration_check import ScanCheck
+from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.measures import Measures
 from schemas.parameters.scan import ScanParameters
@@ -93,6 +94,18 @@ class OpenScan:
     @cached_property
     def cloud(self) -> NDArray[np.void]:
         """(N,) points of all cameras, cleaned and fused, as `points`; Finding where none is left."""
+        kept, _ = self._cleaned
+        if not len(kept):
+            raise Finding("every point is an outlier, expected a foot in the control volume")
+        return fuse(kept, self.parameters.fusion).cloud
+
+    @property
+    def glass(self) -> GlassPlane:
+        """The glass during the scan, from the skin on it; Finding where there are no points."""
+        return self._cleaned[1].glass
+
+    @cached_property
+    def _cleaned(self) -> tuple[NDArray[np.void], Removed]:
         together = np.concatenate(list(self.points.values()))
         if not len(together):
             raise Finding("no stripe in any camera, expected a foot in the films")
@@ -100,10 +113,7 @@ class OpenScan:
         for camera, lost in self._lost.items():
             filmed[camera][lost] = np.nan
         together, views = corrected(together, views_of(self._used.cameras), self.heads)
-        kept, _ = remove_outliers(together, views, self.parameters.outliers, filmed)
-        if not len(kept):
-            raise Finding("every point is an outlier, expected a foot in the control volume")
-        return fuse(kept, self.parameters.fusion).cloud
+        return remove_outliers(together, views, self.parameters.outliers, filmed)
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:
@@ -122,7 +132,7 @@ class OpenScan:
         """The measures of the foot; Finding where the surface is no foot."""
         checked = None if self.calibration_check is None else self.calibration_check.doubt
         doubts = [*filter(None, [checked, self.heads.doubt])]
-        return measure_scanned_foot(self.mesh, self.recorded.document.side, doubts)
+        return measure_scanned_foot(self.mesh, self.recorded.document.side, self.glass, doubts)
 
     @cached_property
     def _used(self) -> Calibration:

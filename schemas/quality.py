@@ -8,6 +8,7 @@ from schemas.base.model import Document
 from schemas.calibration import Source
 from schemas.calibration_check import ScanCheck
 from schemas.fusion import FusionReport
+from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.laser import Laser
 
@@ -128,6 +129,8 @@ class Quality(Document):
     """Sentences on cameras much of whose points are not the foot."""
     heads: HeadsReport = Field(default_factory=HeadsReport)
     """Places of the heads along the travel, from the skin that cameras of two heads saw."""
+    glass: GlassPlane | None = None
+    """The glass during the scan, from the skin on it; null in files of earlier versions."""
     fusion: FusionReport = Field(default_factory=FusionReport)
     """Disagreement of the cameras about the same skin, and their corrections."""
     cloud_points: Count

@@ -9,6 +9,7 @@ from scipy.spatial import KDTree
 from footscan.measure.measures import measure_foot
 from footscan.mesh.mesh import Mesh
 from schemas.base.model import Side
+from schemas.glass import GlassPlane
 from schemas.measures import Measures
 
 ERROR_MM, ERROR_GROWS, REACH_MM = 0.03, 0.04, 10.0
@@ -19,12 +20,13 @@ RELIABLE_MM = 5.0
 hand."""
 
 
-def measure_scanned_foot(mesh: Mesh, side: Side, doubts: Sequence[str] = ()) -> Measures:
+def measure_scanned_foot(mesh: Mesh, side: Side, glass: GlassPlane, doubts: Sequence[str] = ()) -> Measures:
     """Measure a scanned surface; the uncertainties follow from the errors of the scanner.
 
     Parameters
     ----------
     mesh : mm, scanner frame; without `filled`, all vertices count as measured
+    glass : on which the foot stands
     doubts : as of `measure_foot`
 
     Raises
@@ -41,6 +43,7 @@ def measure_scanned_foot(mesh: Mesh, side: Side, doubts: Sequence[str] = ()) -> 
         errors_mm=ERROR_MM + ERROR_GROWS * gap_mm,
         reach_mm=REACH_MM,
         filled=gap_mm > RELIABLE_MM,
+        glass=glass,
         doubts=doubts,
     )
 

@@ -21,7 +21,8 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
     """Remove the outliers from the points of all cameras.
 
     `inputs`: `points-N` of each camera, the `calibration` of all, and `heads`, where they were. The result holds the
-    kept `points`, the `codes` of all points, the counts of `removed` points by camera and reason, and `warnings`.
+    kept `points`, the `codes` of all points, the counts of `removed` points by camera and reason, `warnings`, and the
+    `glass` below the foot.
 
     Raises
     ------
@@ -41,7 +42,13 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
     if not len(kept):
         raise Finding("every point is an outlier, expected a foot in the control volume")
     counts = {str(camera): reasons for camera, reasons in removed.counts.items()}
-    return pack(points=kept, codes=removed.codes, removed=_json(counts), warnings=_json(removed.warnings))
+    return pack(
+        points=kept,
+        codes=removed.codes,
+        removed=_json(counts),
+        warnings=_json(removed.warnings),
+        glass=_json(removed.glass.model_dump(mode="json")),
+    )
 
 
 def _json(content: object) -> NDArray[np.uint8]:

@@ -14,6 +14,7 @@ from schemas.calibration import Source
 from schemas.calibration_check import ScanCheck
 from schemas.frames import FrameManifest
 from schemas.fusion import FusionReport
+from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.laser import Laser
 from schemas.quality import CameraQuality, Comparison, Quality
@@ -38,6 +39,7 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
         cameras=[_camera(camera, inputs, removed.get(str(camera), {})) for camera in ids],
         warnings=json.loads(cleaned["warnings"].tobytes()),
         heads=HeadsReport.model_validate_json(inputs["heads"]),
+        glass=GlassPlane.model_validate_json(cleaned["glass"].tobytes()),
         fusion=FusionReport.model_validate_json(fused["report"].tobytes()),
         cloud_points=len(fused["cloud"]),
         mesh=mesh_quality(surface["vertices"], surface["faces"], surface.get("filled"), cut_mm),

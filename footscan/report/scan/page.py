@@ -16,6 +16,7 @@ from footscan.report.sample_frames import FRAMES_SCRIPT, FrameSample, sample_fra
 from footscan.report.scan.coverage import coverage_plot
 from footscan.report.scan.foot_colours import FootSurface, foot_colourings
 from footscan.report.scan.fusion_tables import corrections_table, disagreement_table, heads_table, warnings_list
+from footscan.report.scan.glass_facts import glass_facts
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
 from footscan.report.scan.mesh_facts import mesh_facts
 from footscan.report.scan.missing import missing_list
@@ -106,6 +107,7 @@ def scan_page(
         section("Cameras", _cameras_table(quality, cloud)),
         section("Removed points", _REMOVED_NOTE, *removed),
         section("Agreement of the cameras", _AGREEMENT_NOTE, heads_table(quality.heads), *_agreement(quality.fusion)),
+        section("Glass", glass_facts(quality.glass)),
         section("Stripe coverage", _COVERAGE_NOTE, coverage_plot(cloud, quality.cameras)),
         section("Calibration", _calibration(calibration, quality)),
         section("Provenance", table(["", ""], ([text(name), text(value)] for name, value in provenance.items()))),
@@ -240,7 +242,7 @@ _GRID_NOTE = '<p class="note">The grid is 10 mm wide; its figures are mm from th
 _REMOVED_NOTE = (
     '<p class="note">Before the fusion; each point counts once, and a reason without a column removed nothing. The '
     "pictures show a camera’s points from the side, X to the right, and along the travel, Y to the left; the line is "
-    "the glass.</p>"
+    "the calibrated glass.</p>"
 )
 _AGREEMENT_NOTE = (
     '<p class="note">Distances along the normal between what two cameras see of the same skin, before and after they '

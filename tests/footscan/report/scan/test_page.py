@@ -15,6 +15,7 @@ from footscan.report.surface_views import upright
 from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
 from schemas.calibration_check import ScanCheck
 from schemas.fusion import CameraCorrection, Disagreement, FusionReport, PairDisagreement
+from schemas.glass import GlassPlane
 from schemas.measures import Measure, Measures
 from schemas.quality import CameraQuality, Comparison, MeshQuality, Quality
 
@@ -102,6 +103,17 @@ def scan():
                 contradicted={2: 5},
                 warnings=[f"camera 2 {HOSTILE}"],
             ),
+            glass=GlassPlane(
+                below_foot_mm=-1.234,
+                below_foot_sd_mm=0.0123,
+                tilt_x_deg=0.25,
+                tilt_x_sd_deg=0.031,
+                supported=["height", "tilt_x"],
+                cameras=[5, 6],
+                contact_mm2=5230.0,
+                stripes=77,
+                corrected=True,
+            ),
             cloud_points=4,
             mesh=MeshQuality(
                 vertices=4,
@@ -165,6 +177,17 @@ def test_cameras_are_compared_before_and_after_they_were_moved(scan):
     assert "camera 2 &lt;script&gt;" in page
     alone = scan["quality"].model_copy(update={"fusion": FusionReport()})
     assert "No two cameras see the same skin" in scan_page(**scan | {"quality": alone})
+
+
+def test_the_glass_stands_with_its_deviations(scan):
+    page = scan_page(**scan)
+    facts = dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", page))
+    assert facts["Height below the foot"].endswith("1.23 ± 0.012 mm")
+    assert facts["Tilt about X"] == "0.25 ± 0.031 °"
+    assert facts["Tilt about Y"] == "not shown"
+    assert (facts["Contact"], facts["Stripes on it"]) == ("52.3 cm²", "77")
+    unknown = scan["quality"].model_copy(update={"glass": GlassPlane()})
+    assert "Not known from the sole" in scan_page(**{**scan, "quality": unknown})
 
 
 def test_filled_parts_are_told_with_their_share(scan):
