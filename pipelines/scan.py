@@ -195,10 +195,10 @@ def reconstruction_steps(
     fused = add("fuse", parameters.fusion, {"clean": cleaned})
     oriented = add("orient", parameters.normals, {"fused": fused, "calibration": maps})
     surface = add("surface", parameters.surface, {"oriented": oriented})
-    doubt = (
-        {} if calibration_doubt is None else {"calibration-doubt": Value(canonical_json(calibration_doubt).encode())}
-    )
-    measures = add("measure", FootParameters(side=side), {"surface": surface, **doubt})
+    measure_inputs: dict[str, Input] = {"surface": surface}
+    if calibration_doubt is not None:
+        measure_inputs["calibration-doubt"] = Value(canonical_json(calibration_doubt).encode())
+    measures = add("measure", FootParameters(side=side), measure_inputs)
     return Reconstruction(cleaned, fused, oriented, surface, measures)
 
 
