@@ -68,8 +68,8 @@ def check_of_scan(scan: RecordedScan, calibration_sha256: str, checks: Sequence[
 def for_cameras(check: CalibrationCheck, cameras: Collection[int], day: datetime.date | None) -> ScanCheck:
     """What a check says of some cameras, seen from a day (None: unknown).
 
-    A camera that the check does not name could not be judged either. Figures are rounded to 0.01 mm: of a check that is
-    repeated, nothing but another verdict changes what rests on it.
+    A camera that the check does not name could not be judged either. Figures are rounded to 0.01 mm, which is what a
+    sentence shows, so that the further digits of a repeated check change nothing.
     """
     judged = [camera for camera in check.cameras if camera.camera in cameras]
     verdicts = {camera.camera: camera.verdict for camera in judged}

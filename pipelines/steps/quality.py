@@ -68,7 +68,8 @@ def _laser(extracted: Mapping[str, NDArray[Any]]) -> Laser | None:
 
 
 def _check(inputs: Mapping[str, bytes]) -> ScanCheck | None:
-    return ScanCheck.model_validate_json(check) if (check := inputs.get("calibration-check")) is not None else None
+    check = inputs.get("calibration-check")
+    return None if check is None else ScanCheck.model_validate_json(check)
 
 
 def _truth(inputs: Mapping[str, bytes]) -> Comparison | None:
