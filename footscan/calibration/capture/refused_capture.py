@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.capture.edge_points import from_object
-from footscan.calibration.capture.from_capture import SEEN, CameraView, Recognised, fit_view, nominal_poses
-from footscan.calibration.capture.placement import CameraFit, departure
+from footscan.calibration.capture.from_capture import CameraView, Recognised, nominal_poses
+from footscan.calibration.capture.judged_placement import LEAST_SHARE, judge_placement
+from footscan.calibration.capture.placement import CameraFit
 from footscan.calibration.capture.reference import Edges
-from footscan.calibration.models.fit import UndeterminedError
 from footscan.calibration.models.maps import to_pixels
 from footscan.calibration.models.region import region_of
 from schemas.base.errors import RefusedInput
@@ -20,19 +20,8 @@ Floats = NDArray[np.float64]
 
 FEWEST_POINTS = 40
 """Points of the stripe, of all cameras together, that a placement needs. Chosen by hand."""
-LEAST_SHARE = 0.5
-"""Share of the stripe on the object's edges from which its departure is known. Chosen by hand."""
-SURE_MM = 0.25
-"""Standard deviation of a map, fitted without a placement, up to which its camera judges the placement. Chosen by
-hand."""
-SIGMAS = 3.0
-"""Standard deviations of the best map that are added to the tolerance of a departure."""
-LEVER_MM = 50.0
-"""Distance of the object's corners from its origin, about: a rotation moves them by this times its angle."""
 OUTLINE_STEP_MM = 1.0
 """Distance of the points of a drawn outline."""
-MOSTLY = 0.5
-"""Share of the placements in which a camera must recognise the object to be trusted."""
 
 
 @dataclass(frozen=True)
@@ -83,16 +72,11 @@ def check_placements(
             raise RefusedCapture(source, problem, field=f"frame {number}", evidence=shown)
     worst: tuple[float, RefusedCapture] | None = None
     for number in range(len(poses)) if len(poses) > 1 else ():
-        maps = _maps_without(number, recognised, edges, poses)
-        all_sigmas = {camera: map_.fit.region_sigma(views[camera].stripes[number]) for camera, map_ in maps.items()}
-        sigmas = {camera: sigma for camera, sigma in all_sigmas.items() if sigma is not None and sigma <= SURE_MM}
-        maps = {camera: maps[camera] for camera in sigmas}
-        if not maps:
+        judged = judge_placement(number, views, recognised, edges, poses)
+        if judged is None:
             continue
-        worlds = [map_.world(views[camera].stripes[number]) for camera, map_ in maps.items()]
-        change = departure(worlds, edges, poses[number])
-        allowed = tolerance_mm + SIGMAS * min(sigmas.values())
-        size = max(float(np.hypot(*change.pose[:2])), float(abs(change.pose[2])) * LEVER_MM)
+        maps, change, size = judged.maps, judged.change, judged.change.size_mm
+        allowed = tolerance_mm + judged.margin_mm
         nominal, actual = poses[number], poses[number] + change.pose
         if change.share >= LEAST_SHARE:
             problem = (
@@ -173,20 +157,6 @@ def _cameras(numbers: Iterable[int]) -> str:
 
 _NOTHING = (np.empty((0, 2)), np.empty((0, 2)))
 """No outlines."""
-
-
-def _maps_without(
-    number: int, recognised: Mapping[int, Recognised], edges: Edges, poses: Floats
-) -> dict[int, CameraFit]:
-    """The maps of all trusted cameras, fitted without one of the placements."""
-    trusted = {c: result for c, result in recognised.items() if np.nanmean(result.first.explained >= SEEN) > MOSTLY}
-    maps = {}
-    for camera, result in (trusted or recognised).items():
-        try:
-            maps[camera] = fit_view(result.view, result.first, edges, poses, without=number)
-        except UndeterminedError:
-            continue
-    return maps
 
 
 def _outline(map_: CameraFit, view: CameraView, edges: Edges, pose: Floats) -> Floats:
