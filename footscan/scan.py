@@ -3,6 +3,7 @@
 Every property is computed when it is first asked for, by the functions that the steps of a run call, and is kept.
 """
 
+import hashlib
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -22,13 +23,16 @@ from footscan.frames.reader import FrameReader, backgrounds_of, noting_lost, pix
 from footscan.frames.travel import read_positions, travelled
 from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
+from footscan.recordings.calibration_checks import check_of_scan, checks_of
 from footscan.recordings.scans import RecordedScan, read_scan
 from footscan.stripe.film import extract_film
 from footscan.stripe.laser import adapted
 from footscan.stripe.points import StripePoints
 from footscan.surface.surface_of_cloud import surface_of_cloud
 from schemas.base.errors import Finding, RefusedInput
-from schemas.calibration import Calibration, read_calibration
+from schemas.base.json_files import read_text
+from schemas.calibration import Calibration, calibration_from_json
+from schemas.calibration_check import ScanCheck
 from schemas.measures import Measures
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm, Travel
@@ -37,10 +41,18 @@ from schemas.scan import CameraFilm, Travel
 class OpenScan:
     """A recorded scan; see `open_scan`."""
 
-    def __init__(self, recorded: RecordedScan, calibration: Calibration, parameters: ScanParameters) -> None:
+    def __init__(
+        self,
+        recorded: RecordedScan,
+        calibration: Calibration,
+        parameters: ScanParameters,
+        calibration_check: ScanCheck | None = None,
+    ) -> None:
         self.recorded = recorded
         """The folder and the content of scan.yaml."""
         self.calibration = calibration
+        self.calibration_check = calibration_check
+        """What the last check of the calibration before the scan says; None if it was not checked."""
         self.parameters = parameters
         self._films = {camera.id: camera for camera in recorded.document.cameras}
         self._lost: dict[int, list[int]] = {}
@@ -97,7 +109,8 @@ class OpenScan:
     @cached_property
     def measures(self) -> Measures:
         """The measures of the foot; Finding where the surface is no foot."""
-        return measure_scanned_foot(self.mesh, self.recorded.document.side)
+        doubt = None if self.calibration_check is None else self.calibration_check.doubt
+        return measure_scanned_foot(self.mesh, self.recorded.document.side, doubt)
 
     @cached_property
     def _used(self) -> Calibration:
@@ -162,4 +175,7 @@ def open_scan(
         raise RefusedInput(
             recorded.file, "names no calibration, expected one here or as an argument", field="calibration"
         )
-    return OpenScan(recorded, read_calibration(path), parameters or ScanParameters())
+    text = read_text(path, "json_bytes")
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    check = check_of_scan(recorded, digest, checks_of(path, digest))
+    return OpenScan(recorded, calibration_from_json(text, path), parameters or ScanParameters(), check)

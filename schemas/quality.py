@@ -6,6 +6,7 @@ from pydantic import Field
 
 from schemas.base.model import Document
 from schemas.calibration import Source
+from schemas.calibration_check import ScanCheck
 from schemas.fusion import FusionReport
 from schemas.laser import Laser
 
@@ -119,6 +120,8 @@ class Quality(Document):
     format: Literal["footscan.quality/1"] = "footscan.quality/1"
     calibration: Source
     """The calibration file that mapped the pixels."""
+    calibration_check: ScanCheck | None = None
+    """Whether it still held when it was last checked before the scan; null if it was not checked."""
     cameras: list[CameraQuality]
     warnings: list[str] = Field(default_factory=list)
     """Sentences on cameras much of whose points are not the foot."""

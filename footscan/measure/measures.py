@@ -189,6 +189,7 @@ def measure_foot(
     reach_mm: float = 0.0,
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
+    calibration_doubt: str | None = None,
 ) -> Measures:
     """Measure a foot in any pose. A left foot is mirrored and measured as a right one.
 
@@ -203,6 +204,7 @@ def measure_foot(
     reach_mm : vertices in the same cube of this edge share their error, as on a smoothed surface; 0: independent errors
     filled : (V,) true for vertices that were filled, not measured
     calibration : name of a measure to (a, b): the reported value is a + b times the measured one
+    calibration_doubt : reason not to rely on the calibration of the scanner: all measures are uncertain
 
     Raises
     ------
@@ -221,6 +223,7 @@ def measure_foot(
         side=foot.side,
         side_note=foot.side_note,
         things=things,
+        calibration_doubt=calibration_doubt,
         axis=foot.axis,
         transform=foot.transform.tolist(),
         measures=take_measures(
@@ -230,7 +233,7 @@ def measure_foot(
             reach_mm=reach_mm,
             filled=filled,
             calibration=calibration,
-            doubt="; ".join(things) or None,
+            doubt="; ".join(filter(None, (calibration_doubt, *things))) or None,
         ),
         landmarks=_in_mesh(landmarks, foot.transform),
     )

@@ -17,12 +17,13 @@ RELIABLE_MM = 5.0
 hand."""
 
 
-def measure_scanned_foot(mesh: Mesh, side: Side) -> Measures:
+def measure_scanned_foot(mesh: Mesh, side: Side, calibration_doubt: str | None = None) -> Measures:
     """Measure a scanned surface; the uncertainties follow from the errors of the scanner.
 
     Parameters
     ----------
     mesh : mm, scanner frame; without `filled`, all vertices count as measured
+    calibration_doubt : as in `measure_foot`
 
     Raises
     ------
@@ -38,6 +39,7 @@ def measure_scanned_foot(mesh: Mesh, side: Side) -> Measures:
         errors_mm=ERROR_MM + ERROR_GROWS * gap_mm,
         reach_mm=REACH_MM,
         filled=gap_mm > RELIABLE_MM,
+        calibration_doubt=calibration_doubt,
     )
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from footscan.capture.cameras.stream import StreamHealth
 from footscan.capture.cameras.usb_bus import Pass
+from pipelines.calibration_check import scanner_check
 from pipelines.console.scanner import Device, Health, Level, Scanned, Side
 from pipelines.live.devices import passes_of
 from pipelines.live.light import ScanLight
@@ -71,6 +72,7 @@ class LiveAdapter:
             *self._board(),
             *(self._camera(camera.id, streams.get(camera.id)) for camera in self._scanner.rig.cameras),
             *self._plan(),
+            self._checked(),
             self._space(),
         ]
         frames = {camera: stream.received - self._before_pass.get(camera, 0) for camera, stream in streams.items()}
@@ -174,6 +176,18 @@ class LiveAdapter:
             yield Device("Passes", "bad", self._plan_problem)
         for number, planned in enumerate(self._passes, start=1):
             yield Device("Passes" if len(self._passes) == 1 else f"Pass {number}", "ok", planned.reason)
+
+    def _checked(self) -> Device:
+        """The last check of the calibration: a camera that moved since makes all measures uncertain."""
+        rig = self._scanner.rig
+        file = self._calibration or (None if rig.calibration is None else Path(rig.calibration))
+        try:
+            check = scanner_check(file, [camera.id for camera in rig.cameras])
+        except FootscanError as error:
+            return Device("Calibration", "bad", str(error))
+        if check is None:
+            return Device("Calibration", "unknown", "was not checked")
+        return Device("Calibration", "bad" if check.doubt else "ok", check.summary("ago"), check.doubt or "")
 
     def _space(self) -> Device:
         existing = next(folder for folder in (self._archive, *self._archive.absolute().parents) if folder.exists())

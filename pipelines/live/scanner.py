@@ -15,6 +15,7 @@ from footscan.capture.cameras.deck import CameraDeck
 from footscan.capture.cameras.stream import CapturedFrame
 from footscan.capture.cameras.usb_bus import Pass
 from footscan.capture.passes import FilmedPass, PassPlan, film_name, film_pass
+from pipelines.calibration_check import check_in_force
 from pipelines.live.devices import heads_of, passes_of, sources_of, timing_of
 from pipelines.live.light import ScanLight, fix_light, measured_light
 from pipelines.live.observer import looking_on
@@ -22,6 +23,7 @@ from pipelines.live.recording_document import ScanStory
 from pipelines.live.scan_order import LiveResult, ScanOrder
 from pipelines.live.state import Activity, OnState, ScannerState, StateBoard, with_board
 from schemas.base.errors import Fault, FootscanError, RefusedInput
+from schemas.calibration_check import CalibrationCheck
 from schemas.rig import Rig
 
 if TYPE_CHECKING:  # heads that are only moved do not wait for Zarr, Dask and the reconstruction
@@ -152,7 +154,8 @@ class LiveScanner:
         Raises
         ------
         RefusedInput
-            The rig lacks data that a scan needs, the scan exists already, or the scanner is busy.
+            The rig lacks data that a scan needs, the scan exists already, the check of the calibration is damaged, or
+            the scanner is busy.
         Finding
             A film is incomplete, and the order does not say `keep_partial`. Nothing is stored.
         Fault
@@ -160,7 +163,7 @@ class LiveScanner:
         """
         with self._at_work("filming"):
             calibration = self._calibration(order)
-            stored = self.film(order)
+            stored = self.film(order, check_in_force(calibration))
             measured = None
             if order.results is not None and calibration is not None:
                 from pipelines.live.measuring import measure_scan
@@ -173,8 +176,10 @@ class LiveScanner:
                 self._board.tell("done", str(stored.place))
             return LiveResult(stored, measured)
 
-    def film(self, order: ScanOrder) -> "FilmedScan":
-        """Film and store a foot: the part of `scan` that needs the devices; the caller has reserved the scanner."""
+    def film(self, order: ScanOrder, check: CalibrationCheck | None = None) -> "FilmedScan":
+        """Film and store a foot, with the last check of the calibration: the part of `scan` that needs the devices.
+
+        The caller has reserved the scanner."""
         from footscan.capture.recording import ScanRecording
         from pipelines.live.storing import store_scan
 
@@ -187,7 +192,8 @@ class LiveScanner:
             travel = self.rig.travel
             light = order.light or self._measured_light(passes)
             plan = PassPlan(travel.start_mm, travel.end_mm, travel.mm_per_s, light.power, order.texture)
-            story = ScanStory(datetime.datetime.now().astimezone(), light, passes, plan)
+            started = datetime.datetime.now().astimezone()
+            story = ScanStory(started, light, passes, plan, calibration_check=check)
             place = order.archive / order.name.patient / order.name.scan
             with ScanRecording(place, self._expected_bytes(plan)) as recording:
                 for number, planned in enumerate(passes, start=1):

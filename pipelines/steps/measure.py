@@ -1,5 +1,6 @@
 """Mesh to measures.json."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -16,14 +17,23 @@ from schemas.parameters.foot import FootParameters
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
     """Measure the foot, as measures.json.
 
-    `inputs`: `surface`. A foot that cannot be measured gives a document with the finding.
+    `inputs`: `surface`, and `calibration-doubt`, a sentence, if a check of the calibration gave reason for one. A foot
+    that cannot be measured gives a document with the finding.
     """
     del places
     surface = unpack(inputs["surface"])
+    doubt = json.loads(inputs["calibration-doubt"]) if "calibration-doubt" in inputs else None
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface["filled"])
     try:
-        measures = measure_scanned_foot(mesh, parameters.side)
+        measures = measure_scanned_foot(mesh, parameters.side, doubt)
     except Finding as finding:  # the other results are still of use
         unmoved = np.eye(4).tolist()
-        measures = Measures(side=parameters.side, axis=None, transform=unmoved, measures={}, finding=str(finding))
+        measures = Measures(
+            side=parameters.side,
+            calibration_doubt=doubt,
+            axis=None,
+            transform=unmoved,
+            measures={},
+            finding=str(finding),
+        )
     return (measures.model_dump_json(indent=2) + "\n").encode()

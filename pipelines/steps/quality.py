@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from footscan.surface.quality import mesh_quality
 from pipelines.arrays import unpack
 from schemas.calibration import Source
+from schemas.calibration_check import ScanCheck
 from schemas.frames import FrameManifest
 from schemas.fusion import FusionReport
 from schemas.laser import Laser
@@ -21,7 +22,7 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     """Collect the quality figures of a scan, as quality.json.
 
     `inputs`: `calibration` (its name and digest), `clean`, `fused`, `surface`, `manifest-N` and `stripe-N` of each
-    camera, and `verified` if the scan has a truth.
+    camera, `calibration-check` if the calibration was checked, and `verified` if the scan has a truth.
     """
     del parameters, places
     cleaned = unpack(inputs["clean"])
@@ -32,6 +33,7 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
     quality = Quality(
         calibration=Source.model_validate_json(inputs["calibration"]),
+        calibration_check=_check(inputs),
         cameras=[_camera(camera, inputs, removed.get(str(camera), {})) for camera in ids],
         warnings=json.loads(cleaned["warnings"].tobytes()),
         fusion=FusionReport.model_validate_json(fused["report"].tobytes()),
@@ -59,6 +61,10 @@ def _camera(camera: int, inputs: Mapping[str, bytes], removed: dict[str, int]) -
 def _laser(extracted: Mapping[str, NDArray[Any]]) -> Laser | None:
     found = extracted["laser"].item() if "laser" in extracted else "auto"
     return None if found == "auto" else cast(Laser, found)
+
+
+def _check(inputs: Mapping[str, bytes]) -> ScanCheck | None:
+    return ScanCheck.model_validate_json(check) if (check := inputs.get("calibration-check")) is not None else None
 
 
 def _truth(inputs: Mapping[str, bytes]) -> Comparison | None:

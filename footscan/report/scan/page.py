@@ -23,7 +23,7 @@ from footscan.report.scan.removed import removed_pictures, removed_table
 from footscan.report.surface_views import surface_views, upright
 from footscan.report.viewer import Drawing, viewer
 from footscan.report.viewer_script import SCRIPT
-from schemas.calibration import Calibration, Source
+from schemas.calibration import Calibration
 from schemas.fusion import FusionReport
 from schemas.measures import Measure, Measures
 from schemas.quality import Comparison, Quality
@@ -107,7 +107,7 @@ def scan_page(
         section("Removed points", _REMOVED_NOTE, *removed),
         section("Agreement of the cameras", _AGREEMENT_NOTE, *_agreement(quality.fusion)),
         section("Stripe coverage", _COVERAGE_NOTE, coverage_plot(cloud, quality.cameras)),
-        section("Calibration", _calibration(calibration, quality.calibration)),
+        section("Calibration", _calibration(calibration, quality)),
         section("Provenance", table(["", ""], ([text(name), text(value)] for name, value in provenance.items()))),
     ]
     return page(
@@ -228,9 +228,11 @@ def _agreement(report: FusionReport) -> list[str]:
     return [disagreement_table(report), corrections_table(report), warnings_list(report)]
 
 
-def _calibration(calibration: Calibration, file: Source) -> str:
+def _calibration(calibration: Calibration, quality: Quality) -> str:
+    file, check = quality.calibration, quality.calibration_check
     created = f"{calibration.created:%Y-%m-%d %H:%M} UTC" if calibration.created else "unknown"
-    rows = [["File", text(file.name)], ["SHA-256", text(file.sha256)], ["Made", created]]
+    state = "calibration was not checked" if check is None else check.summary()
+    rows = [["File", text(file.name)], ["SHA-256", text(file.sha256)], ["Made", created], ["Check", text(state)]]
     return table(["", ""], rows) + calibration_panels(calibration)
 
 

@@ -128,6 +128,7 @@ def scan(
             texture,
             keep_partial,
         )
+        _warn_of_drift(calibration, used)
         with LiveScanner(used) as scanner:
             scanner.listen(StateTeller())
             if problems := scanner.connect():
@@ -189,6 +190,16 @@ def _light(rig: "Rig", power: float | None, exposure_ms: float | None, virtual: 
     if power is None or exposure_ms is None:
         raise RefusedInput("--power, --exposure-ms", "go together, expected both or none")
     return light_by_hand(rig, power, exposure_ms)
+
+
+def _warn_of_drift(calibration: Path | None, rig: "Rig") -> None:
+    """Print a warning if a camera had moved when the calibration was last checked."""
+    from pipelines.calibration_check import scanner_check
+
+    file = calibration or (None if rig.calibration is None else Path(rig.calibration))
+    check = scanner_check(file, [camera.id for camera in rig.cameras])
+    if check is not None and check.doubt is not None:
+        message(f"Warning: {check.doubt}; the measures of this scan will be uncertain")
 
 
 def _with_travel(rig: "Rig", speed: float | None, from_mm: float | None, to_mm: float | None) -> "Rig":
