@@ -1,6 +1,6 @@
 """Where the object stood in one placement, by maps that were fitted without it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,6 +57,16 @@ def judge_by(
         return None
     worlds = [map_.world(stripes[camera]) for camera, map_ in sure.items()]
     return JudgedPlacement(sure, departure(worlds, edges, pose), SIGMAS * min(sigmas.values()))
+
+
+def in_words(cameras: Iterable[int]) -> str:
+    """The cameras in words.
+
+    >>> in_words([3]), in_words([3, 1])
+    ('camera 3', 'cameras 1, 3')
+    """
+    listed = ", ".join(map(str, sorted(cameras)))
+    return f"cameras {listed}" if "," in listed else f"camera {listed}"
 
 
 def _maps_without(

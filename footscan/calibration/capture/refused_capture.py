@@ -1,6 +1,6 @@
 """Refusal of a capture, with evidence: the reference object was placed differently, or is not recognised."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from footscan.calibration.capture.edge_points import from_object
 from footscan.calibration.capture.from_capture import CameraView, Recognised, nominal_poses
-from footscan.calibration.capture.judged_placement import LEAST_SHARE, judge_placement
+from footscan.calibration.capture.judged_placement import LEAST_SHARE, in_words, judge_placement
 from footscan.calibration.capture.placement import CameraFit
 from footscan.calibration.capture.reference import Edges
 from footscan.calibration.models.maps import to_pixels
@@ -88,7 +88,7 @@ def check_placements(
             size = np.inf
             problem = (
                 "the reference object is not recognised in its placement or near it "
-                f"by {_cameras(maps)}, which recognise it in the other frames"
+                f"by {in_words(maps)}, which recognise it in the other frames"
             )
         if size > allowed and (worst is None or size > worst[0]):
             shown = [
@@ -117,7 +117,7 @@ def refuse_unrecognised(views: Mapping[int, CameraView], reasons: Mapping[int, s
     if not reasons:
         return
     camera = min(reasons)
-    others = f" (nor by {_cameras(sorted(reasons)[1:])})" if len(reasons) > 1 else ""
+    others = f" (nor by {in_words(sorted(reasons)[1:])})" if len(reasons) > 1 else ""
     shown = [Evidence(camera, number, stripe, *_NOTHING) for number, stripe in enumerate(views[camera].stripes)]
     problem = f"the reference object is not recognised: {reasons[camera]}{others}"
     raise RefusedCapture(source, problem, field=f"camera {camera}", evidence=shown)
@@ -143,16 +143,10 @@ def refuse_contradictions(recognised: Mapping[int, Recognised], source: str) -> 
             "profile_mm"
         )
     else:
-        others = f", and {_cameras([c for c in wrong if c != camera])} likewise" if len(wrong) > 1 else ""
+        others = f", and {in_words([c for c in wrong if c != camera])} likewise" if len(wrong) > 1 else ""
         cause = f"by its number or `stands`{others}: is this its film?"
     shown = [Evidence(number, 0, result.view.stripes[0], *_NOTHING) for number, result in wrong.items()]
     raise RefusedCapture(source, f"{first.contradiction}, {cause}", field=f"camera {camera}", evidence=shown)
-
-
-def _cameras(numbers: Iterable[int]) -> str:
-    """The cameras in words."""
-    listed = ", ".join(map(str, sorted(numbers)))
-    return f"cameras {listed}" if "," in listed else f"camera {listed}"
 
 
 _NOTHING = (np.empty((0, 2)), np.empty((0, 2)))

@@ -1,6 +1,6 @@
 """What is wrong with a placement, while the object still stands there and can be moved."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -16,7 +16,7 @@ from footscan.calibration.capture.from_capture import (
     nominal_poses,
     recognise_view,
 )
-from footscan.calibration.capture.judged_placement import LEAST_SHARE, judge_by
+from footscan.calibration.capture.judged_placement import LEAST_SHARE, in_words, judge_by
 from footscan.calibration.capture.lines import find_lines
 from footscan.calibration.capture.placement import CameraFit, departure
 from footscan.calibration.capture.recognition import EXPLAINED_MM
@@ -38,8 +38,8 @@ LONG_PX = 25.0
 """Length from which a straight piece shows whether the stripe moved. Chosen by hand."""
 NEAR_PX = 8.0
 """Distance from a straight piece within which its points are searched in a later frame. Chosen by hand."""
-FEWEST_POINTS = 15
-"""Points of a straight piece that are compared: their median is then known to a tenth of their spread or so."""
+REMAINING = 0.5
+"""Share of a straight piece's points that a piece has that is found again. Chosen by hand."""
 STILL_PX = 0.5
 """Largest way of the stripe between two frames of a scanner at rest, about 0.15 mm; noise makes 0.1 px. Chosen by
 hand."""
@@ -74,8 +74,8 @@ def complaints_of(
     dark = tuple(number for number, view in views.items() if len(view.stripes[-1]) < STRIPE)
     complaints = []
     if dark:
-        remedy = "is its laser on, is anything in front of it, does the object stand under the stripe?"
-        complaints.append(Complaint("no stripe", f"{named(dark)} not see the stripe: {remedy}", dark))
+        remedy = "is the laser on, is anything in the way, does the object stand under the stripe?"
+        complaints.append(Complaint("no stripe", f"no stripe in {in_words(dark)}: {remedy}", dark))
     lit = {number: view for number, view in views.items() if number not in dark}
     maps = _earlier_maps(lit, edges, placements)
     pose, stripes = nominal_poses(placements)[-1], {number: view.stripes[-1] for number, view in lit.items()}
@@ -100,14 +100,17 @@ def complaints_of(
     )
     if blind:
         whole = len(blind) == len(lit) > 1
-        who = "no camera recognises" if whole else f"{named(blind)} not recognise"
+        who = "any camera" if whole else in_words(blind)
         remedy = "is it this object, does it stand upright, does anything else stand on the glass?"
-        complaints.append(Complaint("not recognised", f"{who} the object: {remedy}", () if whole else blind))
+        words = f"the object is not recognised by {who}: {remedy}"
+        complaints.append(Complaint("not recognised", words, () if whole else blind))
     return complaints
 
 
 def moved_px(before: Floats, after: Floats) -> float:
     """Measure how far the stripe moved between two frames of one camera, px: the largest way of a straight piece.
+
+    A piece that is not found again within `NEAR_PX` has moved by that at least.
 
     Parameters
     ----------
@@ -126,7 +129,9 @@ def moved_px(before: Floats, after: Floats) -> float:
         near = after[np.abs(line.positions(after)) < line.length / 2.0]
         off = line.distances(near)
         off = off[np.abs(off) < NEAR_PX]
-        if len(off) >= FEWEST_POINTS:
+        if len(off) < REMAINING * len(line.points):
+            ways.append(NEAR_PX)
+        else:
             ways.append(abs(float(np.median(off) - np.median(line.distances(before[line.points])))))
     return max(ways)
 
@@ -152,16 +157,6 @@ def direction_of(pose: Floats) -> str:
         is_off.append(f"turned by {abs(np.degrees(turn)):.1f} degrees from +Y to {'+Z' if turn > 0 else '-Z'}")
         undo.append("turn it back")
     return f"the object stands {' and '.join(is_off)}: {' and '.join(undo)}"
-
-
-def named(cameras: Iterable[int]) -> str:
-    """The cameras with a verb.
-
-    >>> named([3]), named([1, 3])
-    ('camera 3 does', 'cameras 1, 3 do')
-    """
-    numbers = sorted(cameras)
-    return f"camera {numbers[0]} does" if len(numbers) == 1 else f"cameras {', '.join(map(str, numbers))} do"
 
 
 def _earlier_maps(views: Mapping[int, CameraView], edges: Edges, placements: Floats) -> dict[int, CameraFit]:

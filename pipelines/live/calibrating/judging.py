@@ -1,0 +1,129 @@
+"""The stripe in the frames of a session, and what is wrong with the placement that was filmed last."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.calibration.capture.from_capture import CameraView
+from footscan.calibration.capture.judged_placement import in_words
+from footscan.calibration.capture.reference import edges_of
+from footscan.calibration.capture.standing import STILL_PX, Complaint, complaints_of, moved_px
+from footscan.capture.light_choice import stripe_seen
+from footscan.frames.image import decode_image
+from footscan.report.calibration.coverage import coverage_picture, covered_share
+from footscan.stripe.extract import extract_stripe
+from footscan.stripe.laser import adapted_to
+from pipelines.live.calibrating.stills import Stills
+from schemas.calibration import Calibration
+from schemas.mounting import CaptureCamera, mounting_of
+from schemas.parameters.extraction import ExtractionParameters
+from schemas.reference import ReferenceObject
+
+Floats = NDArray[np.float64]
+
+SATURATED = 0.8
+"""Share of the stripe's width that is white from which its middle is unsure. Chosen by hand: at 0.6, as in the films of
+the virtual scanner, maps are known to 0.01 mm."""
+FAINT = 60.0
+"""Grey level of red in the stripe's middle below which much of it is lost in noise. Chosen by hand."""
+
+
+@dataclass
+class SeenPlacements:
+    """The stripes of all placements of a session, by number of the placement and of the camera."""
+
+    stripes: dict[int, dict[int, Floats]] = field(default_factory=dict)
+    """(N, 2) points, px."""
+    image_px: dict[int, tuple[int, int]] = field(default_factory=dict)
+    """Columns and rows of each camera."""
+
+    def add(self, number: int, frames: Mapping[int, bytes]) -> None:
+        """Find the stripe in the JPEG of each camera."""
+        self.stripes[number] = {}
+        for camera, jpeg in frames.items():
+            points, columns, rows = _stripe(jpeg)
+            self.stripes[number][camera] = points
+            self.image_px[camera] = columns, rows
+
+    def forget(self, number: int) -> None:
+        """Forget a placement."""
+        self.stripes.pop(number, None)
+
+    def coverage(self) -> dict[int, float]:
+        """The share of each camera's image between its stripes."""
+        return {camera: covered_share(self._of(camera), size) for camera, size in sorted(self.image_px.items())}
+
+    def picture(self, latest: int | None) -> str:
+        """Draw the stripes in each camera's image, as SVG; those of the placement `latest` stand out."""
+        new = {} if latest is None else self.stripes.get(latest, {})
+        old = {camera: self._of(camera, without=latest) for camera in self.image_px}
+        return coverage_picture(self.image_px, old, new)
+
+    def judge(
+        self,
+        number: int,
+        stills: Stills,
+        reference: ReferenceObject,
+        order: Sequence[int],
+        tolerance_mm: float,
+        calibration: Calibration | None,
+    ) -> list[Complaint]:
+        """Judge placement `number`, whose stripes were added, by those in `order` before it."""
+        if stills.problems:
+            why = "; ".join(stills.problems.values())
+            return [Complaint("no picture", f"{why}: check cables and hubs", tuple(stills.problems))]
+        numbers = [*(other for other in order if other != number and other in self.stripes), number]
+        views = {}
+        for camera, size in self.image_px.items():
+            mounting = mounting_of(CaptureCamera(id=camera, file="-"))
+            views[camera] = CameraView(camera, size, [self.stripes[n][camera] for n in numbers], mounting)
+        placements = np.array([reference.placements_mm[n] for n in numbers], np.float64)
+        edges = edges_of(reference.profile_mm)
+        complaints = complaints_of(views, edges, placements, tolerance_mm, calibration)
+        return [*complaints, *self._moved(number, stills), *_badly_lit(stills)]
+
+    def _moved(self, number: int, stills: Stills) -> list[Complaint]:
+        ways = {
+            camera: moved_px(self.stripes[number][camera], _stripe(later)[0])
+            for camera, (_, later) in stills.frames.items()
+        }
+        moved = tuple(camera for camera, way in ways.items() if way > STILL_PX)
+        if not moved:
+            return []
+        words = f"the stripe moved by {max(ways.values()):.1f} px within a second: keep object and heads still"
+        return [Complaint("moved", words, moved)]
+
+    def _of(self, camera: int, without: int | None = None) -> Floats:
+        """All points (N, 2) of a camera."""
+        stripes = [seen[camera] for number, seen in self.stripes.items() if camera in seen and number != without]
+        return np.concatenate([np.empty((0, 2)), *stripes])
+
+
+def _stripe(jpeg: bytes) -> tuple[Floats, int, int]:
+    """The stripe (N, 2), px, and the columns and rows of the image."""
+    image = decode_image(jpeg)
+    points: Any = extract_stripe(image, adapted_to([image], ExtractionParameters()))
+    return np.column_stack([points["i"], points["j"]]), image.shape[1], image.shape[0]
+
+
+def _badly_lit(stills: Stills) -> list[Complaint]:
+    """Cameras that see the stripe much too bright, or too dark."""
+    bright, dark = [], []
+    for camera, (jpeg, _) in stills.frames.items():
+        image = decode_image(jpeg)
+        seen = stripe_seen([image], adapted_to([image], ExtractionParameters()))
+        if seen.points and seen.saturation > SATURATED:
+            bright.append(camera)
+        if seen.points and seen.peak < FAINT:
+            dark.append(camera)
+    complaints = []
+    if bright:
+        words = f"the stripe is a white band in {in_words(bright)}: there is too much light"
+        complaints.append(Complaint("saturated", words, tuple(bright)))
+    if dark:
+        words = f"the stripe is faint in {in_words(dark)}: there is too little light of the laser, or dirt"
+        complaints.append(Complaint("faint", words, tuple(dark)))
+    return complaints
