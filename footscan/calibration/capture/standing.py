@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,8 @@ NEAR_PX = 8.0
 """Distance from a straight piece within which its points are searched in a later frame. Chosen by hand."""
 REMAINING = 0.5
 """Share of a straight piece's points that a piece has that is found again. Chosen by hand."""
+CHANGED = 0.2
+"""Share of the length of all pieces from which those that are not found again count. Chosen by hand."""
 STILL_PX = 0.5
 """Largest way of the stripe between two frames of a scanner at rest, about 0.15 mm; noise makes 0.1 px. Chosen by
 hand."""
@@ -56,13 +58,22 @@ class Complaint:
     """The cameras that show it; none: all of them together."""
 
 
-def complaints_of(
+class Judgement(NamedTuple):
+    """What was found in the frames of a placement."""
+
+    complaints: list[Complaint]
+    on_object: dict[int, NDArray[np.bool_]]
+    """(N,) which points of each camera's stripe lie on the object, and not on a reflection of it; a camera that does
+    not recognise the object is left out."""
+
+
+def judge_standing(
     views: Mapping[int, CameraView],
     edges: Edges,
     placements: Floats,
     tolerance_mm: float,
     calibration: Calibration | None = None,
-) -> list[Complaint]:
+) -> Judgement:
     """Judge the last of the `placements` (K, 2), mm, by the views of all placements up to it.
 
     The place of the object is judged by maps that the earlier placements give. The first placement is judged by an
@@ -87,30 +98,47 @@ def complaints_of(
         change, allowed_mm = departure(worlds, edges, pose), max(tolerance_mm, EARLIER_TOLERANCE_MM)
         judge = ", by the scanner's present calibration"
     if change is not None and change.share >= LEAST_SHARE and change.size_mm > allowed_mm:
-        return [*complaints, Complaint("elsewhere", f"{direction_of(change.pose)}{judge}")]
+        return Judgement([*complaints, Complaint("elsewhere", f"{direction_of(change.pose)}{judge}")], {})
     sure = {} if judged is None else judged.maps
-    blind = tuple(
-        number
+    worlds_by_camera = {
+        number: sure[number].world(stripes[number]) if number in sure else _world(view, edges, placements)
         for number, view in lit.items()
-        if not (
-            _lies_on_edges(sure[number].world(stripes[number]), edges, pose)
-            if number in sure
-            else _is_recognised(view, edges, placements)
-        )
-    )
+    }
+    on_object = {
+        number: edge_distances(edges, world - pose[:2])[1] < EXPLAINED_MM
+        for number, world in worlds_by_camera.items()
+        if world is not None
+    }
+    on_object = {number: lies for number, lies in on_object.items() if np.mean(lies) >= SEEN}
+    blind = tuple(number for number in lit if number not in on_object)
     if blind:
         whole = len(blind) == len(lit) > 1
         who = "any camera" if whole else in_words(blind)
         remedy = "is it this object, does it stand upright, does anything else stand on the glass?"
         words = f"the object is not recognised by {who}: {remedy}"
         complaints.append(Complaint("not recognised", words, () if whole else blind))
-    return complaints
+    return Judgement(complaints, on_object)
+
+
+def points_on_object(view: CameraView, edges: Edges, placements: Floats) -> list[NDArray[np.bool_]]:
+    """Tell which points of a camera's stripe lie on the object in each of its `placements` (K, 2), mm.
+
+    All do if the camera does not recognise the object.
+    """
+    seen = recognise_view(view, edges, placements)
+    if not isinstance(seen, Recognised):
+        return [np.ones(len(stripe), np.bool_) for stripe in view.stripes]
+    return [
+        edge_distances(edges, seen.rough.world(stripe) - placement)[1] < EXPLAINED_MM
+        for stripe, placement in zip(view.stripes, placements, strict=True)
+    ]
 
 
 def moved_px(before: Floats, after: Floats) -> float:
     """Measure how far the stripe moved between two frames of one camera, px: the largest way of a straight piece.
 
-    A piece that is not found again within `NEAR_PX` has moved by that at least.
+    If many pieces of each frame are not found in the other within `NEAR_PX`, that is the least way. Those of one frame
+    alone are reflections, which come and go.
 
     Parameters
     ----------
@@ -122,18 +150,9 @@ def moved_px(before: Floats, after: Floats) -> float:
     >>> print(moved_px(stripe, stripe + [0.0, 2.0]))
     2.0
     """
-    ways = [0.0]
-    for line in find_lines(before):
-        if line.length < LONG_PX:
-            continue
-        near = after[np.abs(line.positions(after)) < line.length / 2.0]
-        off = line.distances(near)
-        off = off[np.abs(off) < NEAR_PX]
-        if len(off) < REMAINING * len(line.points):
-            ways.append(NEAR_PX)
-        else:
-            ways.append(abs(float(np.median(off) - np.median(line.distances(before[line.points])))))
-    return max(ways)
+    ways, gone = _ways(before, after)
+    _, new = _ways(after, before)
+    return NEAR_PX if min(gone, new) > CHANGED else max(ways, default=0.0)
 
 
 def direction_of(pose: Floats) -> str:
@@ -159,6 +178,23 @@ def direction_of(pose: Floats) -> str:
     return f"the object stands {' and '.join(is_off)}: {' and '.join(undo)}"
 
 
+def _ways(before: Floats, after: Floats) -> tuple[list[float], float]:
+    """The ways of the straight pieces, px, and the share of their length that is not found again."""
+    ways, gone, whole = [], 0.0, 0.0
+    for line in find_lines(before):
+        if line.length < LONG_PX:
+            continue
+        near = after[np.abs(line.positions(after)) < line.length / 2.0]
+        off = line.distances(near)
+        off = off[np.abs(off) < NEAR_PX]
+        whole += line.length
+        if len(off) < REMAINING * len(line.points):
+            gone += line.length
+        else:
+            ways.append(abs(float(np.median(off) - np.median(line.distances(before[line.points])))))
+    return ways, gone / whole if whole else 0.0
+
+
 def _earlier_maps(views: Mapping[int, CameraView], edges: Edges, placements: Floats) -> dict[int, CameraFit]:
     """The maps that the placements before the last one give: without it, since it may be wrong."""
     if len(placements) < 2:
@@ -178,12 +214,7 @@ def _by_calibration(calibration: Calibration | None, stripes: Mapping[int, Float
     return worlds
 
 
-def _lies_on_edges(world: Floats, edges: Edges, pose: Floats) -> bool:
-    """True if most of a stripe (N, 2), mm, lies on the edges of the object in a pose (3,) without a turn."""
-    return bool(np.mean(edge_distances(edges, world - pose[:2])[1] < EXPLAINED_MM) >= SEEN)
-
-
-def _is_recognised(view: CameraView, edges: Edges, placements: Floats) -> bool:
-    """True if a camera recognises the object in the last placement, with the help of the others."""
+def _world(view: CameraView, edges: Edges, placements: Floats) -> Floats | None:
+    """The last stripe (N, 2), mm, by a map of all placements; None if the camera does not recognise the object."""
     seen = recognise_view(view, edges, placements)
-    return isinstance(seen, Recognised) and bool(seen.first.explained[-1] >= SEEN)
+    return seen.first.world(view.stripes[-1]) if isinstance(seen, Recognised) else None

@@ -121,8 +121,8 @@ class Guide:
         self._session = session = earlier or new_session(*args)
         self._seen, self._stored, self._light = SeenPlacements(), None, settings.light
         self._view = View("begin", "", (), purpose, str(session.folder), placements=settings.reference.placements_mm)
-        for number in session.numbers:
-            self._seen.add(number, session.frames(number))
+        if earlier is not None:
+            self._seen.recall({number: session.frames(number) for number in session.numbers}, session.reference)
         words = ""
         if earlier is not None:
             day = datetime.date.fromtimestamp(earlier.folder.stat().st_mtime).isoformat()

@@ -1,6 +1,6 @@
 """The stripe in the frames of a session, and what is wrong with the placement that was filmed last."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from footscan.calibration.capture.from_capture import CameraView
 from footscan.calibration.capture.judged_placement import in_words
 from footscan.calibration.capture.reference import edges_of
-from footscan.calibration.capture.standing import STILL_PX, Complaint, complaints_of, moved_px
+from footscan.calibration.capture.standing import STILL_PX, Complaint, judge_standing, moved_px, points_on_object
 from footscan.capture.light_choice import stripe_seen
 from footscan.frames.image import decode_image
 from footscan.report.calibration.coverage import coverage_picture, covered_share
@@ -39,6 +39,8 @@ class SeenPlacements:
     """(N, 2) points, px."""
     image_px: dict[int, tuple[int, int]] = field(default_factory=dict)
     """Columns and rows of each camera."""
+    _on_object: dict[int, dict[int, NDArray[np.bool_]]] = field(default_factory=dict)
+    """(N,) which points lie on the object, where it is recognised."""
 
     def add(self, number: int, frames: Mapping[int, bytes]) -> None:
         """Find the stripe in the JPEG of each camera."""
@@ -51,15 +53,20 @@ class SeenPlacements:
     def forget(self, number: int) -> None:
         """Forget a placement."""
         self.stripes.pop(number, None)
+        self._on_object.pop(number, None)
 
     def coverage(self) -> dict[int, float]:
         """The share of each camera's image between its stripes."""
-        return {camera: covered_share(self._of(camera), size) for camera, size in sorted(self.image_px.items())}
+        return {
+            camera: covered_share(self._of(camera, self.stripes), size)
+            for camera, size in sorted(self.image_px.items())
+        }
 
     def picture(self, latest: int | None) -> str:
         """Draw the stripes in each camera's image, as SVG; those of the placement `latest` stand out."""
-        new = {} if latest is None else self.stripes.get(latest, {})
-        old = {camera: self._of(camera, without=latest) for camera in self.image_px}
+        earlier = [number for number in self.stripes if number != latest]
+        new = {camera: self._of(camera, self.stripes.keys() - earlier) for camera in self.image_px}
+        old = {camera: self._of(camera, earlier) for camera in self.image_px}
         return coverage_picture(self.image_px, old, new)
 
     def judge(
@@ -76,14 +83,24 @@ class SeenPlacements:
             why = "; ".join(stills.problems.values())
             return [Complaint("no picture", f"{why}: check cables and hubs", tuple(stills.problems))]
         numbers = [*(other for other in order if other != number and other in self.stripes), number]
-        views = {}
-        for camera, size in self.image_px.items():
-            mounting = mounting_of(CaptureCamera(id=camera, file="-"))
-            views[camera] = CameraView(camera, size, [self.stripes[n][camera] for n in numbers], mounting)
+        views = {camera: self._view(camera, numbers) for camera in self.image_px}
         placements = np.array([reference.placements_mm[n] for n in numbers], np.float64)
         edges = edges_of(reference.profile_mm)
-        complaints = complaints_of(views, edges, placements, tolerance_mm, calibration)
+        complaints, self._on_object[number] = judge_standing(views, edges, placements, tolerance_mm, calibration)
         return [*complaints, *self._moved(number, stills), *_badly_lit(stills)]
+
+    def recall(self, frames: Mapping[int, Mapping[int, bytes]], reference: ReferenceObject) -> None:
+        """Find the stripe in the placements of an interrupted session: the JPEGs by placement and camera."""
+        for number, of_placement in frames.items():
+            self.add(number, of_placement)
+        numbers = list(frames)
+        placements = np.array([reference.placements_mm[n] for n in numbers], np.float64)
+        for camera in self.image_px:
+            view = self._view(camera, numbers)
+            for number, lies in zip(
+                numbers, points_on_object(view, edges_of(reference.profile_mm), placements), strict=True
+            ):
+                self._on_object.setdefault(number, {})[camera] = lies
 
     def _moved(self, number: int, stills: Stills) -> list[Complaint]:
         ways = {
@@ -96,9 +113,15 @@ class SeenPlacements:
         words = f"the stripe moved by {max(ways.values()):.1f} px within a second: keep object and heads still"
         return [Complaint("moved", words, moved)]
 
-    def _of(self, camera: int, without: int | None = None) -> Floats:
-        """All points (N, 2) of a camera."""
-        stripes = [seen[camera] for number, seen in self.stripes.items() if camera in seen and number != without]
+    def _view(self, camera: int, numbers: Sequence[int]) -> CameraView:
+        mounting = mounting_of(CaptureCamera(id=camera, file="-"))
+        return CameraView(camera, self.image_px[camera], [self.stripes[n][camera] for n in numbers], mounting)
+
+    def _of(self, camera: int, numbers: Iterable[int]) -> Floats:
+        """The points (N, 2) of a camera on the object in these placements."""
+        stripes = [
+            self.stripes[n][camera][self._on_object[n][camera]] for n in numbers if camera in self._on_object.get(n, {})
+        ]
         return np.concatenate([np.empty((0, 2)), *stripes])
 
 

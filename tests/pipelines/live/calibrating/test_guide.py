@@ -44,7 +44,7 @@ def test_a_scanner_is_calibrated_checked_and_named(scanner: StandingStandIn, tmp
     assert "Y = 0 mm, on the glass" in guide.view.words
     film_all(guide)
     assert guide.view.step == "filmed"
-    assert all(0.1 < share < 0.9 for share in guide.view.coverage.values())
+    assert all(0.05 < share < 0.9 for share in guide.view.coverage.values())
     assert guide.picture().count("<g ") == 3
     guide.finish()
     assert guide.view.step == "calibrated"
@@ -150,7 +150,8 @@ def test_an_interrupted_session_is_gone_on_with_or_discarded(scanner: StandingSt
     again = guide_of(scanner, tmp_path)
     again.begin("calibration")
     assert again.view.words.startswith("An interrupted session of ")
-    assert (again.view.number, again.view.taken, again.view.coverage) == (1, (0,), covered)
+    assert (again.view.number, again.view.taken) == (1, (0,))
+    assert again.view.coverage == pytest.approx(covered, rel=0.05)
     folder = Path(again.view.folder)
     again.discard()
     assert not folder.exists()
