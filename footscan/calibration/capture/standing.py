@@ -111,7 +111,7 @@ def judge_standing(
     }
     on_object = {number: lies for number, lies in on_object.items() if np.mean(lies) >= SEEN}
     blind = tuple(number for number in lit if number not in on_object)
-    if blind:
+    if blind and (len(placements) > 1 or not on_object):  # one frame may be too few for a camera
         whole = len(blind) == len(lit) > 1
         who = "any camera" if whole else in_words(blind)
         remedy = "is it this object, does it stand upright, does anything else stand on the glass?"

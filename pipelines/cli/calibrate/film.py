@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.cli.live.options import (
+    CAPTURES,
     VIRTUAL_FOLDER,
     RigFile,
     StateTeller,
@@ -19,14 +20,13 @@ from pipelines.cli.live.options import (
     plain_world,
 )
 from pipelines.cli.terminal.output import AsJson, message, print_json, print_table
-from schemas.base.errors import FootscanError
+from schemas.base.errors import FootscanError, RefusedInput
 
 if TYPE_CHECKING:
     from pipelines.live.calibrating.filmed import Purpose
     from pipelines.live.calibrating.guide import Guide
     from pipelines.live.calibrating.view import Action, View
 
-CAPTURES = Path("captures")
 KEYS: "dict[str, tuple[Action, str]]" = {
     "v": ("put", "put the virtual object there"),
     "t": ("take", "film it"),
@@ -121,6 +121,9 @@ def _guide(
     with opened_rig(rig, virtual or VIRTUAL_FOLDER, world, calibrated=is_timed) as opened:
         light = light_of(opened.rig, power, exposure_ms, virtual is not None)
         settings = settings_of(opened.file, captures, reference, body, light)
+        if settings is None:
+            problem = "is missing, expected the reference object there or --reference"
+            raise RefusedInput(opened.file.parent / "reference.yaml", problem)
         with LiveScanner(opened.rig) as scanner:
             scanner.listen(StateTeller())
             for problem in scanner.connect().values():

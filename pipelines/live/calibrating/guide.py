@@ -79,15 +79,10 @@ class Guide:
         scanner: StandingScanner,
         settings: GuideSettings,
         put: Callable[[str, OnProgress], None] | None = None,
-        on_view: Callable[[View], None] = lambda _: None,
     ) -> None:
-        """Parameters
-        ----------
-        put : puts `reference K` or `body` onto the glass of a virtual scanner
-        on_view : called with each new view
-        """
-        self._scanner, self._settings = scanner, settings
-        self._put, self._on_view = put, on_view
+        """`put` puts `reference K` or `body` onto the glass of a virtual scanner."""
+        self._scanner, self._settings, self._put = scanner, settings, put
+        self._listeners: list[Callable[[View], None]] = []
         self._session: FilmedPlacements | None = None
         self._seen = SeenPlacements()
         self._light = settings.light
@@ -99,6 +94,10 @@ class Guide:
     def view(self) -> View:
         """The present state; usable from any thread."""
         return self._view
+
+    def listen(self, listener: Callable[[View], None]) -> None:
+        """Call `listener` with each new view, in the thread that works."""
+        self._listeners.append(listener)
 
     def picture(self) -> str:
         """Draw the stripes of all placements, as SVG."""
@@ -120,7 +119,16 @@ class Guide:
         earlier = interrupted_session(*args)
         self._session = session = earlier or new_session(*args)
         self._seen, self._stored, self._light = SeenPlacements(), None, settings.light
-        self._view = View("begin", "", (), purpose, str(session.folder), placements=settings.reference.placements_mm)
+        self._view = View(
+            "begin",
+            "",
+            (),
+            purpose,
+            str(session.folder),
+            profile=settings.reference.profile_mm,
+            placements=settings.reference.placements_mm,
+            drawn=self._view.drawn,
+        )
         if earlier is not None:
             self._seen.recall({number: session.frames(number) for number in session.numbers}, session.reference)
         words = ""
@@ -236,7 +244,7 @@ class Guide:
         """Leave the session; what was filmed stays."""
         self._session = None
         self._seen = SeenPlacements()
-        self._show(self._first_view())
+        self._show(replace(self._first_view(), drawn=self._view.drawn))
 
     def _first_view(self) -> View:
         is_calibrated = self._scanner.rig.calibration is not None
@@ -323,7 +331,8 @@ class Guide:
 
     def _show(self, view: View) -> None:
         self._view = view
-        self._on_view(view)
+        for listener in self._listeners:
+            listener(view)
 
     def _need(self, action: Action) -> None:
         if action not in self._view.actions:

@@ -11,13 +11,18 @@ from schemas.reference import ReferenceObject
 
 def settings_of(
     rig_file: Path, captures: Path, reference: Path | None, body: Path | None, light: ScanLight | None
-) -> GuideSettings:
+) -> GuideSettings | None:
     """Read the reference object, by default reference.yaml beside the rig, and the mesh of a body.
+
+    None if no reference object is named, and none lies beside the rig.
 
     Raises
     ------
     RefusedInput
         A file is missing or breaks its format.
     """
-    known = read_yaml(reference or rig_file.parent / "reference.yaml", ReferenceObject)
+    beside = rig_file.parent / "reference.yaml"
+    if reference is None and not beside.exists():
+        return None
+    known = read_yaml(reference or beside, ReferenceObject)
     return GuideSettings(captures, rig_file, known, None if body is None else read_body(body), light)

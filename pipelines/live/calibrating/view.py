@@ -43,6 +43,8 @@ class View:
     folder: str = ""
     number: int | None = None
     """The placement that is to be filmed or was filmed last."""
+    profile: Sequence[Sequence[float]] = ()
+    """(Y, Z) of the object's corners, mm."""
     placements: Sequence[Sequence[float]] = ()
     """(dY, dZ) of each, mm."""
     taken: Sequence[int] = ()

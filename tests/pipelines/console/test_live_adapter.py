@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from pipelines.console.live_adapter import LiveAdapter
-from pipelines.console.scanner import Side
 from pipelines.live.scanner import STOPPED, LiveScanner
 from schemas.base.errors import FootscanError
 from schemas.rig import Rig
@@ -27,10 +26,11 @@ def over_nothing(tmp_path: Path) -> LiveAdapter:
             "format": "footscan.rig/1",
             "scanner": "S1",
             "port": str(tmp_path / "no-board"),
+            "calibration": "calibration.json",
             "cameras": [{"id": camera, "device": f"http://127.0.0.1:9/{camera}"} for camera in (1, 5)],
         }
     )
-    return LiveAdapter(LiveScanner(rig), tmp_path / "archive", tmp_path / "results", tmp_path / "calibration.json")
+    return LiveAdapter(LiveScanner(rig), tmp_path / "archive", tmp_path / "results")
 
 
 def test_what_is_not_connected_is_told(over_nothing: LiveAdapter) -> None:
@@ -64,12 +64,16 @@ def test_a_foot_that_is_put_onto_the_glass_is_told_and_can_be_stopped(tmp_path: 
     told: list[str] = []
     scanner.listen(lambda state: told.append(str(state)))
 
-    def place(side: Side, progress: Callable[[int, int], None]) -> None:
-        progress(1, 4)
-        over.stop()
-        assert side == "left"
+    class OfTest:
+        subject = "right"
 
-    over = LiveAdapter(scanner, tmp_path / "archive", tmp_path / "results", place_foot=place)
+        def put(self, subject: str, progress: Callable[[int, int], None] | None = None) -> None:
+            assert progress is not None
+            progress(1, 4)
+            over.stop()
+            assert subject == "left"
+
+    over = LiveAdapter(scanner, tmp_path / "archive", tmp_path / "results", glass=OfTest())
     with pytest.raises(FootscanError, match="stopped"):
         over.film("P1", "left", keep_partial=False)
     words = "a virtual left foot is put onto the glass"

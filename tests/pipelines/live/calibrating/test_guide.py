@@ -25,7 +25,9 @@ def scanner(filmed_capture: Path) -> StandingStandIn:
 def guide_of(scanner: StandingStandIn, home: Path, seen: list[View] | None = None) -> Guide:
     write_rig(home / "rig.yaml", scanner.rig)
     settings = GuideSettings(home / "captures", home / "rig.yaml", scanner.capture.reference)
-    return Guide(scanner, settings, scanner.put, (seen if seen is not None else []).append)
+    guide = Guide(scanner, settings, scanner.put)
+    guide.listen((seen if seen is not None else []).append)
+    return guide
 
 
 def film_all(guide: Guide) -> None:
