@@ -13,9 +13,9 @@ COLUMNS = 4
 """Panels in a row."""
 WIDTH, GAP, CAPTION = 240, 12, 18
 """Width of a panel, distance of panels and height of a caption, px of the picture."""
-INK, PAPER, EARLIER, LATEST, REGION = "#444", "#fff", "#3d7ea6", "#e0590b", "#dcecf5"
+INK, PAPER, COVERED, LATEST, REGION = "#444", "#fff", "#3d7ea6", "#e0590b", "#dcecf5"
 THINNED = 4
-"""Every so manieth point is drawn: enough for a line."""
+"""One of so many points is drawn: enough for a line."""
 
 
 def covered_share(stripe: Floats, image_px: tuple[int, int]) -> float:
@@ -31,29 +31,29 @@ def covered_share(stripe: Floats, image_px: tuple[int, int]) -> float:
 
 
 def coverage_picture(
-    image_px: Mapping[int, tuple[int, int]], earlier: Mapping[int, Floats], latest: Mapping[int, Floats]
+    image_px: Mapping[int, tuple[int, int]], covered: Mapping[int, Floats], latest: Mapping[int, Floats]
 ) -> str:
     """Draw a panel for each camera as SVG: the stripes (N, 2), px, and the region between them.
 
     Parameters
     ----------
     image_px : columns and rows of each camera
-    earlier, latest : the stripes that were filmed before, and those of the latest placement, by camera
+    covered : by camera, the stripes of all placements as far as they lie on the object
+    latest : by camera, the whole stripe in the latest placement
     """
     panels, bottom = [], 0.0
     height = WIDTH * max((rows / columns for columns, rows in image_px.values()), default=0.75)
     for place, (camera, (columns, rows)) in enumerate(sorted(image_px.items())):
         x, y = (place % COLUMNS) * (WIDTH + GAP), (place // COLUMNS) * (height + CAPTION + GAP)
         bottom = max(bottom, y + height + CAPTION)
-        old, new = earlier.get(camera, np.empty((0, 2))), latest.get(camera, np.empty((0, 2)))
-        every = np.concatenate([old, new])
-        corners = " ".join(f"{i:.0f},{j:.0f}" for i, j in region_of(every))
-        share = covered_share(every, (columns, rows))
+        old, new = covered.get(camera, np.empty((0, 2))), latest.get(camera, np.empty((0, 2)))
+        corners = " ".join(f"{i:.0f},{j:.0f}" for i, j in region_of(old))
+        share = covered_share(old, (columns, rows))
         panels.append(
             f'<g transform="translate({x:g} {y:g})"><text y="13">Camera {camera}: {100 * share:.0f} %</text>'
             f'<svg y="{CAPTION}" width="{WIDTH}" height="{WIDTH * rows / columns:g}" viewBox="0 0 {columns} {rows}">'
             f'<rect width="{columns}" height="{rows}" fill="{PAPER}" stroke="{INK}" stroke-width="4"/>'
-            f'<polygon points="{corners}" fill="{REGION}"/>{_dots(old, EARLIER)}{_dots(new, LATEST)}</svg></g>'
+            f'<polygon points="{corners}" fill="{REGION}"/>{_dots(old, COVERED)}{_dots(new, LATEST)}</svg></g>'
         )
     across = min(len(image_px), COLUMNS) * (WIDTH + GAP) - GAP
     return (

@@ -23,7 +23,7 @@ _MAIN = """\
 </section>
 <section id="machine"><h2>Scanner</h2>
 <div class="row"><button id="connect" type="button">Connect</button><button id="home" type="button">Home heads</button>
-<a class="button" href="/">Scan feet</a></div></section>
+<button id="shine" type="button">Show the stripe</button><a class="button" href="/">Scan feet</a></div></section>
 </div><div>
 <section id="outcome" hidden><h2 id="outcome-name">Result</h2><ul id="remarks"></ul>
 <div class="wide"><table class="plain"><thead><tr id="outcome-columns"></tr></thead>

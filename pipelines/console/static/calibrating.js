@@ -16,7 +16,8 @@
     if (action === "finish") return view.purpose === "check" ? "Check the calibration" : "Calibrate";
     if (action === "take" && view.step === "look") return "Film it again";
     if (action === "put" && view.step === "body") return "Put the virtual body there";
-    if (action === "end") return ["used", "checked"].includes(view.step) ? "Done" : "Leave; what is filmed stays";
+    if (action === "end" && ["used", "checked"].includes(view.step)) return "Done";
+    if (action === "end") return view.outcome ? "Leave without using it" : "Leave; what is filmed stays";
     return NAMES[action];
   }
 
@@ -44,10 +45,10 @@
   }
 
   function node(name, attributes, words) {
-    const made_ = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) made_.setAttribute(key, value);
-    if (words) made_.textContent = words;
-    return made_;
+    const part = document.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) part.setAttribute(key, value);
+    if (words) part.textContent = words;
+    return part;
   }
 
   // The object in its placement over the glass, seen from the front: Y to the right, Z upwards.
@@ -69,7 +70,7 @@
     svg.append(node("polygon", {points: outline(now), class: "now"}));
     svg.append(node("text", {x: reach - 2, y: 9, "text-anchor": "end"}, "+Y"));
     svg.append(node("text", {x: 2 - reach, y: 9}, "−Y"));
-    svg.append(node("text", {x: at[0], y: 20, "text-anchor": "middle", class: "where"},
+    svg.append(node("text", {x: 0, y: 20, "text-anchor": "middle", class: "where"},
       `Y = ${at[0]} mm${at[1] ? `, raised by ${at[1]} mm` : ", on the glass"}`));
     element("placement").replaceChildren(svg);
   }
@@ -130,16 +131,16 @@
     say(element("do-words"), now.do);
     element("do").hidden = !now.do;
     const busy = hindrance(now);
+    const there = busy || (now.state.name === "disconnected" ? "Connect the scanner first." : "");
     allow(element("connect"), busy);
-    allow(element("home"), busy || (now.state.name === "disconnected" ? "Connect the scanner first." : ""));
+    for (const id of ["home", "shine"]) allow(element(id), there);
     if (!view) {
       say(element("step-words"), "There is no reference object: put its file reference.yaml beside rig.yaml, or start "
         + "the console with --reference.");
       element("usual").hidden = true;
       return;
     }
-    const why = busy || (now.state.name === "disconnected" ? "Connect the scanner first." : "")
-      || (now.state.name === "door open" ? "Close the door first." : "")
+    const why = there || (now.state.name === "door open" ? "Close the door first." : "")
       || (now.state.name === "alarm" ? "Home the heads first." : "");
     say(element("step-name"), STEPS[view.step]);
     say(element("step-words"), view.words);
@@ -168,5 +169,5 @@
 
   listen(show);
   press(element("usual"), () => give(usual));
-  for (const id of ["connect", "home"]) press(element(id), () => act(id));
+  for (const id of ["connect", "home", "shine"]) press(element(id), () => act(id));
 })();

@@ -1,6 +1,6 @@
 """The stripe in the frames of a session, and what is wrong with the placement that was filmed last."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -57,17 +57,12 @@ class SeenPlacements:
 
     def coverage(self) -> dict[int, float]:
         """The share of each camera's image between its stripes."""
-        return {
-            camera: covered_share(self._of(camera, self.stripes), size)
-            for camera, size in sorted(self.image_px.items())
-        }
+        return {camera: covered_share(self._of(camera), size) for camera, size in sorted(self.image_px.items())}
 
     def picture(self, latest: int | None) -> str:
         """Draw the stripes in each camera's image, as SVG; those of the placement `latest` stand out."""
-        earlier = [number for number in self.stripes if number != latest]
-        new = {camera: self._of(camera, self.stripes.keys() - earlier) for camera in self.image_px}
-        old = {camera: self._of(camera, earlier) for camera in self.image_px}
-        return coverage_picture(self.image_px, old, new)
+        covered = {camera: self._of(camera) for camera in self.image_px}
+        return coverage_picture(self.image_px, covered, {} if latest is None else self.stripes.get(latest, {}))
 
     def judge(
         self,
@@ -117,11 +112,9 @@ class SeenPlacements:
         mounting = mounting_of(CaptureCamera(id=camera, file="-"))
         return CameraView(camera, self.image_px[camera], [self.stripes[n][camera] for n in numbers], mounting)
 
-    def _of(self, camera: int, numbers: Iterable[int]) -> Floats:
-        """The points (N, 2) of a camera on the object in these placements."""
-        stripes = [
-            self.stripes[n][camera][self._on_object[n][camera]] for n in numbers if camera in self._on_object.get(n, {})
-        ]
+    def _of(self, camera: int) -> Floats:
+        """The points (N, 2) of a camera on the object in all placements."""
+        stripes = [self.stripes[n][camera][lies[camera]] for n, lies in self._on_object.items() if camera in lies]
         return np.concatenate([np.empty((0, 2)), *stripes])
 
 
