@@ -100,25 +100,28 @@ def measured_light(
     return ScanLight(chosen.power, chosen.exposure_ms, chosen.reasons, chosen.looks, is_measured=True)
 
 
-def standing_frames(deck: CameraDeck, heads: Heads, power: float) -> dict[int, list[bytes]]:
-    """Take the JPEGs of each open camera in about a second, with standing heads and the lasers at `power`.
+def standing_frames(
+    deck: CameraDeck, heads: Heads, power: float, seconds: float = LOOK_SECONDS, settle_seconds: float = SETTLE_SECONDS
+) -> dict[int, list[bytes]]:
+    """Take the JPEGs of each open camera, with standing heads and the lasers at `power` for so many `seconds`.
 
-    A camera that gave no frame has an empty list.
+    The frames of the first `settle_seconds` are left out, and of the last `SETTLE_SECONDS`. A camera that gave no frame
+    has an empty list.
     """
     begin = time.monotonic()
     jpegs: dict[int, list[bytes]] = {camera: [] for camera in deck.open_cameras}
 
     def keep(frame: CapturedFrame) -> None:
         since = frame.seconds - begin
-        if frame.problem is None and SETTLE_SECONDS < since < LOOK_SECONDS - SETTLE_SECONDS:
+        if frame.problem is None and settle_seconds < since < seconds - SETTLE_SECONDS:
             jpegs[frame.camera].append(frame.jpeg)
 
     deck.send_to(keep)
     try:
         if power:
-            heads.shine(power, LOOK_SECONDS)
+            heads.shine(power, seconds)
         else:
-            deck.wait_beyond(begin + LOOK_SECONDS, 3 * LOOK_SECONDS)
+            deck.wait_beyond(begin + seconds, 3 * seconds)
     finally:
         deck.send_to(None)
     return jpegs

@@ -158,7 +158,7 @@ class Guide:
         self._light = stills.light
         self._seen.forget(number)
         if not stills.problems:
-            frames = {camera: jpeg for camera, (jpeg, _) in stills.frames.items()}
+            frames = {camera: jpeg for camera, (_, jpeg) in stills.frames.items()}
             session.keep(number, frames)
             self._seen.add(number, frames)
         complaints = self._seen.judge(

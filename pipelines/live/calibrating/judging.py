@@ -99,8 +99,8 @@ class SeenPlacements:
 
     def _moved(self, number: int, stills: Stills) -> list[Complaint]:
         ways = {
-            camera: moved_px(self.stripes[number][camera], _stripe(later)[0])
-            for camera, (_, later) in stills.frames.items()
+            camera: moved_px(_stripe(earlier)[0], self.stripes[number][camera])
+            for camera, (earlier, _) in stills.frames.items()
         }
         moved = tuple(camera for camera, way in ways.items() if way > STILL_PX)
         if not moved:
@@ -128,7 +128,7 @@ def _stripe(jpeg: bytes) -> tuple[Floats, int, int]:
 def _badly_lit(stills: Stills) -> list[Complaint]:
     """Cameras that see the stripe much too bright, or too dark."""
     bright, dark = [], []
-    for camera, (jpeg, _) in stills.frames.items():
+    for camera, (_, jpeg) in stills.frames.items():
         image = decode_image(jpeg)
         seen = stripe_seen([image], adapted_to([image], ExtractionParameters()))
         if seen.points and seen.saturation > SATURATED:

@@ -8,13 +8,18 @@ from pipelines.live.light import ScanLight, fix_light, standing_frames
 from pipelines.live.scanner import LiveScanner
 from schemas.rig import Rig
 
+LIT_SECONDS = 3.0
+"""Time for which the lasers shine."""
+SETTLE_SECONDS = 1.2
+"""Time from then to the first frame that is used: a busy host or hub delivers frames late. Chosen by hand."""
+
 
 @dataclass(frozen=True)
 class Stills:
     """What the cameras saw while the heads stood."""
 
     frames: Mapping[int, tuple[bytes, bytes]]
-    """JPEG of each camera, and another one about a second later."""
+    """Two JPEGs of each camera, the second one taken about a second after the first."""
     light: ScanLight
     problems: Mapping[int, str]
     """Why a camera gave no frame."""
@@ -33,7 +38,8 @@ def live_stills(scanner: LiveScanner, light: ScanLight | None) -> Stills:
             problems |= scanner.deck.open_only(planned.cameras)
             fix_light(scanner.rig, scanner.deck, light.exposure_ms)
             scanner.heads.travel_to(x_mm)
-            for camera, jpegs in standing_frames(scanner.deck, scanner.heads, light.power).items():
+            taken = standing_frames(scanner.deck, scanner.heads, light.power, LIT_SECONDS, SETTLE_SECONDS)
+            for camera, jpegs in taken.items():
                 if jpegs:
                     frames[camera] = jpegs[0], jpegs[-1]
                 else:

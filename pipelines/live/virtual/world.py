@@ -61,8 +61,8 @@ BODY_TURN_DEG = 20.0
 BODY_REACH_MM = 90.0
 """Half of the travel over the body that is rendered beforehand, from its middle: the standard body turned by any angle
 does not reach further."""
-CREEP_MM = 1.0
-"""Way of standing heads while a placement is filmed: 2 s at 0.5 mm/s."""
+CREEP_MM = 1.5
+"""Way of standing heads while a placement is filmed: 3 s at 0.5 mm/s."""
 BLOCK_REACH_MM = 86.0
 """Half of the travel over the block, from its middle: the block does not reach further."""
 
@@ -161,8 +161,6 @@ class VirtualWorld:
         world = self._world
         pictures = StagePictures(self._subject(subject), self._settings, Path(world.pictures), world.grid_mm)
         rail = range(floor(RAIL_MM[0] / world.dark_grid_mm), ceil(RAIL_MM[1] / world.dark_grid_mm) + 1)
-        if subject.startswith("reference"):  # the others are rendered when they are asked for
-            rail = range(round(self._middle_mm / world.dark_grid_mm), round(self._middle_mm / world.dark_grid_mm) + 1)
         dark = {round(k * world.dark_grid_mm / world.grid_mm) for k in rail}
         pictures.prepare(CAMERAS, dark, StageLight(0.0), progress)
         pictures.prepare(CAMERAS, indices_of_travel(*self._lit_mm(subject), world.grid_mm), StageLight(), progress)
