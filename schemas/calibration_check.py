@@ -78,13 +78,6 @@ def verdict_in_all(cameras: list[CameraCheck]) -> Verdict:
     return "drifted" if "drifted" in verdicts else "unseen" if "unseen" in verdicts else "steady"
 
 
-class UnseenCamera(Document):
-    """A camera that a check could not judge."""
-
-    camera: Annotated[int, Field(ge=1)]
-    reason: Text
-
-
 class ScanCheck(Document):
     """What the check of a calibration says of the cameras of one scan.
 
@@ -103,7 +96,7 @@ class ScanCheck(Document):
     """Largest root mean square deviation of a camera, mm, to 0.01; None if no camera was seen."""
     drifted: list[int] = Field(default_factory=list)
     """Cameras beyond the tolerance."""
-    unseen: list[UnseenCamera] = Field(default_factory=list)
+    unseen: list[int] = Field(default_factory=list)
     """Cameras that could not be checked."""
 
     @model_validator(mode="after")
@@ -115,18 +108,13 @@ class ScanCheck(Document):
     @property
     def doubt(self) -> str | None:
         """The reason not to rely on the calibration, a sentence without a full stop; None if all cameras are steady."""
-        checked = f"when the calibration was checked on {self.checked}"
+        then = f"when the calibration was checked on {self.checked}"
         doubts = []
         if self.drifted:
-            up_to = "up to " if len(self.drifted) > 1 else ""
-            doubts.append(
-                f"{_named(self.drifted)} had moved by {up_to}{self.largest_mm:.2f} mm {checked}: calibrate anew"
-            )
+            by = f"{'up to ' * (len(self.drifted) > 1)}{self.largest_mm:.2f} mm"
+            doubts.append(f"{_named(self.drifted)} had moved by {by} {then}: calibrate anew")
         if self.unseen:
-            reasons = "; ".join(dict.fromkeys(camera.reason for camera in self.unseen))
-            were = "were" if len(self.unseen) > 1 else "was"
-            names = _named([camera.camera for camera in self.unseen])
-            doubts.append(f"{names} {were} not seen {checked} ({reasons}): check again")
+            doubts.append(f"{_named(self.unseen)} could not be judged {then}: check again")
         return "; ".join(doubts) or None
 
     def summary(self, reckoned: str = "before the scan") -> str:
@@ -140,8 +128,7 @@ class ScanCheck(Document):
         if self.doubt is None:
             return f"every camera was within {self.largest_mm:.2f} mm"
         parts = [f"{_named(self.drifted)} had moved"] if self.drifted else []
-        parts += [f"{_named([camera.camera for camera in self.unseen])} could not be judged"] if self.unseen else []
-        return ", ".join(parts)
+        return ", ".join(parts + ([f"{_named(self.unseen)} could not be judged"] if self.unseen else []))
 
 
 def _named(cameras: list[int]) -> str:

@@ -8,22 +8,19 @@ from pathlib import Path
 from footscan.recordings.scans import RecordedScan
 from schemas.base.errors import RefusedInput
 from schemas.base.json_files import read_json
-from schemas.calibration_check import CalibrationCheck, ScanCheck, UnseenCamera
-
-NOT_NAMED = "the check does not name it"
-"""Reason of a camera that a check says nothing about."""
+from schemas.calibration_check import CalibrationCheck, ScanCheck
 
 
 def check_path(calibration: Path) -> Path:
-    """The file of the last check of a calibration."""
-    return calibration.with_name(f"{calibration.stem}.check.json")
+    """The file of the last check of a calibration: beside the file itself, not beside a link to it."""
+    file = calibration.resolve()
+    return file.with_name(f"{file.stem}.check.json")
 
 
 def earlier_path(calibration: Path, check: CalibrationCheck) -> Path:
     """The file that keeps a check after a later one was made."""
-    return calibration.with_name(
-        f"{calibration.stem}.check-{check.checked.astimezone(datetime.UTC):%Y%m%dT%H%M%SZ}.json"
-    )
+    file = calibration.resolve()
+    return file.with_name(f"{file.stem}.check-{check.checked.astimezone(datetime.UTC):%Y%m%dT%H%M%SZ}.json")
 
 
 def checks_of(calibration: Path, calibration_sha256: str) -> list[CalibrationCheck]:
@@ -36,11 +33,12 @@ def checks_of(calibration: Path, calibration_sha256: str) -> list[CalibrationChe
     RefusedInput
         A check cannot be read or is damaged.
     """
-    pattern = re.compile(rf"{re.escape(calibration.stem)}\.check(-\d{{8}}T\d{{6}}Z)?\.json")
+    file = calibration.resolve()
+    pattern = re.compile(rf"{re.escape(file.stem)}\.check(-\d{{8}}T\d{{6}}Z)?\.json")
     try:
-        paths = sorted(path for path in calibration.parent.iterdir() if pattern.fullmatch(path.name))
+        paths = sorted(path for path in file.parent.iterdir() if pattern.fullmatch(path.name))
     except OSError as error:
-        raise RefusedInput(calibration.parent, f"cannot be listed ({error.strerror})") from None
+        raise RefusedInput(file.parent, f"cannot be listed ({error.strerror})") from None
     checks = [read_json(path, CalibrationCheck) for path in paths]
     judging = [check for check in checks if check.calibration_sha256 == calibration_sha256]
     return sorted(judging, key=lambda check: check.checked)
@@ -68,19 +66,19 @@ def check_of_scan(scan: RecordedScan, calibration_sha256: str, checks: Sequence[
 
 
 def for_cameras(check: CalibrationCheck, cameras: Collection[int], day: datetime.date | None) -> ScanCheck:
-    """The part of a check that concerns some cameras, seen from a day (None: unknown).
+    """What a check says of some cameras, seen from a day (None: unknown).
 
-    Figures are rounded to 0.01 mm, so that nothing else of a check changes what rests on it.
+    A camera that the check does not name could not be judged either. Figures are rounded to 0.01 mm: of a check that is
+    repeated, nothing but another verdict changes what rests on it.
     """
-    found = {camera.camera: camera for camera in check.cameras if camera.camera in cameras}
-    off_mm = {number: camera.rms_mm for number, camera in found.items() if camera.rms_mm is not None}
-    unseen = {number: camera.reason or "" for number, camera in found.items() if camera.verdict == "unseen"}
-    unseen |= dict.fromkeys(set(cameras) - set(found), NOT_NAMED)
+    judged = [camera for camera in check.cameras if camera.camera in cameras]
+    verdicts = {camera.camera: camera.verdict for camera in judged}
+    off_mm = [camera.rms_mm for camera in judged if camera.rms_mm is not None]
     on = check.checked.date()
     return ScanCheck(
         checked=on,
         age_days=None if day is None else max((day - on).days, 0),
-        largest_mm=round(max(off_mm.values()), 2) if off_mm else None,
-        drifted=sorted(number for number, camera in found.items() if camera.verdict == "drifted"),
-        unseen=[UnseenCamera(camera=number, reason=reason) for number, reason in sorted(unseen.items())],
+        largest_mm=round(max(off_mm), 2) if off_mm else None,
+        drifted=sorted(camera for camera in cameras if verdicts.get(camera) == "drifted"),
+        unseen=sorted(camera for camera in cameras if verdicts.get(camera, "unseen") == "unseen"),
     )

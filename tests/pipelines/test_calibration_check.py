@@ -98,6 +98,14 @@ def test_a_check_of_a_neighbour_does_not_count(calibration: Path, capture: Recor
     assert check_of(calibration) is None
 
 
+def test_a_link_to_a_calibration_has_the_checks_of_the_file(calibration: Path, capture: RecordedCapture) -> None:
+    link = calibration.parent / "elsewhere" / "linked.json"
+    link.parent.mkdir()
+    link.symlink_to(calibration)
+    assert store_check(link, a_check(link, capture, 0, DRIFTED)) == check_path(calibration)
+    assert check_of(link) == check_of(calibration) is not None
+
+
 def test_a_damaged_check_is_refused_and_kept(calibration: Path, capture: RecordedCapture) -> None:
     path = store_check(calibration, a_check(calibration, capture, 0))
     damaged = path.read_text().replace("steady", "stead")

@@ -56,7 +56,7 @@
     const at = view.placements[view.number];
     const now = view.profile.map(([y, z]) => [y + at[0], z + at[1]]);
     const all = view.placements.flatMap(([dy, dz]) => view.profile.map(([y, z]) => [y + dy, z + dz]));
-    const reach = Math.max(...all.map(([y]) => Math.abs(y))) + 15, top = Math.max(...all.map(([, z]) => z)) + 12;
+    const reach = Math.max(...all.map(([y]) => Math.abs(y))) + 15, top = Math.max(...all.map(([, z]) => z)) + 16;
     const svg = node("svg", {viewBox: `${-reach} ${-top} ${2 * reach} ${top + 24}`, role: "img",
       "aria-label": `The object at Y = ${at[0]} mm, ${at[1]} mm above the glass, seen from the front`});
     const outline = corners => corners.map(([y, z]) => `${y},${-z}`).join(" ");
@@ -70,6 +70,7 @@
     svg.append(node("polygon", {points: outline(now), class: "now"}));
     svg.append(node("text", {x: reach - 2, y: 9, "text-anchor": "end"}, "+Y"));
     svg.append(node("text", {x: 2 - reach, y: 9}, "−Y"));
+    svg.append(node("text", {x: reach - 2, y: 8 - top, "text-anchor": "end"}, "seen from +X"));
     svg.append(node("text", {x: 0, y: 20, "text-anchor": "middle", class: "where"},
       `Y = ${at[0]} mm${at[1] ? `, raised by ${at[1]} mm` : ", on the glass"}`));
     element("placement").replaceChildren(svg);

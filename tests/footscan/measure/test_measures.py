@@ -160,6 +160,19 @@ def test_a_measure_that_rests_on_filled_surface_is_uncertain() -> None:
     assert measured().measures["instep_girth"].filled_share is None
 
 
+def test_measures_of_a_doubted_calibration_are_uncertain() -> None:
+    doubt = "camera 3 had moved by 0.41 mm when the calibration was checked on 2026-11-24: calibrate anew"
+    usual = measure_foot(foot().vertices, foot().faces, "right")
+    doubted = measure_foot(foot().vertices, foot().faces, "right", calibration_doubt=doubt)
+    assert (usual.calibration_doubt, usual.warnings) == (None, [])
+    assert (doubted.calibration_doubt, doubted.warnings) == (doubt, [doubt])
+    for name, measure in doubted.measures.items():
+        before = usual.measures[name]
+        assert (measure.value, measure.uncertainty) == (before.value, before.uncertainty)
+        assert measure.status == ("incomplete" if before.value is None else "uncertain")
+        assert before.value is None or doubt in (measure.note or "")
+
+
 def test_a_gap_makes_a_measure_incomplete() -> None:
     middle = foot().vertices[foot().faces].mean(axis=1)
     half = 0.5 * foot().measures["foot_length"]

@@ -1,6 +1,7 @@
 """The live scanner with a virtual board and two cameras that film a made-up foot: stored scans, states, refusals."""
 
 import datetime
+import shutil
 import threading
 import time
 from collections.abc import Iterator
@@ -13,15 +14,18 @@ import numpy as np
 import pytest
 import quick_rig
 import simplejpeg
+from checked import made_check
 from waiting import wait_until
 
 from footscan.calibration.travel.body import standard_body
 from footscan.capture import frame_positions, latency
 from footscan.frames.film import open_film
 from footscan.frames.travel import read_positions
+from footscan.recordings.calibration_checks import check_of_scan, checks_of
 from footscan.recordings.scans import read_scan
 from footscan.virtual.board.board import Board
 from footscan.virtual.filming.streams import VirtualStreams, free_running
+from pipelines.calibration_check import store_check
 from pipelines.live import storing
 from pipelines.live.calibrating.body_film import film_body
 from pipelines.live.calibrating.live import LiveStanding
@@ -33,6 +37,7 @@ from pipelines.live.state import ScannerState
 from pipelines.live.storing import ScanName, next_scan_name
 from schemas.base.errors import Fault, Finding, RefusedInput
 from schemas.base.json_files import read_json
+from schemas.calibration_check import CalibrationCheck
 from schemas.recording import Recording
 from schemas.rig import Rig, RigCamera, RigLatency, RigTravel
 
@@ -142,6 +147,31 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
     assert result.measured.kind in {None, "finding"}
     assert result.measured.folder == results / "P7/2026-11-20-R"
     assert next_scan_name(bench.home / "archive", "P7", "right", DAY) == "2026-11-20-R-2"
+
+
+def test_a_scan_carries_the_check_that_was_in_force_when_it_began(bench: Bench, pristine: Path) -> None:
+    calibration = Path(shutil.copy(pristine / "calibration.json", bench.home))
+    assert bench.scanner.scan(bench.order(calibration=calibration)).stored.place.name == "2026-11-20-R"
+    assert read_scan(bench.home / "archive/P7/2026-11-20-R").calibration_check is None
+    check = made_check(calibration, "2026-11-20T08:00:00+01:00", {1: 0.03, 5: 0.41, 7: None})
+    store_check(calibration, check)
+    scan = read_scan(bench.scanner.scan(bench.order(calibration=calibration)).stored.place)
+    store_check(calibration, made_check(calibration, "2026-11-20T19:00:00+01:00", {1: 0.03, 5: 0.02}))
+    assert scan.calibration_check is not None
+    assert read_json(scan.calibration_check, CalibrationCheck) == check
+    beside = checks_of(calibration, check.calibration_sha256)
+    known = check_of_scan(scan, check.calibration_sha256, beside)
+    assert known is not None
+    assert (known.drifted, known.unseen, known.age_days) == ([5], [], 0)
+
+
+def test_a_damaged_check_is_refused_before_anything_moves(bench: Bench, pristine: Path) -> None:
+    calibration = Path(shutil.copy(pristine / "calibration.json", bench.home))
+    calibration.with_name("calibration.check.json").write_text("{}")
+    with pytest.raises(RefusedInput, match=r"calibration\.check\.json: checked: is missing"):
+        bench.scanner.scan(bench.order(calibration=calibration))
+    bench.assert_dark_and_empty()
+    assert "homing" not in bench.states
 
 
 def test_a_head_that_was_held_costs_the_scan(bench: Bench) -> None:
