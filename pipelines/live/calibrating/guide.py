@@ -129,10 +129,11 @@ class Guide:
             placements=settings.reference.placements_mm,
             drawn=self._view.drawn,
         )
-        if earlier is not None:
-            self._seen.recall({number: session.frames(number) for number in session.numbers}, session.reference)
         words = ""
         if earlier is not None:
+            frames = {number: session.frames(number) for number in session.numbers}
+            for damaged in self._seen.recall(frames, session.reference):
+                session.drop(damaged)
             day = datetime.date.fromtimestamp(earlier.folder.stat().st_mtime).isoformat()
             words = f"An interrupted session of {day} goes on: discard it if a camera was touched since. "
         self._to_place(self._free_number(), words)
@@ -156,7 +157,6 @@ class Guide:
         assert number is not None
         stills = self._scanner.stills(self._light)
         self._light = stills.light
-        self._seen.forget(number)
         if not stills.problems:
             frames = {camera: jpeg for camera, (_, jpeg) in stills.frames.items()}
             session.keep(number, frames)
@@ -191,19 +191,25 @@ class Guide:
         rig = self._scanner.rig
         numbers = session.numbers
         words = "the scanner is calibrated" if self._view.purpose == "calibration" else "the calibration is checked"
-        with self._scanner.waiting_for(f"{words} from {len(numbers)} placements"):
-            session.finish(still_x_mm(rig))
-            try:
+        try:
+            with self._scanner.waiting_for(words):
+                session.finish(still_x_mm(rig))
                 if self._view.purpose == "check":
                     tolerances = settings.drift_tolerance_mm, settings.placement_tolerance_mm
-                    self._to_checked(check_session(session.folder, rig, *tolerances))
-                    return
-                stored = calibrate_session(session.folder, rig, settings.rig_file, settings.placement_tolerance_mm)
-            except RefusedInput as refused:
-                session.reopen()
-                self._to_refused(refused, numbers)
-                return
-        self._to_stored("calibrated", stored)
+                    checked = check_session(session.folder, rig, *tolerances)
+                else:
+                    stored = calibrate_session(session.folder, rig, settings.rig_file, settings.placement_tolerance_mm)
+        except RefusedInput as refused:
+            session.reopen()
+            self._to_refused(refused, numbers)
+            return
+        except BaseException:  # such as a stop: the session can be gone on with
+            session.reopen()
+            raise
+        if self._view.purpose == "check":
+            self._to_checked(checked)
+        else:
+            self._to_stored("calibrated", stored)
 
     def discard(self) -> None:
         """Remove what was filmed in this session."""

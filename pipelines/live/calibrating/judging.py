@@ -43,17 +43,13 @@ class SeenPlacements:
     """(N,) which points lie on the object, where it is recognised."""
 
     def add(self, number: int, frames: Mapping[int, bytes]) -> None:
-        """Find the stripe in the JPEG of each camera."""
-        self.stripes[number] = {}
+        """Find the stripe in the JPEG of each camera; ValueError if one is damaged."""
+        stripes = {}
         for camera, jpeg in frames.items():
-            points, columns, rows = _stripe(jpeg)
-            self.stripes[number][camera] = points
-            self.image_px[camera] = columns, rows
-
-    def forget(self, number: int) -> None:
-        """Forget a placement."""
-        self.stripes.pop(number, None)
+            stripes[camera], *size = _stripe(jpeg)
+            self.image_px[camera] = (size[0], size[1])
         self._on_object.pop(number, None)
+        self.stripes[number] = stripes
 
     def coverage(self) -> dict[int, float]:
         """The share of each camera's image between its stripes."""
@@ -84,18 +80,27 @@ class SeenPlacements:
         complaints, self._on_object[number] = judge_standing(views, edges, placements, tolerance_mm, calibration)
         return [*complaints, *self._moved(number, stills), *_badly_lit(stills)]
 
-    def recall(self, frames: Mapping[int, Mapping[int, bytes]], reference: ReferenceObject) -> None:
-        """Find the stripe in the placements of an interrupted session: the JPEGs by placement and camera."""
+    def recall(self, frames: Mapping[int, Mapping[int, bytes]], reference: ReferenceObject) -> list[int]:
+        """Find the stripe in the placements of an interrupted session: the JPEGs by placement and camera.
+
+        Returns
+        -------
+        Placements of which a frame is damaged, and which are left out.
+        """
+        damaged = []
         for number, of_placement in frames.items():
-            self.add(number, of_placement)
-        numbers = list(frames)
+            try:
+                self.add(number, of_placement)
+            except ValueError:
+                damaged.append(number)
+        numbers, edges = list(self.stripes), edges_of(reference.profile_mm)
         placements = np.array([reference.placements_mm[n] for n in numbers], np.float64)
-        for camera in self.image_px:
-            view = self._view(camera, numbers)
-            for number, lies in zip(
-                numbers, points_on_object(view, edges_of(reference.profile_mm), placements), strict=True
-            ):
-                self._on_object.setdefault(number, {})[camera] = lies
+        self._on_object = {number: {} for number in numbers}
+        for camera in self.image_px if numbers else ():
+            all_lie = points_on_object(self._view(camera, numbers), edges, placements)
+            for number, lie in zip(numbers, all_lie, strict=True):
+                self._on_object[number][camera] = lie
+        return damaged
 
     def _moved(self, number: int, stills: Stills) -> list[Complaint]:
         ways = {
@@ -114,7 +119,7 @@ class SeenPlacements:
 
     def _of(self, camera: int) -> Floats:
         """The points (N, 2) of a camera on the object in all placements."""
-        stripes = [self.stripes[n][camera][lies[camera]] for n, lies in self._on_object.items() if camera in lies]
+        stripes = [self.stripes[n][camera][lies[camera]] for n, lies in list(self._on_object.items()) if camera in lies]
         return np.concatenate([np.empty((0, 2)), *stripes])
 
 

@@ -14,7 +14,7 @@ from pipelines.capture_job import calibrate_capture, check_calibration
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.pool import cores
-from pipelines.live.rig_file import write_rig
+from pipelines.live.rig_file import read_rig, write_rig
 from pipelines.recordings.captures import read_capture
 from pipelines.scan import CalibrationFile
 from pipelines.travel_job import calibrate_travel
@@ -120,10 +120,10 @@ def add_planes(stored: StoredCalibration, film: Path, rig: Rig, body: Body) -> S
 
 
 def use_calibration(stored: StoredCalibration, rig: Rig, rig_file: Path) -> Rig:
-    """Name a calibration in rig.yaml, and return the rig that does."""
-    used = rig.model_copy(update={"calibration": str(stored.file.resolve())})
-    write_rig(rig_file, used)
-    return used
+    """Name a calibration in rig.yaml, as it is by now, and return the `rig` that does."""
+    named = {"calibration": str(stored.file.resolve())}
+    write_rig(rig_file, read_rig(rig_file).model_copy(update=named))
+    return rig.model_copy(update=named)
 
 
 def check_session(capture: Path, rig: Rig, tolerance_mm: float, placement_tolerance_mm: float) -> StoredCheck:
