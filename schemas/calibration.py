@@ -16,7 +16,7 @@ from pydantic import AwareDatetime, Field, model_validator
 from schemas.base.errors import RefusedInput
 from schemas.base.image_size import FRAME_SIZE, ImageSize
 from schemas.base.json_files import parse_json, read_text, validate
-from schemas.base.model import Document
+from schemas.base.model import Document, Pseudonym
 from schemas.base.units import Point
 from schemas.calibration_history import CalibrationV1, CalibrationV2, migrate_v1, migrate_v2
 
@@ -238,6 +238,8 @@ class Calibration(_Calibration):
     """The content of a calibration file, in its current version."""
 
     format: Literal["footscan.calibration/4"] = "footscan.calibration/4"
+    scanner: Pseudonym | None = None
+    """The scanner that it was made for by `footscan calibrate film`; None if unknown."""
 
 
 def parameter_count(pixel_map: PolynomialMap | HomographyMap) -> int:

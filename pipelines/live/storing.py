@@ -18,6 +18,7 @@ from footscan.capture.passes import FilmedPass, film_name
 from footscan.capture.recording import ScanRecording
 from pipelines.live.recording_document import ScanStory, recording_document
 from schemas.base.errors import Finding, FootscanError, RefusedInput
+from schemas.base.model import Side
 from schemas.frames import GROUP
 from schemas.rig import Rig, RigCamera
 from schemas.scan import Scan
@@ -36,7 +37,7 @@ class ScanName:
 
     patient: str
     scan: str
-    side: Literal["right", "left"]
+    side: Side
     date: datetime.date
 
 

@@ -8,11 +8,11 @@ letting them creep.
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Self
 
 from footscan.capture.board.controller import Controller
+from footscan.capture.board.head import HEADS, Head, Travel
 from footscan.capture.board.position_log import HeadPosition, PositionLog, Triple
 from footscan.capture.board.state import BoardState
 from footscan.capture.grbl.report import Report
@@ -20,7 +20,6 @@ from footscan.capture.grbl.status_poll import TimedReport
 from schemas.base.errors import Fault, RefusedInput
 from schemas.rig import RigBoard
 
-HEADS = (1, 2, 3)
 SLACK_MM = 0.05
 """Largest distance of a reported position from its target: rounding to steps and to the decimals of the report."""
 STEPS_LOST_MM = 0.3
@@ -38,33 +37,6 @@ CREEP_MM_PER_S = 0.5
 """Speed of heads that `shine` lights: 0.01 mm within an exposure of 20 ms."""
 DWELL = "G4P0.01"
 """A dwell; the board answers it when all motion before it has ended."""
-
-
-@dataclass(frozen=True)
-class Head:
-    """Rail of a head: world X of its laser plane = `offset_mm` + `direction` x machine position."""
-
-    offset_mm: float = -20.0
-    """World X at which its home switch trips; from the calibration, it aligns the heads."""
-    direction: int = -1
-    """-1 if X increases away from the home switch, where machine positions decrease; 1 if X decreases."""
-
-    def world(self, machine_mm: float) -> float:
-        """Convert a machine position to world X, mm."""
-        return self.offset_mm + self.direction * machine_mm
-
-    def machine(self, world_mm: float) -> float:
-        """Convert world X to a machine position, mm."""
-        return (world_mm - self.offset_mm) * self.direction
-
-
-class Travel(NamedTuple):
-    """Begin and end of a travel."""
-
-    begin_seconds: float
-    """`time.monotonic()` just before the heads moved."""
-    end_seconds: float
-    """`time.monotonic()` when the heads stood again."""
 
 
 class Heads:
@@ -141,8 +113,8 @@ class Heads:
             raise RefusedInput("lasers", f"expected a power from 0 to 1, found {power:g}", field="power")
         self._power = power
 
-    def travel(self, start_mm: float, end_mm: float, mm_per_s: float) -> Travel:
-        """Move all heads to `start_mm` in the dark, then to `end_mm` at `mm_per_s` with the lasers on, and wait.
+    def travel(self, start_mm: float, end_mm: float, mm_per_s: float, head: int | None = None) -> Travel:
+        """Move all heads, or one, to `start_mm` in the dark, then to `end_mm` with the lasers on, and wait.
 
         The run begins before the start and ends behind the end by the distance that the heads need to accelerate, as
         far as the rails allow: between start and end, speed and brightness are constant.
@@ -159,19 +131,19 @@ class Heads:
         run_up = mm_per_s**2 / (2.0 * min(self.setup.mm_per_s2))
         low, high = self.reach_mm
         begin, end = (min(max(x, low), high) for x in (start_mm - way * run_up, end_mm + way * run_up))
-        self.travel_to(begin)
-        return self._run(begin, end, mm_per_s, self._power)
+        self.travel_to(begin, head=head)
+        return self._run(begin, end, mm_per_s, self._power, head)
 
-    def travel_to(self, x_mm: float, mm_per_s: float | None = None) -> Travel:
-        """Move all heads to `x_mm` with the lasers off, and wait; default speed: full speed."""
+    def travel_to(self, x_mm: float, mm_per_s: float | None = None, head: int | None = None) -> Travel:
+        """Move all heads, or one, to `x_mm` with the lasers off, and wait; default speed: full speed."""
         speed = mm_per_s or min(self.setup.max_mm_per_s)
         self._check_travel(x_mm, x_mm, speed)
         at = self._world(self.board.status().report)
-        farthest = max(at, key=lambda x: abs(x - x_mm))
+        farthest = max(at if head is None else at[head - 1 : head], key=lambda x: abs(x - x_mm))
         if abs(farthest - x_mm) < SLACK_MM / 2.0:
             now = time.monotonic()
             return Travel(now, now)
-        return self._run(farthest, x_mm, speed, 0.0)
+        return self._run(farthest, x_mm, speed, 0.0, head)
 
     def shine(self, power: float, seconds: float) -> Travel:
         """Light the standing heads for `seconds`, and wait until they are dark again.
@@ -271,12 +243,15 @@ class Heads:
             if present.get(number) == 0:
                 self.board.change(number, 1)
 
-    def _run(self, begin_mm: float, end_mm: float, mm_per_s: float, power: float) -> Travel:
-        """Move all heads straight to `end_mm`; `mm_per_s` is the speed of a head that starts at `begin_mm`."""
+    def _run(self, begin_mm: float, end_mm: float, mm_per_s: float, power: float, moved: int | None = None) -> Travel:
+        """Move all heads, or one, straight to `end_mm`; `mm_per_s` is the speed of a head that starts at `begin_mm`."""
         self._need_home()
         at = self.board.status().report.machine_mm
         assert at is not None
-        target = [head.machine(end_mm) for head in self.heads]
+        target = [
+            head.machine(end_mm) if moved in {None, number} else stays
+            for number, head, stays in zip(HEADS, self.heads, at, strict=True)
+        ]
         along = [abs(b - a) for a, b in zip(at, target, strict=True)]
         # The feed is the speed in the space of the three axes: for three equal ones, sqrt(3) times their speed.
         feed = mm_per_s * math.hypot(*along) / max(*along, 1e-9)

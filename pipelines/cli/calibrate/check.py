@@ -1,9 +1,7 @@
 """`footscan calibrate check`."""
 
 from dataclasses import asdict
-from math import hypot
 from pathlib import Path
-from statistics import median
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -70,26 +68,19 @@ def check(
 
 
 def _tell_verdict(calibration: Path, drifts: "list[Drift]", tolerance_mm: float) -> None:
+    from footscan.calibration.checks.drift import common_shift
+
     moved = [drift for drift in drifts if drift.verdict != "steady"]
     if not moved:
         message(f"{calibration}: holds; every camera is within {tolerance_mm:g} mm")
         return
-    if (alike := _alike([drift.shift_mm for drift in drifts if drift.shift_mm])) is not None:
+    if (alike := common_shift(drifts)) is not None:
         y, z = alike
         message(
             f"all cameras are off alike, by {y:+.2f}, {z:+.2f} mm: perhaps the object stood so, not the scanner moved"
         )
     said = "; ".join(f"camera {drift.camera} {_said(drift)}" for drift in moved)
     message(f"{calibration}: does not hold: {said}; {tolerance_mm:g} mm are allowed")
-
-
-def _alike(shifts: list[tuple[float, float]]) -> tuple[float, float] | None:
-    """The shift common to all cameras, if the rest is less than half of it."""
-    if len(shifts) < 2:
-        return None
-    y, z = (median(shift[axis] for shift in shifts) for axis in (0, 1))
-    apart = max(hypot(shift[0] - y, shift[1] - z) for shift in shifts)
-    return (y, z) if apart < hypot(y, z) / 2 else None
 
 
 def _said(drift: "Drift") -> str:

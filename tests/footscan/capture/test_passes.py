@@ -14,7 +14,8 @@ import pytest
 import simplejpeg
 
 from footscan.capture import frame_positions
-from footscan.capture.board.heads import Head, Heads
+from footscan.capture.board.head import Head
+from footscan.capture.board.heads import Heads
 from footscan.capture.cameras.deck import CameraDeck
 from footscan.capture.cameras.source import CameraSource
 from footscan.capture.cameras.stream import CapturedFrame

@@ -17,6 +17,7 @@ import simplejpeg
 from checked import made_check
 from waiting import wait_until
 
+from footscan.calibration.travel.body import standard_body
 from footscan.capture import frame_positions, latency
 from footscan.frames.film import open_film
 from footscan.frames.travel import read_positions
@@ -26,6 +27,9 @@ from footscan.virtual.board.board import Board
 from footscan.virtual.filming.streams import VirtualStreams, free_running
 from pipelines.calibration_check import store_check
 from pipelines.live import storing
+from pipelines.live.calibrating.body_film import film_body
+from pipelines.live.calibrating.live import LiveStanding
+from pipelines.live.calibrating.stills import live_stills
 from pipelines.live.light import light_by_hand
 from pipelines.live.scan_order import ScanOrder
 from pipelines.live.scanner import LiveScanner
@@ -312,6 +316,45 @@ def test_the_light_is_chosen_where_none_is_given(bench: Bench) -> None:
     assert recording.light.looks >= 2
     assert all(camera.light_reason for camera in recording.cameras)
     assert all("cannot be set from here" in camera.not_fixed[0] for camera in recording.cameras)
+
+
+def test_standing_heads_are_filmed_in_the_middle_of_the_travel(bench: Bench) -> None:
+    stills = live_stills(bench.scanner, light_by_hand(bench.scanner.rig, 1.0, 10.0))
+    assert stills.problems == {}
+    for camera, (earlier, later) in stills.frames.items():
+        assert simplejpeg.decode_jpeg(earlier).max() > 100, f"camera {camera} in the dark"
+        assert simplejpeg.decode_jpeg(later).max() > 100
+    assert bench.scanner.heads.position_mm() == pytest.approx((LENGTH_MM / 2,) * 3, abs=0.1)
+    assert bench.scanner.state.name == "idle"
+    assert bench.board.laser_at(time.monotonic()) == 0.0
+
+
+def test_a_stop_ends_the_film_of_a_placement(bench: Bench) -> None:
+    bench.scanner.home()
+    threading.Thread(
+        target=lambda: (wait_until(lambda: bench.board.laser_at(time.monotonic()) > 0), bench.scanner.stop()),
+        daemon=True,
+    ).start()
+    with pytest.raises(Fault, match="stopped; what was filmed before is kept"):
+        LiveStanding(bench.scanner).stills(light_by_hand(bench.scanner.rig, 1.0, 10.0))
+    assert bench.board.laser_at(time.monotonic()) == 0.0
+    assert LiveStanding(bench.scanner).stills(light_by_hand(bench.scanner.rig, 1.0, 10.0)).problems == {}
+
+
+def test_heads_travel_over_a_body_one_after_the_other(bench: Bench) -> None:
+    began = time.monotonic()
+    place = bench.home / "captures" / "S1" / "body"
+    film_body(bench.scanner, place, standard_body(), light_by_hand(bench.scanner.rig, 1.0, 10.0))
+    scan = read_scan(place)
+    assert (scan.document.side, [camera.id for camera in scan.document.cameras]) == ("unknown", [1, 5])
+    for camera in scan.document.cameras:
+        x = read_positions(place / str(camera.positions))
+        assert x[0] < 12.0
+        assert x[-1] > LENGTH_MM - 12.0
+    seconds = np.arange(began, time.monotonic(), 0.02)
+    lit = np.array([bench.board.position_at(one) for one in seconds if bench.board.laser_at(one) > 0])
+    assert len(lit) > 100
+    assert np.all((lit > 0.0).sum(axis=1) <= 1)  # the others wait before the travel
 
 
 def when_filming(bench: Bench, happens: object) -> None:
