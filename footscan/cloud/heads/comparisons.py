@@ -58,7 +58,8 @@ class Comparisons(NamedTuple):
 
     def every(self, step: int) -> "Comparisons":
         """One comparison of `step`."""
-        return Comparisons(*(values[::step] for values in self))
+        columns = {name: values[::step] for name, values in self._asdict().items()}
+        return self._replace(**columns)
 
     @property
     def is_across(self) -> NDArray[np.bool_]:

@@ -34,7 +34,7 @@ def report_of(
     unmoved_mm : robust standard deviation of the distances between cameras of two heads, with the heads as calibrated
     """
     shown = np.any(np.abs(fit.places) > np.maximum(SIGNIFICANT * fit.sd, parameters.smallest_mm / HALF_MM), axis=0)
-    places: Floats = np.round(np.where(shown, fit.places, 0.0), 6)
+    places = np.asarray(np.round(np.where(shown, fit.places, 0.0), 6), np.float64)
     largest = float(np.abs(places @ np.diag(HALF_MM)).sum(axis=1).max())
     is_corrected = bool(shown.any() and fit.spread_mm < LEAST_GAIN * unmoved_mm)
     if not is_corrected:
