@@ -3,6 +3,7 @@
 Every property is computed when it is first asked for, by the functions that the steps of a run call, and is kept.
 """
 
+import hashlib
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -12,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.fusion.fuse import fuse
+from footscan.cloud.heads.find import find_heads
+from footscan.cloud.heads.planes import corrected
 from footscan.cloud.mapping import map_stripe, refuse_other_size
 from footscan.cloud.normals import estimate_normals
-from footscan.cloud.outliers.remove import remove_outliers
-from footscan.cloud.points import of_cameras
+from footscan.cloud.outliers.remove import Removed, remove_outliers
+from footscan.cloud.points import POINT_DTYPE, of_cameras
 from footscan.cloud.views import views_of
 from footscan.frames.film import open_background, open_film
 from footscan.frames.image import Rgb
@@ -23,13 +26,18 @@ from footscan.frames.reader import FrameReader, backgrounds_of, noting_lost, pix
 from footscan.frames.travel import read_positions, travelled
 from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
+from footscan.recordings.calibration_checks import check_of_scan, checks_of
 from footscan.recordings.scans import RecordedScan, read_scan
 from footscan.stripe.film import extract_film
 from footscan.stripe.laser import adapted
 from footscan.stripe.points import StripePoints
 from footscan.surface.surface_of_cloud import surface_of_cloud
 from schemas.base.errors import Finding, RefusedInput
-from schemas.calibration import Calibration, read_calibration
+from schemas.base.json_files import read_text
+from schemas.calibration import Calibration, calibration_from_json
+from schemas.calibration_check import ScanCheck
+from schemas.glass import GlassPlane
+from schemas.heads import HeadsReport
 from schemas.measures import Measures
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm, Travel
@@ -38,10 +46,18 @@ from schemas.scan import CameraFilm, Travel
 class OpenScan:
     """A recorded scan; see `open_scan`."""
 
-    def __init__(self, recorded: RecordedScan, calibration: Calibration, parameters: ScanParameters) -> None:
+    def __init__(
+        self,
+        recorded: RecordedScan,
+        calibration: Calibration,
+        parameters: ScanParameters,
+        calibration_check: ScanCheck | None = None,
+    ) -> None:
         self.recorded = recorded
         """The folder and the content of scan.yaml."""
         self.calibration = calibration
+        self.calibration_check = calibration_check
+        """What the last check of the calibration before the scan says; None if it was not checked."""
         self.parameters = parameters
         self._films = {camera.id: camera for camera in recorded.document.cameras}
         self._lost: dict[int, list[int]] = {}
@@ -72,6 +88,12 @@ class OpenScan:
         """
         return {camera: self._points(camera) for camera in self.cameras}
 
+    @cached_property
+    def heads(self) -> HeadsReport:
+        """Where the heads were, beside where the calibration says."""
+        points = np.concatenate([np.empty(0, POINT_DTYPE), *self.points.values()])
+        return find_heads(points, views_of(self._used.cameras), self.parameters.heads)
+
     @property
     def cloud(self) -> NDArray[np.void]:
         """(N,) points of all cameras, cleaned and fused, as `points`; Finding where none is left."""
@@ -80,6 +102,18 @@ class OpenScan:
     @cached_property
     def _fused(self) -> NDArray[np.void]:
         """`cloud` with the numbers of views."""
+        kept, _ = self._cleaned
+        if not len(kept):
+            raise Finding("every point is an outlier, expected a foot in the control volume")
+        return fuse(kept, self.parameters.fusion).cloud
+
+    @property
+    def glass(self) -> GlassPlane:
+        """The glass during the scan, from the skin on it; Finding where there are no points."""
+        return self._cleaned[1].glass
+
+    @cached_property
+    def _cleaned(self) -> tuple[NDArray[np.void], Removed]:
         together = np.concatenate(list(self.points.values()))
         if not len(together):
             raise Finding("no stripe in any camera, expected a foot in the films")
@@ -87,10 +121,8 @@ class OpenScan:
         for camera, lost in self._lost.items():
             placed[camera][lost] = np.nan
         filmed = {one.view: placed[one.camera] + one.ahead_mm for one in self._used.cameras}
-        kept, _ = remove_outliers(together, views_of(self._used.cameras), self.parameters.outliers, filmed)
-        if not len(kept):
-            raise Finding("every point is an outlier, expected a foot in the control volume")
-        return fuse(kept, self.parameters.fusion).cloud
+        together, views = corrected(together, views_of(self._used.cameras), self.heads)
+        return remove_outliers(together, views, self.parameters.outliers, filmed)
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:
@@ -107,7 +139,9 @@ class OpenScan:
     @cached_property
     def measures(self) -> Measures:
         """The measures of the foot; Finding where the surface is no foot."""
-        return measure_scanned_foot(self.mesh, self.recorded.document.side)
+        checked = None if self.calibration_check is None else self.calibration_check.doubt
+        doubts = [*filter(None, [checked, self.heads.doubt])]
+        return measure_scanned_foot(self.mesh, self.recorded.document.side, self.glass, doubts)
 
     @cached_property
     def _used(self) -> Calibration:
@@ -173,4 +207,7 @@ def open_scan(
         raise RefusedInput(
             recorded.file, "names no calibration, expected one here or as an argument", field="calibration"
         )
-    return OpenScan(recorded, read_calibration(path), parameters or ScanParameters())
+    text = read_text(path, "json_bytes")
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    check = check_of_scan(recorded, digest, checks_of(path, digest))
+    return OpenScan(recorded, calibration_from_json(text, path), parameters or ScanParameters(), check)

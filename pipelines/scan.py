@@ -6,17 +6,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, Self
 
 from footscan.frames.film import film_files
 from footscan.frames.travel import read_positions
+from footscan.recordings.calibration_checks import checks_of
 from footscan.recordings.scans import RecordedScan
 from pipelines.engine.actions.key import parameters_text
 from pipelines.engine.actions.step import Input, Output, SourceFile, Step, Value
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
+from schemas.base.json_files import read_text
 from schemas.base.model import Document, Side, canonical_json
-from schemas.calibration import Calibration, Source, maps_to_json
+from schemas.calibration import Calibration, Source, calibration_from_json, maps_to_json
+from schemas.calibration_check import CalibrationCheck, ScanCheck
 from schemas.parameters.foot import FootParameters
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm
@@ -55,8 +58,17 @@ class CalibrationFile:
     path: Path
     content: Calibration
     digest: str
+    checks: tuple[CalibrationCheck, ...] = ()
+    """Checks of it that lie beside its file, the earliest first."""
     _parts: dict[object, Value] = field(default_factory=dict, compare=False, repr=False)
     """Cached parts that scans take: many scans take the same ones, and they are slow to serialise."""
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read a calibration and its checks; RefusedInput if one of them is missing, damaged or of another format."""
+        text = read_text(path, "json_bytes")
+        digest = sha256(text.encode())
+        return cls(path, calibration_from_json(text, path), digest, tuple(checks_of(path, digest)))
 
     @property
     def source(self) -> Value:
@@ -84,9 +96,15 @@ class CalibrationFile:
 
 
 def scan_steps(
-    scan: RecordedScan, calibration: ScanCalibration, parameters: ScanParameters, digests: FileDigests
+    scan: RecordedScan,
+    calibration: ScanCalibration,
+    parameters: ScanParameters,
+    digests: FileDigests,
+    check: ScanCheck | None = None,
 ) -> list[Step]:
     """Build the steps from a scan's films to its results, in topological order.
+
+    `check` is what the last check of the calibration before the scan says of its cameras; None without one.
 
     Raises
     ------
@@ -106,22 +124,28 @@ def scan_steps(
     colours = {f"colours-{camera.id}": camera.colours for camera in cameras if camera.colours is not None}
     maps = calibration.cameras(frozenset(camera.id for camera in scan.document.cameras))
     foot = FootParameters(side=scan.document.side)
-    made = reconstruction_steps(scan.name, points, maps, parameters, scan.document.side, steps)
-    cleaned, fused, oriented, mesh, measures = made
+    doubt = None if check is None else check.doubt
+    made = reconstruction_steps(scan.name, points, maps, parameters, scan.document.side, steps, doubt)
+    heads, cleaned, fused, oriented, mesh, measures = made
     verified: dict[str, Output] = {}
     if (truth := scan.truth) is not None:
         pair: dict[str, Input] = {"surface": mesh, "truth": source_files(truth, digests)}
         verified = {"verified": add(Step(scan.name, "verify", f"{STEPS}.verify", None, pair, places={"truth": truth}))}
     of_cameras = {**manifests, **stripes, **verified}
     quality_inputs: dict[str, Input] = {
-        "clean": cleaned, "fused": fused, "surface": mesh, "calibration": calibration.source, **of_cameras
+        "heads": heads, "clean": cleaned, "fused": fused, "surface": mesh, "calibration": calibration.source,
+        **of_cameras,
     }  # fmt: skip
+    if check is not None:
+        quality_inputs["calibration-check"] = _document(check, scan.file)
     quality = add(Step(scan.name, "quality", f"{STEPS}.quality", None, quality_inputs))
     add(Step(scan.name, "cloud.ply", f"{STEPS}.cloud_ply", None, {"oriented": oriented}))
     add(Step(scan.name, "foot.stl", f"{STEPS}.foot_stl", foot, {"surface": mesh}))
     ply_inputs: dict[str, Input] = {"surface": mesh, "name": _name(scan)}
     if colours:
-        texture_inputs: dict[str, Input] = {"surface": mesh, "calibration": maps, **points, **colours}
+        texture_inputs: dict[str, Input] = {
+            "surface": mesh, "calibration": maps, "heads": heads, **points, **colours
+        }  # fmt: skip
         ply_inputs["texture"] = add(Step(scan.name, "texture", f"{STEPS}.texture", None, texture_inputs))
     add(Step(scan.name, "foot.ply", f"{STEPS}.foot_ply", foot, ply_inputs))
     report_inputs: dict[str, Input] = {
@@ -144,6 +168,7 @@ def scan_steps(
 class Reconstruction(NamedTuple):
     """The results of the steps from world points to measures."""
 
+    heads: Output
     cleaned: Output
     fused: Output
     oriented: Output
@@ -152,23 +177,34 @@ class Reconstruction(NamedTuple):
 
 
 def reconstruction_steps(
-    name: str, points: Mapping[str, Input], maps: Input, parameters: ScanParameters, side: Side, steps: list[Step]
+    name: str,
+    points: Mapping[str, Input],
+    maps: Input,
+    parameters: ScanParameters,
+    side: Side,
+    steps: list[Step],
+    calibration_doubt: str | None = None,
 ) -> Reconstruction:
     """Add to `steps` those from the world points of all cameras, `points-N`, to measures.
 
-    `name` is the name of the graph's scan, `maps` the calibration of its cameras.
+    `name` is the name of the graph's scan, `maps` the calibration of its cameras, `calibration_doubt` a reason not to
+    rely on it.
     """
 
     def add(kind: str, own: Document, inputs: Mapping[str, Input]) -> Output:
         steps.append(Step(name, kind, f"{STEPS}.{kind}", own, inputs))
         return Output(steps[-1].name)
 
-    cleaned = add("clean", parameters.outliers, {**points, "calibration": maps})
+    heads = add("heads", parameters.heads, {**points, "calibration": maps})
+    cleaned = add("clean", parameters.outliers, {**points, "calibration": maps, "heads": heads})
     fused = add("fuse", parameters.fusion, {"clean": cleaned})
     oriented = add("orient", parameters.normals, {"fused": fused, "calibration": maps})
     surface = add("surface", parameters.surface, {"oriented": oriented})
-    measures = add("measure", FootParameters(side=side), {"surface": surface})
-    return Reconstruction(cleaned, fused, oriented, surface, measures)
+    measure_inputs: dict[str, Input] = {"surface": surface, "clean": cleaned, "heads": heads}
+    if calibration_doubt is not None:
+        measure_inputs["calibration-doubt"] = Value(canonical_json(calibration_doubt).encode())
+    measures = add("measure", FootParameters(side=side), measure_inputs)
+    return Reconstruction(heads, cleaned, fused, oriented, surface, measures)
 
 
 @dataclass(frozen=True)

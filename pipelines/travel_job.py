@@ -5,7 +5,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Protocol
 
+import numpy as np
+
 from footscan.calibration.travel.body import Body
+from footscan.mesh.formats.files import read_mesh
 from footscan.recordings.scans import RecordedScan
 from pipelines.arrays import pack
 from pipelines.engine.actions.step import Failure, Input, Step, Value
@@ -82,6 +85,12 @@ def travel_steps(
         if step.kind == "map":
             inputs |= {f"{name}-{step.camera}": of for name, of in step.inputs.items() if name != "calibration"}
     return [*steps, Step(film.name, "planes", f"{STEPS}.laser_planes", None, inputs)]
+
+
+def read_body(file: Path) -> Body:
+    """Read the mesh of a body, mm."""
+    vertices, faces = read_mesh(file)
+    return Body(vertices, faces.astype(np.int64))
 
 
 def body_value(body: Body) -> Value:

@@ -18,7 +18,7 @@ from pydantic import AwareDatetime, Field, SerializerFunctionWrapHandler, model_
 from schemas.base.errors import RefusedInput
 from schemas.base.image_size import FRAME_SIZE, ImageSize
 from schemas.base.json_files import parse_json, read_text, validate
-from schemas.base.model import Document, canonical_json
+from schemas.base.model import Document, Pseudonym, canonical_json
 from schemas.base.units import Point
 from schemas.calibration_history import CalibrationV1, CalibrationV2, migrate_v1, migrate_v2
 from schemas.scan import MOST_CAMERA, LaserNumber
@@ -312,6 +312,8 @@ class Calibration(_Calibration):
     """The content of a calibration file, in its current version."""
 
     format: Literal["footscan.calibration/4"] = "footscan.calibration/4"
+    scanner: Pseudonym | None = None
+    """The scanner that it was made for by `footscan calibrate film`; None if unknown."""
 
 
 def with_offsets(calibration: Calibration, offsets_mm: Mapping[int, Mapping[int, float]]) -> Calibration:

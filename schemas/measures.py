@@ -64,6 +64,8 @@ class Measures(Document):
     """Warning that the form of the foot contradicts the side."""
     things: list[str] = Field(default_factory=list)
     """Steps of the surface that no foot has: where something was held at the foot. All measures are uncertain then."""
+    doubts: list[str] = Field(default_factory=list)
+    """Reasons not to rely on the scanner, a sentence each. All measures are uncertain then."""
     axis: Axis | None
     """The foot axis that lengths run along: from the rearmost heel point to the tip of the second toe ("toe2") or to
     the middle of the ball, or along the tangent of heel and ball on the medial side; None where nothing could be
@@ -79,4 +81,4 @@ class Measures(Document):
     @property
     def warnings(self) -> list[str]:
         """What speaks against the surface as a whole, a sentence without a full stop each."""
-        return [*([] if self.side_note is None else [self.side_note]), *self.things]
+        return [*([] if self.side_note is None else [self.side_note]), *self.doubts, *self.things]

@@ -6,7 +6,10 @@ from pydantic import Field
 
 from schemas.base.model import Document
 from schemas.calibration import Source
+from schemas.calibration_check import ScanCheck
 from schemas.fusion import FusionReport
+from schemas.glass import GlassPlane
+from schemas.heads import HeadsReport
 from schemas.laser import Laser
 
 Count = Annotated[int, Field(ge=0)]
@@ -119,9 +122,15 @@ class Quality(Document):
     format: Literal["footscan.quality/1"] = "footscan.quality/1"
     calibration: Source
     """The calibration file that mapped the pixels."""
+    calibration_check: ScanCheck | None = None
+    """Whether it still held when it was last checked before the scan; null if it was not checked."""
     cameras: list[CameraQuality]
     warnings: list[str] = Field(default_factory=list)
     """Sentences on cameras much of whose points are not the foot."""
+    heads: HeadsReport = Field(default_factory=HeadsReport)
+    """Places of the heads along the travel, from the skin that cameras of two heads saw."""
+    glass: GlassPlane | None = None
+    """The glass during the scan, from the skin on it; null in files of earlier versions."""
     fusion: FusionReport = Field(default_factory=FusionReport)
     """Disagreement of the cameras about the same skin, and their corrections."""
     cloud_points: Count

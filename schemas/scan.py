@@ -51,6 +51,8 @@ class Scan(Document):
     side: Side
     travel: Travel | None = None
     calibration: RelativePath | None = None
+    calibration_check: RelativePath | None = None
+    """The check of the calibration that was in force when the scan was filmed."""
     scanner: Pseudonym | None = None
     """The scanner that filmed it: a workflow may have a calibration for each scanner."""
     laser: Laser | None = None

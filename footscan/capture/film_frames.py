@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.capture.board.heads import Travel
+from footscan.capture.board.head import Travel
 from footscan.capture.board.position_log import PositionLog
 from footscan.capture.cameras.frame_clock import FrameTimes
 from footscan.capture.frame_positions import STANDING_MM, FramePositions, Timed, frame_positions

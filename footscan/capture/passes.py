@@ -6,7 +6,8 @@ from collections import defaultdict
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
-from footscan.capture.board.heads import Heads, Travel
+from footscan.capture.board.head import Travel
+from footscan.capture.board.heads import Heads
 from footscan.capture.cameras.deck import CameraDeck
 from footscan.capture.cameras.frame_clock import FrameTimes
 from footscan.capture.cameras.stream import CapturedFrame
@@ -37,6 +38,8 @@ class PassPlan:
     """Of the lasers, 0 to 1."""
     dark_return: bool = False
     """True if the way back is filmed in the dark: the skin in the light of the room."""
+    head: int | None = None
+    """The only head that travels; None: all do."""
 
 
 @dataclass
@@ -91,21 +94,21 @@ def film_pass(
     connections = {camera: health.connections for camera, health in deck.health().items()}
     try:
         begin_mm, end_mm = _with_lead(plan, heads)
-        heads.travel_to(begin_mm)
+        heads.travel_to(begin_mm, head=plan.head)
         sorter.begin(background=True)
         deck.send_to(sorter.take)
         before = _stand(deck)
         check()
         sorter.begin(background=False)
         heads.lasers(plan.power)
-        travel = heads.travel(begin_mm, end_mm, plan.mm_per_s)
+        travel = heads.travel(begin_mm, end_mm, plan.mm_per_s, plan.head)
         deck.wait_beyond(travel.end_seconds + AFTER_SECONDS, LATEST_SECONDS)
         check()
         back = None
         if plan.dark_return:
             sorter.begin(background=True)
             heads.lasers(0.0)
-            back = heads.travel(end_mm, begin_mm, plan.mm_per_s)
+            back = heads.travel(end_mm, begin_mm, plan.mm_per_s, plan.head)
             deck.wait_beyond(back.end_seconds + AFTER_SECONDS, LATEST_SECONDS)
             check()
     finally:

@@ -1,6 +1,6 @@
 """The measures of a foot: their definitions, and their values for a mesh."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -13,10 +13,12 @@ from footscan.measure.attached import things_at_foot
 from footscan.measure.foot_landmarks import Landmark, find_landmarks
 from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame.foot_frame import FootFrame, foot_frame
+from footscan.measure.frame.glass import glass_doubt
 from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.mesh.rigid_transform import apply
 from footscan.rows import distinct_rows
 from schemas.base.model import Side
+from schemas.glass import GlassPlane
 from schemas.measures import Axis, Measure, MeasuredLandmark, Measures, Position, Status, Unit
 
 Floats = NDArray[np.float64]
@@ -189,13 +191,14 @@ def measure_foot(
     reach_mm: float = 0.0,
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
-    doubt: str | None = None,
+    glass: GlassPlane | None = None,
+    doubts: Sequence[str] = (),
 ) -> Measures:
     """Measure a foot in any pose. A left foot is mirrored and measured as a right one.
 
     Parameters
     ----------
-    vertices : (V, 3) mm, any frame; in a scanner frame the glass is at Z = 0
+    vertices : (V, 3) mm, any frame
     faces : (F, 3), looking outward
     side : "unknown" is inferred from the form
     axis : the requested foot axis
@@ -204,14 +207,16 @@ def measure_foot(
     reach_mm : vertices in the same cube of this edge share their error, as on a smoothed surface; 0: independent errors
     filled : (V,) true for vertices that were filled, not measured
     calibration : name of a measure to (a, b): the reported value is a + b times the measured one
-    doubt : a reason for which all measures are uncertain
+    glass : the scanner's glass in the frame of the mesh; default: at Z = 0
+    doubts : reasons, a sentence each, not to rely on the scan: all measures are uncertain
 
     Raises
     ------
     Finding
         The surface is no foot, or not in mm.
     """
-    foot = foot_frame(vertices, faces, side, axis, manual)
+    glass = glass or GlassPlane()
+    foot = foot_frame(vertices, faces, side, axis, manual, glass.plane)
     landmarks = find_landmarks(foot, manual or {})
     if errors_mm is not None or filled is not None:  # the foot's vertices are those of the mesh without its strays
         back = apply(np.linalg.inv(foot.transform), foot.vertices)
@@ -219,10 +224,12 @@ def measure_foot(
         errors_mm = None if errors_mm is None else np.asarray(errors_mm, np.float64)[source]
         filled = None if filled is None else filled[source]
     things = things_at_foot(foot)
+    reasons = [*doubts, *filter(None, [glass_doubt(glass)])]
     return Measures(
         side=foot.side,
         side_note=foot.side_note,
         things=things,
+        doubts=reasons,
         axis=foot.axis,
         transform=foot.transform.tolist(),
         measures=take_measures(
@@ -232,7 +239,7 @@ def measure_foot(
             reach_mm=reach_mm,
             filled=filled,
             calibration=calibration,
-            doubt="; ".join([*things, *([] if doubt is None else [doubt])]) or None,
+            doubt="; ".join([*reasons, *things]) or None,
         ),
         landmarks=_in_mesh(landmarks, foot.transform),
     )

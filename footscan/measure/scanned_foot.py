@@ -1,5 +1,7 @@
 """Measures of a foot from this scanner, whose errors and filled parts are known."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
@@ -8,6 +10,7 @@ from footscan.measure.measures import measure_foot
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
 from schemas.base.model import Side
+from schemas.glass import GlassPlane
 from schemas.measures import Measures
 
 ERROR_MM, ERROR_GROWS, REACH_MM = 0.03, 0.04, 10.0
@@ -23,13 +26,15 @@ RELIABLE_MM = 5.0
 hand."""
 
 
-def measure_scanned_foot(mesh: Mesh, side: Side) -> Measures:
+def measure_scanned_foot(mesh: Mesh, side: Side, glass: GlassPlane, doubts: Sequence[str] = ()) -> Measures:
     """Measure a scanned surface; the uncertainties follow from the errors of the scanner.
 
     Parameters
     ----------
     mesh : mm, scanner frame; without `filled`, all vertices count as measured. If most of the sole is filled, as with
         cameras above alone, all measures are uncertain: each is taken in the foot's own frame, which rests on the sole.
+    glass : on which the foot stands
+    doubts : as of `measure_foot`
 
     Raises
     ------
@@ -45,7 +50,8 @@ def measure_scanned_foot(mesh: Mesh, side: Side) -> Measures:
         errors_mm=ERROR_MM + ERROR_GROWS * gap_mm,
         reach_mm=REACH_MM,
         filled=gap_mm > RELIABLE_MM,
-        doubt=_unseen_sole(mesh, filled),
+        glass=glass,
+        doubts=[*doubts, *filter(None, [_unseen_sole(mesh, filled)])],
     )
 
 

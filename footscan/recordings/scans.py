@@ -69,6 +69,11 @@ class RecordedScan:
         return self._optional(self.document.calibration, "calibration")
 
     @property
+    def calibration_check(self) -> Path | None:
+        """The check of its calibration that the scan carries."""
+        return self._optional(self.document.calibration_check, "calibration_check")
+
+    @property
     def truth(self) -> Path | None:
         """The reference model that the scan names."""
         return self._optional(self.document.truth, "truth")

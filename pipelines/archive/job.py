@@ -8,12 +8,12 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
+from footscan.recordings.calibration_checks import check_of_scan
 from footscan.recordings.scans import RecordedScan, read_scan, scan_folders
 from pipelines.archive.workflow_file import check_archives, read_workflow
 from pipelines.calibrate import CaptureInputs, CaptureOfScan, recorded_inputs
 from pipelines.engine.actions.step import Failure, Outcome, Step, Success
 from pipelines.engine.files.access import group_number, share
-from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.places import open_files
 from pipelines.engine.plan import Plan
 from pipelines.engine.pool import OnStepEnd, Pool, cores
@@ -24,8 +24,6 @@ from pipelines.recordings.calibration_choice import CalibrationPlace, calibratio
 from pipelines.recordings.captures import read_capture
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
 from schemas.base.errors import RefusedInput
-from schemas.base.json_files import read_text
-from schemas.calibration import calibration_from_json
 from schemas.frames import GROUP
 from schemas.measures import Measures
 from schemas.parameters.scan import ScanParameters
@@ -237,11 +235,15 @@ def draw_steps(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
     Raises
     ------
     RefusedInput
-        As in `scan_steps` and `recorded_inputs`, or the scan has no calibration.
+        As in `scan_steps`, `recorded_inputs` and `check_of_scan`, or the scan has no calibration.
     """
     calibration = _calibration(scan, planned)
-    steps = scan_steps(scan, calibration, planned.job.parameters, planned.workspace.digests)
-    return [*calibration.steps, *steps] if isinstance(calibration, CaptureOfScan) else steps
+    parameters, digests = planned.job.parameters, planned.workspace.digests
+    if isinstance(calibration, CaptureOfScan):
+        steps = scan_steps(scan, calibration, parameters, digests)
+        return [*calibration.steps, *steps]
+    check = check_of_scan(scan, calibration.digest, calibration.checks)
+    return scan_steps(scan, calibration, parameters, digests, check)
 
 
 def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
@@ -352,7 +354,5 @@ def _calibration(scan: RecordedScan, planned: PlannedJob) -> CalibrationFile | C
             planned.captures[path] = recorded_inputs(read_capture(path), planned.workspace.digests)
         return CaptureOfScan.from_capture(scan.name, planned.captures[path])
     if path not in planned.calibrations:
-        text = read_text(path, "json_bytes")
-        digest = sha256(text.encode())
-        planned.calibrations[path] = CalibrationFile(path, calibration_from_json(text, path), digest)
+        planned.calibrations[path] = CalibrationFile.read(path)
     return planned.calibrations[path]

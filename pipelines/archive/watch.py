@@ -93,4 +93,5 @@ def _read_named_files(document: Path, archive: Path) -> tuple[Path, ...]:
     except FootscanError:
         return ()
     names = [name for camera in scan.cameras for name in (camera.file, camera.background, camera.positions)]
+    names.append(scan.calibration_check)
     return tuple(document.parent / name for name in names if name is not None)

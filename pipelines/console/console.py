@@ -12,12 +12,13 @@ from pipelines.console.operator_lock import OperatorLock
 from pipelines.console.presence import Presence
 from pipelines.console.scanner import Scanner, Side
 from pipelines.console.sitting import ScannedFoot, Sitting, judge_scan
+from pipelines.live.calibrating.guide import Guide
 from schemas.base.errors import FootscanError, RefusedInput
 from schemas.base.model import pseudonym
 
 log = logging.getLogger("footscan.console")
 
-Action = Literal["connect", "home", "jog", "shine", "scan"]
+Action = Literal["connect", "home", "jog", "shine", "scan", "calibrate"]
 
 LOOKS_SECONDS = 1.0
 """Longest age of the health of the devices on a page; chosen by hand."""
@@ -32,9 +33,10 @@ WARNING_SECONDS = 60.0
 class Console:
     """The state behind the pages; usable from any thread. A context manager that closes the scanner, lasers off."""
 
-    def __init__(self, scanner: Scanner, archive: Path, results: Path) -> None:
+    def __init__(self, scanner: Scanner, archive: Path, results: Path, guide: Guide | None = None) -> None:
+        """`guide` leads through calibrations; None if the scanner has no reference object."""
         self.archive, self.results = archive, results
-        self.scanner = scanner
+        self.scanner, self.guide = scanner, guide
         self._lock = threading.Lock()
         self._operator = OperatorLock()
         self._sitting = Sitting()
@@ -47,6 +49,8 @@ class Console:
         self._wake, self.closing = threading.Event(), threading.Event()
         self._seen = self._look()
         self._unlisten = scanner.listen(lambda _: self._wake.set())
+        if guide is not None:
+            guide.listen(lambda _: self._wake.set())
         self._watch = threading.Thread(target=self._look_on, name="console", daemon=True)
         self._watch.start()
 
@@ -124,6 +128,13 @@ class Console:
             return judge_scan(self.scanner.film(patient, side, keep_partial=keep_partial), self.results)
 
         self._begin(page, "scan", film)
+
+    def calibrate(self, page: str, act: Callable[[Guide], None]) -> None:
+        """Start an action of the guide; the pages show its view."""
+        guide = self.guide
+        if guide is None:
+            raise RefusedInput("reference object", "is missing, expected reference.yaml beside rig.yaml")
+        self._begin(page, "calibrate", lambda: act(guide))
 
     def resume(self, page: str) -> None:
         """Continue after the door was closed."""
@@ -223,12 +234,13 @@ class Console:
             "action": action,
             "problem": problem,
             "warning": warning,
-            "do": guidance(state, health, action == "scan"),
+            "do": guidance(state, health, action),
             "devices": [vars(device) for device in health.devices],
             "cameras": list(health.cameras),
             "frames": {str(camera): count for camera, count in health.frames.items()},
             "resumable": health.resumable,
             "sitting": sitting.as_json(),
+            "guide": None if self.guide is None else self.guide.view.as_json(),
         }
 
     def _tell(self) -> None:

@@ -16,8 +16,11 @@ _CLOSE = "Lasers and heads are stopped. Close the lid, then press “Go on”; o
 _CLOSE_THEN_HOME = "Lasers and heads are stopped. Close the lid, then press “Home heads”."
 
 
-def guidance(state: ScannerState, health: Health, is_scanning: bool) -> str:
+def guidance(state: ScannerState, health: Health, action: str | None) -> str:
     """What to do now; empty if the scanner is ready and all is well."""
+    is_scanning = action == "scan"
+    if action == "calibrate" and state.name == "filming":
+        return "Keep your hands off, and do not look into the light."
     if state.name == "door open":
         return _CLOSE if is_scanning and health.resumable else _CLOSE_THEN_HOME
     if state.name not in {"idle", "done", "failed"}:

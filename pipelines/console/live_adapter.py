@@ -5,9 +5,11 @@ import shutil
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Protocol
 
 from footscan.capture.cameras.stream import StreamHealth
 from footscan.capture.cameras.usb_bus import Pass
+from pipelines.calibration_check import scanner_check
 from pipelines.console.scanner import Device, Health, Level, Scanned, Side
 from pipelines.live.devices import passes_of
 from pipelines.live.light import ScanLight
@@ -28,8 +30,16 @@ LEAST_SCANS, FEW_SCANS = 2, 20
 LEVELS: dict[str, Level] = {"lost": "bad", "closed": "bad", "alarm": "bad", "door": "warning", "held": "warning"}
 CABLE = "check its cable and hub, then connect again"
 
-PlaceFoot = Callable[[Side, Callable[[int, int], None]], None]
-"""Puts the foot of a side onto the glass of a virtual scanner; the second argument hears of the progress."""
+
+class Glass(Protocol):
+    """The glass of a virtual scanner."""
+
+    subject: str
+    """What stands on it."""
+
+    def put(self, subject: str, progress: Callable[[int, int], None] | None = None) -> None:
+        """Put another subject onto it; `progress` hears of the pictures that are made."""
+        ...
 
 
 class LiveAdapter:
@@ -40,15 +50,13 @@ class LiveAdapter:
         scanner: LiveScanner,
         archive: Path,
         results: Path,
-        calibration: Path | None = None,
         light: ScanLight | None = None,
-        place_foot: PlaceFoot | None = None,
+        glass: Glass | None = None,
     ) -> None:
-        """`calibration` and `light` as in `ScanOrder`."""
+        """`light` as in `ScanOrder`; `glass`: of a virtual scanner."""
         self._scanner = scanner
-        self._archive, self._results, self._calibration = archive, results, calibration
-        self._light, self._place_foot = light, place_foot
-        self._placed: Side | None = None
+        self._archive, self._results = archive, results
+        self._light, self._glass = light, glass
         self._passes, self._plan_problem = _planned(scanner)
         self._not_opened: dict[int, str] = {}
         self._before_pass: dict[int, int] = {}
@@ -71,6 +79,7 @@ class LiveAdapter:
             *self._board(),
             *(self._camera(camera.id, streams.get(camera.id)) for camera in self._scanner.rig.cameras),
             *self._plan(),
+            self._checked(),
             self._space(),
         ]
         frames = {camera: stream.received - self._before_pass.get(camera, 0) for camera, stream in streams.items()}
@@ -101,13 +110,12 @@ class LiveAdapter:
 
     def film(self, patient: str, side: Side, *, keep_partial: bool) -> Scanned:
         """As `Scanner.film`."""
-        if self._place_foot is not None and side != self._placed:
+        if self._glass is not None and side != self._glass.subject:
             with self._scanner.waiting_for(f"a virtual {side} foot is put onto the glass") as progress:
-                self._place_foot(side, progress)
-            self._placed = side
+                self._glass.put(side, progress)
         today = datetime.datetime.now().astimezone().date()
         name = ScanName(patient, next_scan_name(self._archive, patient, side, today), side, today)
-        order = ScanOrder(name, self._archive, self._results, self._calibration, self._light, keep_partial=keep_partial)
+        order = ScanOrder(name, self._archive, self._results, light=self._light, keep_partial=keep_partial)
         result = self._scanner.scan(order)
         problem = None if result.measured is None else result.measured.problem
         return Scanned(patient, name.scan, side, problem, dict(result.stored.left_out))
@@ -178,6 +186,19 @@ class LiveAdapter:
             yield Device("Passes", "bad", self._plan_problem)
         for number, planned in enumerate(self._passes, start=1):
             yield Device("Passes" if len(self._passes) == 1 else f"Pass {number}", "ok", planned.reason)
+
+    def _checked(self) -> Device:
+        """The last check of the calibration: a camera that moved since makes all measures uncertain."""
+        rig = self._scanner.rig
+        if rig.calibration is None:
+            return Device("Calibration", "bad", "the scanner has none", "calibrate it")
+        try:
+            check = scanner_check(Path(rig.calibration), [camera.id for camera in rig.cameras])
+        except FootscanError as error:
+            return Device("Calibration", "bad", str(error))
+        if check is None:
+            return Device("Calibration", "unknown", "was not checked")
+        return Device("Calibration", "bad" if check.doubt else "ok", check.summary("ago"), check.doubt or "")
 
     def _space(self) -> Device:
         existing = next(folder for folder in (self._archive, *self._archive.absolute().parents) if folder.exists())

@@ -27,6 +27,7 @@ from starlette.types import Receive, Scope, Send
 from footscan.capture.board.termination import ending_signals
 from footscan.report.style import STYLE
 from footscan.report.viewer_script import SCRIPT
+from pipelines.console.calibrating import calibrating_routes, order
 from pipelines.console.console import Console
 from pipelines.console.gate import LARGEST_HEAD, Gate, Stop, hand_over_to
 from pipelines.console.guard import LARGEST_BODY, PAGE, PAGE_HEADER, Guard, Rules
@@ -44,7 +45,7 @@ from schemas.rig import HeadNumber
 _Made = TypeVar("_Made")
 
 STATIC = Path(__file__).with_name("static")
-SCRIPTS = ("link.js", "sitting.js", "foot.js")
+SCRIPTS = ("link.js", "cameras.js", "sitting.js", "calibrating.js", "foot.js")
 ALIVE_SECONDS = 10.0
 """Interval of the signs of life to a page while the state does not change; chosen by hand."""
 PAGES_KEPT = 4
@@ -178,7 +179,7 @@ def application(console: Console, host: str, token: str | None) -> Starlette:
 
 def _application(console: Console, rules: Rules, stop_port: int | None) -> Starlette:
     pages = _Pages(console, stop_port)
-    actions = {
+    actions: dict[str, Callable[[str, bytes], None]] = {
         "connect": lambda page, _: console.connect(page),
         "home": lambda page, _: console.home(page),
         "shine": lambda page, _: console.shine(page),
@@ -188,6 +189,7 @@ def _application(console: Console, rules: Rules, stop_port: int | None) -> Starl
         "stop": lambda *_: console.stop(),
         "scan": lambda page, body: _scan(console, page, body),
         "jog": lambda page, body: _jog(console, page, body),
+        "calibrate": partial(order, console),
     }
     return Starlette(
         routes=[
@@ -195,6 +197,7 @@ def _application(console: Console, rules: Rules, stop_port: int | None) -> Starl
             Route("/foot/{patient}/{scan}", pages.foot),
             Route("/pair/{patient}/{left}/{right}", pages.pair),
             Route("/results/{patient}/{scan}/{name}", pages.result),
+            *calibrating_routes(console),
             Route("/static/{name}", _static),
             Route("/events", pages.events),
             Route("/here", pages.here, methods=["POST"]),

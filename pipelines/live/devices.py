@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from footscan.capture.board.carriages import Head
+from footscan.capture.board.head import Head
 from footscan.capture.cameras.devices import CameraDevice, list_cameras
 from footscan.capture.cameras.source import CameraSource
 from footscan.capture.cameras.usb_bus import Pass, UsbCamera, plan_passes

@@ -61,8 +61,15 @@ def fix_light(rig: Rig, deck: CameraDeck, exposure_ms: Mapping[int, float]) -> d
     return fixed
 
 
-def measured_light(rig: Rig, deck: CameraDeck, heads: Heads, check: Callable[[], None]) -> ScanLight:
-    """Measure the light in which the open cameras see the stripe best, with the heads at `TEST_PLACES` positions.
+def places_of_scan(rig: Rig) -> list[float]:
+    """X, mm, of the positions along the travel at which the light of a scan is measured."""
+    return [rig.travel.start_mm + rig.travel.length_mm * (k + 1) / (TEST_PLACES + 1) for k in range(TEST_PLACES)]
+
+
+def measured_light(
+    rig: Rig, deck: CameraDeck, heads: Heads, places: Sequence[float], check: Callable[[], None]
+) -> ScanLight:
+    """Measure the light in which the open cameras see the stripe best, with the heads at `places`, X in mm.
 
     `check` is called before each measurement and may raise an exception to end it.
 
@@ -75,9 +82,6 @@ def measured_light(rig: Rig, deck: CameraDeck, heads: Heads, check: Callable[[],
     """
     from footscan.capture.light_choice import LightLimits, choose_light
 
-    length = rig.travel.length_mm
-    places = [rig.travel.start_mm + length * (k + 1) / (TEST_PLACES + 1) for k in range(TEST_PLACES)]
-
     def look(power: float, exposures: Mapping[int, float]) -> dict[int, Sequence[Rgb]]:
         fix_light(rig, deck, exposures)
         frames: dict[int, list[Rgb]] = defaultdict(list)
@@ -85,8 +89,10 @@ def measured_light(rig: Rig, deck: CameraDeck, heads: Heads, check: Callable[[],
             check()
             heads.travel_to(place)
             check()
-            for camera, pictures in _look(deck, heads, power).items():
-                frames[camera] += pictures
+            for camera, jpegs in standing_frames(deck, heads, power).items():
+                if not jpegs:
+                    raise Fault(f"camera {camera}: no frame within {LOOK_SECONDS:g} s")
+                frames[camera] += [decode_image(jpeg) for jpeg in jpegs[-FRAMES_A_PLACE:]]
         return dict(frames)
 
     limits = LightLimits(shortest_ms=rig.light.shortest_ms, longest_ms=rig.light.longest_ms, weakest=rig.light.weakest)
@@ -94,25 +100,28 @@ def measured_light(rig: Rig, deck: CameraDeck, heads: Heads, check: Callable[[],
     return ScanLight(chosen.power, chosen.exposure_ms, chosen.reasons, chosen.looks, is_measured=True)
 
 
-def _look(deck: CameraDeck, heads: Heads, power: float) -> dict[int, list[Rgb]]:
-    """Take `FRAMES_A_PLACE` frames of each open camera, with standing heads and the lasers at `power`."""
+def standing_frames(
+    deck: CameraDeck, heads: Heads, power: float, seconds: float = LOOK_SECONDS, settle_seconds: float = SETTLE_SECONDS
+) -> dict[int, list[bytes]]:
+    """Take the JPEGs of each open camera, with standing heads and the lasers at `power` for so many `seconds`.
+
+    The frames of the first `settle_seconds` are left out, and of the last `SETTLE_SECONDS`. A camera that gave no frame
+    has an empty list.
+    """
     begin = time.monotonic()
     jpegs: dict[int, list[bytes]] = {camera: [] for camera in deck.open_cameras}
 
     def keep(frame: CapturedFrame) -> None:
         since = frame.seconds - begin
-        if frame.problem is None and SETTLE_SECONDS < since < LOOK_SECONDS - SETTLE_SECONDS:
-            jpegs[frame.camera] = [*jpegs[frame.camera], frame.jpeg][-FRAMES_A_PLACE:]
+        if frame.problem is None and settle_seconds < since < seconds - SETTLE_SECONDS:
+            jpegs[frame.camera].append(frame.jpeg)
 
     deck.send_to(keep)
     try:
         if power:
-            heads.shine(power, LOOK_SECONDS)
+            heads.shine(power, seconds)
         else:
-            deck.wait_beyond(begin + LOOK_SECONDS, 3 * LOOK_SECONDS)
+            deck.wait_beyond(begin + seconds, 3 * seconds)
     finally:
         deck.send_to(None)
-    for camera, frames in jpegs.items():
-        if not frames:
-            raise Fault(f"camera {camera}: no frame within {LOOK_SECONDS:g} s")
-    return {camera: [decode_image(jpeg) for jpeg in frames] for camera, frames in jpegs.items()}
+    return jpegs

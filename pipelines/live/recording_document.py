@@ -16,6 +16,7 @@ from pipelines.live.devices import timing_of
 from pipelines.live.light import ScanLight
 from pipelines.version import SOFTWARE
 from schemas.base.model import canonical_json
+from schemas.calibration_check import CalibrationCheck
 from schemas.recording import LeftOut, RecordedBoard, RecordedCamera, RecordedLight, RecordedPass, Recording
 from schemas.rig import Rig, RigCamera
 
@@ -25,7 +26,7 @@ LONGEST_TEXT = 1000
 
 @dataclass
 class ScanStory:
-    """Data on the making of a scan that recording.json needs."""
+    """Data on the making of a scan that its documents need."""
 
     started: datetime.datetime
     light: ScanLight
@@ -37,6 +38,8 @@ class ScanStory:
     """Result of fixing the settings of each camera."""
     lost_steps_mm: tuple[float, ...] | None = None
     """Position errors of heads 1, 2, ... after the last travel, by their home switches."""
+    calibration_check: CalibrationCheck | None = None
+    """The last check of the scanner's calibration before the scan; None without one."""
 
     def timing(self, camera: RigCamera) -> CameraTiming:
         """Timing of a camera in the light of the scan."""

@@ -14,13 +14,15 @@ from footscan.capture.cameras.deck import CameraDeck
 from footscan.capture.cameras.stream import CapturedFrame
 from footscan.capture.cameras.usb_bus import Pass
 from footscan.capture.passes import FilmedPass, PassPlan, film_name, film_pass
+from pipelines.calibration_check import check_in_force
 from pipelines.live.devices import heads_of, passes_of, sources_of, timing_of
-from pipelines.live.light import ScanLight, fix_light, measured_light
+from pipelines.live.light import ScanLight, fix_light, measured_light, places_of_scan
 from pipelines.live.observer import looking_on
 from pipelines.live.recording_document import ScanStory
 from pipelines.live.scan_order import LiveResult, ScanOrder
 from pipelines.live.state import Activity, OnState, ScannerState, StateBoard, with_board
 from schemas.base.errors import Fault, FootscanError, RefusedInput
+from schemas.calibration_check import CalibrationCheck
 from schemas.rig import Rig
 
 if TYPE_CHECKING:  # heads that are only moved do not wait for Zarr, Dask and the reconstruction
@@ -151,7 +153,8 @@ class LiveScanner:
         Raises
         ------
         RefusedInput
-            The rig lacks data that a scan needs, the scan exists already, or the scanner is busy.
+            The rig lacks data that a scan needs, the scan exists already, the check of the calibration is damaged, or
+            the scanner is busy.
         Finding
             A film is incomplete, and the order does not say `keep_partial`. Nothing is stored.
         Fault
@@ -159,7 +162,7 @@ class LiveScanner:
         """
         with self._at_work("filming"):
             calibration = self._calibration(order)
-            stored = self.film(order)
+            stored = self.film(order, check_in_force(calibration))
             measured = None
             if order.results is not None and calibration is not None:
                 from pipelines.live.measuring import measure_scan
@@ -172,8 +175,10 @@ class LiveScanner:
                 self._board.tell("done", str(stored.place))
             return LiveResult(stored, measured)
 
-    def film(self, order: ScanOrder) -> "FilmedScan":
-        """Film and store a foot: the part of `scan` that needs the devices; the caller has reserved the scanner."""
+    def film(self, order: ScanOrder, check: CalibrationCheck | None = None) -> "FilmedScan":
+        """Film and store a foot, with the last check of the calibration: the part of `scan` that needs the devices.
+
+        The caller has reserved the scanner."""
         from footscan.capture.recording import ScanRecording
         from pipelines.live.storing import store_scan
 
@@ -184,11 +189,12 @@ class LiveScanner:
             self._home_if_needed()
             passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])
             travel = self.rig.travel
-            light = order.light or self._measured_light(passes)
+            light = order.light or self.measured_light(passes, places_of_scan(self.rig))
             plan = PassPlan(travel.start_mm, travel.end_mm, travel.mm_per_s, light.power, order.texture)
-            story = ScanStory(datetime.datetime.now().astimezone(), light, passes, plan)
+            started = datetime.datetime.now().astimezone()
+            story = ScanStory(started, light, passes, plan, calibration_check=check)
             place = order.archive / order.name.patient / order.name.scan
-            with ScanRecording(place, self._expected_bytes(plan)) as recording:
+            with ScanRecording(place, self.expected_bytes(travel.length_mm * (2 if order.texture else 1))) as recording:
                 for number, planned in enumerate(passes, start=1):
                     words = f"pass {number} of {len(passes)}" if len(passes) > 1 else ""
                     story.filmed.append(self.film_one_pass(planned, plan, light, recording, words, story))
@@ -198,14 +204,22 @@ class LiveScanner:
                 return store_scan(self.rig, order.name, story, self.heads, recording, order.keep_partial)
 
     @contextmanager
-    def ready_to_film(self) -> Iterator[None]:
-        """Reserve the scanner, connected and homed, for passes in the block; then check the heads for lost steps."""
-        with self._at_work("filming"), self._stop_reported():
+    def ready(self, words: str = "") -> Iterator[None]:
+        """Reserve the scanner, connected and homed, for the block."""
+        with self._at_work("filming", words), self._stop_reported():
             self._connect_board()
             self._home_if_needed()
+            self._board.tell("filming", words)
+            yield
+            self._refuse_stopped()
+            self._board.tell("idle")
+
+    @contextmanager
+    def ready_to_film(self) -> Iterator[None]:
+        """Reserve the scanner, connected and homed, for passes in the block; then check the heads for lost steps."""
+        with self.ready():
             yield
             self._check_steps()
-            self._board.tell("idle")
 
     def film_one_pass(
         self,
@@ -238,6 +252,28 @@ class LiveScanner:
         check()
         with self._watched(plan, recording):
             return film_pass(self.heads, self._deck, planned.cameras, plan, take, check)
+
+    def measured_light(self, passes: Sequence[Pass], places: Sequence[float]) -> ScanLight:
+        """Measure the light of all passes, each with its cameras, with the heads at `places`, X in mm.
+
+        The caller has reserved the scanner.
+        """
+        exposures: dict[int, float] = {}
+        reasons: dict[int, str] = {}
+        powers, looks = [], 0
+        for planned in passes:
+            self._board.tell("filming", "looking at the light")
+            self._deck.open_only(planned.cameras)
+            light = measured_light(self.rig, self._deck, self.heads, places, self._refuse_stopped)
+            exposures |= light.exposure_ms
+            reasons |= light.reasons
+            powers.append(light.power)
+            looks += light.looks
+        weakest = min(powers)
+        for planned, power in zip(passes, powers, strict=True):  # one power for all: with less light, expose longer
+            for camera in planned.cameras:
+                exposures[camera] = min(exposures[camera] * power / weakest, self.rig.light.longest_ms)
+        return ScanLight(weakest, exposures, reasons, looks, is_measured=True)
 
     def shine(self, power: float, seconds: float) -> None:
         """Switch the lasers on while the heads stand, so that live pictures show the stripe."""
@@ -323,25 +359,6 @@ class LiveScanner:
         passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])
         return self._deck.open_only(passes[0].cameras)
 
-    def _measured_light(self, passes: Sequence[Pass]) -> ScanLight:
-        """Measure the light of each pass with its cameras, and combine the results for all passes."""
-        exposures: dict[int, float] = {}
-        reasons: dict[int, str] = {}
-        powers, looks = [], 0
-        for planned in passes:
-            self._board.tell("filming", "looking at the light")
-            self._deck.open_only(planned.cameras)
-            light = measured_light(self.rig, self._deck, self.heads, self._refuse_stopped)
-            exposures |= light.exposure_ms
-            reasons |= light.reasons
-            powers.append(light.power)
-            looks += light.looks
-        weakest = min(powers)
-        for planned, power in zip(passes, powers, strict=True):  # one power for all: with less light, expose longer
-            for camera in planned.cameras:
-                exposures[camera] = min(exposures[camera] * power / weakest, self.rig.light.longest_ms)
-        return ScanLight(weakest, exposures, reasons, looks, is_measured=True)
-
     def _calibration(self, order: ScanOrder) -> Path | None:
         if order.calibration is not None:
             return order.calibration
@@ -351,8 +368,9 @@ class LiveScanner:
             raise RefusedInput("rig", "is missing, expected the scanner's calibration file", field="calibration")
         return None
 
-    def _expected_bytes(self, plan: PassPlan) -> int:
-        seconds = abs(plan.end_mm - plan.start_mm) / plan.mm_per_s * (2 if plan.dark_return else 1)
+    def expected_bytes(self, travel_mm: float) -> int:
+        """Expected size of the frames of all cameras on a travel."""
+        seconds = travel_mm / self.rig.travel.mm_per_s
         return round(len(self.rig.cameras) * seconds * self.rig.frames_per_second * FRAME_BYTES)
 
     @contextmanager
@@ -367,7 +385,9 @@ class LiveScanner:
                 with suppress(Fault):  # the state reports it
                     self._stop_heads(UNDER_WAY)
             for latest in heads.log.between(time.monotonic() - REPORT_SECONDS, math.inf)[-1:]:
-                self._board.progress((latest.x_mm[0] - plan.start_mm) / (plan.end_mm - plan.start_mm))
+                self._board.progress(
+                    (latest.x_mm[(plan.head or 1) - 1] - plan.start_mm) / (plan.end_mm - plan.start_mm)
+                )
 
         try:
             with looking_on(look, WATCH_SECONDS, "watch over the pass"):

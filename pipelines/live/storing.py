@@ -1,4 +1,4 @@
-"""Storing of a filmed scan in the archive: films with positions, scan.yaml and recording.json."""
+"""Storing of a filmed scan in the archive: films with positions, scan.yaml, recording.json, the calibration's check."""
 
 import datetime
 from dataclasses import dataclass, field
@@ -18,10 +18,13 @@ from footscan.capture.passes import FilmedPass, film_name
 from footscan.capture.recording import ScanRecording
 from pipelines.live.recording_document import ScanStory, recording_document
 from schemas.base.errors import Finding, FootscanError, RefusedInput
+from schemas.base.model import Side
 from schemas.frames import GROUP
 from schemas.rig import Rig, RigCamera
 from schemas.scan import Scan
 
+CHECK_FILE = "calibration.check.json"
+"""Name of the check of the calibration in the folder of a scan."""
 LARGEST_SD_MM = 0.3
 """Largest standard deviation of the position of a frame; a frame with a larger one is lost. Chosen by hand."""
 MOST_SCANS = 999
@@ -34,7 +37,7 @@ class ScanName:
 
     patient: str
     scan: str
-    side: Literal["right", "left"]
+    side: Side
     date: datetime.date
 
 
@@ -87,6 +90,9 @@ def store_scan(
     for camera_id in left_out:
         for background in (False, True):
             recording.drop_film(film_name(camera_id, background=background))
+    check = story.calibration_check
+    if check is not None:
+        recording.file(CHECK_FILE).write_text(check.model_dump_json(indent=2) + "\n", encoding="utf-8")
     scan = Scan.model_validate(
         {
             "format": "footscan.scan/1",
@@ -95,6 +101,7 @@ def store_scan(
             "side": name.side,
             "date": name.date,
             "scanner": rig.scanner,
+            "calibration_check": None if check is None else CHECK_FILE,
             "cameras": sorted(entries, key=lambda entry: int(str(entry["id"]))),
         }
     )

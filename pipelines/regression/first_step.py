@@ -18,7 +18,7 @@ from schemas.regression import AcceptedStep
 
 FILMED_FROM = {"ingest": "film", "background": "film"}
 """Kinds of steps that read the films of a virtual scan, and the step that makes the films."""
-CALIBRATED = {"map", "clean", "orient", "texture", "quality", "report"}
+CALIBRATED = {"map", "heads", "clean", "orient", "texture", "quality", "report"}
 """Kinds of steps that use the calibration of a virtual scan."""
 LINES = 12
 """Lines of a change that are shown; chosen by hand."""

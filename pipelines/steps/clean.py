@@ -7,19 +7,22 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cloud.heads.planes import corrected
 from footscan.cloud.outliers.remove import remove_outliers
 from footscan.cloud.views import views_of
 from pipelines.arrays import pack, unpack
 from schemas.base.errors import Finding
 from schemas.calibration import Calibration
+from schemas.heads import HeadsReport
 from schemas.parameters.outliers import OutlierParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapping[str, Path]) -> bytes:
     """Remove the outliers from the points of all cameras.
 
-    `inputs`: `points-N` of each camera and the `calibration` of all. The result holds the kept `points`, the `codes` of
-    all points, the counts of `removed` points by camera and reason, and `warnings`.
+    `inputs`: `points-N` of each camera, the `calibration` of all, and `heads`, where they were. The result holds the
+    kept `points`, the `codes` of all points, the counts of `removed` points by camera and reason, `warnings`, and the
+    `glass` below the foot.
 
     Raises
     ------
@@ -35,11 +38,18 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
     if not len(points):
         raise Finding("no stripe in any camera, expected a foot in the films")
     filmed = {one.view: mapped[one.camera]["x_of_frame"] + one.ahead_mm for one in calibrated if one.camera in mapped}
+    points, views = corrected(points, views, HeadsReport.model_validate_json(inputs["heads"]))
     kept, removed = remove_outliers(points, views, parameters, filmed)
     if not len(kept):
         raise Finding("every point is an outlier, expected a foot in the control volume")
     counts = {str(camera): reasons for camera, reasons in removed.counts.items()}
-    return pack(points=kept, codes=removed.codes, removed=_json(counts), warnings=_json(removed.warnings))
+    return pack(
+        points=kept,
+        codes=removed.codes,
+        removed=_json(counts),
+        warnings=_json(removed.warnings),
+        glass=_json(removed.glass.model_dump(mode="json")),
+    )
 
 
 def _json(content: object) -> NDArray[np.uint8]:

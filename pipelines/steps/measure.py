@@ -1,5 +1,6 @@
 """Mesh to measures.json."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -9,6 +10,8 @@ from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from pipelines.arrays import unpack
 from schemas.base.errors import Finding
+from schemas.glass import GlassPlane
+from schemas.heads import HeadsReport
 from schemas.measures import Measures
 from schemas.parameters.foot import FootParameters
 
@@ -16,14 +19,20 @@ from schemas.parameters.foot import FootParameters
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
     """Measure the foot, as measures.json.
 
-    `inputs`: `surface`. A foot that cannot be measured gives a document with the finding.
+    `inputs`: `surface`, `clean` for the glass, `heads`, where they were, and `calibration-doubt`, a sentence, if a
+    check of the calibration gave reason for one. A foot that cannot be measured gives a document with the finding.
     """
     del places
     surface = unpack(inputs["surface"])
+    glass = GlassPlane.model_validate_json(unpack(inputs["clean"])["glass"].tobytes())
+    checked = json.loads(inputs["calibration-doubt"]) if "calibration-doubt" in inputs else None
+    doubts = [*filter(None, [checked, HeadsReport.model_validate_json(inputs["heads"]).doubt])]
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface["filled"])
     try:
-        measures = measure_scanned_foot(mesh, parameters.side)
+        measures = measure_scanned_foot(mesh, parameters.side, glass, doubts)
     except Finding as finding:  # the other results are still of use
         unmoved = np.eye(4).tolist()
-        measures = Measures(side=parameters.side, axis=None, transform=unmoved, measures={}, finding=str(finding))
+        measures = Measures(
+            side=parameters.side, doubts=doubts, axis=None, transform=unmoved, measures={}, finding=str(finding)
+        )
     return (measures.model_dump_json(indent=2) + "\n").encode()

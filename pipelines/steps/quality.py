@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 from footscan.surface.quality import mesh_quality
 from pipelines.arrays import unpack
 from schemas.calibration import Source
+from schemas.calibration_check import ScanCheck
 from schemas.frames import FrameManifest
 from schemas.fusion import FusionReport
+from schemas.glass import GlassPlane
+from schemas.heads import HeadsReport
 from schemas.laser import Laser
 from schemas.quality import CameraQuality, Comparison, Quality
 
@@ -20,8 +23,8 @@ from schemas.quality import CameraQuality, Comparison, Quality
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
     """Collect the quality figures of a scan, as quality.json.
 
-    `inputs`: `calibration` (its name and digest), `clean`, `fused`, `surface`, `manifest-N` and `stripe-N` of each
-    camera, and `verified` if the scan has a truth.
+    `inputs`: `calibration` (its name and digest), `heads`, `clean`, `fused`, `surface`, `manifest-N` and `stripe-N` of
+    each camera, `calibration-check` if the calibration was checked, and `verified` if the scan has a truth.
     """
     del parameters, places
     cleaned = unpack(inputs["clean"])
@@ -32,8 +35,11 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
     quality = Quality(
         calibration=Source.model_validate_json(inputs["calibration"]),
+        calibration_check=_check(inputs),
         cameras=[_camera(camera, inputs, removed.get(str(camera), {})) for camera in ids],
         warnings=json.loads(cleaned["warnings"].tobytes()),
+        heads=HeadsReport.model_validate_json(inputs["heads"]),
+        glass=GlassPlane.model_validate_json(cleaned["glass"].tobytes()),
         fusion=FusionReport.model_validate_json(fused["report"].tobytes()),
         cloud_points=len(fused["cloud"]),
         mesh=mesh_quality(surface["vertices"], surface["faces"], surface.get("filled"), cut_mm),
@@ -59,6 +65,11 @@ def _camera(camera: int, inputs: Mapping[str, bytes], removed: dict[str, int]) -
 def _laser(extracted: Mapping[str, NDArray[Any]]) -> Laser | None:
     found = extracted["laser"].item() if "laser" in extracted else "auto"
     return None if found == "auto" else cast(Laser, found)
+
+
+def _check(inputs: Mapping[str, bytes]) -> ScanCheck | None:
+    check = inputs.get("calibration-check")
+    return None if check is None else ScanCheck.model_validate_json(check)
 
 
 def _truth(inputs: Mapping[str, bytes]) -> Comparison | None:

@@ -13,6 +13,7 @@ from footscan.virtual.worlds.judge import Truth
 from pipelines.arrays import unpack
 from schemas.campaign import ShapeError, WorldMeasure, WorldOutcome
 from schemas.fusion import FusionReport
+from schemas.heads import HeadsReport
 from schemas.measures import Measures
 from schemas.world import World
 
@@ -20,8 +21,8 @@ from schemas.world import World
 def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Path]) -> bytes:
     """Compare cloud, surface and measures with the truth.
 
-    `inputs`: the `world` with its truth, the `kind` of the world, `cleaned`, `fused`, `oriented`, `surface` and
-    `measures`.
+    `inputs`: the `world` with its truth, the `kind` of the world, `heads`, `cleaned`, `fused`, `oriented`, `surface`
+    and `measures`.
     """
     del places
     world = unpack(inputs["world"])
@@ -36,6 +37,7 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
     measures = Measures.model_validate_json(inputs["measures"])
     agreement = FusionReport.model_validate_json(unpack(inputs["fused"])["report"].tobytes())
     cleaning: list[str] = json.loads(unpack(inputs["cleaned"])["warnings"].tobytes())
+    heads = HeadsReport.model_validate_json(inputs["heads"])
     known: dict[str, float | None] = json.loads(world["measures"].tobytes())
     outcome = WorldOutcome(
         seed=parameters.seed,
@@ -45,7 +47,7 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
         shift_mm=float(np.linalg.norm((turn - np.eye(3)) @ measured.mean(axis=0) + shift)),
         cloud=error(coordinates(oriented["cloud"])),
         surface=error(measured),
-        warnings=[*cleaning, *agreement.warnings, *measures.warnings],
+        warnings=[*heads.warnings, *cleaning, *agreement.warnings, *measures.warnings],
         measures={
             name: WorldMeasure(value=measure.value, truth=known[name], sigma=measure.uncertainty, status=measure.status)
             for name, measure in measures.measures.items()

@@ -21,7 +21,14 @@ from schemas.parameters.scan import ScanParameters
 from schemas.scan import Travel
 from schemas.world import World
 
-RESULTS = {"cleaned": "clean", "fused": "fuse", "oriented": "orient", "surface": "surface", "measures": "measure"}
+RESULTS = {
+    "heads": "heads",
+    "cleaned": "clean",
+    "fused": "fuse",
+    "oriented": "orient",
+    "surface": "surface",
+    "measures": "measure",
+}
 """Results of a reconstruction that are compared with the truth, and the kinds of their steps."""
 
 

@@ -35,7 +35,8 @@ class OutlierParameters(Document):
     drop_unsupported: bool = True
     """Drop points of pixels that no control point of the calibration supports."""
     glass_mm: Annotated[float, Field(ge=0, le=50)] = 0.5
-    """Points farther below the glass, at Z = 0, are dropped; points beside the foot this near to it are the glass."""
+    """Points farther below the glass are dropped; points beside the foot this near to it are the glass. A warning says
+    so if the plate was moved by more since the calibration."""
     gap_mm: Annotated[float, Field(gt=0, le=50)] = 1.5
     """A segment of stripe ends where the next point is farther away than this, ..."""
     segment_mm: Annotated[float, Field(gt=0, le=1000)] = 15.0

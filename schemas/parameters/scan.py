@@ -3,6 +3,7 @@
 from schemas.base.model import Document
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.parameters.fusion import FusionParameters
+from schemas.parameters.heads import HeadParameters
 from schemas.parameters.mapping import MappingParameters
 from schemas.parameters.normals import NormalParameters
 from schemas.parameters.outliers import OutlierParameters
@@ -14,6 +15,7 @@ class ScanParameters(Document):
 
     extraction: ExtractionParameters = ExtractionParameters()
     mapping: MappingParameters = MappingParameters()
+    heads: HeadParameters = HeadParameters()
     fusion: FusionParameters = FusionParameters()
     outliers: OutlierParameters = OutlierParameters()
     normals: NormalParameters = NormalParameters()

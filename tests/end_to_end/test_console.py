@@ -1,11 +1,8 @@
 """The operator's page in a real browser: a whole session of two feet, by mouse and by keyboard, and what goes wrong."""
 
-import importlib.util
 import signal
-import socket
 import subprocess
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,13 +11,12 @@ import pytest
 from chromium import Opened as OpenedPage
 from chromium import needs_chromium
 from playwright.sync_api import expect
+from served import console_stand_in, served
 
 from pipelines.console.console import Console
-from pipelines.console.server import listen, server_of
 
 pytestmark = [needs_chromium, pytest.mark.real_time]  # a browser waits for a server beside a stand-in that films
 
-STAND_IN = Path(__file__).parents[1] / "pipelines" / "console" / "stand_in.py"
 DESKTOP, UPRIGHT, ACROSS = (1280, 800), (768, 1024), (1024, 768)
 HOSTILE = "<img src=x onerror=document.title='owned'>"
 TARGETS_PX = 40
@@ -45,13 +41,7 @@ class Opened(OpenedPage):
 
 @pytest.fixture
 def scanner(tmp_path: Path) -> Any:
-    """As in the tests of the server."""
-    spec = importlib.util.spec_from_file_location("console_stand_in", STAND_IN)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.StandIn(tmp_path / "results", step_seconds=0.02)
+    return console_stand_in(tmp_path / "results", step_seconds=0.02)
 
 
 @pytest.fixture
@@ -63,19 +53,8 @@ def console(scanner: Any, tmp_path: Path) -> Iterator[Console]:
 @pytest.fixture
 def address(console: Console) -> Iterator[str]:
     """Of a server that runs."""
-    with listen("127.0.0.1", 0) as listening:
-        server = server_of(console, "127.0.0.1", None)
-        thread = threading.Thread(target=_serve, args=(server, listening), daemon=True)
-        thread.start()
-        yield f"http://127.0.0.1:{listening.getsockname()[1]}"
-        console.closing.set()
-        server.should_exit = True
-        thread.join(60)
-        assert not thread.is_alive(), "the server ends although pages look at it"
-
-
-def _serve(server: Any, listening: socket.socket) -> None:
-    server.run(sockets=[listening])
+    with served(console) as at:
+        yield at
 
 
 @pytest.fixture

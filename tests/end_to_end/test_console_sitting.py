@@ -1,4 +1,4 @@
-"""Both feet of a person in one sitting, from the page alone, over the whole virtual scanner: board, eight cameras, all.
+"""Calibrating, and both feet of a person, from the page alone, over the whole virtual scanner: board, cameras, all.
 
     FOOTSCAN_SITTING=folder pytest tests/end_to_end/test_console_sitting.py -s
 
@@ -23,7 +23,7 @@ from playwright.sync_api import expect
 from waiting import wait_until
 
 from footscan.virtual.foot.foot import make_foot
-from pipelines.console.pages.results import read_measures
+from pipelines.console.pages.results import read_measures, read_quality
 
 FOLDER = os.environ.get("FOOTSCAN_SITTING")
 pytestmark = [
@@ -38,6 +38,10 @@ FOOT_SECONDS = 1500.0
 """The longest a foot may take from its start to its page."""
 TRIES = 3
 """A host that stands still while it films loses places of frames, and the page says so: one tries again."""
+PLACEMENTS = 4
+"""Placements of the reference object that are filmed."""
+WORK_MS = 300_000
+"""The longest that a placement may take to be rendered, filmed and judged, or a scanner to be calibrated."""
 LENGTH_MM = 0.5
 """How far the length of a virtual foot may be off."""
 
@@ -115,6 +119,43 @@ def console(folder: Path) -> Iterator[str]:
             assert process.wait(120) == 0
         finally:
             process.kill()
+
+
+def test_a_scanner_is_calibrated_and_measures_a_foot(browser: Any) -> None:
+    folder = Path(str(FOLDER)).resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    with console(folder) as address:
+        sitting = Sitting(browser, address, folder)
+        page = sitting.page
+        wait_until(lambda: sitting.state == "Ready")
+        page.click("text=Calibrate or check")
+        name, usual = page.locator("#step-name"), page.locator("#usual")
+        if usual.inner_text() != "Calibrate the scanner":
+            page.click("[data-action=calibrate]")
+        for number in range(1, PLACEMENTS + 1):
+            expect(page.locator("#step-words")).to_contain_text(f"Placement {number} of 10")
+            for says, then in (("Put the virtual object there", "Film this placement"), (None, "Next placement")):
+                if says:
+                    expect(usual).to_have_text(says)
+                usual.click()
+                expect(usual).to_have_text(then, timeout=WORK_MS)
+            sitting.picture(f"placement-{number}")
+            if number < PLACEMENTS:
+                usual.click()
+        page.click("[data-action=finish]")
+        expect(name).to_have_text("The scanner is calibrated", timeout=WORK_MS)
+        sitting.picture("calibrated")
+        made = Path(page.locator("#outcome-file").inner_text()).name
+        usual.click()
+        expect(name).to_have_text("The calibration is in use")
+        page.click("text=Scan feet")
+        page.fill("#patient", time.strftime("C%Y%m%d-%H%M%S"))
+        page.click("#start")
+        sitting.scan("right")
+        sitting.check_measured("right")
+        patient, scan = page.url.split("/")[-2:]
+        assert read_quality(folder / "results", patient, scan).calibration.name == made
+        sitting.opened.is_clean()
 
 
 def test_both_feet_in_one_sitting(browser: Any) -> None:

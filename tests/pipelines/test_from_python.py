@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from checked import made_check
 
 import footscan
 from footscan.mesh.formats.files import read_file
 from pipelines.archive.table import write_results_table
+from pipelines.calibration_check import store_check
 from schemas.base.errors import Finding, RefusedInput
 from schemas.measures import Measures
 
@@ -33,6 +35,18 @@ def test_the_arrays_are_those_of_a_run(done: Any) -> None:
     else:
         with pytest.raises(Finding, match=re.escape(delivered.finding)):
             _ = scan.measures
+
+
+def test_a_check_of_the_calibration_is_known(done: Any) -> None:
+    calibration = done.root / "calibration.json"
+    assert footscan.open_scan(done.scan, calibration).calibration_check is None
+    store_check(calibration, made_check(calibration, "2026-11-24T08:00:00+01:00", {1: 0.03, 5: 0.41}))
+    scan = footscan.open_scan(done.scan, calibration)
+    assert scan.calibration_check is not None
+    assert scan.measures.doubts == [scan.calibration_check.doubt]
+    assert scan.measures.measures["foot_length"].status == "uncertain"
+    done.run()
+    assert scan.measures == Measures.model_validate_json((done.results / "measures.json").read_bytes())
 
 
 def test_frames_and_points(done: Any) -> None:

@@ -13,6 +13,7 @@ from footscan.surface.quality import mesh_quality
 from footscan.virtual.foot.foot import make_foot
 from pipelines.arrays import pack, unpack
 from pipelines.steps import measure, surface
+from schemas.glass import GlassPlane
 from schemas.measures import Measure, Measures
 from schemas.parameters.foot import FootParameters
 from schemas.parameters.surface import SurfaceParameters
@@ -20,6 +21,8 @@ from schemas.parameters.surface import SurfaceParameters
 STEP_MM = 4.0
 WINDOW_MM = 30.0
 NOWHERE: dict[str, Path] = {}
+IN_PLACE = pack(glass=np.frombuffer(GlassPlane().model_dump_json().encode(), np.uint8))
+"""What cleaning says of a plate that was not moved."""
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +79,7 @@ def surface_of(oriented: bytes, **values: object) -> bytes:
 
 
 def measures_of(mesh: bytes) -> dict[str, Measure]:
-    document = measure.run({"surface": mesh}, FootParameters(side="right"), NOWHERE)
+    document = measure.run({"surface": mesh, "clean": IN_PLACE}, FootParameters(side="right"), NOWHERE)
     found = Measures.model_validate_json(document)
     assert found.finding is None
     return found.measures

@@ -20,6 +20,8 @@ UNIT_MM = 50.0
 LEAST_VOLUME = 1e-3
 """Determinant of three lines, as unit vectors, up to which they meet in one point, near or at infinity. Chosen by
 hand."""
+SAME_POINT = 1e-12
+"""The same for pieces in the image, px: they meet in one point but for rounding, as those of two equal frames do."""
 LEAST_DEPTH = 0.05
 """Depth, relative to that of the pixel (0, 0), from which a point lies in front of the camera. Chosen by hand."""
 HORIZON = 1e-9
@@ -66,7 +68,8 @@ def named_maps(names: Names, pieces: Floats, ends: Floats, frames: Names, shifts
     world /= np.linalg.norm(world, axis=2, keepdims=True)
     volumes = [np.abs(np.linalg.det(world[:, triple])) for triple in _TRIPLES]
     world = world[np.min(volumes, axis=0) > LEAST_VOLUME]
-    if not len(world) or min(abs(float(np.linalg.det(pieces[triple]))) for triple in _TRIPLES) == 0.0:
+    seen = pieces / np.linalg.norm(pieces, axis=1, keepdims=True)
+    if not len(world) or min(abs(float(np.linalg.det(seen[triple]))) for triple in _TRIPLES) < SAME_POINT:
         return np.empty((0, 3, 3))
     # A line n . x = d is (n, -d). A homography maps points; its transpose maps lines in the opposite direction.
     sign = np.array([1.0, 1.0, -1.0])

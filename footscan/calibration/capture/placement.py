@@ -46,6 +46,8 @@ STAY = 0.01
 hand."""
 LEAST_SHARE = 0.6
 """Share of the stripe on the object's edges from which no search is needed. Chosen by hand."""
+LEVER_MM = 50.0
+"""Distance of the object's corners from its origin, about: a rotation moves them by this times its angle."""
 SAMPLE = 600
 """Points of a placement, of all cameras together, that are used: a bound of time."""
 HELPS = 0.95
@@ -78,6 +80,11 @@ class Departure:
     """(3,) mm, mm, radians, to be added to the nominal pose."""
     share: float
     """Share of the stripe that then lies on the object's edges."""
+
+    @property
+    def size_mm(self) -> float:
+        """The way of the object, or that of its corners if it is turned more than moved, mm."""
+        return max(float(np.hypot(*self.pose[:2])), float(abs(self.pose[2])) * LEVER_MM)
 
 
 def fit_to_edges(

@@ -1,16 +1,16 @@
 """Refusal of a capture, with evidence: the reference object was placed differently, or is not recognised."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from footscan.calibration.capture.edge_points import from_object
-from footscan.calibration.capture.from_capture import SEEN, CameraView, Recognised, fit_view, nominal_poses
-from footscan.calibration.capture.placement import CameraFit, departure
+from footscan.calibration.capture.from_capture import CameraView, Recognised, nominal_poses
+from footscan.calibration.capture.judged_placement import LEAST_SHARE, in_words, judge_placement
+from footscan.calibration.capture.placement import CameraFit
 from footscan.calibration.capture.reference import Edges
-from footscan.calibration.models.fit import UndeterminedError
 from footscan.calibration.models.maps import to_pixels
 from footscan.calibration.models.region import region_of
 from schemas.base.errors import RefusedInput
@@ -20,19 +20,8 @@ Floats = NDArray[np.float64]
 
 FEWEST_POINTS = 40
 """Points of the stripe, of all cameras together, that a placement needs. Chosen by hand."""
-LEAST_SHARE = 0.5
-"""Share of the stripe on the object's edges from which its departure is known. Chosen by hand."""
-SURE_MM = 0.25
-"""Standard deviation of a map, fitted without a placement, up to which its camera judges the placement. Chosen by
-hand."""
-SIGMAS = 3.0
-"""Standard deviations of the best map that are added to the tolerance of a departure."""
-LEVER_MM = 50.0
-"""Distance of the object's corners from its origin, about: a rotation moves them by this times its angle."""
 OUTLINE_STEP_MM = 1.0
 """Distance of the points of a drawn outline."""
-MOSTLY = 0.5
-"""Share of the placements in which a camera must recognise the object to be trusted."""
 
 
 @dataclass(frozen=True)
@@ -83,16 +72,11 @@ def check_placements(
             raise RefusedCapture(source, problem, field=f"frame {number}", evidence=shown)
     worst: tuple[float, RefusedCapture] | None = None
     for number in range(len(poses)) if len(poses) > 1 else ():
-        maps = _maps_without(number, recognised, edges, poses)
-        all_sigmas = {camera: map_.fit.region_sigma(views[camera].stripes[number]) for camera, map_ in maps.items()}
-        sigmas = {camera: sigma for camera, sigma in all_sigmas.items() if sigma is not None and sigma <= SURE_MM}
-        maps = {camera: maps[camera] for camera in sigmas}
-        if not maps:
+        judged = judge_placement(number, views, recognised, edges, poses)
+        if judged is None:
             continue
-        worlds = [map_.world(views[camera].stripes[number]) for camera, map_ in maps.items()]
-        change = departure(worlds, edges, poses[number])
-        allowed = tolerance_mm + SIGMAS * min(sigmas.values())
-        size = max(float(np.hypot(*change.pose[:2])), float(abs(change.pose[2])) * LEVER_MM)
+        maps, change, size = judged.maps, judged.change, judged.change.size_mm
+        allowed = tolerance_mm + judged.margin_mm
         nominal, actual = poses[number], poses[number] + change.pose
         if change.share >= LEAST_SHARE:
             problem = (
@@ -104,7 +88,7 @@ def check_placements(
             size = np.inf
             problem = (
                 "the reference object is not recognised in its placement or near it "
-                f"by {_cameras(maps)}, which recognise it in the other frames"
+                f"by {in_words(maps)}, which recognise it in the other frames"
             )
         if size > allowed and (worst is None or size > worst[0]):
             shown = [
@@ -133,7 +117,7 @@ def refuse_unrecognised(views: Mapping[int, CameraView], reasons: Mapping[int, s
     if not reasons:
         return
     camera = min(reasons)
-    others = f" (nor by {_cameras(sorted(reasons)[1:])})" if len(reasons) > 1 else ""
+    others = f" (nor by {in_words(sorted(reasons)[1:])})" if len(reasons) > 1 else ""
     shown = [Evidence(camera, number, stripe, *_NOTHING) for number, stripe in enumerate(views[camera].stripes)]
     problem = f"the reference object is not recognised: {reasons[camera]}{others}"
     raise RefusedCapture(source, problem, field=f"camera {view_name(camera)}", evidence=shown)
@@ -159,34 +143,14 @@ def refuse_contradictions(recognised: Mapping[int, Recognised], source: str) -> 
             "profile_mm"
         )
     else:
-        others = f", and {_cameras([c for c in wrong if c != camera])} likewise" if len(wrong) > 1 else ""
+        others = f", and {in_words([c for c in wrong if c != camera])} likewise" if len(wrong) > 1 else ""
         cause = f"by its number or `stands`{others}: is this its film?"
     shown = [Evidence(number, 0, result.view.stripes[0], *_NOTHING) for number, result in wrong.items()]
     raise RefusedCapture(source, f"{first.contradiction}, {cause}", field=f"camera {view_name(camera)}", evidence=shown)
 
 
-def _cameras(numbers: Iterable[int]) -> str:
-    """The cameras in words."""
-    listed = ", ".join(map(view_name, sorted(numbers)))
-    return f"cameras {listed}" if "," in listed else f"camera {listed}"
-
-
 _NOTHING = (np.empty((0, 2)), np.empty((0, 2)))
 """No outlines."""
-
-
-def _maps_without(
-    number: int, recognised: Mapping[int, Recognised], edges: Edges, poses: Floats
-) -> dict[int, CameraFit]:
-    """The maps of all trusted cameras, fitted without one of the placements."""
-    trusted = {c: result for c, result in recognised.items() if np.nanmean(result.first.explained >= SEEN) > MOSTLY}
-    maps = {}
-    for camera, result in (trusted or recognised).items():
-        try:
-            maps[camera] = fit_view(result.view, result.first, edges, poses, without=number)
-        except UndeterminedError:
-            continue
-    return maps
 
 
 def _outline(map_: CameraFit, view: CameraView, edges: Edges, pose: Floats) -> Floats:

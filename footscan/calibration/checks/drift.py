@@ -1,6 +1,9 @@
 """Drift of a camera since its calibration: the error of the old map on today's stripe over the reference object."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import hypot
+from statistics import median
 from typing import Literal
 
 import numpy as np
@@ -73,3 +76,16 @@ def drift_of(calibration: CameraCalibration, today: CalibratedView, tolerance_mm
         rms_mm,
         float(distance.max()),
     )
+
+
+def common_shift(drifts: Sequence[Drift]) -> tuple[float, float] | None:
+    """The shift in Y and Z, mm, common to all cameras, if the rest is less than half of it; else None.
+
+    The object was then placed so, rather than the scanner moved.
+    """
+    shifts = [drift.shift_mm for drift in drifts if drift.shift_mm is not None]
+    if len(shifts) < 2:
+        return None
+    y, z = (median(shift[axis] for shift in shifts) for axis in (0, 1))
+    apart = max(hypot(shift[0] - y, shift[1] - z) for shift in shifts)
+    return (y, z) if apart < hypot(y, z) / 2 else None

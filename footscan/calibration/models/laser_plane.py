@@ -44,6 +44,18 @@ def x_in_plane(plane: LaserPlane, x: Floats, yz: Floats, step: Floats, row: Floa
     return np.asarray(x + terms_of_plane(x, yz, step, row, plane.x_mm) @ values)
 
 
+def x_in_turned_plane(plane: LaserPlane, x: Floats, yz: Floats) -> Floats:
+    """X (N,) of points at Y and Z (N, 2) of a plane whose X at their middle is `x` (N,), all in mm.
+
+    >>> plane = LaserPlane(head=1, offset_mm=0.5, yaw=0.01, sd=[0.0] * 7)
+    >>> print(x_in_turned_plane(plane, np.array([100.5]), np.array([[20.0, 57.0]])).round(3))
+    [100.7]
+    """
+    turned = plane.model_copy(update={"offset_mm": 0.0, "scale": 0.0})
+    nothing = np.zeros(len(x))
+    return x_in_plane(turned, x, yz, nothing, nothing)
+
+
 def row_share(j: Floats, size: ImageSize) -> Floats:
     """Place of the rows `j`, px, in a picture: -0.5 at its upper border, 0.5 at the lower one.
 

@@ -1,31 +1,11 @@
 """Heads on the axes of the board: which of them one motor moves, and where they are."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from footscan.capture.board.head import Head
 from schemas.rig import RigBoard
 
 AXIS_LETTERS = "XYZ"
-
-
-@dataclass(frozen=True)
-class Head:
-    """Rail of a head: its world X = `offset_mm` + `direction` x machine position of its axis."""
-
-    offset_mm: float = -20.0
-    """World X at which its home switch trips; from the calibration, it aligns the heads."""
-    direction: int = -1
-    """-1 if X increases away from the home switch, where machine positions decrease; 1 if X decreases."""
-    axis: int = 0
-    """Index of the board's axis that moves it, 0 to 2."""
-
-    def world(self, machine_mm: float) -> float:
-        """Convert a machine position to world X, mm."""
-        return self.offset_mm + self.direction * machine_mm
-
-    def machine(self, world_mm: float) -> float:
-        """Convert world X to a machine position, mm."""
-        return (world_mm - self.offset_mm) * self.direction
 
 
 class Carriages:
@@ -64,6 +44,13 @@ class Carriages:
     def carried(self, head: int | None = None) -> list[bool]:
         """Return of each head whether it moves if head 1, 2, ... is moved, or all are."""
         return [head is None or other.axis == self.heads[head - 1].axis for other in self.heads]
+
+    def moved(self, head: int | None = None) -> dict[int, Head]:
+        """Return the axes that move if head 1, 2, ... is moved, or all are, and the leading head of each."""
+        if head is None:
+            return self.leaders
+        axis = self.heads[head - 1].axis
+        return {axis: self.leaders[axis]}
 
     def world(self, machine_mm: Sequence[float]) -> tuple[float, ...]:
         """Convert the machine positions of the axes to world X of all heads, mm."""

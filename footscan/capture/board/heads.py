@@ -9,10 +9,11 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Self
 
-from footscan.capture.board.carriages import AXIS_LETTERS, Carriages, Head
+from footscan.capture.board.carriages import AXIS_LETTERS, Carriages
 from footscan.capture.board.controller import Controller
+from footscan.capture.board.head import Head, Travel
 from footscan.capture.board.position_log import HeadPosition, PositionLog
 from footscan.capture.board.state import BoardState
 from footscan.capture.grbl.report import Report
@@ -37,15 +38,6 @@ CREEP_MM_PER_S = 0.5
 """Speed of heads that `shine` lights: 0.01 mm within an exposure of 20 ms."""
 DWELL = "G4P0.01"
 """A dwell; the board answers it when all motion before it has ended."""
-
-
-class Travel(NamedTuple):
-    """Begin and end of a travel."""
-
-    begin_seconds: float
-    """`time.monotonic()` just before the heads moved."""
-    end_seconds: float
-    """`time.monotonic()` when the heads stood again."""
 
 
 class Heads:
@@ -118,8 +110,8 @@ class Heads:
             raise RefusedInput("lasers", f"expected a power from 0 to 1, found {power:g}", field="power")
         self._power = power
 
-    def travel(self, start_mm: float, end_mm: float, mm_per_s: float) -> Travel:
-        """Move all heads to `start_mm` in the dark, then to `end_mm` at `mm_per_s` with the lasers on, and wait.
+    def travel(self, start_mm: float, end_mm: float, mm_per_s: float, head: int | None = None) -> Travel:
+        """Move all heads, or the carriage of one, to `start_mm` in the dark, then to `end_mm` with light, and wait.
 
         The run begins before the start and ends behind the end by the distance that the heads need to accelerate, as
         far as the rails allow: between start and end, speed and brightness are constant.
@@ -136,19 +128,20 @@ class Heads:
         run_up = mm_per_s**2 / (2.0 * min(self.setup.mm_per_s2))
         low, high = self.reach_mm
         begin, end = (min(max(x, low), high) for x in (start_mm - way * run_up, end_mm + way * run_up))
-        self.travel_to(begin)
-        return self._run(begin, end, mm_per_s, self._power)
+        self.travel_to(begin, head=head)
+        return self._run(begin, end, mm_per_s, self._power, head)
 
-    def travel_to(self, x_mm: float, mm_per_s: float | None = None) -> Travel:
-        """Move all heads to `x_mm` with the lasers off, and wait; default speed: full speed."""
+    def travel_to(self, x_mm: float, mm_per_s: float | None = None, head: int | None = None) -> Travel:
+        """Move all heads, or the carriage of one, to `x_mm` in the dark, and wait; default speed: full speed."""
         speed = mm_per_s or min(self.setup.max_mm_per_s)
         self._check_travel(x_mm, x_mm, speed)
-        at = self.carriages.leading(self._machine(self.board.status().report))
-        farthest = max(at, key=lambda x: abs(x - x_mm))
+        at = self._machine(self.board.status().report)
+        moved = self.carriages.moved(head).items()
+        farthest = max((leader.world(at[axis]) for axis, leader in moved), key=lambda x: abs(x - x_mm))
         if abs(farthest - x_mm) < SLACK_MM / 2.0:
             now = time.monotonic()
             return Travel(now, now)
-        return self._run(farthest, x_mm, speed, 0.0)
+        return self._run(farthest, x_mm, speed, 0.0, head)
 
     def shine(self, power: float, seconds: float) -> Travel:
         """Light the standing heads for `seconds`, and wait until they are dark again.
@@ -250,11 +243,11 @@ class Heads:
             if present.get(number) == 0:
                 self.board.change(number, 1)
 
-    def _run(self, begin_mm: float, end_mm: float, mm_per_s: float, power: float) -> Travel:
-        """Move all heads straight to `end_mm`; `mm_per_s` is the speed of a head that starts at `begin_mm`."""
+    def _run(self, begin_mm: float, end_mm: float, mm_per_s: float, power: float, moved: int | None = None) -> Travel:
+        """Move all heads, or one, straight to `end_mm`; `mm_per_s` is the speed of a head that starts at `begin_mm`."""
         self._need_home()
         at = self._machine(self.board.status().report)
-        target = {axis: head.machine(end_mm) for axis, head in self.carriages.leaders.items()}
+        target = {axis: leader.machine(end_mm) for axis, leader in self.carriages.moved(moved).items()}
         along = [abs(end - at[axis]) for axis, end in target.items()]
         # The feed is the speed in the space of the axes that move: for three equal ones, sqrt(3) times their speed.
         feed = mm_per_s * math.hypot(*along) / max(*along, 1e-9)

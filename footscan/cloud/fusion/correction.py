@@ -11,7 +11,7 @@ from footscan.cloud.fusion.correction_model import ALL_STRETCHES, STRETCHES, cho
 from footscan.cloud.fusion.motion import MOST_TERMS, SCALE_MM, TERMS, motion_terms, moved
 from footscan.cloud.fusion.pair_least_squares import Forms, solve, sum_up
 from footscan.cloud.fusion.stripes import Floats, Stripes
-from footscan.robust import MAD_TO_SD, TUKEY
+from footscan.robust import MAD_TO_SD, huber_weights, tukey_weights
 from schemas.fusion import CameraCorrection
 from schemas.parameters.fusion import FusionParameters
 
@@ -20,9 +20,6 @@ ROUNDS = 2
 LEAST_POINTS = 200
 LEAST_STRETCHES = 6
 """Comparisons, and stretches with comparisons, from which a camera may be moved. Chosen by hand."""
-HUBER = 1.345
-"""Residual, in standard deviations, up to which a comparison counts in full, in the first iterations: 95 % efficiency
-for normal errors (P. J. Huber, Annals of Mathematical Statistics 35(1), 1964, doi:10.1214/aoms/1177703732)."""
 REWEIGHTINGS = 6
 """Iterations of the robust least squares: a bound of time."""
 GRID = 9
@@ -162,11 +159,7 @@ def _robust_weights(
         left = np.abs(distances - np.einsum("nt,nt->n", rows, fit[cameras[:, 0]] - fit[cameras[:, 1]]))
         left /= np.sqrt(variances)
         left /= max(1.0, MAD_TO_SD * float(np.median(left)) if len(left) else 1.0)
-        if turn < REWEIGHTINGS - 1:
-            trust = HUBER / np.maximum(left, HUBER)
-        else:
-            trust = np.maximum(1.0 - (left / TUKEY) ** 2, 0.0) ** 2
-        weights = trust / variances
+        weights = (huber_weights if turn < REWEIGHTINGS - 1 else tukey_weights)(left) / variances
     return np.asarray(weights)
 
 

@@ -26,7 +26,7 @@ there are no soles. Chosen by hand."""
 
 
 def is_plate(points: NDArray[np.void], views: Mapping[int, View], glass_mm: float) -> NDArray[np.bool_]:
-    """Select the points that lie below the glass at Z = 0 or in it.
+    """Select the points that lie below the glass or in it.
 
     Points more than `glass_mm` below it are a mirror image. Points within `glass_mm` of it are in the glass if they lie
     beside, before or behind the sides of the foot. The latter are dropped only if cameras above the glass see both
@@ -34,7 +34,7 @@ def is_plate(points: NDArray[np.void], views: Mapping[int, View], glass_mm: floa
 
     Parameters
     ----------
-    points : (N,) of `POINT_DTYPE`, N >= 1, mm, scanner frame, all finite
+    points : (N,) of `POINT_DTYPE`, N >= 1, mm, all finite, with heights above the glass for Z, as of `above_glass`
     views : camera -> view, mm
 
     Returns
@@ -66,11 +66,11 @@ def is_plate(points: NDArray[np.void], views: Mapping[int, View], glass_mm: floa
 def is_below_sole(points: NDArray[np.void], views: Mapping[int, View], glass_mm: float) -> NDArray[np.bool_]:
     """Select the points of the glass below a sole that does not touch it: water, dust or a fingerprint shines there.
 
-    They lie within `glass_mm` of Z = 0, in strips of planes in which two cameras below the glass see the sole above.
+    They lie within `glass_mm` of it, in strips of planes in which two cameras below the glass see the sole above.
 
     Parameters
     ----------
-    points : (N,) of `POINT_DTYPE`, N >= 1, mm, scanner frame, all finite, without ghosts
+    points : (N,) of `POINT_DTYPE`, N >= 1, mm, all finite, without ghosts, with heights above the glass for Z
     views : camera -> view, mm
 
     Returns

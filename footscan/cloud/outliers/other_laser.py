@@ -7,12 +7,13 @@ not: a point is assigned to the laser in whose plane more cameras saw it in the 
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from footscan.calibration.models.laser_plane import x_in_plane
+from footscan.calibration.models.laser_plane import x_in_turned_plane
 from footscan.cloud.points import camera_numbers, coordinates
 from footscan.cloud.views import View
 from footscan.compiled import compiled
@@ -86,10 +87,33 @@ def _sheet(number: int, head: int) -> int:
     return view_number(head, laser_of_view(number))
 
 
-def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mapping[int, int]) -> Mask:
-    """The same for points by frame, camera and source."""
+class LasersSeen(NamedTuple):
+    """The laser of each of N points."""
+
+    own: Ints
+    """(N,) index of the head that carries the point's camera"""
+    laser: Ints
+    """(N,) index of the head whose laser made it"""
+    support: Floats
+    """(N,) number of other cameras that saw the point, if it is of the laser of its own head"""
+    places: Floats
+    """(H, N, 2) Y and Z in the plane of each head, mm"""
+    planes: Floats
+    """(H, N) X of each plane in the frame of the point, mm; NaN if it is not known"""
+    linked: Mask
+    """(N,) whether the point and the next one are of one stripe"""
+
+
+def lasers_seen(points: NDArray[np.void], views: Mapping[int, View], heads: Mapping[int, int]) -> LasersSeen:
+    """Assign points to lasers by the cameras that agree with them in each plane.
+
+    Parameters
+    ----------
+    points : (N,) of `POINT_DTYPE`, by frame, camera and source
+    heads : camera -> number of its head, of all cameras; indices are by ascending number
+    """
     numbers = sorted(set(heads.values()))
-    own: Ints = np.array([numbers.index(heads[number]) for number in points["camera"].tolist()])
+    own: Ints = np.array([numbers.index(heads[number]) for number in points["camera"].tolist()], np.int64)
     planes = _planes_by_frame(points, own, len(numbers))
     places = np.full((len(numbers), len(points), 2), np.nan)
     apart = np.full((len(numbers), len(points)), np.inf)
@@ -113,6 +137,12 @@ def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mappin
         may_be = np.where((apart > LEAST_MM) & (apart < FARTHEST_MM), support - BETTER, -np.inf)
         best = np.argmax(may_be, axis=0)
         laser = np.where(np.take_along_axis(may_be, best[None], axis=0)[0] > at_own, best, own)
+    return LasersSeen(own, laser, at_own, places, planes, linked)
+
+
+def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mapping[int, int]) -> Mask:
+    """Select the points of other lasers, of points by frame, camera and source."""
+    own, laser, at_own, places, planes, linked = lasers_seen(points, views, heads)
     strange = np.asarray(laser != own)
     decided = strange | (at_own > CONFIRMED)
     strange = np.where(
@@ -203,13 +233,9 @@ def _in_plane(points: NDArray[np.void], view: View, other: View, plane_x: Floats
     apart there along X, (N,) mm."""
     assert view.plane is not None
     assert other.plane is not None
-    xyz, x, nothing = coordinates(points), points["plane"].astype(np.float64), np.zeros(len(points))
-    turned = [
-        x_in_plane(plane.model_copy(update={"offset_mm": 0.0, "scale": 0.0}), nothing, xyz[:, 1:], nothing, nothing)
-        for plane in (other.plane, view.plane)
-    ]
-    apart = plane_x - x + turned[0] - turned[1]
-    sight = view.centre - np.column_stack([nothing, xyz[:, 1:]])
+    xyz, x = coordinates(points), points["plane"].astype(np.float64)
+    apart = x_in_turned_plane(other.plane, plane_x, xyz[:, 1:]) - x_in_turned_plane(view.plane, x, xyz[:, 1:])
+    sight = view.centre - np.column_stack([np.zeros(len(x)), xyz[:, 1:]])
     return xyz[:, 1:] + (apart / sight[:, 0])[:, None] * sight[:, 1:], np.abs(apart)
 
 
@@ -239,6 +265,7 @@ def _support(places: Floats, camera: Ints, counts: Mask, linked: Mask, frames: I
     Of those points only that count; `frames` (F + 1,) bounds the frames.
     """
     support = np.zeros(len(places))
+    nearest = np.empty(int(camera.max()) + 1)
     first, following = np.full((CELLS, CELLS), -1), np.full(len(places), -1)
     for f in range(len(frames) - 1):
         for k in range(frames[f], frames[f + 1]):
@@ -247,7 +274,8 @@ def _support(places: Floats, camera: Ints, counts: Mask, linked: Mask, frames: I
                 following[k], first[a, b] = first[a, b], k
         for k in range(frames[f], frames[f + 1]):
             if not np.isnan(places[k, 0]):
-                for squared in _nearest(places, k, (camera, linked, counts), (first, following)):
+                _find_nearest(places, k, (camera, linked, counts), (first, following), nearest)
+                for squared in nearest:
                     if squared < CELL_MM**2:
                         support[k] += np.exp(-0.5 * squared / AGREE_MM**2)
         for k in range(frames[f], frames[f + 1]):
@@ -257,11 +285,16 @@ def _support(places: Floats, camera: Ints, counts: Mask, linked: Mask, frames: I
 
 
 @compiled
-def _nearest(places: Floats, k: int, columns: tuple[Ints, Mask, Mask], cells: tuple[Ints, Ints]) -> Floats:
-    """Squared distance, (256,) mm^2, of place k from the stripe of each other camera, where it is below a cell."""
+def _find_nearest(
+    places: Floats, k: int, columns: tuple[Ints, Mask, Mask], cells: tuple[Ints, Ints], nearest: Floats
+) -> None:
+    """Fill `nearest` (C,) with the squared distance, mm^2, of place k from the stripe of each other camera.
+
+    It is infinite where it is more than a cell.
+    """
     camera, linked, counts = columns
     first, following = cells
-    nearest = np.full(256, np.inf)
+    nearest[:] = np.inf
     a, b = int(places[k, 0] // CELL_MM), int(places[k, 1] // CELL_MM)
     for da in range(-1, 2):
         for db in range(-1, 2):
@@ -271,7 +304,6 @@ def _nearest(places: Floats, k: int, columns: tuple[Ints, Mask, Mask], cells: tu
                     squared = _squared_distance(places, k, n, linked[n] and counts[n + 1])
                     nearest[camera[n]] = min(nearest[camera[n]], squared)
                 n = following[n]
-    return nearest
 
 
 @compiled

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cloud.contact import above_glass, estimate_glass, moved_warning
 from footscan.cloud.outliers.body import body_range, is_apart
 from footscan.cloud.outliers.clutter import is_island, is_static
 from footscan.cloud.outliers.ghost import is_ghost
@@ -18,6 +19,7 @@ from footscan.cloud.outliers.support import END, ISOLATED, UNCONFIRMED, judge_se
 from footscan.cloud.outliers.which_laser import choose_lasers
 from footscan.cloud.points import camera_numbers
 from footscan.cloud.views import View
+from schemas.glass import GlassPlane
 from schemas.parameters.outliers import OutlierParameters
 
 Mask = NDArray[np.bool_]
@@ -53,7 +55,10 @@ class Removed:
     counts: dict[int, dict[str, int]]
     """Camera -> reason -> number of points; all reasons, for each camera that has points."""
     warnings: list[str]
-    """A sentence for each camera much of whose points are not the foot, or that sees the foot where it is cut off."""
+    """A sentence for each camera much of whose points are not the foot, or that sees the foot where it is cut off; and
+    one on a plate that was moved."""
+    glass: GlassPlane
+    """The glass on which the foot stands; points were judged by their height above it."""
 
 
 def remove_outliers(
@@ -68,8 +73,9 @@ def remove_outliers(
 
     - stripe points of which it is not known which of two lasers drew them ("laser");
     - points outside the control volume ("volume"), and points that the calibration does not support ("extrapolated");
-    - the foot's mirror image and the glass itself ("glass"), then static objects, and all that is seen where no foot is
-      ("clutter"): they would confirm each other;
+    - the foot's mirror image and the glass itself ("glass"), wherever skin shows the plate to be, see
+      `estimate_glass`; then static objects, and all that is seen where no foot is ("clutter"): they would confirm each
+      other;
     - the last points of a stripe where other cameras see the same place within their stripes ("end"), segments of
       stripe without any before and behind them ("isolated"), and segments that other cameras should see, but do not,
       or that lie behind a surface on which more cameras agree, and points off the surface that the stripes around them
@@ -114,26 +120,35 @@ def remove_outliers(
         drop("isolated", lambda left: is_far(left, parameters.nearest_mm))
         drop("volume", lambda left: _outside(left, volume))
         drop("median", lambda left: is_off_median(left, parameters.median_mm))
-        return points[codes == KEPT], Removed(codes, _count(camera_numbers(points), codes), [])
+        return points[codes == KEPT], Removed(codes, _count(camera_numbers(points), codes), [], GlassPlane())
     drop("volume", lambda left: _outside(left, volume))
     if parameters.drop_unsupported:
         drop("extrapolated", lambda left: ~left["supported"])
-    drop("glass", lambda left: is_plate(left, views, parameters.glass_mm))
+    glass = estimate_glass(points[codes == KEPT], views)
+
+    def drop_glass(select: Callable[[NDArray[np.void], Mapping[int, View], float], Mask]) -> None:
+        drop("glass", lambda left: select(above_glass(left, glass.plane), views, parameters.glass_mm))
+
+    drop_glass(is_plate)
     drop("unconfirmed", lambda left: is_of_other_laser(left, views))
     body = _body(points[codes == KEPT], views, parameters)
     drop("clutter", lambda left: is_static(left, parameters.static_share, body, filmed) | _is_beside(left, body))
     drop("glass", lambda left: is_ghost(left, views, parameters.gap_mm, parameters.segment_mm))
-    drop("glass", lambda left: is_below_sole(left, views, parameters.glass_mm))
+    drop_glass(is_below_sole)
     _drop_by_segment(points, codes, views, parameters, filmed)
-    drop("glass", lambda left: is_plate(left, views, parameters.glass_mm))  # without what seemed to be its sides
+    drop_glass(is_plate)  # without what seemed to be its sides
     drop("unconfirmed", is_off_surface)
     if body is not None:
         drop("clutter", is_apart)
     drop("clutter", lambda left: is_island(left, parameters.island_gap_steps, parameters.island_share))
     camera = camera_numbers(points)
     counts = _count(camera, codes)
-    warnings = [*_warnings(camera[codes != NO_POINT], counts), *_cut_warnings(points, codes, parameters, views)]
-    return points[codes == KEPT], Removed(codes, counts, warnings)
+    warnings = [
+        *_warnings(camera[codes != NO_POINT], counts),
+        *_cut_warnings(points, codes, parameters, views),
+        *moved_warning(glass, parameters.glass_mm),
+    ]
+    return points[codes == KEPT], Removed(codes, counts, warnings, glass)
 
 
 def _drop_by_segment(

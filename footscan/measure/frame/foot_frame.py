@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.measure.frame.axis import along_axis
+from footscan.measure.frame.glass import to_glass
 from footscan.measure.frame.pose import Pose, find_pose
 from footscan.measure.landmarks.dense_points import dense_points
 from footscan.measure.landmarks.toes import FOREFOOT, STRIP_MM
@@ -14,6 +15,7 @@ from footscan.mesh.rigid_transform import apply, low_height
 from footscan.mesh.topology import keep_large_components, used_vertices
 from schemas.base.errors import Finding
 from schemas.base.model import Side
+from schemas.glass import CALIBRATED, Plane
 from schemas.measures import Axis
 
 Floor = Literal["glass", "sole", "resting"]
@@ -38,7 +40,7 @@ HEEL_STATION, BALL_STATION, HEEL_OVER_BALL = (0.08, 0.22), (0.55, 0.85), 1.0
 """Between these shares of the length, the heel of a foot is no broader than its ball; the narrow end of a pear may be.
 Chosen by hand."""
 GLASS_MM, GLASS_DEG = 3.0, 3.0
-"""A mesh stands on the glass if its lowest point is nearer than this to Z = 0 and its sole is level to this angle.
+"""A mesh stands on the glass if its lowest point is nearer than this to it and its sole is parallel to this angle.
 Chosen by hand."""
 ABOUT_LEVEL_DEG = 20.0
 """Largest tilt on the glass of a foot without a flat sole, whose level is less certain; chosen by hand."""
@@ -70,7 +72,7 @@ class FootFrame(NamedTuple):
     side_note: str | None = None
     """A warning if the form contradicts the stated side."""
     floor: Floor = "sole"
-    """Origin of the floor: the scanner's glass at Z = 0, a plane through the flat sole, or, without a flat sole, the
+    """Origin of the floor: the scanner's glass, a plane through the flat sole, or, without a flat sole, the
     plane on which the foot comes to rest."""
     floor_residual: float = 0.0
     """Standard deviation of the skin on the floor about it, mm."""
@@ -89,8 +91,9 @@ def foot_frame(
     side: Side,
     axis: Axis = "toe2",
     marked: Mapping[str, Floats] | None = None,
+    glass: Plane = CALIBRATED,
 ) -> FootFrame:
-    """Compute the frame of a foot in any pose; on the scanner's glass the floor stays at Z = 0.
+    """Compute the frame of a foot in any pose; on the scanner's glass that is the floor.
 
     The axis runs from the rearmost heel point to the tip of the second toe ("toe2"), to the middle of the ball
     ("ball_center"), or along the medial tangent of heel and ball ("brannock"). Where the second toe cannot be
@@ -103,6 +106,7 @@ def foot_frame(
     side : "unknown" is inferred from the form
     axis : the requested axis
     marked : (3,) mm, points set by a person, in the frame of the mesh; pternion and toe_2_tip are used here
+    glass : the plane of the scanner's glass in the frame of the mesh
 
     Raises
     ------
@@ -112,7 +116,7 @@ def foot_frame(
     places, faces = used_vertices(np.asarray(vertices, np.float64), keep_large_components(faces, STRAY_SHARE))
     _check_size(places)
     pose = find_pose(places, faces)
-    transform, floor = _on_floor(places, pose)
+    transform, floor = _on_floor(places, pose, to_glass(glass))
     samples = dense_points(places, faces, SPACING_MM)
     moved = apply(transform, samples)
     _check_form(moved, pose)
@@ -163,19 +167,22 @@ def _check_size(vertices: Floats) -> None:
         raise Finding(f"the surface is {diagonal:.3g} across, expected a foot in mm: {_range(DIAGONAL_MM)}")
 
 
-def _on_floor(vertices: Floats, pose: Pose) -> tuple[Floats, Floor]:
+def _on_floor(vertices: Floats, pose: Pose, to_glass: Floats) -> tuple[Floats, Floor]:
     """Returns (4, 4) the transform to the glass if the foot stands on it, or else to the floor of its pose.
 
     The heel comes to lie near X = 0.
     """
     transform = pose.transform.copy()
     floor: Floor = "sole" if pose.stands else "resting"
-    tilt = float(np.degrees(np.arccos(np.clip(transform[2, 2], -1.0, 1.0))))
-    if abs(vertices[:, 2].min()) < GLASS_MM and tilt < (GLASS_DEG if pose.stands else ABOUT_LEVEL_DEG):
+    turn = transform[:3, :3] @ to_glass[:3, :3].T
+    tilt = float(np.degrees(np.arccos(np.clip(turn[2, 2], -1.0, 1.0))))
+    lowest = apply(to_glass, vertices)[:, 2].min()
+    if abs(lowest) < GLASS_MM and tilt < (GLASS_DEG if pose.stands else ABOUT_LEVEL_DEG):
         floor = "glass"
-        along = transform[0, :2] / np.linalg.norm(transform[0, :2])
-        transform = np.eye(4)
-        transform[:2, :2] = along, [-along[1], along[0]]
+        along = turn[0, :2] / np.linalg.norm(turn[0, :2])
+        about_z = np.eye(4)
+        about_z[:2, :2] = along, [-along[1], along[0]]
+        transform = about_z @ to_glass
     low = apply(transform, vertices)
     transform[0, 3] -= low[low[:, 2] <= low_height(pose.length), 0].min()
     return transform, floor

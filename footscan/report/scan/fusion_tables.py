@@ -1,8 +1,29 @@
-"""Tables of the fusion: disagreement of the cameras on the same skin, and the corrections that moved them."""
+"""Tables of heads and cameras: where the heads were, how far cameras disagree on the same skin, and what was moved."""
+
+import math
 
 from footscan.report.markup import number, table, text, words
 from schemas.calibration import view_name
 from schemas.fusion import CameraCorrection, FusionReport
+from schemas.heads import HeadsReport
+
+
+def heads_table(report: HeadsReport) -> str:
+    """A row for each head: where it was along the travel, beside where the calibration says."""
+    if not report.heads:
+        return '<p class="note">Cameras of different heads see too little of the same skin to compare the heads.</p>'
+    headings = ["Head", "Cameras", "Along the travel, mm", "Yaw, degrees", "Pitch, degrees", "Travel, %"]
+    rows = [
+        [
+            str(head.head),
+            ", ".join(map(str, head.cameras)),
+            f"{number(head.offset_mm, 2)} ± {number(head.sd[0], 2)}",
+            *(number(math.degrees(turn), 2) for turn in (head.yaw, head.pitch)),
+            number(100 * head.scale, 2),
+        ]
+        for head in report.heads
+    ]
+    return table(headings, rows, numeric=range(2, len(headings)), kind="dense")
 
 
 def disagreement_table(report: FusionReport) -> str:

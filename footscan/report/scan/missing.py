@@ -17,6 +17,7 @@ def missing_list(measures: Measures, quality: Quality) -> str:
         *_cameras(quality),
         *_mesh(quality.mesh),
         *quality.warnings,
+        *quality.heads.warnings,
         *quality.fusion.warnings,
     ]
     if not lines:

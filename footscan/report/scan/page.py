@@ -15,7 +15,8 @@ from footscan.report.page import page
 from footscan.report.sample_frames import FRAMES_SCRIPT, FrameSample, sample_frames
 from footscan.report.scan.coverage import coverage_plot
 from footscan.report.scan.foot_colours import FootSurface, foot_colourings
-from footscan.report.scan.fusion_tables import corrections_table, disagreement_table, warnings_list
+from footscan.report.scan.fusion_tables import corrections_table, disagreement_table, heads_table, warnings_list
+from footscan.report.scan.glass_facts import glass_facts
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
 from footscan.report.scan.mesh_facts import mesh_facts
 from footscan.report.scan.missing import missing_list
@@ -23,7 +24,7 @@ from footscan.report.scan.removed import removed_pictures, removed_table
 from footscan.report.surface_views import surface_views, upright
 from footscan.report.viewer import Drawing, viewer
 from footscan.report.viewer_script import SCRIPT
-from schemas.calibration import Calibration, Source
+from schemas.calibration import Calibration
 from schemas.fusion import FusionReport
 from schemas.measures import Measure, Measures
 from schemas.quality import Comparison, Quality
@@ -105,9 +106,10 @@ def scan_page(
         section("Mesh", mesh_facts(quality.mesh, quality.cloud_points)),
         section("Cameras", _cameras_table(quality, cloud)),
         section("Removed points", _REMOVED_NOTE, *removed),
-        section("Agreement of the cameras", _AGREEMENT_NOTE, *_agreement(quality.fusion)),
+        section("Agreement of the cameras", _AGREEMENT_NOTE, heads_table(quality.heads), *_agreement(quality.fusion)),
+        section("Glass", glass_facts(quality.glass)),
         section("Stripe coverage", _COVERAGE_NOTE, coverage_plot(cloud, quality.cameras)),
-        section("Calibration", _calibration(calibration, quality.calibration)),
+        section("Calibration", _calibration(calibration, quality)),
         section("Provenance", table(["", ""], ([text(name), text(value)] for name, value in provenance.items()))),
     ]
     return page(
@@ -228,9 +230,11 @@ def _agreement(report: FusionReport) -> list[str]:
     return [disagreement_table(report), corrections_table(report), warnings_list(report)]
 
 
-def _calibration(calibration: Calibration, file: Source) -> str:
+def _calibration(calibration: Calibration, quality: Quality) -> str:
+    file, check = quality.calibration, quality.calibration_check
     created = f"{calibration.created:%Y-%m-%d %H:%M} UTC" if calibration.created else "unknown"
-    rows = [["File", text(file.name)], ["SHA-256", text(file.sha256)], ["Made", created]]
+    state = "calibration was not checked" if check is None else check.summary()
+    rows = [["File", text(file.name)], ["SHA-256", text(file.sha256)], ["Made", created], ["Check", text(state)]]
     return table(["", ""], rows) + calibration_panels(calibration)
 
 
@@ -238,7 +242,7 @@ _GRID_NOTE = '<p class="note">The grid is 10 mm wide; its figures are mm from th
 _REMOVED_NOTE = (
     '<p class="note">Before the fusion; each point counts once, and a reason without a column removed nothing. The '
     "pictures show a camera’s points from the side, X to the right, and along the travel, Y to the left; the line is "
-    "the glass.</p>"
+    "the calibrated glass.</p>"
 )
 _AGREEMENT_NOTE = (
     '<p class="note">Distances along the normal between what two cameras see of the same skin, before and after they '

@@ -7,11 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.cli.calibrate import capture, chart, check, chessboard, compare, latency, show, travel
+from pipelines.cli.calibrate import capture, chart, check, chessboard, compare, film, latency, show, travel
 from pipelines.cli.terminal.output import AsJson, print_json, print_text
 
 calibrate = typer.Typer(help="Fit each camera's map from pixels to millimetres, and check it.", no_args_is_help=True)
 calibrate.command("chart")(chart.chart)
+calibrate.command("film")(film.film)
+calibrate.command("morning")(film.morning)
 calibrate.command("capture")(capture.capture)
 calibrate.command("chessboard")(chessboard.chessboard)
 calibrate.command("travel")(travel.travel)

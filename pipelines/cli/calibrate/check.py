@@ -1,9 +1,7 @@
 """`footscan calibrate check`."""
 
 from dataclasses import asdict
-from math import hypot
 from pathlib import Path
-from statistics import median
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -28,52 +26,61 @@ def check(
     cache: Annotated[
         Path | None, typer.Option(help="Folder of a result store; results of this capture that it holds are reused.")
     ] = None,
+    record: Annotated[
+        bool,
+        typer.Option("--record/--no-record", help="Keep the verdict beside the calibration: later scans carry it."),
+    ] = True,
     as_json: AsJson = False,
 ) -> int:
     """Measure the drift of each camera since its calibration. The exit status is 1 if a camera has drifted."""
+    from footscan.recordings.calibration_checks import check_path
+    from pipelines.calibration_check import check_document, store_check
     from pipelines.capture_job import check_calibration
+    from pipelines.engine.files.digest import sha256
     from pipelines.engine.pool import cores
     from pipelines.recordings.captures import read_capture
-    from schemas.calibration import read_calibration
+    from schemas.base.json_files import read_text
+    from schemas.calibration import calibration_from_json
     from schemas.parameters.calibration import CaptureCalibrationParameters
 
     today = read_capture(capture)
-    keep_inputs([picture], calibration, *today.files)
-    known = read_calibration(calibration)
+    keep_inputs([picture, check_path(calibration) if record else None], calibration, *today.files)
+    known_text = read_text(calibration, "json_bytes")
+    known = calibration_from_json(known_text, calibration)
     parameters = CaptureCalibrationParameters(placement_tolerance_mm=placement_tolerance_mm)
     with drawn(today, picture):
         drifts = check_calibration(known, today, parameters, tolerance_mm, cores(), cache)
-    moved = [drift for drift in drifts if drift.verdict != "steady"]
+    document = check_document(sha256(known_text.encode()), today, drifts, tolerance_mm)
     if as_json:
         print_json(
             {
-                "verdict": "drifted" if moved else "steady",
+                "verdict": document.verdict,
                 "tolerance_mm": tolerance_mm,
                 "cameras": [asdict(drift) for drift in drifts],
             }
         )
     else:
         _print_drifts(drifts)
+    _tell_verdict(calibration, drifts, tolerance_mm)
+    if record:
+        message(f"{store_check(calibration, document)}: the verdict, which scans carry from now on")
+    return 0 if document.verdict == "steady" else 1
+
+
+def _tell_verdict(calibration: Path, drifts: "list[Drift]", tolerance_mm: float) -> None:
+    from footscan.calibration.checks.drift import common_shift
+
+    moved = [drift for drift in drifts if drift.verdict != "steady"]
     if not moved:
         message(f"{calibration}: holds; every camera is within {tolerance_mm:g} mm")
-        return 0
-    said = "; ".join(f"camera {drift.camera} {_said(drift)}" for drift in moved)
-    if (alike := _alike([drift.shift_mm for drift in drifts if drift.shift_mm])) is not None:
+        return
+    if (alike := common_shift(drifts)) is not None:
         y, z = alike
         message(
             f"all cameras are off alike, by {y:+.2f}, {z:+.2f} mm: perhaps the object stood so, not the scanner moved"
         )
+    said = "; ".join(f"camera {drift.camera} {_said(drift)}" for drift in moved)
     message(f"{calibration}: does not hold: {said}; {tolerance_mm:g} mm are allowed")
-    return 1
-
-
-def _alike(shifts: list[tuple[float, float]]) -> tuple[float, float] | None:
-    """The shift common to all cameras, if the rest is less than half of it."""
-    if len(shifts) < 2:
-        return None
-    y, z = (median(shift[axis] for shift in shifts) for axis in (0, 1))
-    apart = max(hypot(shift[0] - y, shift[1] - z) for shift in shifts)
-    return (y, z) if apart < hypot(y, z) / 2 else None
 
 
 def _said(drift: "Drift") -> str:

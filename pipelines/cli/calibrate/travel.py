@@ -9,7 +9,6 @@ from pipelines.cli.calibrate.file import tell_calibration, write_calibration
 from pipelines.cli.terminal.output import AsJson, keep_inputs, message, print_json, print_table
 
 if TYPE_CHECKING:
-    from footscan.calibration.travel.body import Body
     from schemas.calibration import Calibration
 
 
@@ -38,7 +37,7 @@ def travel(
     from pipelines.engine.pool import cores
     from pipelines.live.rig_file import read_rig
     from pipelines.scan import CalibrationFile
-    from pipelines.travel_job import calibrate_travel
+    from pipelines.travel_job import calibrate_travel, read_body
     from schemas.base.errors import RefusedInput
     from schemas.calibration import read_calibration, with_offsets
     from schemas.rig import USUAL_HEADS
@@ -48,7 +47,7 @@ def travel(
     if maps is None:
         raise RefusedInput(film.file, "names no calibration, expected one here or --calibration", field="calibration")
     keep_inputs([out], maps, film.file, *([] if body is None else [body]))
-    shape = standard_body() if body is None else _body(body)
+    shape = standard_body() if body is None else read_body(body)
     heads = dict(USUAL_HEADS)
     content = read_calibration(maps)
     if rig is not None:
@@ -96,16 +95,6 @@ def print_planes(calibration: "Calibration") -> None:
         rows.append([camera.name, str(plane.head), *cells])
     columns = ["camera", "head", "X mm", "yaw °", "pitch °", "bend mm", "travel %", "delay frames", "shutter frames"]
     print_table("Laser planes", columns, rows)
-
-
-def _body(file: Path) -> "Body":
-    import numpy as np
-
-    from footscan.calibration.travel.body import Body
-    from footscan.mesh.formats.files import read_mesh
-
-    vertices, faces = read_mesh(file)
-    return Body(vertices, faces.astype(np.int64))
 
 
 def body(

@@ -36,6 +36,7 @@ GridMm = Annotated[
     ),
 ]
 VIRTUAL_FOLDER = Path("virtual")
+CAPTURES = Path("captures")
 
 
 @dataclass(frozen=True)

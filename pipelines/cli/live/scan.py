@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from pipelines.cli.live.light import light_of
 from pipelines.cli.live.options import (
     OF_VIRTUAL,
     VIRTUAL_FOLDER,
@@ -24,7 +25,6 @@ from schemas.base.errors import Fault, FootscanError, RefusedInput
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pipelines.live.light import ScanLight
     from pipelines.live.scan_order import LiveResult
     from pipelines.live.scanner import LiveScanner
     from pipelines.live.virtual.world import World
@@ -124,10 +124,11 @@ def scan(
             out,
             results if measure else None,
             calibration,
-            _light(used, power, exposure_ms, virtual),
+            light_of(used, power, exposure_ms, virtual),
             texture,
             keep_partial,
         )
+        _warn_of_drift(calibration, used)
         with LiveScanner(used) as scanner:
             scanner.listen(StateTeller())
             if problems := scanner.connect():
@@ -176,19 +177,14 @@ def _homed(rig: RigFile, virtual: bool, virtual_folder: Path) -> "Iterator[LiveS
         yield one
 
 
-def _light(rig: "Rig", power: float | None, exposure_ms: float | None, virtual: bool) -> "ScanLight | None":
-    """The light set on the command line; None if it is to be chosen."""
-    from pipelines.live.light import light_by_hand
+def _warn_of_drift(calibration: Path | None, rig: "Rig") -> None:
+    """Print a warning if a camera had moved when the calibration was last checked."""
+    from pipelines.calibration_check import scanner_check
 
-    if power is None and exposure_ms is None:
-        if not virtual:
-            return None
-        from pipelines.live.virtual.world import EXPOSURE_MS
-
-        return light_by_hand(rig, 1.0, EXPOSURE_MS)  # its pictures are made beforehand, and for one light
-    if power is None or exposure_ms is None:
-        raise RefusedInput("--power, --exposure-ms", "go together, expected both or none")
-    return light_by_hand(rig, power, exposure_ms)
+    file = calibration or (None if rig.calibration is None else Path(rig.calibration))
+    check = scanner_check(file, [camera.id for camera in rig.cameras])
+    if check is not None and check.doubt is not None:
+        message(f"Warning: {check.doubt}; the measures of this scan will be uncertain")
 
 
 def _with_travel(rig: "Rig", speed: float | None, from_mm: float | None, to_mm: float | None) -> "Rig":
@@ -206,7 +202,7 @@ def _known(world: "World | None") -> dict[str, float]:
         return {}
     from pipelines.live.virtual.world import virtual_foot
 
-    return virtual_foot(world, world.subject).measures
+    return virtual_foot(world, "left" if world.subject == "left" else "right").measures
 
 
 def _print(result: "LiveResult", known: dict[str, float], as_json: bool) -> None:

@@ -21,6 +21,7 @@ def advice(measures: Measures, quality: Quality, recording: Recording | None) ->
     filmed = {} if recording is None else {camera.id: camera for camera in recording.cameras}
     return [
         *_finding(measures),
+        *_calibration(quality),
         *_cameras(quality, filmed),
         *_latencies(filmed),
         *_agreement(quality),
@@ -37,6 +38,14 @@ def _finding(measures: Measures) -> Iterator[str]:
         yield f"{measures.side_note[:1].upper()}{measures.side_note[1:]}: was the right side chosen? Scan again if not."
     for thing in measures.things:
         yield f"{thing[:1].upper()}{thing[1:]}. Take everything away from the foot, and scan again."
+
+
+def _calibration(quality: Quality) -> Iterator[str]:
+    check = quality.calibration_check
+    if check is None or check.doubt is None:
+        return
+    again = "'footscan calibrate capture', then scan again" if check.drifted else "'footscan calibrate check' again"
+    yield f"{check.doubt[:1].upper()}{check.doubt[1:]}. Put the reference object onto the glass and run {again}."
 
 
 def _cameras(quality: Quality, filmed: dict[int, RecordedCamera]) -> Iterator[str]:

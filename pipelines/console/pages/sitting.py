@@ -5,7 +5,7 @@ from pipelines.console.pages.shell import shell
 
 def sitting_page() -> str:
     """Return the page; `sitting.js` fills it with the state from the server."""
-    return shell(title="footscan", parts=[_MAIN], scripts=["sitting.js"])
+    return shell(title="footscan", parts=[_MAIN], scripts=["cameras.js", "sitting.js"])
 
 
 _MAIN = """\
@@ -32,7 +32,8 @@ _MAIN = """\
 <button id="new-person" type="button" hidden>Next person</button></div></section>
 <section id="machine"><h2>Heads and light</h2>
 <div class="row"><button id="connect" type="button">Connect</button><button id="home" type="button">Home heads</button>
-<button id="shine" type="button">Show the stripe</button></div>
+<button id="shine" type="button">Show the stripe</button>
+<a class="button" href="/calibrating">Calibrate or check</a></div>
 <details><summary>Move heads by hand</summary><fieldset class="jog"><legend>Along the travel, lasers off</legend>
 <label>Which <select id="jog-head"><option value="">all heads</option></select></label>
 <div class="row"><button type="button" data-jog="-50">−50 mm</button><button type="button" data-jog="-5">−5 mm</button>

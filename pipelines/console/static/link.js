@@ -21,6 +21,13 @@ const footscan = (() => {
 
   const page = pageName(), element = id => document.getElementById(id);
 
+  function made(tag, words = "", kind = "") {
+    const node = document.createElement(tag);
+    node.textContent = words;
+    if (kind) node.className = kind;
+    return node;
+  }
+
   // Elements that a screen reader announces change only if their text changes.
   function say(node, words) {
     if (node.textContent !== words) node.textContent = words;
@@ -153,7 +160,7 @@ const footscan = (() => {
   follow();
 
   return {
-    act, say, element,
+    act, say, element, made,
     // Calls `listener` with the latest state, and with each new one.
     listen(listener) {
       listeners.push(listener);

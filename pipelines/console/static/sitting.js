@@ -1,22 +1,14 @@
 // The page from which a scan is made.
 "use strict";
 (() => {
-  const {act, allow, element, hindrance, listen, press, say} = footscan;
+  const {act, allow, element, hindrance, listen, made, press, say} = footscan;
   const SIDES = {right: "Right foot", left: "Left foot"};
   const MARKS = {ok: "✓", warning: "!", bad: "✕", unknown: "?"};
-  const CLEAR_POINTS = 100;  // glints of the scanner itself give some points
   const PSEUDONYM = /^[A-Za-z0-9_-]{1,64}$/;
   const patient = element("patient"), form = element("scan");
-  let seen = null, before = null, pictured = "", listed = "", fed = "";
+  let seen = null, before = null, listed = "", fed = "";
 
   const chosenSide = () => form.elements.side.value;
-
-  function made(tag, words = "", kind = "") {
-    const node = document.createElement(tag);
-    node.textContent = words;
-    if (kind) node.className = kind;
-    return node;
-  }
 
   // Checked while typing: wrong letters are reported at once, a missing pseudonym only at the start.
   function patientProblem() {
@@ -96,27 +88,6 @@
     element("devices").dataset.level = worst || "unknown";
   }
 
-  function showCameras({cameras, devices, frames, state}) {
-    if (pictured !== String(cameras)) {
-      pictured = String(cameras);
-      element("pictures").replaceChildren(...cameras.map(camera => {
-        const figure = made("figure"), caption = made("figcaption"), picture = made("img");
-        figure.id = `camera-${camera}`;
-        picture.alt = "";
-        picture.hidden = true;
-        caption.append(made("b", `Camera ${camera}`), " ", made("span", "no picture yet"));
-        figure.append(picture, made("div", "no picture", "dark"), caption);
-        return figure;
-      }));
-    }
-    for (const camera of cameras) {
-      const figure = element(`camera-${camera}`);
-      const device = devices.find(part => part.name === `Camera ${camera}`);
-      figure.dataset.level = device ? device.level : "unknown";
-      if (state.name === "filming") say(figure.querySelector("span"), `${frames[camera] ?? 0} frames`);
-    }
-  }
-
   // The heads that may be moved alone are those that the scanner reports.
   function showHeads(devices) {
     const heads = devices.map(part => /^Head (\d+)$/.exec(part.name)).filter(found => found).map(found => found[1]);
@@ -124,37 +95,6 @@
     if (which.dataset.heads === String(heads)) return;
     which.dataset.heads = String(heads);
     which.replaceChildren(new Option("all heads", ""), ...heads.map(head => new Option(`head ${head}`, head)));
-  }
-
-  // One picture after another, so as not to overload a slow line; less often while the scanner films.
-  async function lookOn() {
-    for (let turn = 0; ; turn++) {
-      const cameras = seen ? seen.cameras : [], filming = seen && seen.state.name === "filming";
-      await new Promise(done => setTimeout(done, !cameras.length || document.hidden ? 1000 : filming ? 500 : 120));
-      if (cameras.length && !document.hidden) await look(cameras[turn % cameras.length]);
-    }
-  }
-
-  async function look(camera) {
-    const figure = element(`camera-${camera}`);
-    if (!figure) return;
-    const picture = figure.querySelector("img"), caption = figure.querySelector("span");
-    try {
-      const answer = await fetch(`/cameras/${camera}.jpg`), is = answer.status === 200;
-      const old = picture.src;
-      if (is) picture.src = URL.createObjectURL(await answer.blob());
-      if (old) URL.revokeObjectURL(old);
-      if (!is) picture.removeAttribute("src");
-      picture.hidden = !is;
-      figure.querySelector(".dark").hidden = is;
-      const points = Number(answer.headers.get("X-Stripe-Points") || 0);
-      picture.alt = is ? `Camera ${camera} now, ${points < CLEAR_POINTS ? "no clear stripe in it" : "with the stripe found"}` : "";
-      if (seen.state.name !== "filming")
-        say(caption, is ? (points < CLEAR_POINTS ? "no clear stripe" : `stripe: ${points} points`) : "no picture");
-    } catch {
-      picture.hidden = true;
-      figure.querySelector(".dark").hidden = false;
-    }
   }
 
   // The page in charge opens the result when a scan has ended.
@@ -172,7 +112,6 @@
     showSitting(now.sitting);
     showDevices(now.devices);
     showHeads(now.devices);
-    showCameras(now);
     const why = hindrance(now), there = now.state.name === "disconnected" ? "Connect the scanner first." : "";
     for (const id of ["connect", "new-person"]) allow(element(id), why);
     for (const button of [element("home"), element("shine"), ...document.querySelectorAll("[data-jog]")])
@@ -195,5 +134,4 @@
     fed = "";
     patient.focus();
   });
-  lookOn();
 })();

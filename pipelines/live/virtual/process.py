@@ -29,6 +29,8 @@ class WorldProcess:
             The process could not be started.
         """
         command = [sys.executable, "-m", "pipelines.live.virtual.world", world.model_dump_json()]
+        self.subject = world.subject
+        """The subject on the glass."""
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
         )  # Ctrl-C goes to the scanner, which ends this process last
@@ -52,6 +54,7 @@ class WorldProcess:
     def put(self, subject: SubjectName, progress: Callable[[int, int], None] | None = None) -> None:
         """Put another subject onto the glass."""
         self.order({"put": subject}, progress)
+        self.subject = subject
 
     def order(self, order: dict[str, Any], progress: Callable[[int, int], None] | None = None) -> None:
         """Send an order of `pipelines.live.virtual.world.obey`, and wait until it is done."""

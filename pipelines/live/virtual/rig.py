@@ -9,7 +9,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+import yaml
+
+from footscan.calibration.travel.body import standard_body
+from footscan.mesh.formats.files import mesh_bytes
+from footscan.mesh.mesh import Mesh
+from footscan.virtual.stage.reference import standard_reference
 from pipelines.archive.job import CACHE
+from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.pool import Threads
 from pipelines.engine.workspace import Workspace, digests_by_kind
 from pipelines.live.latencies import measure_latencies, rig_with
@@ -54,13 +62,14 @@ def virtual_rig(
 
     file = folder / "rig.yaml"
     rig = _stored_rig(file, world)
+    world = _with_objects(world, folder)
     lacks_latency = calibrated and any(camera.latency is None for camera in rig.cameras)
     calibration = folder / f"calibration-{world.scanner_seed}.json"
-    if calibrated and not calibration.exists():
+    if calibrated and not _has_calibration(rig) and not calibration.exists():
         on_progress("calibration", 0, 1)
         _calibrate(folder, calibration, world.scanner_seed)
     with WorldProcess(world.model_copy(update={"subject": "block"}) if lacks_latency else world, pictures) as process:
-        rig = _plugged_in(rig, process, calibration if calibration.exists() else None)
+        rig = _plugged_in(rig, process, calibration)
         write_rig(file, rig)
         if lacks_latency:
             rig = _with_latencies(rig, world, on_progress)
@@ -77,8 +86,20 @@ def _stored_rig(file: Path, world: World) -> Rig:
     return Rig(format="footscan.rig/1", scanner=scanner, port="unknown", cameras=cameras)
 
 
-def _plugged_in(rig: Rig, process: WorldProcess, calibration: Path | None) -> Rig:
-    """The rig with the present addresses of the devices."""
+def _with_objects(world: World, folder: Path) -> World:
+    """The world with the reference object and the body of a folder, which are written if they are missing."""
+    reference, body = folder / "reference.yaml", folder / "body.stl"
+    if not reference.exists():
+        document = standard_reference().model_dump(mode="json")
+        write_atomically(reference, yaml.safe_dump(document, sort_keys=False, default_flow_style=None).encode())
+    if not body.exists():
+        shape = standard_body()
+        write_atomically(body, mesh_bytes(Mesh(shape.vertices, shape.faces.astype(np.int32)), ".stl"))
+    return world.model_copy(update={"reference": str(reference), "body": str(body)})
+
+
+def _plugged_in(rig: Rig, process: WorldProcess, first: Path) -> Rig:
+    """The rig with the present addresses of the devices, and with its calibration or, if it has none, the first one."""
     cameras = [
         camera.model_copy(
             update={
@@ -88,8 +109,14 @@ def _plugged_in(rig: Rig, process: WorldProcess, calibration: Path | None) -> Ri
         )
         for camera in rig.cameras
     ]
-    path = None if calibration is None else str(calibration.resolve())
-    return rig.model_copy(update={"port": process.port, "cameras": cameras, "calibration": path})
+    calibration = rig.calibration
+    if not _has_calibration(rig):
+        calibration = str(first.resolve()) if first.exists() else None
+    return rig.model_copy(update={"port": process.port, "cameras": cameras, "calibration": calibration})
+
+
+def _has_calibration(rig: Rig) -> bool:
+    return rig.calibration is not None and Path(rig.calibration).exists()
 
 
 def _with_latencies(rig: Rig, world: World, on_progress: OnProgress) -> Rig:

@@ -19,6 +19,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field
 
+from footscan.mesh.formats.files import read_mesh
 from footscan.virtual.board.board import Board
 from footscan.virtual.board.memory import SET_UP
 from footscan.virtual.board.rails import Gait
@@ -26,9 +27,11 @@ from footscan.virtual.filming.streams import VirtualStreams
 from footscan.virtual.foot.foot import Foot, FootShape, make_foot, sample_shape
 from footscan.virtual.optics.scene import SKIN, Mesh
 from footscan.virtual.stage.pictures import Progress, StageLight, StagePictures, Subject
-from footscan.virtual.stage.reference_stage import NOTHING, block_subject
+from footscan.virtual.stage.reference import read_reference, standard_reference
+from footscan.virtual.stage.reference_stage import NOTHING, block_subject, reference_subject
 from footscan.virtual.stage.stage import Positions, Stage, indices_of_travel
-from footscan.virtual.stage.standing import stand_in_the_middle
+from footscan.virtual.stage.standing import stand_on_glass
+from schemas.base.errors import RefusedInput
 from schemas.base.model import Document
 from schemas.parameters.simulation import Scale, Seed, SimulationSettings
 
@@ -53,10 +56,18 @@ ACCELERATIONS = (120, 121, 122)
 """Numbers of the board's settings of the accelerations, mm/s^2."""
 SLACK_MM = 2.0
 """Largest distance of a head from its target, and from the other heads."""
+BODY_TURN_DEG = 20.0
+"""Angle of the body to the travel: as a person is told to place it."""
+BODY_REACH_MM = 90.0
+"""Half of the travel over the body that is rendered beforehand, from its middle: the standard body turned by any angle
+does not reach further."""
+CREEP_MM = 1.5
+"""Way of standing heads while a placement is filmed: 3 s at 0.5 mm/s."""
 BLOCK_REACH_MM = 86.0
 """Half of the travel over the block, from its middle: the block does not reach further."""
 
-SubjectName = Literal["right", "left", "block", "nothing"]
+SubjectName = Annotated[str, Field(pattern=r"^(right|left|block|nothing|body|reference \d{1,4})$")]
+"""`reference K`: the reference object in its placement K, counted from 0."""
 
 
 class World(Document):
@@ -66,6 +77,10 @@ class World(Document):
     """Folder of the pictures, kept from one start to the next."""
     subject: SubjectName = "nothing"
     """The subject on the glass."""
+    reference: str | None = None
+    """File of the reference object; default: the standard one."""
+    body: str | None = None
+    """Mesh of the body that shows the laser planes, standing on Z = 0, mm."""
     foot_seed: Seed | None = None
     """Seed of the shape of the feet; default: the mean male foot."""
     light: Literal["dark", "ambient", "bright"] = "ambient"
@@ -154,9 +169,13 @@ class VirtualWorld:
     def _lit_mm(self, subject: SubjectName) -> tuple[float, float]:
         """Range of X, mm, in which heads may have light."""
         start, end, speed = self._world.start_mm, self._world.end_mm, self._world.mm_per_s
+        if subject.startswith("reference"):
+            return self._middle_mm, self._middle_mm + CREEP_MM
         if subject == "block":
             start, end = block_range_mm(self._world)
             speed = BLOCK_MM_PER_S
+        if subject == "body":
+            start, end = self._middle_mm - BODY_REACH_MM, self._middle_mm + BODY_REACH_MM
         run_up = EVEN_SECONDS * speed + speed**2 / (2.0 * min(SET_UP[axis] for axis in ACCELERATIONS)) + SLACK_MM
         return max(start - run_up, RAIL_MM[0]), min(end + run_up, RAIL_MM[1])
 
@@ -180,12 +199,24 @@ class VirtualWorld:
     def _subject(self, subject: SubjectName) -> Subject:
         if subject == "nothing":
             return NOTHING
-        middle_mm = (self._world.start_mm + self._world.end_mm) / 2
+        middle_mm = self._middle_mm
         if subject == "block":
             return block_subject(middle_mm)
-        foot = virtual_foot(self._world, subject)
-        travel = SimulationSettings(start_mm=middle_mm, step_mm=1, frames=1)
-        return Subject(Mesh(stand_in_the_middle(foot.vertices, travel), foot.faces.astype(np.int64)), SKIN)
+        if subject == "body":
+            if self._world.body is None:
+                raise RefusedInput("virtual world", "has no body", field="body")
+            vertices, faces = read_mesh(Path(self._world.body))
+            return Subject(Mesh(stand_on_glass(vertices, middle_mm, BODY_TURN_DEG), faces.astype(np.int64)))
+        if subject.startswith("reference"):
+            file = self._world.reference
+            reference = standard_reference() if file is None else read_reference(Path(file))
+            return reference_subject(middle_mm, int(subject.removeprefix("reference ")), reference)
+        foot = virtual_foot(self._world, "left" if subject == "left" else "right")
+        return Subject(Mesh(stand_on_glass(foot.vertices, middle_mm), foot.faces.astype(np.int64)), SKIN)
+
+    @property
+    def _middle_mm(self) -> float:
+        return (self._world.start_mm + self._world.end_mm) / 2
 
     def _exposures(self, camera: int) -> Iterator[float]:
         self._is_whole.wait()  # the threads of the cameras start before `self.streams` is set

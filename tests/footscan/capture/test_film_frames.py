@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from footscan.capture.board.heads import Travel
+from footscan.capture.board.head import Travel
 from footscan.capture.board.position_log import HeadPosition, PositionLog
 from footscan.capture.cameras.frame_clock import number_frames
 from footscan.capture.film_frames import CameraTiming, FilmFrames, motion_of_head, place_frames

@@ -13,6 +13,7 @@ from footscan.mesh.formats.files import read_mesh
 from footscan.mesh.topology import vertex_normals
 from footscan.virtual.foot.foot import Foot, make_foot
 from schemas.base.errors import Finding
+from schemas.glass import GlassPlane
 from schemas.measures import Measure, Measures
 
 KNOWN_LANDMARKS = ("metatarsale_tibiale", "metatarsale_fibulare", "landing_point", "junction_point", "pternion")
@@ -44,6 +45,10 @@ def noisy(noise: float, seed: int) -> np.ndarray:
 
 def values(measures: dict[str, Measure]) -> dict[str, float]:
     return {name: measure.value for name, measure in measures.items() if measure.value is not None}
+
+
+def statuses(measures: Measures) -> dict[str, str]:
+    return {name: measure.status for name, measure in measures.measures.items()}
 
 
 def test_measures_equal_those_of_the_construction() -> None:
@@ -160,6 +165,19 @@ def test_a_measure_that_rests_on_filled_surface_is_uncertain() -> None:
     assert measured().measures["instep_girth"].filled_share is None
 
 
+def test_measures_of_a_doubted_calibration_are_uncertain() -> None:
+    doubt = "camera 3 had moved by 0.41 mm when the calibration was checked on 2026-11-24: calibrate anew"
+    usual = measure_foot(foot().vertices, foot().faces, "right")
+    doubted = measure_foot(foot().vertices, foot().faces, "right", doubts=[doubt])
+    assert (usual.doubts, usual.warnings) == ([], [])
+    assert (doubted.doubts, doubted.warnings) == ([doubt], [doubt])
+    for name, measure in doubted.measures.items():
+        before = usual.measures[name]
+        assert (measure.value, measure.uncertainty) == (before.value, before.uncertainty)
+        assert measure.status == ("incomplete" if before.value is None else "uncertain")
+        assert before.value is None or doubt in (measure.note or "")
+
+
 def test_a_gap_makes_a_measure_incomplete() -> None:
     middle = foot().vertices[foot().faces].mean(axis=1)
     half = 0.5 * foot().measures["foot_length"]
@@ -223,3 +241,26 @@ def test_a_real_foot() -> None:
     assert result["ball_length"] / result["foot_length"] == pytest.approx(0.740, abs=0.045)
     assert result["ball_girth"] / result["foot_length"] == pytest.approx(0.93, abs=0.126)
     assert result["heel_breadth"] / result["foot_length"] == pytest.approx(0.27, abs=0.06)
+
+
+@pytest.mark.parametrize("height", [-2.0, 2.0])
+def test_measures_are_taken_above_the_glass(height: float) -> None:
+    moved = foot().vertices + np.array([0.0, 0.0, height])
+    glass = GlassPlane(height_mm=height, below_foot_mm=height, largest_mm=2.0, corrected=True)
+    measures = measure_foot(moved, foot().faces, "right", glass=glass)
+    assert measures.doubts == []
+    assert values(measures.measures) == pytest.approx(values(measured().measures), rel=1e-3, abs=2e-3)
+    assert statuses(measures) == statuses(measured())
+    above_zero = measure_foot(moved, foot().faces, "right").measures["instep_height"].value
+    assert above_zero == pytest.approx((measured().measures["instep_height"].value or 0.0) + height, abs=0.2)
+
+
+def test_glass_too_far_from_its_place_makes_measures_uncertain() -> None:
+    moved = foot().vertices + np.array([0.0, 0.0, 3.4])
+    glass = GlassPlane(height_mm=3.4, below_foot_mm=3.4, largest_mm=3.4, corrected=True)
+    measures = measure_foot(moved, foot().faces, "right", glass=glass)
+    assert measures.warnings == measures.doubts
+    assert "ok" not in statuses(measures).values()
+    assert values(measures.measures) == pytest.approx(values(measured().measures), rel=1e-3, abs=2e-3)
+    for name in values(measures.measures):
+        assert "the glass is up to 3.4 mm from where it was calibrated" in (measures.measures[name].note or "")

@@ -7,6 +7,7 @@ from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
 from footscan.virtual.foot.foot import make_foot
+from schemas.glass import GlassPlane
 
 
 @pytest.fixture(scope="module")
@@ -23,12 +24,12 @@ def with_filled(foot: Mesh, share: float) -> Mesh:
 
 
 def test_a_foot_whose_sole_was_not_seen_has_no_good_measure(foot: Mesh) -> None:
-    measures = measure_scanned_foot(with_filled(foot, 1.0), "right").measures
+    measures = measure_scanned_foot(with_filled(foot, 1.0), "right", GlassPlane()).measures
     assert "ok" not in {measure.status for measure in measures.values()}
     assert "100 % of the sole was filled, not measured" in (measures["foot_length"].note or "")
 
 
 def test_a_foot_whose_sole_was_seen_has_good_measures(foot: Mesh) -> None:
-    seen = measure_scanned_foot(with_filled(foot, 0.1), "right").measures
+    seen = measure_scanned_foot(with_filled(foot, 0.1), "right", GlassPlane()).measures
     assert seen["foot_length"].status == seen["instep_height"].status == "ok"
-    assert measure_scanned_foot(foot, "right").measures["arch_index"].status == "ok"
+    assert measure_scanned_foot(foot, "right", GlassPlane()).measures["arch_index"].status == "ok"

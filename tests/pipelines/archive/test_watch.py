@@ -48,6 +48,20 @@ def test_a_scan_waits_until_its_last_film_is_there_and_quiet(arriving: tuple[Pat
     assert arrivals.complete() == []
 
 
+def test_a_scan_waits_for_the_check_that_it_carries(arriving: tuple[Path, Path]) -> None:
+    archive, scan = arriving
+    folder = archive / "P0001/S1"
+    shutil.copytree(scan, folder)
+    document = folder / "scan.yaml"
+    document.write_text(document.read_text().replace("cameras:", "calibration_check: check.json\ncameras:"))
+    age(folder)
+    arrivals = Arrivals((archive,))
+    assert arrivals.complete() == []
+    (folder / "check.json").write_text("{}")
+    age(folder)
+    assert arrivals.complete() == [folder]
+
+
 def test_a_scan_that_changes_comes_again(arriving: tuple[Path, Path]) -> None:
     archive, scan = arriving
     folder = archive / "P0001/S1"

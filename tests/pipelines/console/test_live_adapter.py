@@ -1,13 +1,18 @@
 """The live scanner in words: missing devices are named with a remedy."""
 
+import datetime
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from checked import made_check
 
+from pipelines.calibration_check import store_check
+from pipelines.console.guidance import guidance
 from pipelines.console.live_adapter import LiveAdapter
-from pipelines.console.scanner import Side
+from pipelines.console.scanner import Device
 from pipelines.live.scanner import STOPPED, LiveScanner
+from pipelines.live.state import ScannerState
 from schemas.base.errors import FootscanError
 from schemas.rig import Rig
 
@@ -30,7 +35,8 @@ def over_nothing(tmp_path: Path) -> LiveAdapter:
             "cameras": [{"id": camera, "device": f"http://127.0.0.1:9/{camera}"} for camera in (1, 5)],
         }
     )
-    return LiveAdapter(LiveScanner(rig), tmp_path / "archive", tmp_path / "results", tmp_path / "calibration.json")
+    rig = rig.model_copy(update={"calibration": str(tmp_path / "calibration.json")})
+    return LiveAdapter(LiveScanner(rig), tmp_path / "archive", tmp_path / "results")
 
 
 def test_what_is_not_connected_is_told(over_nothing: LiveAdapter) -> None:
@@ -40,11 +46,37 @@ def test_what_is_not_connected_is_told(over_nothing: LiveAdapter) -> None:
     assert told["Head 2"] == ("unknown", "position unknown")
     assert told["Camera 5"] == ("unknown", "not open")
     assert told["Passes"] == ("ok", "All 2 cameras in one pass: cameras 1, 5 on no USB bus of this computer.")
+    assert told["Calibration"] == ("unknown", "was not checked")
     assert told["Disk"][1].endswith("GB are free for scans")
     assert health.cameras == (1, 5)
     assert not health.resumable
     assert over_nothing.state.name == "disconnected"
     assert over_nothing.picture(1) is None
+
+
+def calibration_of(over: LiveAdapter) -> Device:
+    return next(device for device in over.health().devices if device.name == "Calibration")
+
+
+def test_the_last_check_of_the_calibration_is_told_before_a_scan(over_nothing: LiveAdapter, tmp_path: Path) -> None:
+    calibration = tmp_path / "calibration.json"
+    calibration.write_text("{}")
+    store_check(calibration, made_check(calibration, "2026-11-20T08:00:00+01:00", {1: 0.03, 5: 0.41, 7: None}))
+    device = calibration_of(over_nothing)
+    sentence = "camera 5 had moved by 0.41 mm when the calibration was checked on 2026-11-20: calibrate anew"
+    assert (device.level, device.remedy) == ("bad", sentence)
+    assert f"Calibration: {sentence}." in guidance(ScannerState("idle"), over_nothing.health(), None)
+    yesterday = datetime.datetime.now().astimezone() - datetime.timedelta(days=1)
+    store_check(calibration, made_check(calibration, yesterday.isoformat(), {1: 0.03, 5: 0.02}))
+    device = calibration_of(over_nothing)
+    assert (device.level, device.remedy) == ("ok", "")
+    assert device.words == f"checked on {yesterday.date()}, 1 day ago: every camera was within 0.03 mm"
+    (tmp_path / "calibration.check.json").write_text("{}")
+    device = calibration_of(over_nothing)
+    assert (device.level, device.words.partition(": ")[0]) == ("bad", str(tmp_path / "calibration.check.json"))
+    calibration.write_text("made anew")
+    (tmp_path / "calibration.check.json").unlink()
+    assert calibration_of(over_nothing).words == "was not checked"
 
 
 def test_orders_to_nothing_are_faults_and_a_stop_is_none(over_nothing: LiveAdapter, tmp_path: Path) -> None:
@@ -64,12 +96,16 @@ def test_a_foot_that_is_put_onto_the_glass_is_told_and_can_be_stopped(tmp_path: 
     told: list[str] = []
     scanner.listen(lambda state: told.append(str(state)))
 
-    def place(side: Side, progress: Callable[[int, int], None]) -> None:
-        progress(1, 4)
-        over.stop()
-        assert side == "left"
+    class OfTest:
+        subject = "right"
 
-    over = LiveAdapter(scanner, tmp_path / "archive", tmp_path / "results", place_foot=place)
+        def put(self, subject: str, progress: Callable[[int, int], None] | None = None) -> None:
+            assert progress is not None
+            progress(1, 4)
+            over.stop()
+            assert subject == "left"
+
+    over = LiveAdapter(scanner, tmp_path / "archive", tmp_path / "results", glass=OfTest())
     with pytest.raises(FootscanError, match="stopped"):
         over.film("P1", "left", keep_partial=False)
     words = "a virtual left foot is put onto the glass"

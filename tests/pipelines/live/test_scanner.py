@@ -1,72 +1,39 @@
 """The live scanner with a virtual board and two cameras that film a made-up foot: stored scans, states, refusals."""
 
-import datetime
+import shutil
 import threading
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import quick_rig
 import simplejpeg
+from checked import made_check
+from scanner_bench import DAY, FOOT_MM, LENGTH_MM, THREE_HEADS, Bench, open_bench
 from waiting import wait_until
 
+from footscan.calibration.travel.body import standard_body
 from footscan.capture import frame_positions, latency
 from footscan.frames.film import open_film
 from footscan.frames.travel import read_positions
+from footscan.recordings.calibration_checks import check_of_scan, checks_of
 from footscan.recordings.scans import read_scan
-from footscan.virtual.board.board import Board
-from footscan.virtual.filming.streams import VirtualStreams, free_running
+from pipelines.calibration_check import store_check
 from pipelines.live import storing
+from pipelines.live.calibrating.body_film import film_body
+from pipelines.live.calibrating.live import LiveStanding
+from pipelines.live.calibrating.stills import live_stills
 from pipelines.live.light import light_by_hand
-from pipelines.live.scan_order import ScanOrder
-from pipelines.live.scanner import LiveScanner
 from pipelines.live.state import ScannerState
-from pipelines.live.storing import ScanName, next_scan_name
+from pipelines.live.storing import next_scan_name
 from schemas.base.errors import Fault, Finding, RefusedInput
 from schemas.base.json_files import read_json
+from schemas.calibration_check import CalibrationCheck
 from schemas.recording import Recording
-from schemas.rig import Rig, RigCamera, RigHead, RigLatency, RigTravel
+from schemas.rig import RigHead, RigTravel
 
 pytestmark = pytest.mark.real_time  # cameras stream while heads move
-
-DARK = bytes(simplejpeg.encode_jpeg(np.full((480, 640, 3), 20, np.uint8), 90, "RGB", "420"))
-DAY = datetime.date(2026, 11, 20)
-RATE = 20.0
-LATENCY_S = 0.04
-LENGTH_MM = 110.0
-"""Of the travel: part of a foot, but where it is measured."""
-FOOT_MM = 190.0
-STEP_MM = 10.0
-"""Spacing of the pictures of the made-up foot."""
-
-
-@dataclass
-class Bench:
-    """A scanner, its world, and the folder of its scans."""
-
-    scanner: LiveScanner
-    board: Board
-    streams: VirtualStreams
-    home: Path
-    states: list[str]
-
-    def order(self, **changes: Any) -> ScanOrder:
-        scan = next_scan_name(self.home / "archive", "P7", "right", DAY)
-        order = ScanOrder(
-            ScanName("P7", scan, "right", DAY),
-            self.home / "archive",
-            light=light_by_hand(self.scanner.rig, 1.0, 10.0),
-        )
-        return replace(order, **changes)
-
-    def assert_dark_and_empty(self) -> None:
-        assert self.board.laser_at(time.monotonic()) == 0.0
-        assert not (self.home / "archive").exists()
 
 
 @pytest.fixture
@@ -80,52 +47,6 @@ def lenient(monkeypatch: pytest.MonkeyPatch) -> None:
 def bench(pristine: Path, tmp_path: Path, lenient: None) -> Iterator[Bench]:  # noqa: ARG001
     with open_bench(pristine, tmp_path) as one:
         yield one
-
-
-THREE_HEADS = (RigHead(), RigHead(), RigHead())
-TWO_CAMERAS = {1: 1, 5: 3}
-
-
-@contextmanager
-def open_bench(
-    pristine: Path, home: Path, heads: tuple[RigHead, ...] = THREE_HEADS, on_head: Mapping[int, int] = TWO_CAMERAS
-) -> Iterator[Bench]:
-    """A scanner with these heads; `on_head` has the head of each camera."""
-    films = {}
-    for camera in (1, 5):
-        film = open_film(pristine / f"archive/P0001/S1/cam{camera}.avi")
-        films[camera] = [frame if isinstance(frame, bytes) else b"" for frame in film.stored()]
-    with Board(heads_at=(-4.0, -4.0, -4.0), settings=quick_rig.SETTINGS) as board:
-
-        def picture(camera: int, seconds: float) -> bytes:
-            if not board.laser_at(seconds):
-                return DARK
-            head = on_head[camera]
-            axis = heads[head - 1].axis or head
-            x = board.position_at(seconds)[axis - 1]
-            film = films[1 if axis == 1 else 5]
-            return film[int(np.clip(round(x / STEP_MM), 0, len(film) - 1))]
-
-        with VirtualStreams(tuple(on_head), picture, free_running(RATE), latency_s=LATENCY_S) as streams:
-            latency = RigLatency(seconds=LATENCY_S, sd_s=0.001, frame_sd_s=0.002)
-            rig = Rig(
-                format="footscan.rig/1",
-                scanner="bench",
-                port=board.port,
-                board=quick_rig.QUICK,
-                heads=heads,
-                cameras=[
-                    RigCamera(id=camera, device=streams.url(camera), head=head, latency=latency)
-                    for camera, head in on_head.items()
-                ],
-                travel=RigTravel(start_mm=0.0, length_mm=LENGTH_MM, mm_per_s=60.0),
-                frames_per_second=RATE,
-            )
-            states: list[str] = []
-            with LiveScanner(rig) as scanner:
-                scanner.listen(lambda state: states.append(state.name))
-                assert scanner.connect() == {}
-                yield Bench(scanner, board, streams, home, states)
 
 
 def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
@@ -192,6 +113,31 @@ def test_twelve_cameras_on_four_heads_of_which_two_share_an_axis(pristine: Path,
         places = bench.scanner.jog(4.0, 50.0, 4)
         assert places[3] == pytest.approx(places[2] - 18.0, abs=0.01)  # the carriage moves both
         assert places[2] == pytest.approx(places[0] + 4.0, abs=0.1)
+
+
+def test_a_scan_carries_the_check_that_was_in_force_when_it_began(bench: Bench, pristine: Path) -> None:
+    calibration = Path(shutil.copy(pristine / "calibration.json", bench.home))
+    assert bench.scanner.scan(bench.order(calibration=calibration)).stored.place.name == "2026-11-20-R"
+    assert read_scan(bench.home / "archive/P7/2026-11-20-R").calibration_check is None
+    check = made_check(calibration, "2026-11-20T08:00:00+01:00", {1: 0.03, 5: 0.41, 7: None})
+    store_check(calibration, check)
+    scan = read_scan(bench.scanner.scan(bench.order(calibration=calibration)).stored.place)
+    store_check(calibration, made_check(calibration, "2026-11-20T19:00:00+01:00", {1: 0.03, 5: 0.02}))
+    assert scan.calibration_check is not None
+    assert read_json(scan.calibration_check, CalibrationCheck) == check
+    beside = checks_of(calibration, check.calibration_sha256)
+    known = check_of_scan(scan, check.calibration_sha256, beside)
+    assert known is not None
+    assert (known.drifted, known.unseen, known.age_days) == ([5], [], 0)
+
+
+def test_a_damaged_check_is_refused_before_anything_moves(bench: Bench, pristine: Path) -> None:
+    calibration = Path(shutil.copy(pristine / "calibration.json", bench.home))
+    calibration.with_name("calibration.check.json").write_text("{}")
+    with pytest.raises(RefusedInput, match=r"calibration\.check\.json: checked: is missing"):
+        bench.scanner.scan(bench.order(calibration=calibration))
+    bench.assert_dark_and_empty()
+    assert "homing" not in bench.states
 
 
 def test_a_head_that_was_held_costs_the_scan(bench: Bench) -> None:
@@ -336,6 +282,45 @@ def test_the_light_is_chosen_where_none_is_given(bench: Bench) -> None:
     assert recording.light.looks >= 2
     assert all(camera.light_reason for camera in recording.cameras)
     assert all("cannot be set from here" in camera.not_fixed[0] for camera in recording.cameras)
+
+
+def test_standing_heads_are_filmed_in_the_middle_of_the_travel(bench: Bench) -> None:
+    stills = live_stills(bench.scanner, light_by_hand(bench.scanner.rig, 1.0, 10.0))
+    assert stills.problems == {}
+    for camera, (earlier, later) in stills.frames.items():
+        assert simplejpeg.decode_jpeg(earlier).max() > 100, f"camera {camera} in the dark"
+        assert simplejpeg.decode_jpeg(later).max() > 100
+    assert bench.scanner.heads.position_mm() == pytest.approx((LENGTH_MM / 2,) * 3, abs=0.1)
+    assert bench.scanner.state.name == "idle"
+    assert bench.board.laser_at(time.monotonic()) == 0.0
+
+
+def test_a_stop_ends_the_film_of_a_placement(bench: Bench) -> None:
+    bench.scanner.home()
+    threading.Thread(
+        target=lambda: (wait_until(lambda: bench.board.laser_at(time.monotonic()) > 0), bench.scanner.stop()),
+        daemon=True,
+    ).start()
+    with pytest.raises(Fault, match="stopped; what was filmed before is kept"):
+        LiveStanding(bench.scanner).stills(light_by_hand(bench.scanner.rig, 1.0, 10.0))
+    assert bench.board.laser_at(time.monotonic()) == 0.0
+    assert LiveStanding(bench.scanner).stills(light_by_hand(bench.scanner.rig, 1.0, 10.0)).problems == {}
+
+
+def test_heads_travel_over_a_body_one_after_the_other(bench: Bench) -> None:
+    began = time.monotonic()
+    place = bench.home / "captures" / "S1" / "body"
+    film_body(bench.scanner, place, standard_body(), light_by_hand(bench.scanner.rig, 1.0, 10.0))
+    scan = read_scan(place)
+    assert (scan.document.side, [camera.id for camera in scan.document.cameras]) == ("unknown", [1, 5])
+    for camera in scan.document.cameras:
+        x = read_positions(place / str(camera.positions))
+        assert x[0] < 12.0
+        assert x[-1] > LENGTH_MM - 12.0
+    seconds = np.arange(began, time.monotonic(), 0.02)
+    lit = np.array([bench.board.position_at(one) for one in seconds if bench.board.laser_at(one) > 0])
+    assert len(lit) > 100
+    assert np.all((lit > 0.0).sum(axis=1) <= 1)  # the others wait before the travel
 
 
 def when_filming(bench: Bench, happens: object) -> None:

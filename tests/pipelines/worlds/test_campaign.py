@@ -15,12 +15,13 @@ from schemas.base.errors import Fault, RefusedInput
 from schemas.campaign import WorldOutcome
 from schemas.parameters.scan import ScanParameters
 from schemas.regression import Seeds, SuiteWorlds
-from schemas.world import World, WorldCameras, WorldLaser, WorldSubject
+from schemas.world import World, WorldCameras, WorldGlass, WorldLaser, WorldSubject
 
 COARSE = WorldCameras(frames=50, step_mm=8.0)
 WORLDS = {
     1: World(seed=1, cameras=COARSE),
     2: World(seed=2, cameras=COARSE, laser=WorldLaser(power=0.01)),
+    4: World(seed=4, cameras=COARSE, glass=WorldGlass(height_mm=-1.6, tilt_x_deg=0.4, tilt_y_deg=-0.3)),
     3: World(seed=3, cameras=COARSE, subject=WorldSubject(kind="last", toe_gap_mm=-1.0, leg_mm=90.0)),
 }
 
@@ -61,6 +62,14 @@ def test_a_body_shows_where_the_planes_lie(tmp_path: Path) -> None:
     ideal, chart, both = surface_mm(as_designed(off)), surface_mm(off), surface_mm(off, standard_body())
     assert chart > 5.0 * ideal
     assert both < 2.5 * ideal
+
+
+def test_a_foot_on_a_plate_that_was_moved_is_measured_above_the_plate(outcomes: dict[int, WorldOutcome]) -> None:
+    moved = outcomes[4]
+    assert moved.measures["instep_height"].status == "ok"
+    assert moved.measures["instep_height"].error == pytest.approx(0.0, abs=0.3)
+    assert moved.measures["arch_index"].error == pytest.approx(0.0, abs=0.01)
+    assert [warning for warning in moved.warnings if "the plate was moved since the calibration" in warning]
 
 
 def test_a_world_without_light_is_refused_rightly(outcomes: dict[int, WorldOutcome]) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from waiting import LONG_SECONDS, fault_of, wait_until
 
-from footscan.capture.board.carriages import Head
+from footscan.capture.board.head import Head
 from footscan.capture.board.heads import Heads
 from footscan.capture.board.position_log import HeadPosition, PositionLog
 from footscan.capture.grbl.settings import required_settings

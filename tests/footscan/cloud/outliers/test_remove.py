@@ -248,6 +248,19 @@ def test_a_block_keeps_its_edges(views: Views) -> None:
     assert len(kept) == len(points)
 
 
+@pytest.mark.parametrize("height", [-2.0, 1.5])
+def test_a_plate_that_was_moved(views: Views, height: float) -> None:
+    points = block(views)
+    points["z"] += height - 0.008 * points["y"]  # 0.46 degrees
+    mirrored = line(5, 20, (-20.0, height - 0.9), (20.0, height - 0.9))
+    kept, removed = remove_outliers(np.concatenate([points, mirrored]), views, WITH_ENDS)
+    assert len(kept) == len(points)
+    assert removed.counts[5]["glass"] == len(mirrored)
+    assert removed.glass.below_foot_mm == pytest.approx(height, abs=0.01)
+    assert removed.glass.tilt_x_deg == pytest.approx(-0.458, abs=0.01)
+    assert [warning for warning in removed.warnings if f"{abs(height):.2f} mm" in warning]
+
+
 def test_a_block_is_no_clutter_where_clutter_is(views: Views) -> None:
     spoilt = np.concatenate([line(3, frame, (-60.0, 40.0), (-55.0, 50.0)) for frame in range(-30, 70)])
     assert dropped(block(views), spoilt, views) == {"clutter": len(spoilt)}

@@ -6,10 +6,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from footscan.measure.frame.foot_frame import FootFrame, foot_frame
+from footscan.measure.frame.glass import to_glass
 from footscan.mesh.rigid_transform import apply
 from footscan.virtual.foot.foot import Foot, make_foot, sample_shape
 from schemas.base.errors import Finding
 from schemas.base.model import Side
+from schemas.glass import Plane
 from schemas.measures import Axis
 
 ABOVE_GLASS = np.array([120.0, -40.0, 33.0])
@@ -46,6 +48,18 @@ def test_a_foot_in_any_pose_comes_to_stand_in_its_own_frame(pose: Rotation, side
     moved = apply(frame.transform, pose.apply(foot.vertices) + ABOVE_GLASS)
     np.testing.assert_allclose(moved, frame.vertices, atol=1e-9)
     assert np.linalg.det(frame.transform[:3, :3]) == pytest.approx(1.0 if side == "right" else -1.0)
+
+
+@pytest.mark.parametrize("plane", [Plane(-1.5, 0.0, 0.0), Plane(2.2, -0.008, 0.009)])
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_the_glass_is_the_floor_wherever_it_stands(side: Side, plane: Plane) -> None:
+    foot = known_foot(side)
+    from_glass = np.linalg.inv(to_glass(plane))
+    moved = apply(from_glass, foot.vertices)
+    frame, expected = foot_frame(moved, foot.faces, side, glass=plane), foot_frame(foot.vertices, foot.faces, side)
+    assert frame.floor == expected.floor == "glass"
+    np.testing.assert_allclose(frame.vertices, expected.vertices, atol=0.02)
+    np.testing.assert_allclose(frame.transform @ from_glass, expected.transform, atol=2e-4)
 
 
 @pytest.mark.parametrize("side", ["right", "left"])

@@ -1,3 +1,4 @@
+import datetime
 import re
 from concurrent.futures import ThreadPoolExecutor
 from html.parser import HTMLParser
@@ -12,7 +13,9 @@ from footscan.report.scan.foot_colours import FootSurface
 from footscan.report.scan.page import ScanPoints, ScanTitle, scan_page
 from footscan.report.surface_views import upright
 from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
+from schemas.calibration_check import ScanCheck
 from schemas.fusion import CameraCorrection, Disagreement, FusionReport, PairDisagreement
+from schemas.glass import GlassPlane
 from schemas.measures import Measure, Measures
 from schemas.quality import CameraQuality, Comparison, MeshQuality, Quality
 
@@ -100,6 +103,17 @@ def scan():
                 contradicted={2: 5},
                 warnings=[f"camera 2 {HOSTILE}"],
             ),
+            glass=GlassPlane(
+                below_foot_mm=-1.234,
+                below_foot_sd_mm=0.0123,
+                tilt_x_deg=0.25,
+                tilt_x_sd_deg=0.031,
+                supported=["height", "tilt_x"],
+                cameras=[5, 6],
+                contact_mm2=5230.0,
+                stripes=77,
+                corrected=True,
+            ),
             cloud_points=4,
             mesh=MeshQuality(
                 vertices=4,
@@ -165,6 +179,17 @@ def test_cameras_are_compared_before_and_after_they_were_moved(scan):
     assert "No two cameras see the same skin" in scan_page(**scan | {"quality": alone})
 
 
+def test_the_glass_stands_with_its_deviations(scan):
+    page = scan_page(**scan)
+    facts = dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", page))
+    assert facts["Height below the foot"].endswith("1.23 ± 0.012 mm")
+    assert facts["Tilt about X"] == "0.25 ± 0.031 °"
+    assert facts["Tilt about Y"] == "not shown"
+    assert (facts["Contact"], facts["Stripes on it"]) == ("52.3 cm²", "77")
+    unknown = scan["quality"].model_copy(update={"glass": GlassPlane()})
+    assert "Not known from the sole" in scan_page(**{**scan, "quality": unknown})
+
+
 def test_filled_parts_are_told_with_their_share(scan):
     page = scan_page(**scan)
     assert "Measured, 62.5 %" in page
@@ -192,6 +217,21 @@ def test_the_calibration_stands_with_its_digest_and_a_picture(scan):
     assert ["SHA-256", "12ab"] in rows_of(page)
     assert ["Made", "unknown"] in rows_of(page)
     assert 'aria-label="Camera 1: residuals and support"' in page
+
+
+def test_the_check_of_the_calibration_stands_beside_it_and_a_doubt_among_the_warnings(scan):
+    assert ["Check", "calibration was not checked"] in rows_of(scan_page(**scan))
+    on = datetime.date(2026, 11, 24)
+    steady = ScanCheck(checked=on, age_days=1, largest_mm=0.04)
+    page = scan_page(**scan | {"quality": scan["quality"].model_copy(update={"calibration_check": steady})})
+    assert ["Check", "checked on 2026-11-24, 1 day before the scan: every camera was within 0.04 mm"] in rows_of(page)
+    moved = ScanCheck(checked=on, age_days=0, largest_mm=0.41, drifted=[2])
+    quality = scan["quality"].model_copy(update={"calibration_check": moved})
+    measures = scan["measures"].model_copy(update={"doubts": [moved.doubt]})
+    page = scan_page(**scan | {"quality": quality, "measures": measures})
+    assert ["Check", "checked on 2026-11-24: camera 2 had moved"] in rows_of(page)
+    sentence = "Camera 2 had moved by 0.41 mm when the calibration was checked on 2026-11-24: calibrate anew."
+    assert f"<li>{sentence}</li>" in page
 
 
 @pytest.mark.parametrize("broken", [{"open_edges": 3}, {"non_manifold_edges": 1}])

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import pytest
 from stand_in import measures_of, quality_of
 
 from pipelines.console.pages.advice import advice
@@ -38,6 +39,27 @@ def recorded(lost: int, latency: dict[str, Any] | None, warnings: list[str]) -> 
 
 def test_a_good_scan_needs_nothing() -> None:
     assert told(measures_of("right"), quality_of()) == []
+
+
+@pytest.mark.parametrize(
+    ("cameras", "line"),
+    [
+        ({"largest_mm": 0.04}, None),
+        (
+            {"largest_mm": 0.41, "drifted": [3]},
+            "Camera 3 had moved by 0.41 mm when the calibration was checked on 2026-11-24: calibrate anew. Put the "
+            "reference object onto the glass and run 'footscan calibrate capture', then scan again.",
+        ),
+        (
+            {"largest_mm": 0.04, "unseen": [7]},
+            "Camera 7 could not be judged when the calibration was checked on 2026-11-24: check again. Put the "
+            "reference object onto the glass and run 'footscan calibrate check' again.",
+        ),
+    ],
+)
+def test_a_calibration_that_does_not_hold_is_told_with_what_to_do(cameras: dict[str, Any], line: str | None) -> None:
+    quality = quality_of() | {"calibration_check": {"checked": "2026-11-24", "age_days": 0, **cameras}}
+    assert told(measures_of("right"), quality) == ([] if line is None else [line])
 
 
 def test_a_blind_camera_is_named() -> None:

@@ -1,0 +1,174 @@
+// The page on which the scanner is calibrated and checked, placement by placement.
+"use strict";
+(() => {
+  const {act, allow, element, hindrance, listen, made, press, say} = footscan;
+  const SVG = "http://www.w3.org/2000/svg";
+  const NAMES = {put: "Put the virtual object there", take: "Film this placement", next: "Next placement",
+    discard: "Discard this session", body: "Film the body, too", "film-body": "Film the body", use: "Use it for scans",
+    calibrate: "Calibrate the scanner", check: "Check the calibration"};
+  const STEPS = {begin: "Calibrate or check", place: "Place the object", look: "Judge the placement",
+    filmed: "All placements are filmed", calibrated: "The scanner is calibrated", body: "Place the body",
+    planes: "The laser planes are found", used: "The calibration is in use", checked: "The calibration is checked"};
+  const SURE_MS = 5000;
+  let usual = "", drawn = "", shown = "", told = "";
+
+  function nameOf(action, view) {
+    if (action === "finish") return view.purpose === "check" ? "Check the calibration" : "Calibrate";
+    if (action === "take" && view.step === "look") return "Film it again";
+    if (action === "put" && view.step === "body") return "Put the virtual body there";
+    if (action === "end" && ["used", "checked"].includes(view.step)) return "Done";
+    if (action === "end") return view.outcome ? "Leave without using it" : "Leave; what is filmed stays";
+    return NAMES[action];
+  }
+
+  const give = (action, number = 0) => act("calibrate", {action, number});
+
+  function button(action, view) {
+    const node = made("button", nameOf(action, view));
+    node.type = "button";
+    node.dataset.action = action;
+    if (action === "discard") press(node, () => discard(node));
+    else press(node, () => give(action));
+    return node;
+  }
+
+  // What was filmed is removed on the second click alone.
+  function discard(node) {
+    if (node.dataset.sure) return give("discard");
+    node.dataset.sure = "yes";
+    node.textContent = "Remove all frames of this session?";
+    setTimeout(() => {
+      delete node.dataset.sure;
+      node.textContent = NAMES.discard;
+    }, SURE_MS);
+    return null;
+  }
+
+  function node(name, attributes, words) {
+    const part = document.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) part.setAttribute(key, value);
+    if (words) part.textContent = words;
+    return part;
+  }
+
+  // The object in its placement over the glass, seen from the front: Y to the right, Z upwards.
+  function drawPlacement(view) {
+    const at = view.placements[view.number];
+    const now = view.profile.map(([y, z]) => [y + at[0], z + at[1]]);
+    const all = view.placements.flatMap(([dy, dz]) => view.profile.map(([y, z]) => [y + dy, z + dz]));
+    const reach = Math.max(...all.map(([y]) => Math.abs(y))) + 15, top = Math.max(...all.map(([, z]) => z)) + 16;
+    const svg = node("svg", {viewBox: `${-reach} ${-top} ${2 * reach} ${top + 24}`, role: "img",
+      "aria-label": `The object at Y = ${at[0]} mm, ${at[1]} mm above the glass, seen from the front`});
+    const outline = corners => corners.map(([y, z]) => `${y},${-z}`).join(" ");
+    for (const number of view.taken) {
+      const [dy, dz] = view.placements[number];
+      if (number !== view.number)
+        svg.append(node("polygon", {points: outline(view.profile.map(([y, z]) => [y + dy, z + dz])), class: "earlier"}));
+    }
+    svg.append(node("line", {x1: -reach, x2: reach, y1: 0, y2: 0, class: "glass"}));
+    svg.append(node("line", {x1: 0, x2: 0, y1: -top, y2: 5, class: "middle"}));
+    svg.append(node("polygon", {points: outline(now), class: "now"}));
+    svg.append(node("text", {x: reach - 2, y: 9, "text-anchor": "end"}, "+Y"));
+    svg.append(node("text", {x: 2 - reach, y: 9}, "−Y"));
+    svg.append(node("text", {x: reach - 2, y: 8 - top, "text-anchor": "end"}, "seen from +X"));
+    svg.append(node("text", {x: 0, y: 20, "text-anchor": "middle", class: "where"},
+      `Y = ${at[0]} mm${at[1] ? `, raised by ${at[1]} mm` : ", on the glass"}`));
+    element("placement").replaceChildren(svg);
+  }
+
+  function showSteps(view, why) {
+    const now = JSON.stringify([view.step, view.actions, view.purpose]);
+    if (now !== shown) {
+      const focused = document.activeElement;
+      const within = element("others-now").contains(focused) || element("numbers").contains(focused);
+      shown = now;
+      usual = view.actions[0] || "";
+      say(element("usual"), usual ? nameOf(usual, view) : "");
+      element("usual").hidden = !usual;
+      element("others-now").replaceChildren(...view.actions.slice(1).filter(action => action !== "go")
+        .map(action => button(action, view)));
+      if (within) element("usual").focus();
+    }
+    for (const one of [element("usual"), ...element("others-now").children, ...element("numbers").children]) allow(one, why);
+    say(element("usual-told"), why);
+  }
+
+  function showNumbers(view, why) {
+    element("all-placements").hidden = !view.actions.includes("go");
+    const now = JSON.stringify([view.number, view.taken, view.placements]);
+    if (now === element("numbers").dataset.now) return;
+    element("numbers").dataset.now = now;
+    element("numbers").replaceChildren(...view.placements.map(([y, z], number) => {
+      const taken = view.taken.includes(number), one = made("button", `${number + 1}${taken ? " ✓" : ""}`);
+      one.type = "button";
+      one.setAttribute("aria-label", `Placement ${number + 1}: Y = ${y} mm, Z = ${z} mm${taken ? ", filmed" : ""}`);
+      if (number === view.number) one.setAttribute("aria-current", "step");
+      press(one, () => give("go", number));
+      allow(one, why);
+      return one;
+    }));
+  }
+
+  function showOutcome(view) {
+    const outcome = view.outcome;
+    element("outcome").hidden = !outcome;
+    if (!outcome || told === JSON.stringify(outcome)) return;
+    told = JSON.stringify(outcome);
+    element("outcome").dataset.level = outcome.is_well ? "ok" : "bad";
+    element("remarks").replaceChildren(...outcome.remarks.map(words => made("li", words)));
+    element("outcome-columns").replaceChildren(...outcome.columns.map(words => made("th", words)));
+    element("outcome-rows").replaceChildren(...outcome.rows.map(row => {
+      const line = made("tr");
+      line.append(...row.map(cell => made("td", cell)));
+      return line;
+    }));
+    say(element("outcome-file"), outcome.file);
+    element("outcome-picture").hidden = !outcome.has_picture;
+    if (outcome.has_picture) element("outcome-picture").src = `/calibrating/result.png?${Date.now()}`;
+  }
+
+  function show(now) {
+    const view = now.guide;
+    say(element("do-words"), now.do);
+    element("do").hidden = !now.do;
+    const busy = hindrance(now);
+    const there = busy || (now.state.name === "disconnected" ? "Connect the scanner first." : "");
+    allow(element("connect"), busy);
+    for (const id of ["home", "shine"]) allow(element(id), there);
+    if (!view) {
+      say(element("step-words"), "There is no reference object: put its file reference.yaml beside rig.yaml, or start "
+        + "the console with --reference.");
+      element("usual").hidden = true;
+      return;
+    }
+    const why = there || (now.state.name === "door open" ? "Close the door first." : "")
+      || (now.state.name === "alarm" ? "Home the heads first." : "");
+    say(element("step-name"), STEPS[view.step]);
+    say(element("step-words"), view.words);
+    const complaints = element("complaints"), words = view.complaints.map(one => one.words);
+    complaints.hidden = !words.length;
+    if ([...complaints.children].map(one => one.textContent).join("\n") !== words.join("\n"))
+      complaints.replaceChildren(...words.map(one => made("li", one)));
+    const placing = view.number !== null && ["place", "look"].includes(view.step);
+    element("placement").hidden = !placing;
+    const key = JSON.stringify([view.number, view.taken]);
+    if (placing && element("placement").dataset.key !== key) {
+      element("placement").dataset.key = key;
+      drawPlacement(view);
+    }
+    showNumbers(view, why);
+    showSteps(view, why);
+    showOutcome(view);
+    const covered = Object.entries(view.coverage);
+    element("covered").hidden = !covered.length || Boolean(view.outcome);
+    if (covered.length && drawn !== `${view.folder} ${view.drawn}`) {
+      drawn = `${view.folder} ${view.drawn}`;
+      element("stripes").src = `/calibrating/stripes.svg?${view.drawn}`;
+      element("stripes").alt = covered.map(([camera, share]) => `camera ${camera}: ${Math.round(100 * share)} %`).join(", ");
+    }
+  }
+
+  listen(show);
+  press(element("usual"), () => give(usual));
+  for (const id of ["connect", "home", "shine"]) press(element(id), () => act(id));
+})();

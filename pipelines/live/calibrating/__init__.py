@@ -1,0 +1,1 @@
+"""Calibrating and checking the scanner by the scanner itself, step by step."""

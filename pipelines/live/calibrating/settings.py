@@ -1,0 +1,28 @@
+"""The settings of sessions, from the files of a scanner."""
+
+from pathlib import Path
+
+from pipelines.live.calibrating.guide import GuideSettings
+from pipelines.live.light import ScanLight
+from pipelines.travel_job import read_body
+from schemas.base.yaml_files import read_yaml
+from schemas.reference import ReferenceObject
+
+
+def settings_of(
+    rig_file: Path, captures: Path, reference: Path | None, body: Path | None, light: ScanLight | None
+) -> GuideSettings | None:
+    """Read the reference object, by default reference.yaml beside the rig, and the mesh of a body.
+
+    None if no reference object is named, and none lies beside the rig.
+
+    Raises
+    ------
+    RefusedInput
+        A file is missing or breaks its format.
+    """
+    beside = rig_file.parent / "reference.yaml"
+    if reference is None and not beside.exists():
+        return None
+    known = read_yaml(reference or beside, ReferenceObject)
+    return GuideSettings(captures, rig_file, known, None if body is None else read_body(body), light)

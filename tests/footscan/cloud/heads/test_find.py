@@ -1,0 +1,81 @@
+"""Where the heads are, from the skin that cameras of two heads see."""
+
+import numpy as np
+import pytest
+
+from footscan.cloud.heads.find import find_heads
+from footscan.cloud.heads.planes import corrected, places_of
+from schemas.heads import HeadsReport
+from schemas.parameters.heads import HeadParameters
+from tests.footscan.cloud.heads.ellipsoid import points_of, views
+
+SMALL = (0.0, 0.0, -0.3)
+
+
+@pytest.fixture(scope="module")
+def small() -> HeadsReport:
+    return find_heads(points_of(SMALL), views(), HeadParameters())
+
+
+def test_heads_at_their_places_are_left_there() -> None:
+    report = find_heads(points_of((0.0, 0.0, 0.0)), views(), HeadParameters())
+    assert report.comparisons > 1000
+    assert not report.is_corrected
+    assert report.largest_mm == 0.0
+    assert report.warnings == []
+    assert report.doubt is None
+
+
+def test_a_small_offset_is_found_and_reported(small: HeadsReport) -> None:
+    offsets = places_of(small)[:, 0]
+    np.testing.assert_allclose(offsets, np.array(SMALL) - np.mean(SMALL), atol=0.05)
+    assert small.is_corrected
+    assert small.doubt is None
+    assert small.warnings[0].startswith(
+        "heads are not where the calibration says, and the scan was corrected: head 1 by"
+    )
+    assert small.after_mm < 0.9 * small.before_mm  # type: ignore[operator]  # both are known where heads are compared
+
+
+def test_points_move_by_what_was_found(small: HeadsReport) -> None:
+    points = points_of(SMALL)
+    moved, planes = corrected(points, views(), small)
+    of_lower = points["camera"] >= 5
+    np.testing.assert_allclose((moved["x"] - points["x"])[of_lower].mean(), small.heads[2].offset_mm, atol=0.02)
+    assert (moved["y"] == points["y"]).all()
+    assert planes[5].plane is not None
+    assert planes[5].plane.offset_mm == small.heads[2].offset_mm
+
+
+def test_a_large_offset_puts_the_measures_in_doubt() -> None:
+    report = find_heads(points_of((2.0, 0.0, 0.0)), views(), HeadParameters())
+    np.testing.assert_allclose(places_of(report)[:, 0], [4 / 3, -2 / 3, -2 / 3], atol=0.15)
+    assert report.doubt is not None
+    assert "of a head lie" in report.doubt
+    assert report.doubt.endswith("calibrate the laser planes with `footscan calibrate travel`")
+
+
+def test_a_turned_plane_is_found() -> None:
+    report = find_heads(points_of((0.0, 0.0, 0.0), turn=0.008), views(), HeadParameters())
+    yaw = places_of(report)[:, 1]
+    assert yaw[0] - yaw[2] == pytest.approx(0.008, abs=0.003)
+    assert report.is_corrected
+
+
+def test_heads_that_travel_one_after_the_other_are_not_trusted_if_they_are_off() -> None:
+    """Without a common line, an offset and a scale may stand for each other."""
+    report = find_heads(points_of((0.0, 0.0, -0.4), shared=False), views(), HeadParameters())
+    assert report.is_corrected
+    assert report.doubt is not None
+
+
+def test_a_single_head_has_nothing_to_compare() -> None:
+    points = points_of((0.0, 0.0, 0.0))
+    report = find_heads(points[points["camera"] <= 2], views(), HeadParameters())
+    assert report == HeadsReport()
+
+
+def test_no_points_and_no_wish_give_an_empty_report() -> None:
+    points = points_of(SMALL)
+    assert find_heads(points[:0], views(), HeadParameters()) == HeadsReport()
+    assert find_heads(points, views(), HeadParameters(correct_heads=False)) == HeadsReport()
