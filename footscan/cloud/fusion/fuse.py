@@ -1,6 +1,6 @@
 """Fusion of the points of all cameras to one cloud."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.fusion.agreement import Pairs, disagreements, find_overlaps
-from footscan.cloud.fusion.correction import correct
+from footscan.cloud.fusion.correction import LEAST_POINTS, correct
 from footscan.cloud.fusion.merge import merge
 from footscan.cloud.fusion.stripes import Floats, Stripes, sort_stripes
 from footscan.cloud.outliers.alone import is_off_alone
@@ -16,6 +16,10 @@ from footscan.cloud.outliers.off_surface import is_off_shared_surface
 from schemas.calibration import view_name
 from schemas.fusion import FusionReport, PairDisagreement
 from schemas.parameters.fusion import FusionParameters
+
+WORSE_MM = 0.05
+"""Increase of the distance between two cameras, median over what both see, from which it is reported. Chosen by
+hand."""
 
 
 class Fusion(NamedTuple):
@@ -83,9 +87,28 @@ def fuse(points: NDArray[np.void] | Iterable[NDArray[np.void]], parameters: Fusi
             f"{parameters.largest_correction_mm:g} mm at most: it was moved since the calibration, or its travel is "
             "not what the scan says"
             for camera, away in sorted(corrected.too_far.items())
-        ],
+        ]
+        + [*_worse(before, after)],
     )
     return Fusion(merged.points[~off], report)
+
+
+def _worse(before: Pairs, after: Pairs) -> Iterator[str]:
+    """Name the pairs of cameras that agree worse after the correction.
+
+    >>> from schemas.fusion import Disagreement
+    >>> disagreements = [Disagreement(median_mm=mm, deviation_mm=0.02, rms_mm=mm) for mm in (0.03, 0.2)]
+    >>> next(_worse(*({(1, 5): (400, disagreement)} for disagreement in disagreements)))
+    'cameras 1 and 5 agree worse after the correction of the cameras: 0.03 mm apart before, 0.20 mm after'
+    """
+    for pair, (count, was) in before.items():
+        now = after.get(pair, before[pair])[1]
+        if count >= LEAST_POINTS and abs(now.median_mm) > abs(was.median_mm) + WORSE_MM:
+            first, second = pair
+            yield (
+                f"cameras {first} and {second} agree worse after the correction of the cameras: "
+                f"{abs(was.median_mm):.2f} mm apart before, {abs(now.median_mm):.2f} mm after"
+            )
 
 
 def _deviations(stripes: Stripes, pairs: Pairs) -> Floats:
