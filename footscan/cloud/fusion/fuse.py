@@ -104,7 +104,7 @@ def _worse(before: Pairs, after: Pairs) -> Iterator[str]:
     for pair, (count, was) in before.items():
         now = after.get(pair, before[pair])[1]
         if count >= LEAST_POINTS and abs(now.median_mm) > abs(was.median_mm) + WORSE_MM:
-            first, second = pair
+            first, second = map(view_name, pair)
             yield (
                 f"cameras {first} and {second} agree worse after the correction of the cameras: "
                 f"{abs(was.median_mm):.2f} mm apart before, {abs(now.median_mm):.2f} mm after"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import simplejpeg
 from checked import made_check
-from scanner_bench import DAY, FOOT_MM, LENGTH_MM, THREE_HEADS, Bench, open_bench
+from live_bench import DAY, FOOT_MM, LENGTH_MM, THREE_HEADS, Bench, open_bench
 from waiting import wait_until
 
 from footscan.calibration.travel.body import standard_body
