@@ -68,9 +68,10 @@ def find_heads(points: NDArray[np.void], views: Mapping[int, View], parameters: 
     heads = {camera: head for camera, head in heads.items() if np.any(usable["camera"] == camera)}
     head_of = head_indices(heads)
     count = len(set(heads.values()))
+    x_mm = round(float(np.median(usable["plane"])), 3) if len(usable) else 0.0
+    nothing = HeadsReport(points=len(usable), x_mm=x_mm)
     if not parameters.correct_heads or count < 2:
-        return HeadsReport()
-    x_mm = round(float(np.median(usable["plane"])), 3)
+        return nothing
     known = calibrated_places(views, heads, x_mm)
     unmoved = displaced(usable, -known, head_of, x_mm)
     ordered = unmoved[np.lexsort([unmoved[name] for name in ("source", "camera", "frame")])]
@@ -78,7 +79,7 @@ def find_heads(points: NDArray[np.void], views: Mapping[int, View], parameters: 
     first = compare(ordered, head_of[ordered["camera"]], bare, head_of, x_mm)
     across = int(np.count_nonzero(first.is_across))
     if across < FEWEST:
-        return HeadsReport(comparisons=across)
+        return nothing.model_copy(update={"comparisons": across})
     start = unmoved_heads(known, len(heads))
     if np.ptp(known[:, 0]) <= LINE_MM:
         start, unmoved_mm = first_places(first.every(-(-len(first.distance) // USED)), known, len(heads))
@@ -87,7 +88,8 @@ def find_heads(points: NDArray[np.void], views: Mapping[int, View], parameters: 
         fit, unmoved_mm = _refined(ordered[::THINNED], bare, heads, start, known, x_mm)
     moved = fit.places - known
     fit = fit._replace(places=moved - moved.mean(axis=0))
-    return report_of(heads, fit, unmoved_mm, across, x_mm, parameters)
+    found = nothing.model_copy(update={"comparisons": across})
+    return report_of(found, heads, fit, unmoved_mm, parameters)
 
 
 def _refined(
