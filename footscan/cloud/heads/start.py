@@ -23,7 +23,7 @@ FARTHEST_MM, CELL_MM = 8.0, 0.05
 """Range of the offsets that are tried, and the distance from one to the next. Chosen by hand."""
 SPREAD_MM = 0.06
 """Standard deviation of a comparison that is explained. Chosen by hand."""
-ASSIGNMENTS = 6
+ROUNDS = 6
 """Rounds in which comparisons are assigned to their likeliest origin: a bound of time."""
 
 
@@ -48,7 +48,7 @@ def first_places(comparisons: Comparisons, known: Floats, cameras: int) -> Found
     fits = []
     for first in firsts:
         fit = solve(comparisons, first, distance, start)
-        for _ in range(ASSIGNMENTS):
+        for _ in range(ROUNDS):
             change = likeliest(comparisons, origins, distance, fit)
             fit = solve(comparisons, change, distance, fit)
         fits.append(fit)
