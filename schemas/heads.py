@@ -35,6 +35,8 @@ class HeadsReport(Document):
     heads: list[HeadPlace] = Field(default_factory=list)
     x_mm: Number = 0.0
     """Where the offsets hold."""
+    points: Annotated[int, Field(ge=0)] = 0
+    """Number of points of cameras on known heads."""
     comparisons: Annotated[int, Field(ge=0)] = 0
     """Number of places at which cameras of two heads were compared."""
     before_mm: Length | None = None

@@ -49,7 +49,7 @@ hand."""
 SIGMA_MM = (0.02, 0.25)
 """Least and largest standard deviation of points in the plane: from what a good camera resolves to the noise of dim
 stripes, beyond which contact cannot be told from skin that rises. Chosen by hand."""
-ROUNDS = 40
+REWEIGHTINGS = 40
 """Rounds of expectation maximisation: in 39 of 40 drawn worlds the plane has settled to less than 1 µm by then."""
 FIRST_SHARES = (0.6, 0.3, 0.1)
 """Shares of contact, rising skin and strays from which it starts. Chosen by hand."""
@@ -231,7 +231,7 @@ def _contact(points: NDArray[np.void], guess: Floats, fitted: NDArray[np.bool_])
     terms, sigma, shares = guess * fitted, SIGMA_MM[1], np.array(FIRST_SHARES)
     terms[0] = guess[0] if fitted.all() else np.median(z - terms[1] * x - terms[2] * y)
     weights, sums = np.zeros(len(near)), np.zeros((4, 4))
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTINGS):
         shares, sums = _expect(x, y, z, terms, sigma, shares, weights)
         inverse = np.linalg.pinv(sums[:3, :3][np.ix_(fitted, fitted)], hermitian=True)
         terms[fitted] = inverse @ sums[:3, 3][fitted]

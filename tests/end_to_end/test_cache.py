@@ -17,7 +17,7 @@ from footscan.virtual.foot.foot import make_foot
 
 Footscan = Callable[..., CompletedProcess[str]]
 Results = Callable[[Path], dict[str, bytes]]
-STEPS = 35
+STEPS = 36
 """Ingest, extract and map of 8 cameras; fuse, clean, orient, surface, measure, verify, quality, 2 exports, report."""
 OF_CAMERAS = {"ingest", "extract", "map"}
 

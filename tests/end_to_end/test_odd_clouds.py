@@ -21,6 +21,8 @@ from pipelines.steps import fuse, measure, orient, quality, report, surface, ver
 from schemas.base.errors import Finding
 from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
 from schemas.frames import FrameManifest
+from schemas.glass import GlassPlane
+from schemas.heads import HeadsReport
 from schemas.parameters.foot import FootParameters
 from schemas.parameters.fusion import FusionParameters
 from schemas.parameters.normals import NormalParameters
@@ -106,12 +108,13 @@ def truth(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def meshed(cloud: Cloud, calibration: bytes, parameters: SurfaceParameters) -> dict[str, bytes]:
     """The results of the steps up to the surface."""
-    reports = {"removed": np.frombuffer(b"{}", np.uint8), "warnings": np.frombuffer(b"[]", np.uint8)}
+    nothing = {"removed": "{}", "warnings": "[]", "glass": GlassPlane().model_dump_json()}
+    reports = {name: np.frombuffer(text.encode(), np.uint8) for name, text in nothing.items()}
     clean = pack(points=cloud, codes=np.full(len(cloud), KEPT, np.uint8), **reports)
     fused = fuse.run({"clean": clean}, FusionParameters(), {})
     oriented = orient.run({"fused": fused, "calibration": calibration}, NormalParameters(), {})
     return {
-        "clean": clean, "fused": fused, "oriented": oriented,
+        "heads": HeadsReport().model_dump_json().encode(), "clean": clean, "fused": fused, "oriented": oriented,
         "surface": surface.run({"oriented": oriented}, parameters, {}),
     }  # fmt: skip
 
@@ -137,7 +140,7 @@ def test_a_surface_is_verified_and_reported(name: str, calibration: bytes, truth
     done = meshed(cloud, calibration, SurfaceParameters())
     verified = verify.run({"surface": done["surface"]}, None, {"truth": truth})
     side = FootParameters(side="unknown")
-    measures = measure.run({"surface": done["surface"]}, side, {})
+    measures = measure.run(done, side, {})
     manifest = FrameManifest(encoding="image", height=480, width=640, frames=["0" * 64] * FRAMES)
     of_cameras: dict[str, bytes] = {}
     for camera in np.unique(cloud["camera"]).tolist():

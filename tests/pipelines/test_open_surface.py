@@ -14,6 +14,7 @@ from footscan.virtual.foot.foot import make_foot
 from pipelines.arrays import pack, unpack
 from pipelines.steps import measure, surface
 from schemas.glass import GlassPlane
+from schemas.heads import HeadsReport
 from schemas.measures import Measure, Measures
 from schemas.parameters.foot import FootParameters
 from schemas.parameters.surface import SurfaceParameters
@@ -79,7 +80,11 @@ def surface_of(oriented: bytes, **values: object) -> bytes:
 
 
 def measures_of(mesh: bytes) -> dict[str, Measure]:
-    document = measure.run({"surface": mesh, "clean": IN_PLACE}, FootParameters(side="right"), NOWHERE)
+    document = measure.run(
+        {"surface": mesh, "clean": IN_PLACE, "heads": HeadsReport().model_dump_json().encode()},
+        FootParameters(side="right"),
+        NOWHERE,
+    )
     found = Measures.model_validate_json(document)
     assert found.finding is None
     return found.measures

@@ -290,4 +290,8 @@ def _covariance(
 def _inverse(normal: Floats) -> Floats:
     """The inverse of a normal matrix (P, P), computed in scaled form."""
     scale = np.sqrt(np.diagonal(normal))
-    return np.asarray(np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale))
+    scaled = normal / np.outer(scale, scale)
+    # A singular matrix has no inverse; its pseudo-inverse leaves out what the data say nothing of.
+    singular = np.linalg.matrix_rank(scaled, hermitian=True) < len(scaled)
+    inverse = np.linalg.pinv(scaled, hermitian=True) if singular else np.linalg.inv(scaled)
+    return np.asarray(inverse / np.outer(scale, scale))

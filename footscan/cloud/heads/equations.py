@@ -39,6 +39,20 @@ class HeadFit(NamedTuple):
     """Robust standard deviation of what is left of the distances between cameras of two heads"""
 
 
+class FoundPlaces(NamedTuple):
+    """What explains the comparisons."""
+
+    fit: HeadFit
+    unmoved_mm: float
+    """Robust standard deviation of the distances between cameras of two heads with the heads as calibrated; cameras are
+    moved all the same"""
+
+
+def unmoved_heads(known: Floats, cameras: int) -> HeadFit:
+    """A fit with the heads at places (H, 4), to begin with."""
+    return HeadFit(known, np.zeros(known.shape), np.zeros((cameras, RIGID)), 0.0)
+
+
 def same_line(comparisons: Comparisons, laser: Ints, heads: int) -> Floats:
     """Derivatives (M, H) of the distance by X of each head, if both cameras saw the line of head `laser` (M,).
 
@@ -127,6 +141,13 @@ def solve(comparisons: Comparisons, change: Floats, distance: Floats, near: Head
         unknowns[of_heads:].reshape(cameras, RIGID),
         spread_of(left[comparisons.is_across]),
     )
+
+
+def spread_unmoved(comparisons: Comparisons, change: Floats, distance: Floats, known: Floats, cameras: int) -> float:
+    """Robust standard deviation, mm, of what is left of `distance` (M,) with the heads at the places (H, 4) known."""
+    rest = distance - displacements(change, comparisons, known)
+    still = unmoved_heads(np.zeros(known.shape), cameras)
+    return solve(comparisons, np.zeros(change.shape), rest, still).spread_mm
 
 
 def spread_of(distances: Floats) -> float:

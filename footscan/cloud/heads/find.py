@@ -6,6 +6,7 @@ laser plane also displaces it, but alike over the whole travel and alike for all
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,18 @@ from numpy.typing import NDArray
 from footscan.calibration.models.laser_plane import x_in_turned_plane
 from footscan.cloud.fusion.stripes import Floats
 from footscan.cloud.heads.comparisons import Comparisons, compare
-from footscan.cloud.heads.equations import HeadFit, displacements, likeliest, merged_lines, same_line, solve
-from footscan.cloud.heads.planes import displaced, head_indices, heads_of, views_at
+from footscan.cloud.heads.equations import (
+    FoundPlaces,
+    HeadFit,
+    displacements,
+    likeliest,
+    merged_lines,
+    same_line,
+    solve,
+    spread_unmoved,
+    unmoved_heads,
+)
+from footscan.cloud.heads.planes import calibrated_places, displaced, head_indices, heads_of, views_at
 from footscan.cloud.heads.start import first_places
 from footscan.cloud.heads.verdict import HALF_MM, report_of
 from footscan.cloud.outliers.other_laser import FARTHEST_MM, LasersSeen, lasers_seen
@@ -60,41 +71,58 @@ def find_heads(points: NDArray[np.void], views: Mapping[int, View], parameters: 
     heads = {camera: head for camera, head in heads.items() if np.any(usable["camera"] == camera)}
     head_of = head_indices(heads)
     count = len(set(heads.values()))
+    x_mm = round(float(np.median(usable["plane"])), 3) if len(usable) else 0.0
+    nothing = HeadsReport(points=len(usable), x_mm=x_mm)
     if not parameters.correct_heads or count < 2:
-        return HeadsReport()
-    x_mm = round(float(np.median(usable["plane"])), 3)
-    ordered = usable[np.lexsort([usable[name] for name in ("source", "camera", "frame")])]
-    first = compare(ordered, head_of[ordered["camera"]], views, head_of, x_mm)
-    if np.count_nonzero(first.is_across) < FEWEST:
-        return HeadsReport(comparisons=int(np.count_nonzero(first.is_across)))
-    fit, unmoved_mm = first_places(first.every(-(-len(first.distance) // USED)), count, len(heads))
-    if np.ptp(fit.places[:, 0]) > LINE_MM:
-        fit = _refined(ordered[::THINNED], views, heads, fit, x_mm)
-    return report_of(heads, fit, unmoved_mm, int(np.count_nonzero(first.is_across)), x_mm, parameters)
+        return nothing
+    known = calibrated_places(views, heads, x_mm)
+    unmoved = displaced(usable, -known, head_of, x_mm)
+    ordered = unmoved[np.lexsort([unmoved[name] for name in ("source", "camera", "frame")])]
+    bare = {camera: replace(view, plane=None) for camera, view in views.items()}
+    first = compare(ordered, head_of[ordered["camera"]], bare, head_of, x_mm)
+    across = int(np.count_nonzero(first.is_across))
+    if across < FEWEST:
+        return nothing.model_copy(update={"comparisons": across})
+    start = unmoved_heads(known, len(heads))
+    if np.ptp(known[:, 0]) <= LINE_MM:
+        start, unmoved_mm = first_places(first.every(-(-len(first.distance) // USED)), known, len(heads))
+        fit = start
+    if np.ptp(start.places[:, 0]) > LINE_MM:
+        fit, unmoved_mm = _refined(ordered[::THINNED], bare, heads, start, known, x_mm)
+    moved = fit.places - known
+    fit = fit._replace(places=moved - moved.mean(axis=0))
+    found = nothing.model_copy(update={"comparisons": across})
+    return report_of(found, heads, fit, unmoved_mm, parameters)
 
 
 def _refined(
-    points: NDArray[np.void], views: Mapping[int, View], heads: Mapping[int, int], fit: HeadFit, x_mm: float
-) -> HeadFit:
+    points: NDArray[np.void],
+    views: Mapping[int, View],
+    heads: Mapping[int, int],
+    fit: HeadFit,
+    known: Floats,
+    x_mm: float,
+) -> FoundPlaces:
     """Places of the heads, from points that are assigned to lasers at those of `fit`, and again until they settle.
 
     The first places stay where frames of different heads are not of one moment, or no camera sees the lines of two
     heads: there a line of another head cannot be assigned.
     """
-    head_of = head_indices(heads)
+    head_of, unmoved_mm = head_indices(heads), fit.spread_mm
     for _ in range(ROUNDS):
         places = fit.places
         moved, views_there = displaced(points, places, head_of, x_mm), views_at(views, heads, places, x_mm)
         seen = lasers_seen(moved, views_there, heads)
         if not _is_of_one_moment(seen) or _travels_alone(seen, places):
-            return fit
+            return FoundPlaces(fit, unmoved_mm)
         of_laser, laser = _in_laser_planes(moved, seen, views_there, heads)
         comparisons = compare(of_laser, laser, views, head_of, x_mm, NEAR_MM)
         change, distance = _of_lines(comparisons, fit)
         fit = solve(comparisons, change, distance, fit)
+        unmoved_mm = spread_unmoved(comparisons, change, distance, known, len(heads))
         if np.max(np.abs(fit.places - places) * HALF_MM) < SETTLED_MM:
             break
-    return fit
+    return FoundPlaces(fit, unmoved_mm)
 
 
 def _is_of_one_moment(seen: LasersSeen) -> bool:

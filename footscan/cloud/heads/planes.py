@@ -46,6 +46,22 @@ def head_indices(heads: Mapping[int, int]) -> NDArray[np.intp]:
     return indices
 
 
+def calibrated_places(views: Mapping[int, View], heads: Mapping[int, int], x_mm: float) -> Floats:
+    """(H, 4) places of the heads by the calibration, at X = `x_mm`; 0 where no film has shown them.
+
+    >>> calibrated_places({}, {1: 1, 3: 2}, 0.0).tolist()
+    [[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]]
+    """
+    places = np.zeros((len(set(heads.values())), 4))
+    indices = head_indices(heads)
+    for camera in heads:
+        plane = views[camera].plane if camera in views else None
+        if plane is not None:
+            offset = plane.offset_mm + plane.scale * (x_mm - plane.x_mm)
+            places[indices[camera]] = offset, plane.yaw, plane.pitch, plane.scale
+    return places
+
+
 def displaced(points: NDArray[np.void], places: Floats, head_of: NDArray[np.intp], x_mm: float) -> NDArray[np.void]:
     """Move points along X to where places (H, 4) of their heads put them; `head_of` as of `head_indices`."""
     head = head_of[points["camera"]]

@@ -4,19 +4,19 @@ Where two laser planes are apart, cameras see two stripes on the skin that both 
 is of is not known at first. Most comparisons are explained by the right offset.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from footscan.cloud.fusion.stripes import Floats
-from footscan.cloud.heads.comparisons import HEAD_TERMS, RIGID, Comparisons
+from footscan.cloud.heads.comparisons import HEAD_TERMS, Comparisons
 from footscan.cloud.heads.equations import (
-    HeadFit,
+    FoundPlaces,
     likeliest,
     merged_lines,
     own_lines,
     same_line,
     solve,
+    spread_unmoved,
+    unmoved_heads,
 )
 
 FARTHEST_MM, CELL_MM = 8.0, 0.05
@@ -27,37 +27,34 @@ ROUNDS = 6
 """Rounds in which comparisons are assigned to their likeliest origin: a bound of time."""
 
 
-class FirstFit(NamedTuple):
-    """What explains the comparisons."""
-
-    fit: HeadFit
-    unmoved_mm: float
-    """Robust standard deviation of the distances between cameras of two heads with the heads as calibrated; cameras are
-    moved all the same"""
-
-
-def first_places(comparisons: Comparisons, heads: int, cameras: int) -> FirstFit:
+def first_places(comparisons: Comparisons, known: Floats, cameras: int) -> FoundPlaces:
     """Find places of the heads from comparisons of points whose laser is not known.
 
     Where the offsets are about equal, all origins explain a comparison alike: each of them is tried first, and the
     places that explain most are taken.
+
+    known : (H, 4) places by the calibration, from which the search starts; if they are 0, offsets are tried
     """
-    distance = comparisons.distance
-    places = np.zeros((heads, HEAD_TERMS))
-    places[:, 0] = _offsets(comparisons, heads)
-    start = HeadFit(places, np.zeros(places.shape), np.zeros((cameras, RIGID)), 0.0)
+    distance, heads = comparisons.distance, len(known)
+    calibrated = unmoved_heads(known, cameras)
+    start = calibrated
+    if not known.any():
+        start = unmoved_heads(np.zeros((heads, HEAD_TERMS)), cameras)
+        start.places[:, 0] = _offsets(comparisons, heads)
     lines = [same_line(comparisons, head, heads) for head in comparisons.heads.T]
     lines += [same_line(comparisons, np.full(len(distance), head), heads) for head in range(heads)]
     origins = [merged_lines(comparisons, heads), *lines, own_lines(comparisons, heads)]
+    firsts = [likeliest(comparisons, origins, distance, start)] if known.any() else origins[:3]
     fits = []
-    for first in origins[:3]:
+    for first in firsts:
         fit = solve(comparisons, first, distance, start)
         for _ in range(ROUNDS):
             change = likeliest(comparisons, origins, distance, fit)
             fit = solve(comparisons, change, distance, fit)
         fits.append(fit)
-    unmoved = solve(comparisons, np.zeros((len(distance), heads)), distance, start)
-    return FirstFit(min(fits, key=lambda fit: fit.spread_mm), unmoved.spread_mm)
+    change = likeliest(comparisons, origins, distance, calibrated)
+    unmoved_mm = spread_unmoved(comparisons, change, distance, known, cameras)
+    return FoundPlaces(min(fits, key=lambda fit: fit.spread_mm), unmoved_mm)
 
 
 def _offsets(comparisons: Comparisons, heads: int) -> Floats:

@@ -19,17 +19,17 @@ LEAST_GAIN = 0.9
 
 
 def report_of(
+    nothing: HeadsReport,
     heads: Mapping[int, int],
     fit: HeadFit,
     unmoved_mm: float,
-    comparisons: int,
-    x_mm: float,
     parameters: HeadParameters,
 ) -> HeadsReport:
     """Report the places of the heads; those that the scan does not show are 0.
 
     Parameters
     ----------
+    nothing : the report of a scan that shows no places
     heads : camera -> number of its head
     unmoved_mm : robust standard deviation of the distances between cameras of two heads, with the heads as calibrated
     """
@@ -45,8 +45,9 @@ def report_of(
             _place(number, [camera for camera in sorted(heads) if heads[camera] == number], of_head, sd)
             for number, of_head, sd in zip(numbers, places, fit.sd, strict=True)
         ],
-        x_mm=x_mm,
-        comparisons=comparisons,
+        points=nothing.points,
+        x_mm=nothing.x_mm,
+        comparisons=nothing.comparisons,
         before_mm=round(unmoved_mm, 5),
         after_mm=round(fit.spread_mm, 5),
         largest_mm=round(largest, 4),

@@ -72,10 +72,11 @@ def test_heads_that_travel_one_after_the_other_are_not_trusted_if_they_are_off()
 def test_a_single_head_has_nothing_to_compare() -> None:
     points = points_of((0.0, 0.0, 0.0))
     report = find_heads(points[points["camera"] <= 2], views(), HeadParameters())
-    assert report == HeadsReport()
+    assert report.heads == []
+    assert report.points > 0
 
 
 def test_no_points_and_no_wish_give_an_empty_report() -> None:
     points = points_of(SMALL)
     assert find_heads(points[:0], views(), HeadParameters()) == HeadsReport()
-    assert find_heads(points, views(), HeadParameters(correct_heads=False)) == HeadsReport()
+    assert find_heads(points, views(), HeadParameters(correct_heads=False)).heads == []

@@ -40,7 +40,7 @@ def test_a_mesh_down_to_its_films(finished: Path, trace: Trace) -> None:
     assert found["digest"] == sha256(mesh.read_bytes())
     actions = found["actions"]
     steps = {action["step"].removeprefix("P0001/S1/") for action in actions.values()}
-    chain = {"foot.stl", "surface", "orient", "clean", "fuse"}
+    chain = {"foot.stl", "surface", "orient", "clean", "heads", "fuse"}
     assert steps == chain | {f"{kind}-{camera}" for kind in ("ingest", "extract", "map") for camera in (1, 5)}
     action = actions[found["made_by"]]
     assert action["result"] == found["digest"]
