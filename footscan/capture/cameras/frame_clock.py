@@ -51,7 +51,7 @@ class FrameTimes:
     is_late: Bools
     """True for frames with a stamp half a period after `seconds` or later."""
     is_certain: Bools
-    """True if no other number is possible with usual delays."""
+    """True if no other number is possible with usual delays. Never of a last frame behind a gap."""
     missing: Ints
     """Numbers between the first and the last that no frame has, shape (M,)."""
     period_s: float
@@ -93,6 +93,9 @@ def number_frames(stamps: Floats, is_repeated: Bools | None = None, period_s: fl
     number = latest - slack // 2
     fit_sd = line.sd(number)
     sd = np.hypot(fit_sd, line.period * np.sqrt(_mean_square_error(slack)))
+    is_certain = slack == 0
+    if np.any(np.diff(number[-2:]) > 1):
+        is_certain[-1] = False  # frames were lost, or this one is late: no frame follows that would show which
     of_frame = np.cumsum(~is_copy) - 1  # a copy goes with the frame before
     seconds = line.at(number)
     return FrameTimes(
@@ -101,7 +104,7 @@ def number_frames(stamps: Floats, is_repeated: Bools | None = None, period_s: fl
         sd_s=sd[of_frame],
         delay_s=stamps - seconds[of_frame],
         is_late=(stamps - seconds[of_frame] >= LATE_PERIODS * line.period),
-        is_certain=(slack == 0)[of_frame],
+        is_certain=is_certain[of_frame],
         missing=np.setdiff1d(np.arange(number[0], number[-1]), number) - number[0],
         period_s=line.period,
         jitter_s=line.jitter,
