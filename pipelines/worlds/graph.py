@@ -88,6 +88,10 @@ class WorldGraph:
     def compare(self, kind: WorldKind, results: dict[str, Input]) -> list[Step]:
         """Add the last step, of kind `outcome`, and return the steps that it needs."""
         self.add("outcome", "world_outcome", {"world": self.drawn, "kind": _value(kind), **results}, self.world)
+        return self.to_last()
+
+    def to_last(self) -> list[Step]:
+        """Return the last step and those that it needs."""
         needed: set[str] = {self.steps[-1].name}
         kept = []
         for step in reversed(self.steps):
@@ -95,6 +99,13 @@ class WorldGraph:
                 kept.append(step)
                 needed |= {source.step for source in step.inputs.values() if isinstance(source, Output)}
         return kept[::-1]
+
+
+def calibration_steps(world: World, body: Body) -> list[Step]:
+    """Build the steps of a world without pictures to the calibration by its chart and a body, the last one's result."""
+    graph = WorldGraph(world)
+    graph.film_body(machine_of(world), body)
+    return graph.to_last()
 
 
 def point_steps(world: World, parameters: ScanParameters, body: Body | None = None) -> list[Step]:

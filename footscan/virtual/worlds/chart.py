@@ -30,7 +30,7 @@ def world_chart(machine: Machine) -> str:
         pose = machine.calibration_pose(machine.head_of[camera_id])
         random = np.random.default_rng([machine.world.seed, 400 + camera_id])
         for laser, sheet in enumerate(machine.sheets_of(camera_id), start=1):
-            points = _on_sheet(corners, sheet.pose(pose), machine.world.laser.bend_mm)
+            points = on_sheet(corners, sheet.pose(pose), machine.world.laser.bend_mm)
             pixels = moved_camera(camera, pose).project(points)
             seen = _can_be_seen(camera, corners, pixels, rows, columns)
             located = pixels + random.normal(0.0, machine.world.cameras.corner_px, pixels.shape)
@@ -42,7 +42,7 @@ def world_chart(machine: Machine) -> str:
     return "".join(lines)
 
 
-def _on_sheet(corners: Floats, pose: Pose, bend_mm: float) -> Floats:
+def on_sheet(corners: Floats, pose: Pose, bend_mm: float) -> Floats:
     """Points (N, 3), scanner frame, at which edges along X through `corners` (N, 2) meet the sheet of a head."""
     x = np.zeros(len(corners))
     for _ in range(PLANE_STEPS):
