@@ -2,7 +2,8 @@
 
 The stripe of the other head is mapped as if it lay in the plane of the camera's own head, which displaces it. Each
 camera looks from elsewhere, so stripes that are mapped in the plane in which they lie coincide, and displaced ones do
-not: a point is assigned to the laser in whose plane more cameras saw it in the same frame.
+not: a point is assigned to the laser in whose plane more cameras saw it in the same frame. With rolling shutters the
+cameras see it at different moments of the frame, between which the stripe moves on.
 """
 
 from collections.abc import Mapping
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from footscan.calibration.models.laser_plane import x_in_turned_plane
-from footscan.cloud.points import camera_numbers, coordinates
+from footscan.cloud.points import camera_numbers, coordinates, stripe_step
 from footscan.cloud.views import View
 from footscan.compiled import compiled
 from schemas.calibration import LaserPlane, laser_of_view, view_number
@@ -23,9 +24,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-LEAST_MM = 0.25
-"""Distance in X between two planes from which a stripe of the other one is displaced more than by noise. Chosen by
-hand."""
+LEAST_MM = 0.15
+"""Distance in X between two planes from which a stripe of the other one is displaced more than by noise. Tuned on the
+points of three assembled scanners without pictures (`draw_assembled`, seeds 402, 403, 405)."""
 FARTHEST_MM = 20.0
 """Distance in X beyond which a camera does not see the other stripe beside its own one: heads that travel one after the
 other. Chosen by hand."""
@@ -51,6 +52,11 @@ SMOOTHED = 5
 """Points on each side of a point along its stripe whose support counts as its own. Chosen by hand."""
 ROUNDS = 3
 """Rounds of assignment; from the second on, only points of a laser support others of it. Chosen by hand."""
+MOST_SLOPE = 10.0
+"""Bound of the way that a stripe moves across the skin, in mm per mm of travel. Chosen by hand."""
+SLOPE_ERROR = 0.5
+"""Standard deviation of that way, as a share of it: the next stripe may be that of another head. Values from 0.25 to 1
+serve as well on the points that `LEAST_MM` was tuned on."""
 CELL_MM, CELLS = 1.0, 512
 """Cells in which neighbours are searched, a side. Those beyond are folded back: it costs time, no correctness."""
 
@@ -129,10 +135,12 @@ def lasers_seen(points: NDArray[np.void], views: Mapping[int, View], heads: Mapp
     laser = own.copy()
     seen_by = camera_numbers(points)
     support, at_own = np.zeros(apart.shape), np.zeros(len(points))
+    late = _late(points, views)
+    motion = _motion(points, late)
     for turn in range(ROUNDS):
         for number in range(len(numbers)):
             counts = np.isfinite(places[number, :, 0]) & ((laser == number) | (turn == 0))
-            support[number] = smoothed(_support(places[number], seen_by, counts, linked, frames), linked)
+            support[number] = smoothed(_support(places[number], seen_by, counts, linked, frames, late, motion), linked)
         at_own = np.take_along_axis(support, own[None], axis=0)[0]
         may_be = np.where((apart > LEAST_MM) & (apart < FARTHEST_MM), support - BETTER, -np.inf)
         best = np.argmax(may_be, axis=0)
@@ -239,6 +247,42 @@ def _in_plane(points: NDArray[np.void], view: View, other: View, plane_x: Floats
     return xyz[:, 1:] + (apart / sight[:, 0])[:, None] * sight[:, 1:], np.abs(apart)
 
 
+def _late(points: NDArray[np.void], views: Mapping[int, View]) -> Floats:
+    """How far the head had travelled when the row of each point was exposed, (N,) mm, from when its frame counts."""
+    late = np.zeros(len(points))
+    for number, view in views.items():
+        rows = np.flatnonzero(points["camera"] == number)
+        if view.plane is not None:
+            xyz, x = coordinates(points[rows]), points["plane"][rows].astype(np.float64)
+            late[rows] = xyz[:, 0] - x_in_turned_plane(view.plane, x, xyz[:, 1:])
+    return late
+
+
+def _motion(points: NDArray[np.void], late: Floats) -> Floats:
+    """The way in Y and Z (N, 2) that the stripe at each point moves across the skin per mm of travel, if rows are late.
+
+    It leads to the nearest points of the same camera in the frames before and behind.
+    """
+    motion = np.zeros((len(points), 2))
+    step = stripe_step(points)
+    if np.ptp(late) < AGREE_MM / MOST_SLOPE or not step:
+        return motion
+    yz, frame = coordinates(points)[:, 1:], points["frame"].astype(np.float64)
+    reach = MOST_SLOPE * step
+    for number in np.unique(points["camera"]):
+        rows = np.flatnonzero(points["camera"] == number)
+        apart = 3.0 * reach + np.ptp(yz[rows])  # frames lie so far apart in the tree that they are not near each other
+        tree = KDTree(np.column_stack([apart * frame[rows], yz[rows]]))
+        found = np.zeros(len(rows))
+        for way in (-1.0, 1.0):
+            _, near = tree.query(np.column_stack([apart * (frame[rows] + way), yz[rows]]), distance_upper_bound=reach)
+            known = near < len(rows)
+            motion[rows[known]] += way * (yz[rows[near[known]]] - yz[rows[known]]) / step
+            found += known
+        motion[rows] /= np.maximum(found, 1.0)[:, None]
+    return motion
+
+
 def _linked(points: NDArray[np.void]) -> Mask:
     """Whether each point and the next one are of one stripe, (N,)."""
     gap = np.hypot(np.diff(points["y"]), np.diff(points["z"]))
@@ -259,10 +303,13 @@ def smoothed(support: Floats, linked: Mask) -> Floats:
 
 
 @compiled
-def _support(places: Floats, camera: Ints, counts: Mask, linked: Mask, frames: Ints) -> Floats:
+def _support(
+    places: Floats, camera: Ints, counts: Mask, linked: Mask, frames: Ints, late: Floats, motion: Floats
+) -> Floats:
     """How many other cameras saw each place (N, 2) in its frame; a camera counts less the farther its stripe is.
 
-    Of those points only that count; `frames` (F + 1,) bounds the frames.
+    Of those points only that count; `frames` (F + 1,) bounds the frames. Rows of two cameras that were exposed one
+    `late`r than the other, (N,) mm, show the stripe displaced by its `motion` (N, 2) meanwhile.
     """
     support = np.zeros(len(places))
     nearest = np.empty(int(camera.max()) + 1)
@@ -274,10 +321,9 @@ def _support(places: Floats, camera: Ints, counts: Mask, linked: Mask, frames: I
                 following[k], first[a, b] = first[a, b], k
         for k in range(frames[f], frames[f + 1]):
             if not np.isnan(places[k, 0]):
-                _find_nearest(places, k, (camera, linked, counts), (first, following), nearest)
+                _find_nearest(places, k, (camera, linked, counts), (first, following), (late, motion), nearest)
                 for squared in nearest:
-                    if squared < CELL_MM**2:
-                        support[k] += np.exp(-0.5 * squared / AGREE_MM**2)
+                    support[k] += np.exp(-0.5 * squared)
         for k in range(frames[f], frames[f + 1]):
             if counts[k]:
                 first[int(places[k, 0] // CELL_MM) % CELLS, int(places[k, 1] // CELL_MM) % CELLS] = -1
@@ -286,30 +332,41 @@ def _support(places: Floats, camera: Ints, counts: Mask, linked: Mask, frames: I
 
 @compiled
 def _find_nearest(
-    places: Floats, k: int, columns: tuple[Ints, Mask, Mask], cells: tuple[Ints, Ints], nearest: Floats
+    places: Floats,
+    k: int,
+    columns: tuple[Ints, Mask, Mask],
+    cells: tuple[Ints, Ints],
+    travel: tuple[Floats, Floats],
+    nearest: Floats,
 ) -> None:
-    """Fill `nearest` (C,) with the squared distance, mm^2, of place k from the stripe of each other camera.
+    """Fill `nearest` (C,) with the squared distance of place k from the stripe of each other camera, in its sigmas.
 
     It is infinite where it is more than a cell.
     """
     camera, linked, counts = columns
     first, following = cells
+    late, motion = travel
     nearest[:] = np.inf
+    speed = motion[k, 0] ** 2 + motion[k, 1] ** 2
     a, b = int(places[k, 0] // CELL_MM), int(places[k, 1] // CELL_MM)
     for da in range(-1, 2):
         for db in range(-1, 2):
             n = first[(a + da) % CELLS, (b + db) % CELLS]
             while n >= 0:
                 if camera[n] != camera[k]:
-                    squared = _squared_distance(places, k, n, linked[n] and counts[n + 1])
-                    nearest[camera[n]] = min(nearest[camera[n]], squared)
+                    later = late[n] - late[k]
+                    y, z = places[k, 0] + later * motion[k, 0], places[k, 1] + later * motion[k, 1]
+                    squared = _squared_distance(places, y, z, n, linked[n] and counts[n + 1])
+                    if squared < CELL_MM**2:
+                        variance = AGREE_MM**2 + SLOPE_ERROR**2 * later**2 * speed
+                        nearest[camera[n]] = min(nearest[camera[n]], squared / variance)
                 n = following[n]
 
 
 @compiled
-def _squared_distance(places: Floats, k: int, n: int, to_next: bool) -> float:
-    """Of place k from place n, or from the line between n and the next one."""
-    y, z = places[k, 0] - places[n, 0], places[k, 1] - places[n, 1]
+def _squared_distance(places: Floats, y: float, z: float, n: int, to_next: bool) -> float:
+    """Of the place (y, z) from place n, or from the line between n and the next one."""
+    y, z = y - places[n, 0], z - places[n, 1]
     if to_next:
         v, w = places[n + 1, 0] - places[n, 0], places[n + 1, 1] - places[n, 1]
         length = v * v + w * w

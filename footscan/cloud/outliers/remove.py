@@ -71,7 +71,7 @@ def remove_outliers(
 
     They are dropped in this order:
 
-    - stripe points of which it is not known which of two lasers drew them ("laser");
+    - stripe points of which it is not known which of two lasers drew them, and those of other heads' lasers ("laser");
     - points outside the control volume ("volume"), and points that the calibration does not support ("extrapolated");
     - the foot's mirror image and the glass itself ("glass"), wherever skin shows the plate to be, see
       `estimate_glass`; then static objects, and all that is seen where no foot is ("clutter"): they would confirm each
@@ -130,7 +130,7 @@ def remove_outliers(
         drop("glass", lambda left: select(above_glass(left, glass.plane), views, parameters.glass_mm))
 
     drop_glass(is_plate)
-    drop("unconfirmed", lambda left: is_of_other_laser(left, views))
+    drop("laser", lambda left: is_of_other_laser(left, views))
     body = _body(points[codes == KEPT], views, parameters)
     drop("clutter", lambda left: is_static(left, parameters.static_share, body, filmed) | _is_beside(left, body))
     drop("glass", lambda left: is_ghost(left, views, parameters.gap_mm, parameters.segment_mm))
