@@ -48,8 +48,9 @@ LINKED_MM = 1.0
 """Distance up to which successive points are of one stripe; they are sampled every 0.3 mm. Chosen by hand."""
 FEW = 0.1
 """Share of the points of another head below which a head has not met the skin yet, or no longer. Chosen by hand."""
-SMOOTHED = 5
-"""Points on each side of a point along its stripe whose support counts as its own. Chosen by hand."""
+SMOOTHED = 20
+"""Points on each side of a point along its stripe whose support counts as its own: 6 mm. Tuned as `LEAST_MM`; 10 and 40
+serve nearly as well."""
 ROUNDS = 3
 """Rounds of assignment; from the second on, only points of a laser support others of it. Chosen by hand."""
 MOST_SLOPE = 10.0
@@ -136,11 +137,14 @@ def lasers_seen(points: NDArray[np.void], views: Mapping[int, View], heads: Mapp
     seen_by = camera_numbers(points)
     support, at_own = np.zeros(apart.shape), np.zeros(len(points))
     late = _late(points, views)
-    motion = _motion(points, late)
+    moved = late[:, None] * _motion(points, late)
+    spread = SLOPE_ERROR * np.linalg.norm(moved, axis=1)
     for turn in range(ROUNDS):
         for number in range(len(numbers)):
             counts = np.isfinite(places[number, :, 0]) & ((laser == number) | (turn == 0))
-            support[number] = smoothed(_support(places[number], seen_by, counts, linked, frames, late, motion), linked)
+            support[number] = smoothed(
+                _support(places[number] - moved, seen_by, counts, linked, frames, spread), linked
+            )
         at_own = np.take_along_axis(support, own[None], axis=0)[0]
         may_be = np.where((apart > LEAST_MM) & (apart < FARTHEST_MM), support - BETTER, -np.inf)
         best = np.argmax(may_be, axis=0)
@@ -153,10 +157,10 @@ def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mappin
     own, laser, at_own, places, planes, linked = lasers_seen(points, views, heads)
     strange = np.asarray(laser != own)
     decided = strange | (at_own > CONFIRMED)
-    strange = np.where(
-        decided, strange, _vote(strange, decided, linked) | _not_yet_met(points, own, decided & ~strange)
-    )
-    return strange | _met_other_laser(points, np.flatnonzero(~decided & ~strange), decided & ~strange, places, planes)
+    strange |= ~decided & _vote(strange, decided, linked)
+    strange |= _not_yet_met(points, own, decided & ~strange)
+    decided |= strange
+    return strange | _met_other_laser(points, np.flatnonzero(~decided), decided & ~strange, places, planes)
 
 
 def _vote(strange: Mask, decided: Mask, linked: Mask) -> Mask:
@@ -270,7 +274,7 @@ def _motion(points: NDArray[np.void], late: Floats) -> Floats:
     yz, frame = coordinates(points)[:, 1:], points["frame"].astype(np.float64)
     reach = MOST_SLOPE * step
     for number in np.unique(points["camera"]):
-        rows = np.flatnonzero(points["camera"] == number)
+        rows: Ints = np.flatnonzero(points["camera"] == number)
         apart = 3.0 * reach + np.ptp(yz[rows])  # frames lie so far apart in the tree that they are not near each other
         tree = KDTree(np.column_stack([apart * frame[rows], yz[rows]]))
         found = np.zeros(len(rows))
@@ -303,13 +307,11 @@ def smoothed(support: Floats, linked: Mask) -> Floats:
 
 
 @compiled
-def _support(
-    places: Floats, camera: Ints, counts: Mask, linked: Mask, frames: Ints, late: Floats, motion: Floats
-) -> Floats:
+def _support(places: Floats, camera: Ints, counts: Mask, linked: Mask, frames: Ints, spread: Floats) -> Floats:
     """How many other cameras saw each place (N, 2) in its frame; a camera counts less the farther its stripe is.
 
-    Of those points only that count; `frames` (F + 1,) bounds the frames. Rows of two cameras that were exposed one
-    `late`r than the other, (N,) mm, show the stripe displaced by its `motion` (N, 2) meanwhile.
+    Of those points only that count; `frames` (F + 1,) bounds the frames. `spread`, (N,) mm, is the standard deviation
+    of a place, beside that by which cameras agree.
     """
     support = np.zeros(len(places))
     nearest = np.empty(int(camera.max()) + 1)
@@ -321,7 +323,7 @@ def _support(
                 following[k], first[a, b] = first[a, b], k
         for k in range(frames[f], frames[f + 1]):
             if not np.isnan(places[k, 0]):
-                _find_nearest(places, k, (camera, linked, counts), (first, following), (late, motion), nearest)
+                _find_nearest(places, k, (camera, linked, counts), (first, following), spread, nearest)
                 for squared in nearest:
                     support[k] += np.exp(-0.5 * squared)
         for k in range(frames[f], frames[f + 1]):
@@ -336,7 +338,7 @@ def _find_nearest(
     k: int,
     columns: tuple[Ints, Mask, Mask],
     cells: tuple[Ints, Ints],
-    travel: tuple[Floats, Floats],
+    spread: Floats,
     nearest: Floats,
 ) -> None:
     """Fill `nearest` (C,) with the squared distance of place k from the stripe of each other camera, in its sigmas.
@@ -345,28 +347,24 @@ def _find_nearest(
     """
     camera, linked, counts = columns
     first, following = cells
-    late, motion = travel
     nearest[:] = np.inf
-    speed = motion[k, 0] ** 2 + motion[k, 1] ** 2
     a, b = int(places[k, 0] // CELL_MM), int(places[k, 1] // CELL_MM)
     for da in range(-1, 2):
         for db in range(-1, 2):
             n = first[(a + da) % CELLS, (b + db) % CELLS]
             while n >= 0:
                 if camera[n] != camera[k]:
-                    later = late[n] - late[k]
-                    y, z = places[k, 0] + later * motion[k, 0], places[k, 1] + later * motion[k, 1]
-                    squared = _squared_distance(places, y, z, n, linked[n] and counts[n + 1])
+                    squared = _squared_distance(places, k, n, linked[n] and counts[n + 1])
                     if squared < CELL_MM**2:
-                        variance = AGREE_MM**2 + SLOPE_ERROR**2 * later**2 * speed
+                        variance = AGREE_MM**2 + spread[k] ** 2 + spread[n] ** 2
                         nearest[camera[n]] = min(nearest[camera[n]], squared / variance)
                 n = following[n]
 
 
 @compiled
-def _squared_distance(places: Floats, y: float, z: float, n: int, to_next: bool) -> float:
-    """Of the place (y, z) from place n, or from the line between n and the next one."""
-    y, z = y - places[n, 0], z - places[n, 1]
+def _squared_distance(places: Floats, k: int, n: int, to_next: bool) -> float:
+    """Of place k from place n, or from the line between n and the next one."""
+    y, z = places[k, 0] - places[n, 0], places[k, 1] - places[n, 1]
     if to_next:
         v, w = places[n + 1, 0] - places[n, 0], places[n + 1, 1] - places[n, 1]
         length = v * v + w * w
