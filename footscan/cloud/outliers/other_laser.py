@@ -281,7 +281,7 @@ def _motion(points: NDArray[np.void], late: Floats) -> Floats:
         for way in (-1.0, 1.0):
             _, near = tree.query(np.column_stack([apart * (frame[rows] + way), yz[rows]]), distance_upper_bound=reach)
             known = near < len(rows)
-            motion[rows[known]] += way * (yz[rows[near[known]]] - yz[rows[known]]) / step
+            motion[rows[known]] += way * (yz[rows][near[known]] - yz[rows[known]]) / step
             found += known
         motion[rows] /= np.maximum(found, 1.0)[:, None]
     return motion
