@@ -1,10 +1,11 @@
-"""Scanners that were assembled at home, beside the ideal one: worlds without pictures, with one calibration or two.
+"""Scanners that were assembled at home, beside the ideal one, with one calibration or two.
 
-    .venv/bin/python -m benchmarks.assembly [FIRST COUNT [FOLDER]]
+    .venv/bin/python -m benchmarks.assembly [FIRST COUNT [FOLDER [films]]]
 
 Each scanner (`draw_assembled`) measures one foot three times: ideal, calibrated by its chart alone, and calibrated by
 the chart and the film of the standard body. The baseline is the ideal scanner. Then each parameter of the laser planes
-is compared with the truth, in its standard deviations. FOLDER keeps what came of each world.
+is compared with the truth, in its standard deviations. FOLDER keeps what came of each world. With `films` the feet are
+filmed, and so is the body; without, cameras have stripe points with errors, and no pictures.
 """
 
 import sys
@@ -26,7 +27,7 @@ from pipelines.engine.workspace import Workspace
 from pipelines.worlds.campaign import run_worlds
 from pipelines.worlds.graph import calibration_steps
 from schemas.calibration import Calibration
-from schemas.campaign import WorldOutcome
+from schemas.campaign import WorldKind, WorldOutcome
 from schemas.parameters.scan import ScanParameters
 from schemas.world import World
 
@@ -38,22 +39,22 @@ OF_CAMERA = ("delay_frames", "shutter_frames")
 def main() -> None:
     numbers = [int(text) for text in sys.argv[1:3]] or [FIRST, COUNT]
     worlds = [draw_assembled(seed) for seed in range(numbers[0], numbers[0] + numbers[1])]
-    if len(sys.argv) > 3:
-        _compare(worlds, Path(sys.argv[3]))
-    else:
-        with tempfile.TemporaryDirectory() as folder:
-            _compare(worlds, Path(folder))
+    kind: WorldKind = "films" if sys.argv[4:] == ["films"] else "points"
+    with tempfile.TemporaryDirectory() as temporary:
+        _compare(worlds, kind, Path(sys.argv[3] if len(sys.argv) > 3 else temporary))
 
 
-def _compare(worlds: Sequence[World], folder: Path) -> None:
+def _compare(worlds: Sequence[World], kind: WorldKind, folder: Path) -> None:
     ideal = [as_designed(world) for world in worlds]
+    parameters = ScanParameters()
     with local_cluster(cores()) as pool:
         runs = {
-            "ideal scanner": run_worlds(ideal, "points", ScanParameters(), folder, pool, _show),
-            "chart": run_worlds(worlds, "points", ScanParameters(), folder, pool, _show),
-            "chart and body": run_worlds(worlds, "points", ScanParameters(), folder, pool, _show, standard_body()),
+            "ideal scanner": run_worlds(ideal, kind, parameters, folder, pool, _show),
+            "chart": run_worlds(worlds, kind, parameters, folder, pool, _show),
+            "chart and body": run_worlds(worlds, kind, parameters, folder, pool, _show, standard_body()),
         }
-        _compare_planes(worlds, folder, pool)
+        if kind == "points":
+            _compare_planes(worlds, folder, pool)
     print(f"\n{len(worlds)} scanners; median (largest)")
     baseline = _means(runs["ideal scanner"])
     for name, outcomes in runs.items():

@@ -274,12 +274,13 @@ def _motion(points: NDArray[np.void], late: Floats) -> Floats:
     yz, frame = coordinates(points)[:, 1:], points["frame"].astype(np.float64)
     reach = MOST_SLOPE * step
     for number in np.unique(points["camera"]):
-        rows: Ints = np.flatnonzero(points["camera"] == number)
+        rows = np.flatnonzero(points["camera"] == number)
         apart = 3.0 * reach + np.ptp(yz[rows])  # frames lie so far apart in the tree that they are not near each other
         tree = KDTree(np.column_stack([apart * frame[rows], yz[rows]]))
         found = np.zeros(len(rows))
         for way in (-1.0, 1.0):
-            _, near = tree.query(np.column_stack([apart * (frame[rows] + way), yz[rows]]), distance_upper_bound=reach)
+            moved = np.column_stack([apart * (frame[rows] + way), yz[rows]])
+            near = np.asarray(tree.query(moved, distance_upper_bound=reach)[1])
             known = near < len(rows)
             motion[rows[known]] += way * (yz[rows][near[known]] - yz[rows[known]]) / step
             found += known

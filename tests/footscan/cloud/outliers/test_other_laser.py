@@ -15,27 +15,37 @@ VIEWS = {
 }
 
 
-def slope(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    return 30.0 + 0.3 * (x - 50.0) + 0.1 * y
+AT_ONCE = {1: 0.0, 2: 0.0, 3: 0.0}
 
 
-def scene(views: dict[int, View] = VIEWS) -> tuple[np.ndarray, np.ndarray]:
-    """A slope that three cameras see in their planes. Camera 3 also sees the stripe of head 1: True for its points."""
+def scene(
+    views: dict[int, View] = VIEWS, steepness: float = 0.3, late: dict[int, float] = AT_ONCE
+) -> tuple[np.ndarray, np.ndarray]:
+    """A slope that three cameras see in their planes. Camera 3 also sees the stripe of head 1: True for its points.
+
+    steepness : mm in Z per mm in X; late : mm that the heads travel until each camera has exposed its rows
+    """
+
+    def slope(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return 30.0 + steepness * (x - 50.0) + 0.1 * y
+
     parts, strange = [], []
     for frame in range(20):
         y = np.arange(-30.0, 30.0, 0.3)
         for camera, view in views.items():
             assert view.plane is not None
-            x = np.full(len(y), 2.0 * frame + view.plane.offset_mm)
+            plane = np.full(len(y), 2.0 * frame + view.plane.offset_mm)
+            x = plane + late.get(camera, 0.0)
             own = np.column_stack([x, y, slope(x, y)])
-            parts.append(make_points(own, camera, frame, plane=x))
+            parts.append(make_points(own, camera, frame, plane=plane))
             strange.append(np.zeros(len(y), np.bool_))
-        x = np.full(len(y), 2.0 * frame + UPPER.offset_mm)
+        own_plane = 2.0 * frame + LOWER.offset_mm
+        x = np.full(len(y), 2.0 * frame + UPPER.offset_mm + late[3])
         there = np.column_stack([x, y, slope(x, y)])
-        eye = VIEWS[3].centre + np.array([2.0 * frame + LOWER.offset_mm, 0.0, 0.0])
-        share = (2.0 * frame + LOWER.offset_mm - x) / (eye[0] - x)
+        eye = VIEWS[3].centre + np.array([own_plane + late[3], 0.0, 0.0])
+        share = (own_plane + late[3] - x) / (eye[0] - x)
         seen = there + share[:, None] * (eye - there)
-        parts.append(make_points(seen, 3, frame, plane=seen[:, 0]))
+        parts.append(make_points(seen, 3, frame, plane=np.full(len(y), own_plane)))
         strange.append(np.ones(len(y), np.bool_))
     return np.concatenate(parts), np.concatenate(strange)
 
@@ -44,6 +54,13 @@ def test_the_stripe_of_another_head_is_found() -> None:
     points, strange = scene()
     np.testing.assert_array_equal(is_of_other_laser(points, VIEWS)[strange], True)
     assert not is_of_other_laser(points, VIEWS)[~strange].any()
+
+
+def test_rolling_shutters_hide_no_stripe_of_another_head() -> None:
+    points, strange = scene(steepness=3.0, late={1: 0.2, 2: 0.2, 3: -0.2})  # the stripe moves by 1.2 mm in between
+    found = is_of_other_laser(points, VIEWS)
+    assert found[strange].mean() > 0.95
+    assert found[~strange].mean() < 0.05
 
 
 def test_nothing_is_known_without_planes() -> None:
