@@ -18,6 +18,7 @@ import numpy as np
 
 from footscan.calibration.models.laser_plane import MIDDLE_Z_MM, terms_of_plane
 from footscan.calibration.travel.body import standard_body
+from footscan.recordings.scans import read_scan
 from footscan.virtual.worlds.chart import on_sheet
 from footscan.virtual.worlds.draw import as_designed, draw_assembled
 from footscan.virtual.worlds.machine import Machine, machine_of
@@ -25,7 +26,7 @@ from pipelines.engine.actions.step import Success
 from pipelines.engine.pool import Pool, cores, local_cluster
 from pipelines.engine.workspace import Workspace
 from pipelines.worlds.campaign import run_worlds
-from pipelines.worlds.graph import calibration_steps
+from pipelines.worlds.graph import calibration_steps, film_step
 from schemas.calibration import Calibration
 from schemas.campaign import WorldKind, WorldOutcome
 from schemas.parameters.scan import ScanParameters
@@ -53,8 +54,7 @@ def _compare(worlds: Sequence[World], kind: WorldKind, folder: Path) -> None:
             "chart": run_worlds(worlds, kind, parameters, folder, pool, _show),
             "chart and body": run_worlds(worlds, kind, parameters, folder, pool, _show, standard_body()),
         }
-        if kind == "points":
-            _compare_planes(worlds, folder, pool)
+        _compare_planes(worlds, kind, folder, pool)
     print(f"\n{len(worlds)} scanners; median (largest)")
     baseline = _means(runs["ideal scanner"])
     for name, outcomes in runs.items():
@@ -66,19 +66,14 @@ def _compare(worlds: Sequence[World], kind: WorldKind, folder: Path) -> None:
         print(f"  {'':16} silent errors {silent}")
 
 
-def _compare_planes(worlds: Sequence[World], folder: Path, pool: Pool) -> None:
+def _compare_planes(worlds: Sequence[World], kind: WorldKind, folder: Path, pool: Pool) -> None:
     """Print how far each parameter of the laser planes lies from the truth, and how often within 3 of its sigmas."""
     errors: dict[str, list[float]] = defaultdict(list)
     sigmas: dict[str, list[float]] = defaultdict(list)
     with Workspace(folder / "cache") as workspace:
         for world in worlds:
-            steps = calibration_steps(world, standard_body())
-            end = workspace.run(steps, pool, lambda _: None)[steps[-1].name]
-            if not isinstance(end, Success):
-                print(f"  {world.seed}: {end.problem}")
-                continue
-            made = Calibration.model_validate_json(workspace.store.get(end.digest) or b"")
-            for name, error, sigma in _plane_errors(made, machine_of(world)):
+            made = _calibrated(world, kind, folder, workspace, pool)
+            for name, error, sigma in [] if made is None else _plane_errors(made, machine_of(world)):
                 errors[name].append(error)
                 sigmas[name].append(sigma)
     print("\nlaser planes, chart and body: error, median (largest); determined; within 3 sigma")
@@ -88,6 +83,21 @@ def _compare_planes(worlds: Sequence[World], folder: Path, pool: Pool) -> None:
         within = np.mean(error[known] <= 3 * sigma[known]) if known.any() else np.nan
         shares = f"{100 * known.mean():.0f} %; {100 * within:.1f} %"
         print(f"  {name:16} {np.median(error):.5f} ({error.max():.5f}); {shares}")
+
+
+def _calibrated(world: World, kind: WorldKind, folder: Path, workspace: Workspace, pool: Pool) -> Calibration | None:
+    """Calibrate the scanner of a world by its chart and the body; None, and the reason is printed, if that fails."""
+    film = None
+    if kind == "films":
+        filmed = film_step(world, folder / f"{world.seed}-body", standard_body())
+        workspace.run([filmed], pool, lambda _: None)
+        film = read_scan(filmed.places["folder"]), workspace.digests
+    steps = calibration_steps(world, standard_body(), film)
+    end = workspace.run(steps, pool, lambda _: None)[steps[-1].name]
+    if isinstance(end, Success):
+        return Calibration.model_validate_json(workspace.store.get(end.digest) or b"")
+    print(f"  {world.seed}: {end.problem}")
+    return None
 
 
 def _plane_errors(made: Calibration, machine: Machine) -> list[tuple[str, float, float]]:

@@ -85,6 +85,12 @@ class WorldGraph:
             planes[f"manifest-{camera}"], planes[f"travel-{camera}"] = _frames(machine, camera)
         self.whole = self.add("planes", "laser_planes", planes)
 
+    def read_body(self, film: RecordedScan, body: Body, digests: FileDigests) -> None:
+        """Add what the film of a body shows to the calibration."""
+        heads = _numbered_heads(machine_of(self.world))
+        self.steps += travel_steps(film, self, heads, body, digests)
+        self.whole = Output(self.steps[-1].name)
+
     def compare(self, kind: WorldKind, results: dict[str, Input]) -> list[Step]:
         """Add the last step, of kind `outcome`, and return the steps that it needs."""
         self.add("outcome", "world_outcome", {"world": self.drawn, "kind": _value(kind), **results}, self.world)
@@ -101,10 +107,16 @@ class WorldGraph:
         return kept[::-1]
 
 
-def calibration_steps(world: World, body: Body) -> list[Step]:
-    """Build the steps of a world without pictures to the calibration by its chart and a body, the last one's result."""
+def calibration_steps(world: World, body: Body, film: tuple[RecordedScan, FileDigests] | None = None) -> list[Step]:
+    """Build the steps to the calibration by a world's chart and a body, the result of the last step.
+
+    film : of the body; without it, the body is seen without pictures.
+    """
     graph = WorldGraph(world)
-    graph.film_body(machine_of(world), body)
+    if film is None:
+        graph.film_body(machine_of(world), body)
+    else:
+        graph.read_body(film[0], body, film[1])
     return graph.to_last()
 
 
@@ -160,9 +172,7 @@ def filmed_steps(
     """
     graph = WorldGraph(world)
     if body is not None:
-        made = travel_steps(body[0], graph, _numbered_heads(machine_of(world)), body[1], digests)
-        graph.steps += made
-        graph.whole = Output(made[-1].name)
+        graph.read_body(*body, digests)
     made = scan_steps(scan, graph, parameters, digests)
     graph.steps += made
     results: dict[str, Input] = {name: Output(f"{graph.name}/{kind}") for name, kind in RESULTS.items()}
