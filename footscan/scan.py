@@ -12,7 +12,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.fusion.fuse import fuse
+from footscan.cloud.fusion.fuse import Fusion, fuse
 from footscan.cloud.heads.find import find_heads
 from footscan.cloud.heads.planes import corrected
 from footscan.cloud.mapping import map_stripe, refuse_other_size
@@ -97,15 +97,15 @@ class OpenScan:
     @property
     def cloud(self) -> NDArray[np.void]:
         """(N,) points of all cameras, cleaned and fused, as `points`; Finding where none is left."""
-        return of_cameras(self._fused)
+        return of_cameras(self._fused.cloud)
 
     @cached_property
-    def _fused(self) -> NDArray[np.void]:
-        """`cloud` with the numbers of views."""
+    def _fused(self) -> Fusion:
+        """`cloud` with the numbers of views, and how the cameras agree."""
         kept, _ = self._cleaned
         if not len(kept):
             raise Finding("every point is an outlier, expected a foot in the control volume")
-        return fuse(kept, self.parameters.fusion).cloud
+        return fuse(kept, self.parameters.fusion)
 
     @property
     def glass(self) -> GlassPlane:
@@ -128,7 +128,7 @@ class OpenScan:
     def normals(self) -> NDArray[np.float64]:
         """(N, 3) outward unit normals of the points of `cloud`."""
         return np.asarray(
-            estimate_normals(self._fused, views_of(self._used.cameras), self.parameters.normals), np.float64
+            estimate_normals(self._fused.cloud, views_of(self._used.cameras), self.parameters.normals), np.float64
         )
 
     @cached_property
@@ -141,7 +141,9 @@ class OpenScan:
         """The measures of the foot; Finding where the surface is no foot."""
         checked = None if self.calibration_check is None else self.calibration_check.doubt
         doubts = [*filter(None, [checked, self.heads.doubt])]
-        return measure_scanned_foot(self.mesh, self.recorded.document.side, self.glass, doubts)
+        return measure_scanned_foot(
+            self.mesh, self.recorded.document.side, self.glass, doubts, self._fused.report.rms_mm
+        )
 
     @cached_property
     def _used(self) -> Calibration:

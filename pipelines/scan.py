@@ -200,7 +200,7 @@ def reconstruction_steps(
     fused = add("fuse", parameters.fusion, {"clean": cleaned})
     oriented = add("orient", parameters.normals, {"fused": fused, "calibration": maps})
     surface = add("surface", parameters.surface, {"oriented": oriented})
-    measure_inputs: dict[str, Input] = {"surface": surface, "clean": cleaned, "heads": heads}
+    measure_inputs: dict[str, Input] = {"surface": surface, "fused": fused, "clean": cleaned, "heads": heads}
     if calibration_doubt is not None:
         measure_inputs["calibration-doubt"] = Value(canonical_json(calibration_doubt).encode())
     measures = add("measure", FootParameters(side=side), measure_inputs)

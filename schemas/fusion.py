@@ -1,5 +1,6 @@
 """The report of the fusion: the disagreement of the cameras about the same skin, and their corrections."""
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -70,3 +71,18 @@ class FusionReport(Document):
     contradicted: dict[Camera, Count] = Field(default_factory=dict)
     """Number of points by camera that were dropped in favour of other cameras."""
     warnings: list[str] = Field(default_factory=list)
+
+    @property
+    def rms_mm(self) -> float:
+        """Root mean square of the distances of all pairs of cameras, after the corrections; 0 without pairs.
+
+        >>> one = Disagreement(median_mm=0.0, deviation_mm=0.1, rms_mm=0.3)
+        >>> other = one.model_copy(update={"rms_mm": 0.1})
+        >>> pairs = [PairDisagreement(cameras=(1, 2), points=1, before=one, after=one)]
+        >>> pairs.append(PairDisagreement(cameras=(1, 3), points=7, before=other, after=other))
+        >>> print(f"{FusionReport(pairs=pairs).rms_mm:.3f}")
+        0.141
+        """
+        points = sum(pair.points for pair in self.pairs)
+        squares = sum(pair.points * pair.after.rms_mm**2 for pair in self.pairs)
+        return math.sqrt(squares / points) if points else 0.0

@@ -1,6 +1,7 @@
 """The measures of a foot: their definitions, and their values for a mesh."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import NamedTuple
 
@@ -15,8 +16,9 @@ from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame.foot_frame import FootFrame, foot_frame
 from footscan.measure.frame.glass import glass_doubt
 from footscan.measure.quantity import NotMeasurable, Quantity
+from footscan.measure.replicates import replicates
+from footscan.measure.uncertainty import Scatter, SurfaceErrors, scatter_of
 from footscan.mesh.rigid_transform import apply
-from footscan.rows import distinct_rows
 from schemas.base.model import Side
 from schemas.glass import GlassPlane
 from schemas.measures import Axis, Measure, MeasuredLandmark, Measures, Position, Status, Unit
@@ -25,6 +27,8 @@ Floats = NDArray[np.float64]
 
 FILLED_SHARE = 0.05
 """A measure of which more than this share rests on filled surface is uncertain; chosen by hand."""
+MISSING_SHARE = 0.2
+"""A measure that more than this share of the replicates does not have is uncertain. Chosen by hand."""
 DIGITS: dict[Unit, int] = {"mm": 3, "mm2": 0, "mm3": 0, "deg": 2, "1": 4}
 """Decimals of a value, by its unit."""
 
@@ -189,6 +193,8 @@ def measure_foot(
     manual: Mapping[str, Floats] | None = None,
     errors_mm: NDArray[np.floating] | None = None,
     reach_mm: float = 0.0,
+    wide_mm: float = 0.0,
+    count: int = 0,
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
     glass: GlassPlane | None = None,
@@ -205,6 +211,9 @@ def measure_foot(
     manual : landmarks set by a person: name to (3,) mm in the frame of the mesh
     errors_mm : (V,) standard deviations of the vertices; default: inferred from the roughness of the mesh
     reach_mm : vertices in the same cube of this edge share their error, as on a smoothed surface; 0: independent errors
+    wide_mm : standard deviation of a further error, which vertices share over `WIDE_MM`
+    count : number of replicates by which the errors of the vertices are propagated, see `replicates`; 0: propagation is
+        linear
     filled : (V,) true for vertices that were filled, not measured
     calibration : name of a measure to (a, b): the reported value is a + b times the measured one
     glass : the scanner's glass in the frame of the mesh; default: at Z = 0
@@ -237,6 +246,8 @@ def measure_foot(
             landmarks,
             errors_mm=errors_mm,
             reach_mm=reach_mm,
+            wide_mm=wide_mm,
+            count=count,
             filled=filled,
             calibration=calibration,
             doubt="; ".join([*reasons, *things]) or None,
@@ -251,6 +262,8 @@ def take_measures(
     *,
     errors_mm: Floats | None = None,
     reach_mm: float = 0.0,
+    wide_mm: float = 0.0,
+    count: int = 0,
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
     doubt: str | None = None,
@@ -261,37 +274,31 @@ def take_measures(
     measures are uncertain.
     """
     surface = FootSurface(foot, landmarks)
-    errors = _Errors(surface.errors if errors_mm is None else errors_mm, _cubes(foot.vertices, reach_mm), filled)
+    errors = SurfaceErrors(foot.vertices, surface.errors if errors_mm is None else errors_mm, reach_mm, wide_mm)
+    scatter = scatter_of([_values(one) for one in replicates(foot, errors.fields, count)], count)
     calibrations = calibration or {}
     to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
     return {
-        name: _measure(definition, surface, errors, calibrations.get(name), to_mesh, doubt)
+        name: _measure(definition, surface, (errors, scatter.get(name)), filled, calibrations.get(name), to_mesh, doubt)
         for name, definition in _definitions().items()
     }
 
 
-class _Errors(NamedTuple):
-    """Errors of the vertices of a foot."""
-
-    deviations: Floats
-    """(V,) standard deviations, mm"""
-    patch: NDArray[np.int64] | None
-    """(V,) number of a patch whose vertices share their error; None if all errors are independent."""
-    filled: NDArray[np.bool_] | None
-    """(V,) true for vertices that were not measured; None if unknown."""
-
-
-def _cubes(vertices: Floats, edge: float) -> NDArray[np.int64] | None:
-    """Returns (V,) the number of the cube in which each vertex lies; None without cubes."""
-    if edge <= 0:
-        return None
-    return distinct_rows(np.floor(vertices / edge)).number
+def _values(foot: FootFrame) -> dict[str, float]:
+    """All measures that can be taken of a foot in its own frame."""
+    surface = FootSurface(foot, find_landmarks(foot))
+    values = {}
+    for name, definition in _definitions().items():
+        with suppress(NotMeasurable):
+            values[name] = definition.compute(surface).value
+    return values
 
 
 def _measure(
     definition: Definition,
     surface: FootSurface,
-    errors: _Errors,
+    errors: tuple[SurfaceErrors, Scatter | None],
+    filled: NDArray[np.bool_] | None,
     calibration: tuple[float, float] | None,
     to_mesh: Floats,
     doubt: str | None,
@@ -304,12 +311,16 @@ def _measure(
         )
     offset, factor = calibration or (0.0, 1.0)
     digits = DIGITS[definition.unit]
-    share = None if errors.filled is None else round(quantity.share(errors.filled), 3)
+    share = None if filled is None else round(quantity.share(filled), 3)
     doubts = [reason for reason in (quantity.doubt, doubt) if reason is not None]
     if share is not None and share > FILLED_SHARE:
         doubts.append(f"{100 * share:.0f} % of it rests on surface that was filled, not measured")
+    surface_errors, scatter = errors
+    if scatter is not None and scatter.missing > MISSING_SHARE:
+        doubts.append(f"it cannot be measured in {100 * scatter.missing:.0f} % of the ways in which the scan may err")
     status: Status = "uncertain" if doubts else "ok"
-    deviation = quantity.sd(errors.deviations, errors.patch)
+    sds = surface_errors.linear_sd(quantity), None if scatter is None else scatter.sd
+    deviation = max((sd for sd in sds if sd is not None), default=None)
     notes = [*doubts, *([] if quantity.note is None else [quantity.note])]
     return Measure(
         value=round(offset + factor * quantity.value, digits),

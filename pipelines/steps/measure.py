@@ -10,6 +10,7 @@ from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from pipelines.arrays import unpack
 from schemas.base.errors import Finding
+from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.measures import Measures
@@ -19,17 +20,19 @@ from schemas.parameters.foot import FootParameters
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
     """Measure the foot, as measures.json.
 
-    `inputs`: `surface`, `clean` for the glass, `heads`, where they were, and `calibration-doubt`, a sentence, if a
-    check of the calibration gave reason for one. A foot that cannot be measured gives a document with the finding.
+    `inputs`: `surface`, `clean` for the glass, `heads`, where they were, `fused` for how cameras agree, and
+    `calibration-doubt`, a sentence, if a check of the calibration gave reason for one. A foot that cannot be measured
+    gives a document with the finding.
     """
     del places
     surface = unpack(inputs["surface"])
     glass = GlassPlane.model_validate_json(unpack(inputs["clean"])["glass"].tobytes())
     checked = json.loads(inputs["calibration-doubt"]) if "calibration-doubt" in inputs else None
     doubts = [*filter(None, [checked, HeadsReport.model_validate_json(inputs["heads"]).doubt])]
+    agreement = FusionReport.model_validate_json(unpack(inputs["fused"])["report"].tobytes())
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface["filled"])
     try:
-        measures = measure_scanned_foot(mesh, parameters.side, glass, doubts)
+        measures = measure_scanned_foot(mesh, parameters.side, glass, doubts, agreement.rms_mm)
     except Finding as finding:  # the other results are still of use
         unmoved = np.eye(4).tolist()
         measures = Measures(

@@ -1,0 +1,88 @@
+"""Replicates of a foot: the same foot, displaced at random as the scanner may err.
+
+Landmarks lie where the skin is outermost or highest, often on a plateau, and may move by millimetres where the skin
+moves by hundredths. What that does to a measure is not linear, and is found by trying: the Monte Carlo method of JCGM
+101:2008.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.measure.frame.axis import along_axis
+from footscan.measure.frame.foot_frame import SPACING_MM, FootFrame, forefoot_points
+from footscan.measure.landmarks.dense_points import dense_points
+from footscan.mesh.rigid_transform import apply, low_height
+from footscan.mesh.topology import vertex_normals
+from schemas.base.errors import Finding
+
+SEED = 101
+"""Replicates of one foot are the same in every run."""
+
+Floats = NDArray[np.float64]
+
+
+class ErrorField(NamedTuple):
+    """Errors of the vertices that vary smoothly over the surface."""
+
+    deviations: Floats
+    """(V,) standard deviations of the displacement along the normal, mm"""
+    reach_mm: float
+    """Distance over which vertices share their error"""
+
+
+def replicates(foot: FootFrame, errors: Sequence[ErrorField], count: int) -> Iterator[FootFrame]:
+    """Displace a foot at random, `count` times, and find its axis anew.
+
+    The floor stays where it is. A replicate that is no foot any more is left out.
+    """
+    normals = vertex_normals(foot.vertices, foot.faces)
+    random = np.random.default_rng(SEED)
+    for _ in range(count):
+        away = sum(error.deviations * smooth_field(foot.vertices, error.reach_mm, random) for error in errors)
+        try:
+            yield _reframed(foot, foot.vertices + np.multiply.outer(away, np.ones(3)) * normals)
+        except Finding:
+            continue
+
+
+def smooth_field(places: Floats, reach_mm: float, random: np.random.Generator) -> Floats:
+    """Draw a field of unit variance at `places` (N, 3), mm: white noise on a grid, interpolated.
+
+    Examples
+    --------
+    Neighbours share their value, places far apart do not:
+
+    >>> places = np.array([[0.0, 0, 0], [0.1, 0, 0], [50.0, 0, 0]])
+    >>> drawn = [smooth_field(places, 10.0, np.random.default_rng(seed)) for seed in range(300)]
+    >>> np.corrcoef(np.transpose(drawn))[0].round(1).tolist()
+    [1.0, 1.0, 0.0]
+    """
+    cells = places / reach_mm
+    low = np.floor(cells).astype(np.int64)
+    share = cells - low
+    low -= low.min(axis=0)
+    grid = random.normal(size=tuple(low.max(axis=0) + 2))
+    total, squares = np.zeros(len(places)), np.zeros(len(places))
+    for corner in np.ndindex(2, 2, 2):
+        weight = np.prod(np.where(corner, share, 1.0 - share), axis=1)
+        total += weight * grid[tuple((low + corner).T)]
+        squares += weight**2
+    return np.asarray(total / np.sqrt(squares))
+
+
+def _reframed(foot: FootFrame, vertices: Floats) -> FootFrame:
+    """The foot with other vertices, in the frame of its axis."""
+    samples = dense_points(vertices, foot.faces, SPACING_MM)
+    low = samples[samples[:, 2] <= low_height(foot.length)]
+    forefoot = forefoot_points(vertices, foot.faces, foot.length, foot.low)
+    turn, axis, length = along_axis(np.eye(4), low, forefoot, foot.length, foot.axis, {})
+    return foot._replace(
+        vertices=apply(turn, vertices),
+        samples=apply(turn, samples),
+        transform=turn @ foot.transform,
+        axis=axis,
+        length=length,
+    )
