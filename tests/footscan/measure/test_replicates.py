@@ -1,0 +1,67 @@
+"""Replicates of a foot: standard deviations that hold what errors of the surface do to its measures."""
+
+import numpy as np
+import pytest
+
+from footscan.measure.frame.foot_frame import foot_frame
+from footscan.measure.measures import measure_foot
+from footscan.measure.replicates import ErrorField, replicates, smooth_field
+from footscan.measure.uncertainty import scatter_of
+from footscan.mesh.mesh import Mesh
+from footscan.mesh.topology import vertex_normals
+from footscan.virtual.foot.foot import make_foot
+
+SD_MM, REACH_MM = 0.03, 10.0
+
+
+@pytest.fixture(scope="module")
+def foot() -> Mesh:
+    made = make_foot()
+    return Mesh(made.vertices, made.faces)
+
+
+def sigmas(foot: Mesh, count: int) -> np.ndarray:
+    """Errors of measures of four feet whose surface errs, in standard deviations as reported."""
+    true = measure_foot(foot.vertices, foot.faces, "right").measures
+    normals, errors = vertex_normals(foot.vertices, foot.faces), np.full(len(foot.vertices), SD_MM)
+    found = []
+    for seed in range(4):
+        away = SD_MM * smooth_field(foot.vertices, REACH_MM, np.random.default_rng(seed))
+        moved = foot.vertices + away[:, None] * normals
+        measures = measure_foot(moved, foot.faces, "right", errors_mm=errors, reach_mm=REACH_MM, count=count).measures
+        for name, measure in measures.items():
+            if measure.value is not None and measure.uncertainty and true[name].value is not None:
+                found.append(abs(measure.value - true[name].value) / measure.uncertainty)
+    return np.array(found)
+
+
+def test_the_standard_deviations_hold_the_errors(foot: Mesh) -> None:
+    by_replicates, linear = sigmas(foot, count=16), sigmas(foot, count=0)
+    assert np.mean(by_replicates < 3) >= 0.98
+    assert np.mean(by_replicates < 1) > 0.5
+    assert np.mean(linear < 3) < np.mean(by_replicates < 3)  # landmarks on plateaus
+
+
+def test_a_field_has_unit_variance_everywhere() -> None:
+    places = np.random.default_rng(0).uniform(0.0, 300.0, (20_000, 3))
+    field = smooth_field(places, 10.0, np.random.default_rng(1))
+    assert abs(field.std() - 1.0) < 0.02
+    assert abs(field.mean()) < 0.05
+
+
+def test_replicates_are_the_same_in_every_run(foot: Mesh) -> None:
+    frame = foot_frame(foot.vertices, foot.faces, "right")
+    errors = [ErrorField(np.full(len(frame.vertices), SD_MM), REACH_MM)]
+    first, again = (list(replicates(frame, errors, 2)) for _ in range(2))
+    for one, other in zip(first, again, strict=True):
+        np.testing.assert_array_equal(one.vertices, other.vertices)
+    assert np.abs(first[0].vertices - first[1].vertices).max() > SD_MM
+    assert abs(first[0].length - frame.length) < 0.5
+
+
+def test_a_measure_that_few_replicates_have_has_no_scatter() -> None:
+    values = [{"foot_length": 250.0 + k, **({"ball_girth": 240.0} if k < 4 else {})} for k in range(10)]
+    scatter = scatter_of(values, count=20)
+    assert set(scatter) == {"foot_length"}
+    assert scatter["foot_length"].missing == 0.5
+    assert scatter["foot_length"].sd > np.std(np.arange(10.0), ddof=1)
