@@ -1,6 +1,6 @@
 """A calibration with the laser planes that a film of a body shows."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,15 +11,20 @@ from footscan.calibration.models.maps import is_supported, to_world
 from footscan.calibration.models.pose import camera_centres
 from footscan.calibration.models.uncertainty import standard_deviations
 from footscan.calibration.travel.body import Body
-from footscan.calibration.travel.fit import TravelFit, TravelPoints, fit_travel
+from footscan.calibration.travel.fit import OF_CAMERA, OF_HEAD, TravelFit, TravelPoints, fit_travel
 from footscan.stripe.points import StripePoints
 from schemas.base.errors import Finding
 from schemas.calibration import Calibration, CameraCalibration, LaserPlane
 
 Floats = NDArray[np.float64]
 
+DELAY = len(OF_HEAD) + OF_CAMERA.index("delay_frames")
+"""Column of the delays in the planes of a fit."""
 FEWEST = 500
 """Points of a camera on the body, at least. Chosen by hand."""
+LARGEST_DELAY = 0.4
+"""Difference of the delays of two cameras of a head, in frames, from which a film is refused. Latencies that were
+measured differ by hundredths of a frame; a camera that lost a frame unnoticed is one off. Chosen by hand."""
 LARGEST_RMS_MM = 0.1
 """Distance of the points from the body from which a warning is given: the body is another one, its form is off, or the
 cameras' maps are. Chosen by hand."""
@@ -53,7 +58,7 @@ def with_laser_planes(
     Raises
     ------
     Finding
-        A camera hardly saw the body, or the points do not lie on it.
+        A camera hardly saw the body, the points do not lie on it, or a camera was a frame off the others of its head.
     """
     cameras = sorted(films)
     calibrated = {camera.view: camera for camera in calibration.cameras}
@@ -69,6 +74,7 @@ def with_laser_planes(
         parts.append(part)
     points = TravelPoints(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
     fit = fit_travel(points, [numbers.index(sheets[view]) for view in cameras], body)
+    _refuse_lost_frames(fit.planes[:, DELAY], [maps[view] for view in cameras], head_of_camera)
     planes = {camera: _plane(fit, index, sheets[camera][0]) for index, camera in enumerate(cameras)}
     warnings = [*calibration.warnings]
     if fit.rms_mm > LARGEST_RMS_MM:
@@ -84,6 +90,26 @@ def with_laser_planes(
         }
     )
     return document, fit
+
+
+def _refuse_lost_frames(
+    delays: Floats, cameras: Sequence[CameraCalibration], head_of_camera: Mapping[int, int]
+) -> None:
+    """Refuse delays (C,), in frames, by which cameras of one head contradict each other.
+
+    The delays of a head's cameras count from their mean, so that one frame that one camera lost would move the plane.
+    """
+    heads = np.array([head_of_camera[camera.camera] for camera in cameras])
+    for head in np.unique(heads):
+        of_head = np.flatnonzero(heads == head)
+        off = delays[of_head] - np.median(delays[of_head])
+        worst = int(np.argmax(np.abs(off)))
+        if np.ptp(off) > LARGEST_DELAY:
+            raise Finding(
+                f"camera {cameras[of_head[worst]].name} was {np.ptp(off):.1f} frames off the other cameras of its head "
+                f"while the body was filmed, expected {LARGEST_DELAY:g} at most: film the body again, or measure the "
+                "latencies of the cameras first"
+            )
 
 
 def _points(index: int, camera: CameraCalibration, film: CameraTravel, centre: Floats) -> TravelPoints:
