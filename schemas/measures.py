@@ -82,3 +82,11 @@ class Measures(Document):
     def warnings(self) -> list[str]:
         """What speaks against the surface as a whole, a sentence without a full stop each."""
         return [*([] if self.side_note is None else [self.side_note]), *self.doubts, *self.things]
+
+    def own_note(self, name: str) -> str | None:
+        """The note of a measure without the reasons that all measures have in common; None if nothing is left."""
+        note = self.measures[name].note
+        for reason in (*self.doubts, *self.things) if note else ():
+            note = note.replace(reason, "") if note else None
+        parts = [part for part in (note or "").split("; ") if part.strip()]
+        return "; ".join(parts) or None

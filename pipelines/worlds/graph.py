@@ -97,11 +97,12 @@ class WorldGraph:
         return self.to_last()
 
     def to_last(self) -> list[Step]:
-        """Return the last step and those that it needs."""
+        """Return the last step and those that it needs; of several of one name, the last one."""
         needed: set[str] = {self.steps[-1].name}
         kept = []
         for step in reversed(self.steps):
             if step.name in needed:
+                needed.remove(step.name)
                 kept.append(step)
                 needed |= {source.step for source in step.inputs.values() if isinstance(source, Output)}
         return kept[::-1]

@@ -17,6 +17,9 @@ SIGNIFICANT = 4.0
 LEAST_GAIN = 0.9
 """Cameras of two heads must agree better by this factor, or the heads stay where they are. Chosen by hand."""
 
+FILM_BODY = "`footscan calibrate film`, or “Calibrate or check” in the console"
+"""What to do about heads that are not where the calibration says."""
+
 
 def report_of(
     nothing: HeadsReport,
@@ -91,4 +94,4 @@ def _doubt(places: Floats, largest: float, parameters: HeadParameters) -> str | 
         reasons.append(f"the travels of two heads differ by {100 * scale:.2f} %")
     if not reasons:
         return None
-    return f"{', '.join(reasons)}: calibrate the laser planes with `footscan calibrate travel`"
+    return f"{', '.join(reasons)}: film the body that shows the laser planes ({FILM_BODY})"

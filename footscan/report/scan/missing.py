@@ -30,10 +30,15 @@ def _measures(measures: Measures) -> Iterator[str]:
         yield f"Not measured: {measures.finding}."
     for warning in measures.warnings:
         yield f"{warning[:1].upper()}{warning[1:]}."
+    in_common = bool(measures.doubts or measures.things)
+    if in_common:
+        yield "All measures are uncertain for that reason."
     for status, reading in (("incomplete", "could not be taken"), ("uncertain", "is uncertain")):
         for name, measure in measures.measures.items():
             if measure.status == status:
-                yield f"{words(name)} {reading}" + (f": {measure.note}." if measure.note else ".")
+                own = measures.own_note(name)
+                if own or not in_common:
+                    yield f"{words(name)} {reading}" + (f": {own}." if own else ".")
 
 
 def _cameras(quality: Quality) -> Iterator[str]:

@@ -169,7 +169,7 @@ def _measures(measures: Measures, drawings: Mapping[str, Drawing], turned: str) 
             _value(measure),
             UNITS[measure.unit][0],
             f'<span class="status {measure.status}">{measure.status}</span>',
-            text(measure.definition) + (f'<p class="note">{text(note)}</p>' if (note := _note(measure)) else ""),
+            text(measure.definition) + _note(measure, measures.own_note(name)),
         ]
         for name, measure in _ordered(measures)
     )
@@ -188,13 +188,14 @@ def _name(name: str, measure: Measure, is_drawn: bool) -> str:
     )
 
 
-def _note(measure: Measure) -> str:
-    """The note below the definition: a remark and the uncertainty of the value."""
+def _note(measure: Measure, own: str | None) -> str:
+    """The note below the definition: the measure's own remark and the uncertainty of the value."""
     unit, decimals = UNITS[measure.unit]
     sigma = None
     if measure.uncertainty is not None:
         sigma = f"standard deviation {number(measure.uncertainty, decimals + 1)} {unit}".rstrip()
-    return "; ".join(part for part in (measure.note, sigma) if part)
+    note = "; ".join(part for part in (own, sigma) if part)
+    return f'<p class="note">{text(note)}</p>' if note else ""
 
 
 def _value(measure: Measure) -> str:

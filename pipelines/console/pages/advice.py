@@ -21,6 +21,7 @@ def advice(measures: Measures, quality: Quality, recording: Recording | None) ->
     filmed = {} if recording is None else {camera.id: camera for camera in recording.cameras}
     return [
         *_finding(measures),
+        *_heads(quality),
         *_calibration(quality),
         *_cameras(quality, filmed),
         *_latencies(filmed),
@@ -38,6 +39,11 @@ def _finding(measures: Measures) -> Iterator[str]:
         yield f"{measures.side_note[:1].upper()}{measures.side_note[1:]}: was the right side chosen? Scan again if not."
     for thing in measures.things:
         yield f"{thing[:1].upper()}{thing[1:]}. Take everything away from the foot, and scan again."
+
+
+def _heads(quality: Quality) -> Iterator[str]:
+    if quality.heads.doubt is not None:
+        yield f"{quality.heads.doubt[:1].upper()}{quality.heads.doubt[1:]}. Then scan again."
 
 
 def _calibration(quality: Quality) -> Iterator[str]:

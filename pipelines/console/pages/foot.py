@@ -19,7 +19,7 @@ from pipelines.console.pages.results import read_measures, read_quality, read_re
 from pipelines.console.pages.shell import shell
 from schemas.base.errors import RefusedInput
 from schemas.base.limits import BeyondLimitError
-from schemas.measures import Measure, Measures
+from schemas.measures import Measures
 from schemas.quality import Quality
 
 VERDICTS = {
@@ -128,11 +128,12 @@ def _measures(measures: Measures, drawings: Mapping[str, Drawing]) -> str:
     if measures.finding is not None:
         return f'<p class="note">Not measured: {text(measures.finding)}</p>'
     names = [*(name for name in FIRST if name in measures.measures), *sorted(measures.measures.keys() - set(FIRST))]
-    rows = (_row(name, measures.measures[name], name in drawings) for name in names)
+    rows = (_row(name, measures, name in drawings) for name in names)
     return table(["Measure", "Value", "Unit", "Status"], rows, numeric=[1], kind="plain")
 
 
-def _row(name: str, measure: Measure, is_drawn: bool) -> list[str]:
+def _row(name: str, measures: Measures, is_drawn: bool) -> list[str]:
+    measure, own = measures.measures[name], measures.own_note(name)
     unit, decimals = UNITS[measure.unit]
     value = "–" if measure.value is None else number(measure.value, decimals)
     label = text(words(name))
@@ -140,5 +141,5 @@ def _row(name: str, measure: Measure, is_drawn: bool) -> list[str]:
         caption = text(f"{words(name)} {value} {unit}: {measure.definition}")
         attributes = f'data-shows="{text(name)}" data-told="{caption}" aria-pressed="false"'
         label = f'<button type="button" {attributes}>{label}</button>'
-    note = f'<p class="note">{text(measure.note)}</p>' if measure.note and measure.status != "ok" else ""
+    note = f'<p class="note">{text(own)}</p>' if own and measure.status != "ok" else ""
     return [label + note, value, unit, f'<span class="status {measure.status}">{measure.status}</span>']

@@ -33,3 +33,18 @@ def test_a_foot_whose_sole_was_seen_has_good_measures(foot: Mesh) -> None:
     seen = measure_scanned_foot(with_filled(foot, 0.1), "right", GlassPlane()).measures
     assert seen["foot_length"].status == seen["instep_height"].status == "ok"
     assert measure_scanned_foot(foot, "right", GlassPlane()).measures["arch_index"].status == "ok"
+
+
+def test_a_reason_that_all_measures_share_is_no_note_of_one(foot: Mesh) -> None:
+    measures = measure_scanned_foot(foot, "right", GlassPlane(), ["camera 3 has moved"])
+    assert "camera 3 has moved" in (measures.measures["foot_length"].note or "")
+    assert {"camera 3 has moved"} == set(measures.doubts)
+    assert "camera 3" not in " ".join(filter(None, map(measures.own_note, measures.measures)))
+
+
+def test_cameras_that_disagree_widen_every_measure(foot: Mesh) -> None:
+    agreeing, apart = (
+        measure_scanned_foot(foot, "right", GlassPlane(), disagreement_mm=mm).measures for mm in (0.03, 0.2)
+    )
+    for name in ("foot_length", "foot_breadth", "ball_girth", "instep_height"):
+        assert (apart[name].uncertainty or 0.0) > 2 * (agreeing[name].uncertainty or np.inf)
