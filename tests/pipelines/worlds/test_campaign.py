@@ -10,6 +10,7 @@ from footscan.virtual.worlds.draw import as_designed, draw_assembled, draw_world
 from pipelines.engine.pool import Threads
 from pipelines.worlds import campaign
 from pipelines.worlds.campaign import run_worlds, world_key
+from pipelines.worlds.graph import WorldGraph
 from pipelines.worlds.night import fresh_seeds, read_kept, run_night_of_worlds
 from schemas.base.errors import Fault, RefusedInput
 from schemas.campaign import WorldOutcome
@@ -62,6 +63,16 @@ def test_a_body_shows_where_the_planes_lie(tmp_path: Path) -> None:
     ideal, chart, both = surface_mm(as_designed(off)), surface_mm(off), surface_mm(off, standard_body())
     assert chart > 5.0 * ideal
     assert both < 2.5 * ideal
+
+
+def test_of_steps_of_one_name_the_last_is_taken() -> None:
+    """The film of a body takes maps of the cameras before the planes are known; the scan takes them again."""
+    graph = WorldGraph(World(seed=1))
+    before = graph.camera(1)
+    graph.whole = graph.add("planes", "laser_planes", {"calibration": graph.whole})
+    assert graph.camera(1) == before
+    names = [step.name.rpartition("/")[2] for step in graph.to_last()]
+    assert names == ["world", "calibration", "planes", "camera-map-1"]
 
 
 def test_a_foot_on_a_plate_that_was_moved_is_measured_above_the_plate(outcomes: dict[int, WorldOutcome]) -> None:
