@@ -15,7 +15,7 @@ from footscan.measure.landmarks.errors import saddle_gradient, summit_gradient
 from footscan.measure.landmarks.sides import FULL_SIZE_MM
 from footscan.measure.outline import Outline, Plane, smooth_outline
 from footscan.measure.quantity import NotMeasurable, Quantity
-from footscan.measure.roughness import roughness
+from footscan.measure.roughness import Roughness, roughness
 from footscan.mesh.sections import Cuttable, Loop, cut, cuttable
 from footscan.mesh.topology import vertex_normals
 
@@ -58,13 +58,19 @@ class LandmarkQuantities(NamedTuple):
 
 
 class FootSurface:
-    """A foot in its own frame, with what all measures share: normals, noise, landmarks, sections."""
+    """A foot in its own frame, with what all measures share: normals, noise, landmarks, sections.
 
-    def __init__(self, foot: FootFrame, landmarks: Mapping[str, Landmark]) -> None:
+    Parameters
+    ----------
+    rough : of the same mesh, or one that was displaced a little; default: it is estimated
+    """
+
+    def __init__(self, foot: FootFrame, landmarks: Mapping[str, Landmark], rough: Roughness | None = None) -> None:
         self.length_mm = foot.length
         self.mesh: Cuttable = cuttable(foot.vertices, foot.faces)
         self.normals: Floats = vertex_normals(foot.vertices, foot.faces)
-        self.errors, self.noise = roughness(foot.vertices, self.normals, foot.faces)
+        self.roughness = rough or roughness(foot.vertices, self.normals, foot.faces)
+        self.errors, self.noise = self.roughness
         self.landmarks = landmarks
         self._places: dict[str, LandmarkQuantities] = {}
         self._outlines: dict[tuple[float, ...], Outline] = {}

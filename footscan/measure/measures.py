@@ -17,6 +17,7 @@ from footscan.measure.frame.foot_frame import FootFrame, foot_frame
 from footscan.measure.frame.glass import glass_doubt
 from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.measure.replicates import replicates
+from footscan.measure.roughness import Roughness
 from footscan.measure.uncertainty import Scatter, SurfaceErrors, scatter_of
 from footscan.mesh.rigid_transform import apply
 from schemas.base.model import Side
@@ -275,7 +276,7 @@ def take_measures(
     """
     surface = FootSurface(foot, landmarks)
     errors = SurfaceErrors(foot.vertices, surface.errors if errors_mm is None else errors_mm, reach_mm, wide_mm)
-    scatter = scatter_of([_values(one) for one in replicates(foot, errors.fields, count)], count)
+    scatter = scatter_of([_values(one, surface.roughness) for one in replicates(foot, errors.fields, count)], count)
     calibrations = calibration or {}
     to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
     return {
@@ -284,13 +285,14 @@ def take_measures(
     }
 
 
-def _values(foot: FootFrame) -> dict[str, float]:
-    """All measures that can be taken of a foot in its own frame."""
-    surface = FootSurface(foot, find_landmarks(foot))
+def _values(replicate: FootFrame, rough: Roughness) -> dict[str, float]:
+    """The lengths, angles and indices that can be taken of a replicate; areas and volumes hardly rest on landmarks."""
+    surface = FootSurface(replicate, find_landmarks(replicate), rough)
     values = {}
     for name, definition in _definitions().items():
-        with suppress(NotMeasurable):
-            values[name] = definition.compute(surface).value
+        if definition.unit not in ("mm2", "mm3"):
+            with suppress(NotMeasurable):
+                values[name] = definition.compute(surface).value
     return values
 
 
