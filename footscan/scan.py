@@ -24,7 +24,7 @@ from footscan.frames.film import open_background, open_film
 from footscan.frames.image import Rgb
 from footscan.frames.reader import FrameReader, backgrounds_of, noting_lost, pixel_frames
 from footscan.frames.travel import read_positions, travelled
-from footscan.measure.scanned_foot import measure_scanned_foot
+from footscan.measure.scanned_foot import measure_scanned_foot, seen_ends
 from footscan.mesh.mesh import Mesh
 from footscan.recordings.calibration_checks import check_of_scan, checks_of
 from footscan.recordings.scans import RecordedScan, read_scan
@@ -142,7 +142,12 @@ class OpenScan:
         checked = None if self.calibration_check is None else self.calibration_check.doubt
         doubts = [*filter(None, [checked, self.heads.doubt])]
         return measure_scanned_foot(
-            self.mesh, self.recorded.document.side, self.glass, doubts, self._fused.report.rms_mm
+            self.mesh,
+            self.recorded.document.side,
+            self.glass,
+            doubts,
+            self._fused.report.rms_mm,
+            seen_ends(self.cloud),
         )
 
     @cached_property

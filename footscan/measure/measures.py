@@ -316,7 +316,7 @@ def _measure(
     share = None if filled is None else round(quantity.share(filled), 3)
     doubts = [reason for reason in (quantity.doubt, doubt) if reason is not None]
     if share is not None and share > FILLED_SHARE:
-        doubts.append(f"{100 * share:.0f} % of it rests on surface that was filled, not measured")
+        doubts.append(f"{100 * share:.0f} % of it rests on surface that was filled, or that one camera alone saw")
     surface_errors, scatter = errors
     if scatter is not None and scatter.missing > MISSING_SHARE:
         doubts.append(f"it cannot be measured in {100 * scatter.missing:.0f} % of the ways in which the scan may err")

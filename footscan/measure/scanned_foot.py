@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,13 @@ ERROR_MM, ERROR_GROWS, REACH_MM = 0.03, 0.04, 10.0
 vertices share their error. Tuned on virtual feet: docs/surface.md."""
 END_GROWS = 0.15
 """Growth of the standard deviation per mm along the travel beyond the outermost stripe, at heel and toes."""
+ALONE_GROWS, ALONE_MM = 0.5, 0.5
+"""Growth of the standard deviation per mm along the travel beyond the last place where two cameras agree: one camera
+alone may take the stripe of another head's laser for its own. An end that reaches farther beyond it than the second
+counts as filled. Chosen by hand, after a filmed scanner (`draw_assembled`, seed 501) whose heel began too early."""
+FEWEST_AT_END, LEAST_CONFIRMED, LEG_MM = 5, 0.2, 90.0
+"""Points that make an end; share of the points on which cameras must agree for that; and height above which a foot's
+length does not end. Chosen by hand."""
 AGREEMENT_MM, OF_DISAGREEMENT = 0.03, 2.0
 """Cameras of an exact scanner disagree by the first, root mean square: noise. What they disagree by beyond it shows
 errors that their mean has too, this many times as large, and as broad as a camera's view: each camera errs, and what
@@ -37,7 +45,12 @@ hand."""
 
 
 def measure_scanned_foot(
-    mesh: Mesh, side: Side, glass: GlassPlane, doubts: Sequence[str] = (), disagreement_mm: float = 0.0
+    mesh: Mesh,
+    side: Side,
+    glass: GlassPlane,
+    doubts: Sequence[str] = (),
+    disagreement_mm: float = 0.0,
+    ends: "SeenEnds | None" = None,
 ) -> Measures:
     """Measure a scanned surface; the uncertainties follow from the errors of the scanner.
 
@@ -48,6 +61,7 @@ def measure_scanned_foot(
     glass : on which the foot stands
     doubts : as of `measure_foot`
     disagreement_mm : root mean square of the distances at which two cameras saw the same skin
+    ends : where the skin ends; default: two cameras agree on it everywhere
 
     Raises
     ------
@@ -56,16 +70,19 @@ def measure_scanned_foot(
     """
     filled = np.zeros(len(mesh.vertices), bool) if mesh.filled is None else mesh.filled
     beyond_mm = _beyond(mesh.vertices, filled)
+    alone_mm = _alone(mesh.vertices[:, 0], ends)
     gap_mm = np.where(beyond_mm > 0, beyond_mm, KDTree(mesh.vertices[~filled]).query(mesh.vertices)[0])
     return measure_foot(
         mesh.vertices,
         mesh.faces,
         side,
-        errors_mm=ERROR_MM + np.where(beyond_mm > 0, END_GROWS * beyond_mm, ERROR_GROWS * gap_mm),
+        errors_mm=ERROR_MM
+        + np.where(beyond_mm > 0, END_GROWS * beyond_mm, ERROR_GROWS * gap_mm)
+        + ALONE_GROWS * alone_mm,
         reach_mm=REACH_MM,
         wide_mm=OF_DISAGREEMENT * math.sqrt(max(disagreement_mm**2 - AGREEMENT_MM**2, 0.0)),
         count=REPLICATES,
-        filled=gap_mm > RELIABLE_MM,
+        filled=(gap_mm > RELIABLE_MM) | (alone_mm > ALONE_MM),
         glass=glass,
         doubts=[*doubts, *filter(None, [_unseen_sole(mesh, filled)])],
     )
@@ -86,3 +103,36 @@ def _beyond(vertices: NDArray[np.float64], filled: NDArray[np.bool_]) -> NDArray
     """
     x = vertices[:, 0]
     return np.asarray(np.maximum(x[~filled].min() - x, x - x[~filled].max()))
+
+
+def _alone(x: NDArray[np.float64], ends: "SeenEnds | None") -> NDArray[np.float64]:
+    """Return (V,) how far the surface up to each vertex rests on what one camera alone saw of its end, mm."""
+    if ends is None:
+        return np.zeros(len(x))
+    first = np.clip(ends.confirmed_mm[0] - x, 0.0, ends.confirmed_mm[0] - ends.seen_mm[0])
+    return np.asarray(first + np.clip(x - ends.confirmed_mm[1], 0.0, ends.seen_mm[1] - ends.confirmed_mm[1]))
+
+
+class SeenEnds(NamedTuple):
+    """Where the skin ends along the travel."""
+
+    confirmed_mm: tuple[float, float]
+    """Least and greatest X at which two cameras or more agree on it"""
+    seen_mm: tuple[float, float]
+    """Least and greatest X at which any camera saw it"""
+
+
+def seen_ends(cloud: NDArray[np.void]) -> SeenEnds | None:
+    """Find where a cloud ends; None if its cameras hardly agree anywhere.
+
+    Parameters
+    ----------
+    cloud : (N,) of `POINT_DTYPE`, fused
+    """
+    low = cloud[cloud["z"] < LEG_MM]
+    confirmed = np.sort(low["x"][low["cameras"] > 1].astype(np.float64))
+    if len(confirmed) < max(FEWEST_AT_END, LEAST_CONFIRMED * len(low)):
+        return None
+    every = np.sort(low["x"].astype(np.float64))
+    first, last = FEWEST_AT_END - 1, -FEWEST_AT_END
+    return SeenEnds((float(confirmed[first]), float(confirmed[last])), (float(every[first]), float(every[last])))

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from footscan.measure.scanned_foot import measure_scanned_foot
+from footscan.cloud.points import make_points
+from footscan.measure.scanned_foot import SeenEnds, measure_scanned_foot, seen_ends
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
 from footscan.virtual.foot.foot import make_foot
@@ -48,3 +49,24 @@ def test_cameras_that_disagree_widen_every_measure(foot: Mesh) -> None:
     )
     for name in ("foot_length", "foot_breadth", "ball_girth", "instep_height"):
         assert (apart[name].uncertainty or 0.0) > 2 * (agreeing[name].uncertainty or np.inf)
+
+
+def test_an_end_that_one_camera_alone_saw_makes_the_length_uncertain(foot: Mesh) -> None:
+    first, last = foot.vertices[:, 0].min(), foot.vertices[:, 0].max()
+    seen = SeenEnds((first + 2.0, last), (first, last))
+    alone = measure_scanned_foot(foot, "right", GlassPlane(), ends=seen).measures
+    assert alone["foot_length"].status == "uncertain"
+    assert "one camera alone" in (alone["foot_length"].note or "")
+    assert alone["foot_breadth"].status == "ok"
+    assert (alone["foot_length"].uncertainty or 0.0) > 0.5
+    slightly = SeenEnds((first + 0.2, last), (first, last))
+    assert measure_scanned_foot(foot, "right", GlassPlane(), ends=slightly).measures["foot_length"].status == "ok"
+
+
+def test_the_ends_that_cameras_confirm() -> None:
+    x = np.arange(100.0)
+    cloud = make_points(np.column_stack([x, x * 0, x * 0]), camera=1)
+    cloud["cameras"] = np.where(x < 20.0, 1, 2)
+    assert seen_ends(cloud) == SeenEnds((24.0, 95.0), (4.0, 95.0))
+    cloud["cameras"] = 1
+    assert seen_ends(cloud) is None
