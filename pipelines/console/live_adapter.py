@@ -111,7 +111,7 @@ class LiveAdapter:
     def film(self, patient: str, side: Side, *, keep_partial: bool) -> Scanned:
         """As `Scanner.film`."""
         if self._glass is not None and side != self._glass.subject:
-            with self._scanner.waiting_for(f"a virtual {side} foot is put onto the glass") as progress:
+            with self._scanner.waiting_for(f"putting the virtual {side} foot onto the glass") as progress:
                 self._glass.put(side, progress)
         today = datetime.datetime.now().astimezone().date()
         name = ScanName(patient, next_scan_name(self._archive, patient, side, today), side, today)

@@ -1,8 +1,8 @@
 // The link between a page and the server: the stream of states, orders, and Stop, which is always available.
 "use strict";
 const footscan = (() => {
-  const NAMES = {disconnected: "Not connected", idle: "Ready", homing: "Homing", filming: "Filming", storing: "Storing",
-    reconstructing: "Reconstructing", done: "Done", failed: "Failed", "door open": "Door open", alarm: "Alarm"};
+  const NAMES = {disconnected: "Not connected", idle: "Ready", preparing: "Please wait", homing: "Homing",
+    filming: "Filming", storing: "Storing", reconstructing: "Reconstructing", done: "Done", failed: "Failed", "door open": "Door open", alarm: "Alarm"};
   const LEVELS = {disconnected: "bad", idle: "ok", done: "ok", failed: "bad", alarm: "bad", "door open": "warning"};
   const PRESENT_MS = 150, STOP_SOON_MS = 60, STOP_LATE_MS = 1000;
   const SWITCH = "The server does not answer. To switch the lasers off at once, use the scanner’s own switch.";

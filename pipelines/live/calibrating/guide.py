@@ -131,9 +131,10 @@ class Guide:
         )
         words = ""
         if earlier is not None:
-            frames = {number: session.frames(number) for number in session.numbers}
-            for damaged in self._seen.recall(frames, session.reference):
-                session.drop(damaged)
+            with self._scanner.waiting_for("reading the interrupted session"):
+                frames = {number: session.frames(number) for number in session.numbers}
+                for damaged in self._seen.recall(frames, session.reference):
+                    session.drop(damaged)
             day = datetime.date.fromtimestamp(earlier.folder.stat().st_mtime).isoformat()
             words = f"An interrupted session of {day} goes on: discard it if a camera was touched since. "
         self._to_place(self._free_number(), words)
@@ -145,7 +146,7 @@ class Guide:
         what, subject = "body", "body"
         if self._view.step != "body":
             what, subject = "object", f"reference {self._view.number}"
-        with self._scanner.waiting_for(f"a virtual {what} is put onto the glass") as progress:
+        with self._scanner.waiting_for(f"putting the virtual {what} onto the glass") as progress:
             self._put(subject, progress)
         actions = tuple(action for action in self._view.actions if action != "put")
         self._show(replace(self._view, words=f"A virtual {what} stands there now. Film it.", actions=actions))
@@ -157,18 +158,13 @@ class Guide:
         assert number is not None
         stills = self._scanner.stills(self._light)
         self._light = stills.light
-        if not stills.problems:
-            frames = {camera: jpeg for camera, (_, jpeg) in stills.frames.items()}
-            session.keep(number, frames)
-            self._seen.add(number, frames)
-        complaints = self._seen.judge(
-            number,
-            stills,
-            session.reference,
-            session.numbers,
-            self._settings.placement_tolerance_mm,
-            self._known(),
-        )
+        try:
+            with self._scanner.waiting_for("judging the placement"):
+                complaints = self._kept_and_judged(session, number, stills)
+        except BaseException:  # such as a stop: a placement that was not judged is filmed again
+            if not stills.problems:
+                session.drop(number)
+            raise
         self._to_look(number, complaints, is_kept=not stills.problems)
 
     def next(self) -> None:
@@ -190,7 +186,7 @@ class Guide:
         session, settings = self._in_session(), self._settings
         rig = self._scanner.rig
         numbers = session.numbers
-        words = "the scanner is calibrated" if self._view.purpose == "calibration" else "the calibration is checked"
+        words = "calculating the calibration" if self._view.purpose == "calibration" else "checking the calibration"
         try:
             with self._scanner.waiting_for(words):
                 session.finish(still_x_mm(rig))
@@ -234,7 +230,7 @@ class Guide:
         assert stored is not None
         film = session.folder / "body"
         self._scanner.film_body(film, self._body, self._light)
-        with self._scanner.waiting_for("the laser planes are found"):
+        with self._scanner.waiting_for("finding the laser planes"):
             stored = add_planes(stored, film, self._scanner.rig, self._body)
         self._to_stored("planes", stored)
 
@@ -258,6 +254,14 @@ class Guide:
         if not is_calibrated:
             words = "The scanner has no calibration yet: calibrate it with the reference object."
         return View("begin", words, ("check", "calibrate") if is_calibrated else ("calibrate",))
+
+    def _kept_and_judged(self, session: FilmedPlacements, number: int, stills: Stills) -> list[Complaint]:
+        if not stills.problems:
+            frames = {camera: jpeg for camera, (_, jpeg) in stills.frames.items()}
+            session.keep(number, frames)
+            self._seen.add(number, frames)
+        tolerance_mm = self._settings.placement_tolerance_mm
+        return self._seen.judge(number, stills, session.reference, session.numbers, tolerance_mm, self._known())
 
     def _to_place(self, number: int | None, before: str = "", complaints: tuple[Complaint, ...] = ()) -> None:
         session = self._in_session()

@@ -108,5 +108,14 @@ def test_a_foot_that_is_put_onto_the_glass_is_told_and_can_be_stopped(tmp_path: 
     over = LiveAdapter(scanner, tmp_path / "archive", tmp_path / "results", glass=OfTest())
     with pytest.raises(FootscanError, match="stopped"):
         over.film("P1", "left", keep_partial=False)
-    words = "a virtual left foot is put onto the glass"
-    assert told == [f"idle: {words}", f"idle 25 %: {words}", f"failed: {STOPPED}"]
+    words = "putting the virtual left foot onto the glass"
+    assert told == [f"preparing: {words}", f"preparing 25 %: {words}", f"failed: {STOPPED}"]
+    assert guidance(ScannerState("preparing", words), over.health(), "scan") == "The scan is being prepared."
+    assert guidance(ScannerState("preparing", words), over.health(), "calibrate") == ""
+
+
+def test_a_scanner_that_was_not_connected_is_not_ready_after_a_preparation() -> None:
+    scanner = LiveScanner(Rig.model_validate(RIG))
+    with scanner.waiting_for("judging the placement"):
+        assert str(scanner.state) == "preparing: judging the placement"
+    assert scanner.state.name == "disconnected"

@@ -1,5 +1,7 @@
 """Sessions on a stand-in that shows the frames of a recorded capture of three placements by three cameras."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -61,6 +63,8 @@ def test_a_scanner_is_calibrated_checked_and_named(scanner: StandingStandIn, tmp
     named = read_rig(tmp_path / "rig.yaml").calibration
     assert named == scanner.rig.calibration == str(tmp_path / Path(named or "").name)
     guide.end()
+    assert scanner.busy == [*["putting the virtual object onto the glass", "judging the placement"] * 3,
+                            "calculating the calibration"]  # fmt: skip
     assert [view.step for view in views[:3]] == ["place", "place", "look"]
 
     assert guide.view.actions == ("check", "calibrate")
@@ -164,6 +168,27 @@ def test_an_interrupted_session_is_gone_on_with_or_discarded(scanner: StandingSt
     again.begin("calibration")
     assert again.view.taken == ()
     assert "interrupted" not in again.view.words
+
+
+def test_a_placement_whose_judging_was_stopped_is_not_kept(
+    scanner: StandingStandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    guide = guide_of(scanner, tmp_path)
+    guide.begin("calibration")
+    guide.put()
+
+    @contextmanager
+    def stopped(_words: str) -> Iterator[None]:
+        yield
+        raise Fault("stopped; what was filmed before is kept")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(scanner, "waiting_for", stopped)
+        with pytest.raises(Fault):
+            guide.take()
+    assert (guide.view.step, guide.view.taken) == ("place", ())
+    guide.go(1)
+    assert guide.view.taken == ()
 
 
 def test_a_refused_capture_leads_back_to_its_placement(scanner: StandingStandIn, tmp_path: Path) -> None:
