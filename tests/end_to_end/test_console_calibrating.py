@@ -51,7 +51,7 @@ def test_a_scanner_is_calibrated_and_checked(
     press("Place the object")
     expect(page.locator("#placement .where")).to_have_text("Y = 0 mm, on the glass")
     usual.click()
-    expect(words).to_have_text("A virtual object stands there now. Film it.")
+    expect(words).to_contain_text(": a virtual object stands there now. Film it.")
     press("Judge the placement")
     expect(words).to_have_text("Placement 1 is good.")
     expect(page.locator("#stripes")).to_have_attribute("alt", re.compile(r"^camera 1: \d %, .*, camera 8: \d %$"))
@@ -62,7 +62,7 @@ def test_a_scanner_is_calibrated_and_checked(
     # From here by the keyboard: the button that had the focus keeps it, whatever it is called.
     usual.focus()
     for says in (
-        "Film it again",
+        "Film this placement",
         "Next placement",
         "Put the virtual object there",
         "Film this placement",
@@ -82,7 +82,7 @@ def test_a_scanner_is_calibrated_and_checked(
     assert usual.inner_text() == "Check the calibration"
     press("Place the object")
     usual.click()
-    expect(words).to_have_text("A virtual object stands there now. Film it.")
+    expect(words).to_contain_text(": a virtual object stands there now. Film it.")
     press("Judge the placement")
     press("The calibration is checked")
     expect(words).to_contain_text("The calibration holds: every camera is within 0.0")

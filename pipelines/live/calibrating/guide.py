@@ -143,13 +143,17 @@ class Guide:
         """Put what is to be filmed onto the glass of a virtual scanner."""
         self._need("put")
         assert self._put is not None
-        what, subject = "body", "body"
-        if self._view.step != "body":
-            what, subject = "object", f"reference {self._view.number}"
+        number = self._view.number
+        step: Step = "body" if self._view.step == "body" else "place"
+        if step == "body" or number is None:
+            what, subject, words = "body", "body", "A"
+        else:
+            what, subject, words = "object", f"reference {number}", f"{self._placement(number)}: a"
         with self._scanner.waiting_for(f"putting the virtual {what} onto the glass") as progress:
             self._put(subject, progress)
+        words = f"{words} virtual {what} stands there now. Film it."
         actions = tuple(action for action in self._view.actions if action != "put")
-        self._show(replace(self._view, words=f"A virtual {what} stands there now. Film it.", actions=actions))
+        self._show(replace(self._view, step=step, words=words, complaints=(), actions=actions))
 
     def take(self) -> None:
         """Film the present placement, and judge it while the object stands there."""
@@ -274,7 +278,7 @@ class Guide:
         x_mm = still_x_mm(self._scanner.rig)
         height = "on the glass" if z == 0 else f"raised by {z:g} mm"
         words = (
-            f"{before}Placement {number + 1} of {len(session.reference.placements_mm)}: stand the object at "
+            f"{before}{self._placement(number)}: stand the object at "
             f"Y = {_signed(y)} mm, {height}, across the laser's plane at X = {x_mm:g} mm. Then film it."
         )
         actions = (*self._puts(), "take", *self._enough(), "go", "discard", "end")
@@ -352,6 +356,9 @@ class Guide:
     def _in_session(self) -> FilmedPlacements:
         assert self._session is not None, "an action of a session is allowed in one only"
         return self._session
+
+    def _placement(self, number: int) -> str:
+        return f"Placement {number + 1} of {len(self._view.placements)}"
 
     def _puts(self) -> tuple[Action, ...]:
         return () if self._put is None else ("put",)

@@ -109,6 +109,8 @@ def test_what_is_wrong_is_told_while_the_object_stands_there(scanner: StandingSt
     [complaint] = guide.view.complaints
     assert (complaint.kind, complaint.cameras) == ("no stripe", (1, 2, 5))
     guide.put()
+    assert guide.view.complaints == ()
+    assert guide.view.words == "Placement 1 of 3: a virtual object stands there now. Film it."
     scanner.covered = {5}
     guide.take()
     assert [one.words.split(":")[0] for one in guide.view.complaints] == ["no stripe in camera 5"]
