@@ -27,7 +27,10 @@ CAMERA_BYTES = 40_000 * 400
 """Largest size of a camera's part of a scan with laser-off frames: bytes per frame x frames."""
 LEAST_SCANS, FEW_SCANS = 2, 20
 """The disk is bad below, and a warning is shown below, this many times the size of a scan; chosen by hand."""
-LEVELS: dict[str, Level] = {"lost": "bad", "closed": "bad", "alarm": "bad", "door": "warning", "held": "warning"}
+LEVELS: dict[str, Level] = {
+    "lost": "bad", "closed": "bad", "alarm": "bad", "door": "warning", "held": "warning", "not homed": "warning"
+}  # fmt: skip
+"""Level of the controller in a state of the board; in others it is well."""
 CABLE = "check its cable and hub, then connect again"
 
 

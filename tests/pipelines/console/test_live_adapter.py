@@ -3,10 +3,13 @@
 import datetime
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from checked import made_check
 
+from footscan.capture.board.state import state_from
+from footscan.capture.grbl.report import Report
 from pipelines.calibration_check import store_check
 from pipelines.console.guidance import guidance
 from pipelines.console.live_adapter import LiveAdapter
@@ -52,6 +55,22 @@ def test_what_is_not_connected_is_told(over_nothing: LiveAdapter) -> None:
     assert not health.resumable
     assert over_nothing.state.name == "disconnected"
     assert over_nothing.picture(1) is None
+
+
+def test_heads_that_are_not_homed_are_a_warning(over_nothing: LiveAdapter, monkeypatch: pytest.MonkeyPatch) -> None:
+    report = Report("Idle", None, None)
+    for homed, level, words in (
+        (False, "warning", "where the heads stand is not known"),
+        (True, "ok", "the heads stand"),
+    ):
+        board = SimpleNamespace(watches_door=True, homed=homed)
+        log = SimpleNamespace(between=lambda *_: [])
+        state = state_from(report, homed=homed, alarm=None)
+        heads = SimpleNamespace(board=board, log=log, state=state, close=lambda: None)
+        monkeypatch.setattr(over_nothing._scanner, "_heads", heads)
+        controller, head, *_ = over_nothing.health().devices
+        assert (controller.name, controller.level, controller.words) == ("Controller", level, words)
+        assert controller.remedy == head.remedy == ("" if homed else "home the heads")
 
 
 def calibration_of(over: LiveAdapter) -> Device:
