@@ -17,6 +17,7 @@ from pipelines.console.scanner import Device
 from pipelines.live.scanner import STOPPED, LiveScanner
 from pipelines.live.state import ScannerState
 from schemas.base.errors import FootscanError
+from schemas.calibration import Calibration
 from schemas.rig import Rig
 
 RIG = {
@@ -49,7 +50,7 @@ def test_what_is_not_connected_is_told(over_nothing: LiveAdapter) -> None:
     assert told["Head 2"] == ("unknown", "position unknown")
     assert told["Camera 5"] == ("unknown", "not open")
     assert told["Passes"] == ("ok", "All 2 cameras in one pass: cameras 1, 5 on no USB bus of this computer.")
-    assert told["Calibration"] == ("unknown", "was not checked")
+    assert told["Calibration"] == ("unknown", "calibration; not checked")
     assert told["Disk"][1].endswith("GB are free for scans")
     assert health.cameras == (1, 5)
     assert not health.resumable
@@ -89,13 +90,28 @@ def test_the_last_check_of_the_calibration_is_told_before_a_scan(over_nothing: L
     store_check(calibration, made_check(calibration, yesterday.isoformat(), {1: 0.03, 5: 0.02}))
     device = calibration_of(over_nothing)
     assert (device.level, device.remedy) == ("ok", "")
-    assert device.words == f"checked on {yesterday.date()}, 1 day ago: every camera was within 0.03 mm"
+    assert device.words == f"calibration; checked on {yesterday.date()}, 1 day ago: every camera was within 0.03 mm"
     (tmp_path / "calibration.check.json").write_text("{}")
     device = calibration_of(over_nothing)
     assert (device.level, device.words.partition(": ")[0]) == ("bad", str(tmp_path / "calibration.check.json"))
     calibration.write_text("made anew")
     (tmp_path / "calibration.check.json").unlink()
-    assert calibration_of(over_nothing).words == "was not checked"
+    assert calibration_of(over_nothing).words == "calibration; not checked"
+
+
+def test_the_calibration_in_use_and_its_day_are_told(
+    over_nothing: LiveAdapter, tmp_path: Path, calibration: Callable[..., Calibration]
+) -> None:
+    now = datetime.datetime.now().astimezone()
+    for days, level, words in (
+        (0, "ok", "made today"),
+        (1, "unknown", f"made on {now.date() - datetime.timedelta(1)}"),
+    ):
+        made = calibration().model_copy(update={"created": now - datetime.timedelta(days)})
+        (tmp_path / "calibration.json").write_text(made.model_dump_json())
+        device = calibration_of(over_nothing)
+        age = ", 1 day ago" if days else ""
+        assert (device.level, device.words) == (level, f"calibration, {words}{age}; not checked since")
 
 
 def test_orders_to_nothing_are_faults_and_a_stop_is_none(over_nothing: LiveAdapter, tmp_path: Path) -> None:
