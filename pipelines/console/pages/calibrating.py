@@ -19,6 +19,7 @@ _MAIN = """\
 <button id="usual" class="main" type="button">Begin</button>
 <p id="usual-told" class="note" aria-live="polite"></p>
 <div id="others-now" class="row"></div>
+<p id="price" class="note" aria-live="polite"></p>
 <details id="all-placements" hidden><summary>All placements</summary><div id="numbers" class="row"></div></details>
 </section>
 <section id="machine"><h2>Scanner</h2>

@@ -158,6 +158,7 @@
     }
     showNumbers(view, why);
     showSteps(view, why);
+    say(element("price"), view.price);
     showOutcome(view);
     const covered = Object.entries(view.coverage);
     element("covered").hidden = !covered.length || Boolean(view.outcome);

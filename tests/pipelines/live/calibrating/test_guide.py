@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -243,3 +244,11 @@ def test_light_that_was_wrong_is_chosen_anew(scanner: StandingStandIn, tmp_path:
     guide.take()
     guide.take()
     assert [light is None for light in scanner.lights] == [True, False]
+
+
+def test_a_calibration_from_few_placements_has_a_price() -> None:
+    view = View("look", "", ("next", "finish"), "calibration", placements=((0, 0),) * 10, taken=range(5))
+    assert view.price.startswith("5 of 10 placements: the calibration holds only in the regions")
+    assert view.as_json()["price"] == view.price
+    for free in ({"taken": range(10)}, {"actions": ("next",)}, {"purpose": "check"}):
+        assert replace(view, **free).price == ""
