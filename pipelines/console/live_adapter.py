@@ -183,8 +183,8 @@ class LiveAdapter:
         counts = {"torn": stream.torn, "repeated": stream.repeated, "overflowed": stream.overflowed}
         defects = [f"{count} {defect}" for defect, count in counts.items() if count]
         if defects:
-            return Device(name, "warning", f"{stream.received} frames, of these {', '.join(defects)}", CABLE)
-        return Device(name, "ok", f"{stream.received} frames")
+            return Device(name, "warning", f"{_frames(stream.received)}, of these {', '.join(defects)}", CABLE)
+        return Device(name, "ok", _frames(stream.received))
 
     def _plan(self) -> Iterator[Device]:
         if self._plan_problem is not None:
@@ -224,6 +224,10 @@ class LiveAdapter:
             return self._scanner.heads.state.name in {"door", "held"}
         except FootscanError:
             return False
+
+
+def _frames(count: int) -> str:
+    return f"{count} frame{'s' * (count != 1)}"
 
 
 def _day_made(calibration: Path) -> datetime.date | None:

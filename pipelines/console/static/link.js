@@ -97,10 +97,12 @@ const footscan = (() => {
     for (const listener of listeners) listener(seen);
   }
 
+  const counted = (count, what) => `${count.toLocaleString("en")} ${what}${count === 1 ? "" : "s"}`;
+
   // Not announced by a screen reader: it changes every second.
   function countOf(frames) {
     const counts = Object.values(frames);
-    return `${counts.reduce((sum, count) => sum + count, 0).toLocaleString("en")} frames of ${counts.length} cameras`;
+    return `${counted(counts.reduce((sum, count) => sum + count, 0), "frame")} of ${counted(counts.length, "camera")}`;
   }
 
   function lost() {
@@ -160,7 +162,7 @@ const footscan = (() => {
   follow();
 
   return {
-    act, say, element, made,
+    act, say, element, made, counted,
     // Calls `listener` with the latest state, and with each new one.
     listen(listener) {
       listeners.push(listener);

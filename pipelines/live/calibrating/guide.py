@@ -311,7 +311,7 @@ class Guide:
 
     def _to_stored(self, step: Step, stored: StoredCalibration) -> None:
         self._stored = stored
-        columns = ("camera", "points", "own rms mm", "held-out rms mm")
+        columns = ("camera", "points", "error, mm", "error on placements left out, mm")
         outcome = Outcome(columns, stored.rows(), stored.remarks(), str(stored.file), has_picture=True)
         more: tuple[Action, ...] = ("body",) if step == "calibrated" else ()
         advice = " A film of the body would show where the laser planes lie, too." if more else ""
@@ -321,7 +321,7 @@ class Guide:
         )
 
     def _to_checked(self, stored: StoredCheck) -> None:
-        columns = ("camera", "points", "Y mm", "Z mm", "off rms mm", "verdict")
+        columns = ("camera", "points", "off in Y, mm", "off in Z, mm", "off in all, mm", "verdict")
         outcome = Outcome(
             columns, stored.rows(), stored.remarks(), str(stored.file), is_well=stored.check.verdict == "steady"
         )
