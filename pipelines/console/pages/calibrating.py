@@ -16,7 +16,7 @@ _MAIN = """\
 <p id="step-words" role="status"></p>
 <ul id="complaints" role="alert" hidden></ul>
 <div id="placement" hidden></div>
-<button id="usual" class="main" type="button">Begin</button>
+<button id="usual" class="main" type="button" hidden>Begin</button>
 <p id="usual-told" class="note" aria-live="polite"></p>
 <div id="others-now" class="row"></div>
 <p id="price" class="note" aria-live="polite"></p>
