@@ -23,10 +23,12 @@ def guidance(state: ScannerState, health: Health, action: str | None) -> str:
         return "Keep your hands off, and do not look into the light."
     if state.name == "door open":
         return _CLOSE if is_scanning and health.resumable else _CLOSE_THEN_HOME
-    if state.name not in {"idle", "done", "failed"}:
+    if state.name not in {"idle", "preparing", "done", "failed"}:
         return _DO.get(state.name, "")
     if is_scanning:
         return "The scan is being prepared."
+    if state.name == "preparing":
+        return ""
     remedies = [
         f"{device.name}: {device.remedy or device.words}." for device in health.devices if device.level == "bad"
     ]

@@ -4,6 +4,7 @@ import datetime
 import shutil
 import time
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
 
@@ -18,6 +19,7 @@ from pipelines.live.scanner import REPORT_SECONDS, LiveScanner
 from pipelines.live.state import OnState, ScannerState
 from pipelines.live.storing import ScanName, next_scan_name
 from schemas.base.errors import FootscanError
+from schemas.calibration import read_calibration
 
 JOG_MM_PER_S = 20.0
 SHINE_SECONDS = 4.0
@@ -27,7 +29,10 @@ CAMERA_BYTES = 40_000 * 400
 """Largest size of a camera's part of a scan with laser-off frames: bytes per frame x frames."""
 LEAST_SCANS, FEW_SCANS = 2, 20
 """The disk is bad below, and a warning is shown below, this many times the size of a scan; chosen by hand."""
-LEVELS: dict[str, Level] = {"lost": "bad", "closed": "bad", "alarm": "bad", "door": "warning", "held": "warning"}
+LEVELS: dict[str, Level] = {
+    "lost": "bad", "closed": "bad", "alarm": "bad", "door": "warning", "held": "warning", "not homed": "warning"
+}  # fmt: skip
+"""Level of the controller in a state of the board; in others it is well."""
 CABLE = "check its cable and hub, then connect again"
 
 
@@ -111,7 +116,7 @@ class LiveAdapter:
     def film(self, patient: str, side: Side, *, keep_partial: bool) -> Scanned:
         """As `Scanner.film`."""
         if self._glass is not None and side != self._glass.subject:
-            with self._scanner.waiting_for(f"a virtual {side} foot is put onto the glass") as progress:
+            with self._scanner.waiting_for(f"putting the virtual {side} foot onto the glass") as progress:
                 self._glass.put(side, progress)
         today = datetime.datetime.now().astimezone().date()
         name = ScanName(patient, next_scan_name(self._archive, patient, side, today), side, today)
@@ -178,8 +183,8 @@ class LiveAdapter:
         counts = {"torn": stream.torn, "repeated": stream.repeated, "overflowed": stream.overflowed}
         defects = [f"{count} {defect}" for defect, count in counts.items() if count]
         if defects:
-            return Device(name, "warning", f"{stream.received} frames, of these {', '.join(defects)}", CABLE)
-        return Device(name, "ok", f"{stream.received} frames")
+            return Device(name, "warning", f"{_frames(stream.received)}, of these {', '.join(defects)}", CABLE)
+        return Device(name, "ok", _frames(stream.received))
 
     def _plan(self) -> Iterator[Device]:
         if self._plan_problem is not None:
@@ -188,17 +193,22 @@ class LiveAdapter:
             yield Device("Passes" if len(self._passes) == 1 else f"Pass {number}", "ok", planned.reason)
 
     def _checked(self) -> Device:
-        """The last check of the calibration: a camera that moved since makes all measures uncertain."""
+        """The calibration in use and its last check: a camera that moved since makes all measures uncertain."""
         rig = self._scanner.rig
         if rig.calibration is None:
             return Device("Calibration", "bad", "the scanner has none", "calibrate it")
+        file = Path(rig.calibration)
         try:
-            check = scanner_check(Path(rig.calibration), [camera.id for camera in rig.cameras])
+            check = scanner_check(file, [camera.id for camera in rig.cameras])
         except FootscanError as error:
             return Device("Calibration", "bad", str(error))
+        today, made = datetime.datetime.now().astimezone().date(), _day_made(file)
+        words = file.stem if made is None else f"{file.stem}, made {_day_in_words(made, today)}"
         if check is None:
-            return Device("Calibration", "unknown", "was not checked")
-        return Device("Calibration", "bad" if check.doubt else "ok", check.summary("ago"), check.doubt or "")
+            since = "" if made is None else " since"
+            return Device("Calibration", "ok" if made == today else "unknown", f"{words}; not checked{since}")
+        level: Level = "bad" if check.doubt else "ok"
+        return Device("Calibration", level, f"{words}; {check.summary('ago')}", check.doubt or "")
 
     def _space(self) -> Device:
         existing = next(folder for folder in (self._archive, *self._archive.absolute().parents) if folder.exists())
@@ -214,6 +224,30 @@ class LiveAdapter:
             return self._scanner.heads.state.name in {"door", "held"}
         except FootscanError:
             return False
+
+
+def _frames(count: int) -> str:
+    return f"{count} frame{'s' * (count != 1)}"
+
+
+def _day_made(calibration: Path) -> datetime.date | None:
+    """The local day on which a calibration was made; None if its file cannot be read or does not say."""
+    try:
+        return _day_in_file(calibration, calibration.stat().st_mtime_ns)
+    except (OSError, FootscanError):
+        return None
+
+
+@lru_cache(maxsize=4)
+def _day_in_file(calibration: Path, _changed_ns: int) -> datetime.date | None:
+    """As `_day_made`; pages ask once a second, and the file is read again only after a change."""
+    created = read_calibration(calibration).created
+    return None if created is None else created.astimezone().date()
+
+
+def _day_in_words(day: datetime.date, today: datetime.date) -> str:
+    days = (today - day).days
+    return "today" if days == 0 else f"on {day}" + (f", {days} day{'s' * (days > 1)} ago" if days > 0 else "")
 
 
 def _planned(scanner: LiveScanner) -> tuple[list[Pass], str | None]:

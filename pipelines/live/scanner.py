@@ -141,11 +141,11 @@ class LiveScanner:
 
     @contextmanager
     def waiting_for(self, words: str) -> Iterator[Callable[[int, int], None]]:
-        """Reserve the scanner during a preparation outside of it; yields a function that reports the progress."""
-        with self._at_work("idle", words), self._stop_reported():
-            yield lambda done, total: self._board.tell("idle", words, done / total)
+        """Reserve the scanner for work that needs no device; yields a function that reports the progress."""
+        with self._at_work("preparing", words), self._stop_reported():
+            yield lambda done, total: self._board.tell("preparing", words, done / total)
             self._refuse_stopped()
-            self._board.tell("idle")
+            self._board.tell("disconnected" if self._heads is None else "idle")
 
     def scan(self, order: ScanOrder) -> LiveResult:
         """Film, store, reconstruct and measure a foot.

@@ -12,7 +12,10 @@ from schemas.base.errors import FootscanError, RefusedInput
 
 log = logging.getLogger("footscan.live")
 
-Activity = Literal["disconnected", "idle", "homing", "filming", "storing", "reconstructing", "done", "failed"]
+Activity = Literal[
+    "disconnected", "idle", "preparing", "homing", "filming", "storing", "reconstructing", "done", "failed"
+]  # fmt: skip
+"""`preparing`: the scanner is reserved for work that needs none of its devices, such as a calculation."""
 StateName = Activity | Literal["door open", "alarm"]
 
 

@@ -51,18 +51,20 @@ def test_a_scanner_is_calibrated_and_checked(
     press("Place the object")
     expect(page.locator("#placement .where")).to_have_text("Y = 0 mm, on the glass")
     usual.click()
-    expect(words).to_have_text("A virtual object stands there now. Film it.")
-    press("Judge the placement")
+    expect(words).to_contain_text(": a virtual object stands there now. Film it.")
+    press("Placement 1: good")
     expect(words).to_have_text("Placement 1 is good.")
     expect(page.locator("#stripes")).to_have_attribute("alt", re.compile(r"^camera 1: \d %, .*, camera 8: \d %$"))
     press("Place the object")
+    expect(page.locator("#numbers button[aria-label*='= -']")).to_have_count(0)  # a minus, no hyphen
     page.click("[data-action=take]")  # the object was not moved
+    expect(name).to_have_text("Placement 2: film again")
     expect(page.locator("#complaints")).to_contain_text("move it 40.0 mm towards +Y and move it 14.0 mm up")
 
     # From here by the keyboard: the button that had the focus keeps it, whatever it is called.
     usual.focus()
     for says in (
-        "Film it again",
+        "Film this placement",
         "Next placement",
         "Put the virtual object there",
         "Film this placement",
@@ -78,12 +80,16 @@ def test_a_scanner_is_calibrated_and_checked(
     press("The calibration is in use")
     assert read_rig(tmp_path / "rig.yaml").calibration == glass.rig.calibration
 
-    press("Calibrate or check")
+    expect(usual).to_have_text("Scan a foot")
+    usual.click()
+    expect(page.locator("#start")).to_have_text("Scan the right foot")
+    page.click("text=Calibrate or check")
+    expect(name).to_have_text("Calibrate or check")
     assert usual.inner_text() == "Check the calibration"
     press("Place the object")
     usual.click()
-    expect(words).to_have_text("A virtual object stands there now. Film it.")
-    press("Judge the placement")
+    expect(words).to_contain_text(": a virtual object stands there now. Film it.")
+    press("Placement 1: good")
     press("The calibration is checked")
     expect(words).to_contain_text("The calibration holds: every camera is within 0.0")
     expect(page.locator("#outcome-picture")).to_be_hidden()

@@ -130,6 +130,7 @@ def test_a_scanner_is_calibrated_and_measures_a_foot(browser: Any) -> None:
         wait_until(lambda: sitting.state == "Ready")
         page.click("text=Calibrate or check")
         name, usual = page.locator("#step-name"), page.locator("#usual")
+        expect(usual).to_be_visible()
         if usual.inner_text() != "Calibrate the scanner":
             page.click("[data-action=calibrate]")
         for number in range(1, PLACEMENTS + 1):
@@ -142,6 +143,7 @@ def test_a_scanner_is_calibrated_and_measures_a_foot(browser: Any) -> None:
             sitting.picture(f"placement-{number}")
             if number < PLACEMENTS:
                 usual.click()
+        expect(page.locator("#price")).to_contain_text(f"{PLACEMENTS} of 10 placements: ")
         page.click("[data-action=finish]")
         expect(name).to_have_text("The scanner is calibrated", timeout=WORK_MS)
         sitting.picture("calibrated")

@@ -182,6 +182,8 @@ def _tell(guide: "Guide") -> None:
         write_atomically(picture, guide.picture().encode())
         shares = ", ".join(f"{camera}: {100 * share:.0f} %" for camera, share in sorted(view.coverage.items()))
         message(f"covered of each camera's picture so far: {shares} ({picture})")
+    if view.price:
+        message(view.price)
 
 
 def _ask(view: "View") -> "Action | int | None":

@@ -16,9 +16,10 @@ _MAIN = """\
 <p id="step-words" role="status"></p>
 <ul id="complaints" role="alert" hidden></ul>
 <div id="placement" hidden></div>
-<button id="usual" class="main" type="button">Begin</button>
+<button id="usual" class="main" type="button" hidden>Begin</button>
 <p id="usual-told" class="note" aria-live="polite"></p>
 <div id="others-now" class="row"></div>
+<p id="price" class="note" aria-live="polite"></p>
 <details id="all-placements" hidden><summary>All placements</summary><div id="numbers" class="row"></div></details>
 </section>
 <section id="machine"><h2>Scanner</h2>

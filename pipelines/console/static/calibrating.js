@@ -6,22 +6,37 @@
   const NAMES = {put: "Put the virtual object there", take: "Film this placement", next: "Next placement",
     discard: "Discard this session", body: "Film the body, too", "film-body": "Film the body", use: "Use it for scans",
     calibrate: "Calibrate the scanner", check: "Check the calibration"};
-  const STEPS = {begin: "Calibrate or check", place: "Place the object", look: "Judge the placement",
+  const STEPS = {begin: "Calibrate or check", place: "Place the object",
     filmed: "All placements are filmed", calibrated: "The scanner is calibrated", body: "Place the body",
     planes: "The laser planes are found", used: "The calibration is in use", checked: "The calibration is checked"};
   const SURE_MS = 5000;
-  let usual = "", drawn = "", shown = "", told = "";
+  let usual = "", step = "", drawn = "", shown = "", told = "";
+
+  // The minus of a number, or of an axis, is longer than a hyphen.
+  const minus = words => words.replace(/(?<!\w)-(?=[\dYZ])/g, "−");
+
+  function headingOf({step, number, complaints}) {
+    if (step !== "look") return STEPS[step];
+    return `Placement ${number + 1}: ${complaints.length ? "film again" : "good"}`;
+  }
 
   function nameOf(action, view) {
     if (action === "finish") return view.purpose === "check" ? "Check the calibration" : "Calibrate";
     if (action === "take" && view.step === "look") return "Film it again";
     if (action === "put" && view.step === "body") return "Put the virtual body there";
+    if (action === "end" && view.step === "used") return "Scan a foot";
     if (action === "end" && ["used", "checked"].includes(view.step)) return "Done";
     if (action === "end") return view.outcome ? "Leave without using it" : "Leave; what is filmed stays";
     return NAMES[action];
   }
 
   const give = (action, number = 0) => act("calibrate", {action, number});
+
+  async function giveUsual() {
+    const scans = usual === "end" && step === "used";
+    const problem = await give(usual);
+    if (scans && !problem) location.assign("/");
+  }
 
   function button(action, view) {
     const node = made("button", nameOf(action, view));
@@ -58,7 +73,7 @@
     const all = view.placements.flatMap(([dy, dz]) => view.profile.map(([y, z]) => [y + dy, z + dz]));
     const reach = Math.max(...all.map(([y]) => Math.abs(y))) + 15, top = Math.max(...all.map(([, z]) => z)) + 16;
     const svg = node("svg", {viewBox: `${-reach} ${-top} ${2 * reach} ${top + 24}`, role: "img",
-      "aria-label": `The object at Y = ${at[0]} mm, ${at[1]} mm above the glass, seen from the front`});
+      "aria-label": minus(`The object at Y = ${at[0]} mm, ${at[1]} mm above the glass, seen from the front`)});
     const outline = corners => corners.map(([y, z]) => `${y},${-z}`).join(" ");
     for (const number of view.taken) {
       const [dy, dz] = view.placements[number];
@@ -72,7 +87,7 @@
     svg.append(node("text", {x: 2 - reach, y: 9}, "−Y"));
     svg.append(node("text", {x: reach - 2, y: 8 - top, "text-anchor": "end"}, "seen from +X"));
     svg.append(node("text", {x: 0, y: 20, "text-anchor": "middle", class: "where"},
-      `Y = ${at[0]} mm${at[1] ? `, raised by ${at[1]} mm` : ", on the glass"}`));
+      minus(`Y = ${at[0]} mm${at[1] ? `, raised by ${at[1]} mm` : ", on the glass"}`)));
     element("placement").replaceChildren(svg);
   }
 
@@ -83,6 +98,7 @@
       const within = element("others-now").contains(focused) || element("numbers").contains(focused);
       shown = now;
       usual = view.actions[0] || "";
+      step = view.step;
       say(element("usual"), usual ? nameOf(usual, view) : "");
       element("usual").hidden = !usual;
       element("others-now").replaceChildren(...view.actions.slice(1).filter(action => action !== "go")
@@ -101,7 +117,7 @@
     element("numbers").replaceChildren(...view.placements.map(([y, z], number) => {
       const taken = view.taken.includes(number), one = made("button", `${number + 1}${taken ? " ✓" : ""}`);
       one.type = "button";
-      one.setAttribute("aria-label", `Placement ${number + 1}: Y = ${y} mm, Z = ${z} mm${taken ? ", filmed" : ""}`);
+      one.setAttribute("aria-label", minus(`Placement ${number + 1}: Y = ${y} mm, Z = ${z} mm${taken ? ", filmed" : ""}`));
       if (number === view.number) one.setAttribute("aria-current", "step");
       press(one, () => give("go", number));
       allow(one, why);
@@ -115,11 +131,11 @@
     if (!outcome || told === JSON.stringify(outcome)) return;
     told = JSON.stringify(outcome);
     element("outcome").dataset.level = outcome.is_well ? "ok" : "bad";
-    element("remarks").replaceChildren(...outcome.remarks.map(words => made("li", words)));
+    element("remarks").replaceChildren(...outcome.remarks.map(words => made("li", minus(words))));
     element("outcome-columns").replaceChildren(...outcome.columns.map(words => made("th", words)));
     element("outcome-rows").replaceChildren(...outcome.rows.map(row => {
       const line = made("tr");
-      line.append(...row.map(cell => made("td", cell)));
+      line.append(...row.map(cell => made("td", minus(cell))));
       return line;
     }));
     say(element("outcome-file"), outcome.file);
@@ -143,9 +159,9 @@
     }
     const why = there || (now.state.name === "door open" ? "Close the door first." : "")
       || (now.state.name === "alarm" ? "Home the heads first." : "");
-    say(element("step-name"), STEPS[view.step]);
-    say(element("step-words"), view.words);
-    const complaints = element("complaints"), words = view.complaints.map(one => one.words);
+    say(element("step-name"), headingOf(view));
+    say(element("step-words"), minus(view.words));
+    const complaints = element("complaints"), words = view.complaints.map(one => minus(one.words));
     complaints.hidden = !words.length;
     if ([...complaints.children].map(one => one.textContent).join("\n") !== words.join("\n"))
       complaints.replaceChildren(...words.map(one => made("li", one)));
@@ -158,6 +174,7 @@
     }
     showNumbers(view, why);
     showSteps(view, why);
+    say(element("price"), view.price);
     showOutcome(view);
     const covered = Object.entries(view.coverage);
     element("covered").hidden = !covered.length || Boolean(view.outcome);
@@ -169,6 +186,6 @@
   }
 
   listen(show);
-  press(element("usual"), () => give(usual));
+  press(element("usual"), giveUsual);
   for (const id of ["connect", "home", "shine"]) press(element(id), () => act(id));
 })();

@@ -1,7 +1,7 @@
 // Live pictures of the cameras, on the pages that have a place for them.
 "use strict";
 (() => {
-  const {element, listen, made, say} = footscan;
+  const {counted, element, listen, made, say} = footscan;
   const CLEAR_POINTS = 100;  // glints of the scanner itself give some points
   let seen = null, pictured = "";
 
@@ -22,9 +22,12 @@
       const figure = element(`camera-${camera}`);
       const device = devices.find(part => part.name === `Camera ${camera}`);
       figure.dataset.level = device ? device.level : "unknown";
-      if (state.name === "filming") say(figure.querySelector("span"), `${frames[camera] ?? 0} frames`);
+      if (state.name === "filming") say(figure.querySelector("span"), counted(frames[camera] ?? 0, "frame"));
     }
   }
+
+  // In the dark, the search for the stripe finds room light and glints.
+  const mayShine = ({action, state}) => action === "shine" || state.name === "filming";
 
   // One picture after another, so as not to overload a slow line; less often while the scanner films.
   async function lookOn() {
@@ -39,6 +42,7 @@
     const figure = element(`camera-${camera}`);
     if (!figure) return;
     const picture = figure.querySelector("img"), caption = figure.querySelector("span");
+    const litBefore = mayShine(seen);
     try {
       const answer = await fetch(`/cameras/${camera}.jpg`), is = answer.status === 200;
       const old = picture.src;
@@ -47,10 +51,11 @@
       if (!is) picture.removeAttribute("src");
       picture.hidden = !is;
       figure.querySelector(".dark").hidden = is;
-      const points = Number(answer.headers.get("X-Stripe-Points") || 0);
-      picture.alt = is ? `Camera ${camera} now, ${points < CLEAR_POINTS ? "no clear stripe in it" : "with the stripe found"}` : "";
-      if (seen.state.name !== "filming")
-        say(caption, is ? (points < CLEAR_POINTS ? "no clear stripe" : `stripe: ${points} points`) : "no picture");
+      const points = Number(answer.headers.get("X-Stripe-Points") || 0), lit = litBefore && mayShine(seen);
+      const clear = points >= CLEAR_POINTS, found = clear ? ", with the stripe found" : ", no clear stripe in it";
+      picture.alt = is ? `Camera ${camera} now${lit ? found : ""}` : "";
+      const words = lit ? (clear ? `stripe: ${points} points` : "no clear stripe") : "live";
+      if (seen.state.name !== "filming") say(caption, is ? words : "no picture");
     } catch {
       picture.hidden = true;
       figure.querySelector(".dark").hidden = false;

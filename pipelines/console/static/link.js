@@ -1,8 +1,8 @@
 // The link between a page and the server: the stream of states, orders, and Stop, which is always available.
 "use strict";
 const footscan = (() => {
-  const NAMES = {disconnected: "Not connected", idle: "Ready", homing: "Homing", filming: "Filming", storing: "Storing",
-    reconstructing: "Reconstructing", done: "Done", failed: "Failed", "door open": "Door open", alarm: "Alarm"};
+  const NAMES = {disconnected: "Not connected", idle: "Ready", preparing: "Please wait", homing: "Homing",
+    filming: "Filming", storing: "Storing", reconstructing: "Reconstructing", done: "Done", failed: "Failed", "door open": "Door open", alarm: "Alarm"};
   const LEVELS = {disconnected: "bad", idle: "ok", done: "ok", failed: "bad", alarm: "bad", "door open": "warning"};
   const PRESENT_MS = 150, STOP_SOON_MS = 60, STOP_LATE_MS = 1000;
   const SWITCH = "The server does not answer. To switch the lasers off at once, use the scanner’s own switch.";
@@ -97,10 +97,12 @@ const footscan = (() => {
     for (const listener of listeners) listener(seen);
   }
 
+  const counted = (count, what) => `${count.toLocaleString("en")} ${what}${count === 1 ? "" : "s"}`;
+
   // Not announced by a screen reader: it changes every second.
   function countOf(frames) {
     const counts = Object.values(frames);
-    return `${counts.reduce((sum, count) => sum + count, 0).toLocaleString("en")} frames of ${counts.length} cameras`;
+    return `${counted(counts.reduce((sum, count) => sum + count, 0), "frame")} of ${counted(counts.length, "camera")}`;
   }
 
   function lost() {
@@ -160,7 +162,7 @@ const footscan = (() => {
   follow();
 
   return {
-    act, say, element, made,
+    act, say, element, made, counted,
     // Calls `listener` with the latest state, and with each new one.
     listen(listener) {
       listeners.push(listener);

@@ -131,9 +131,10 @@ class Guide:
         )
         words = ""
         if earlier is not None:
-            frames = {number: session.frames(number) for number in session.numbers}
-            for damaged in self._seen.recall(frames, session.reference):
-                session.drop(damaged)
+            with self._scanner.waiting_for("reading the interrupted session"):
+                frames = {number: session.frames(number) for number in session.numbers}
+                for damaged in self._seen.recall(frames, session.reference):
+                    session.drop(damaged)
             day = datetime.date.fromtimestamp(earlier.folder.stat().st_mtime).isoformat()
             words = f"An interrupted session of {day} goes on: discard it if a camera was touched since. "
         self._to_place(self._free_number(), words)
@@ -142,13 +143,17 @@ class Guide:
         """Put what is to be filmed onto the glass of a virtual scanner."""
         self._need("put")
         assert self._put is not None
-        what, subject = "body", "body"
-        if self._view.step != "body":
-            what, subject = "object", f"reference {self._view.number}"
-        with self._scanner.waiting_for(f"a virtual {what} is put onto the glass") as progress:
+        number = self._view.number
+        step: Step = "body" if self._view.step == "body" else "place"
+        if step == "body" or number is None:
+            what, subject, words = "body", "body", "A"
+        else:
+            what, subject, words = "object", f"reference {number}", f"{self._placement(number)}: a"
+        with self._scanner.waiting_for(f"putting the virtual {what} onto the glass") as progress:
             self._put(subject, progress)
+        words = f"{words} virtual {what} stands there now. Film it."
         actions = tuple(action for action in self._view.actions if action != "put")
-        self._show(replace(self._view, words=f"A virtual {what} stands there now. Film it.", actions=actions))
+        self._show(replace(self._view, step=step, words=words, complaints=(), actions=actions))
 
     def take(self) -> None:
         """Film the present placement, and judge it while the object stands there."""
@@ -157,18 +162,13 @@ class Guide:
         assert number is not None
         stills = self._scanner.stills(self._light)
         self._light = stills.light
-        if not stills.problems:
-            frames = {camera: jpeg for camera, (_, jpeg) in stills.frames.items()}
-            session.keep(number, frames)
-            self._seen.add(number, frames)
-        complaints = self._seen.judge(
-            number,
-            stills,
-            session.reference,
-            session.numbers,
-            self._settings.placement_tolerance_mm,
-            self._known(),
-        )
+        try:
+            with self._scanner.waiting_for("judging the placement"):
+                complaints = self._kept_and_judged(session, number, stills)
+        except BaseException:  # such as a stop: a placement that was not judged is filmed again
+            if not stills.problems:
+                session.drop(number)
+            raise
         self._to_look(number, complaints, is_kept=not stills.problems)
 
     def next(self) -> None:
@@ -190,7 +190,7 @@ class Guide:
         session, settings = self._in_session(), self._settings
         rig = self._scanner.rig
         numbers = session.numbers
-        words = "the scanner is calibrated" if self._view.purpose == "calibration" else "the calibration is checked"
+        words = "calculating the calibration" if self._view.purpose == "calibration" else "checking the calibration"
         try:
             with self._scanner.waiting_for(words):
                 session.finish(still_x_mm(rig))
@@ -234,7 +234,7 @@ class Guide:
         assert stored is not None
         film = session.folder / "body"
         self._scanner.film_body(film, self._body, self._light)
-        with self._scanner.waiting_for("the laser planes are found"):
+        with self._scanner.waiting_for("finding the laser planes"):
             stored = add_planes(stored, film, self._scanner.rig, self._body)
         self._to_stored("planes", stored)
 
@@ -259,6 +259,14 @@ class Guide:
             words = "The scanner has no calibration yet: calibrate it with the reference object."
         return View("begin", words, ("check", "calibrate") if is_calibrated else ("calibrate",))
 
+    def _kept_and_judged(self, session: FilmedPlacements, number: int, stills: Stills) -> list[Complaint]:
+        if not stills.problems:
+            frames = {camera: jpeg for camera, (_, jpeg) in stills.frames.items()}
+            session.keep(number, frames)
+            self._seen.add(number, frames)
+        tolerance_mm = self._settings.placement_tolerance_mm
+        return self._seen.judge(number, stills, session.reference, session.numbers, tolerance_mm, self._known())
+
     def _to_place(self, number: int | None, before: str = "", complaints: tuple[Complaint, ...] = ()) -> None:
         session = self._in_session()
         if number is None:
@@ -270,7 +278,7 @@ class Guide:
         x_mm = still_x_mm(self._scanner.rig)
         height = "on the glass" if z == 0 else f"raised by {z:g} mm"
         words = (
-            f"{before}Placement {number + 1} of {len(session.reference.placements_mm)}: stand the object at "
+            f"{before}{self._placement(number)}: stand the object at "
             f"Y = {_signed(y)} mm, {height}, across the laser's plane at X = {x_mm:g} mm. Then film it."
         )
         actions = (*self._puts(), "take", *self._enough(), "go", "discard", "end")
@@ -303,7 +311,7 @@ class Guide:
 
     def _to_stored(self, step: Step, stored: StoredCalibration) -> None:
         self._stored = stored
-        columns = ("camera", "points", "own rms mm", "held-out rms mm")
+        columns = ("camera", "points", "error, mm", "error on placements left out, mm")
         outcome = Outcome(columns, stored.rows(), stored.remarks(), str(stored.file), has_picture=True)
         more: tuple[Action, ...] = ("body",) if step == "calibrated" else ()
         advice = " A film of the body would show where the laser planes lie, too." if more else ""
@@ -313,7 +321,7 @@ class Guide:
         )
 
     def _to_checked(self, stored: StoredCheck) -> None:
-        columns = ("camera", "points", "Y mm", "Z mm", "off rms mm", "verdict")
+        columns = ("camera", "points", "off in Y, mm", "off in Z, mm", "off in all, mm", "verdict")
         outcome = Outcome(
             columns, stored.rows(), stored.remarks(), str(stored.file), is_well=stored.check.verdict == "steady"
         )
@@ -348,6 +356,9 @@ class Guide:
     def _in_session(self) -> FilmedPlacements:
         assert self._session is not None, "an action of a session is allowed in one only"
         return self._session
+
+    def _placement(self, number: int) -> str:
+        return f"Placement {number + 1} of {len(self._view.placements)}"
 
     def _puts(self) -> tuple[Action, ...]:
         return () if self._put is None else ("put",)

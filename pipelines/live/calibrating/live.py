@@ -1,7 +1,7 @@
 """The live scanner as the guide needs it."""
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 from footscan.calibration.travel.body import Body
@@ -38,9 +38,11 @@ class LiveStanding:
         with _stop_in_words():
             film_body(self._scanner, place, body, light)
 
-    def waiting_for(self, words: str) -> AbstractContextManager[Callable[[int, int], None]]:
+    @contextmanager
+    def waiting_for(self, words: str) -> Iterator[Callable[[int, int], None]]:
         """As `StandingScanner.waiting_for`."""
-        return self._scanner.waiting_for(words)
+        with _stop_in_words(), self._scanner.waiting_for(words) as progress:
+            yield progress
 
 
 @contextmanager

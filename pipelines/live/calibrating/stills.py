@@ -30,7 +30,7 @@ def live_stills(scanner: LiveScanner, light: ScanLight | None) -> Stills:
     x_mm = still_x_mm(scanner.rig)
     frames: dict[int, tuple[bytes, bytes]] = {}
     problems: dict[int, str] = {}
-    with scanner.ready("the reference object is filmed"):
+    with scanner.ready("the reference object"):
         passes = passes_of(scanner.rig, [camera.id for camera in scanner.rig.cameras])
         if light is None:
             light = scanner.measured_light(passes, [x_mm])

@@ -61,6 +61,18 @@ class View:
         """True if the session came to a result that gives no cause to act."""
         return self.outcome is not None and self.outcome.is_well
 
+    @property
+    def price(self) -> str:
+        """What it costs to calibrate from the placements that are filmed by now; empty if that is not offered."""
+        taken, all_of = len(self.taken), len(self.placements)
+        if self.purpose != "calibration" or "finish" not in self.actions or taken == all_of:
+            return ""
+        return (
+            f"{taken} of {all_of} placements: the calibration holds only in the regions that are drawn as covered. "
+            "Film all for whole feet."
+        )
+
     def as_json(self) -> dict[str, Any]:
         """The view as a JSON object."""
-        return asdict(self) | {"coverage": {str(camera): share for camera, share in self.coverage.items()}}
+        coverage = {str(camera): share for camera, share in self.coverage.items()}
+        return asdict(self) | {"coverage": coverage, "price": self.price}

@@ -49,7 +49,9 @@ def test_a_session_from_the_page(web: TestClient, until: Until, results: Path) -
     assert web.get("/calibrating").status_code == 200
     give(web, until, "calibrate", "place")
     give(web, until, "go", "place", 1)
-    assert give(web, until, "put", "place")["words"] == "A virtual object stands there now. Film it."
+    assert give(web, until, "put", "place")["words"] == (
+        "Placement 2 of 3: a virtual object stands there now. Film it."
+    )
     view = give(web, until, "take", "look")
     assert (view["taken"], view["complaints"]) == ((1,), ())
     assert set(view["coverage"]) == {"1", "2", "5"}

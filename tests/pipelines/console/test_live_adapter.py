@@ -3,10 +3,13 @@
 import datetime
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from checked import made_check
 
+from footscan.capture.board.state import state_from
+from footscan.capture.grbl.report import Report
 from pipelines.calibration_check import store_check
 from pipelines.console.guidance import guidance
 from pipelines.console.live_adapter import LiveAdapter
@@ -14,6 +17,7 @@ from pipelines.console.scanner import Device
 from pipelines.live.scanner import STOPPED, LiveScanner
 from pipelines.live.state import ScannerState
 from schemas.base.errors import FootscanError
+from schemas.calibration import Calibration
 from schemas.rig import Rig
 
 RIG = {
@@ -46,12 +50,28 @@ def test_what_is_not_connected_is_told(over_nothing: LiveAdapter) -> None:
     assert told["Head 2"] == ("unknown", "position unknown")
     assert told["Camera 5"] == ("unknown", "not open")
     assert told["Passes"] == ("ok", "All 2 cameras in one pass: cameras 1, 5 on no USB bus of this computer.")
-    assert told["Calibration"] == ("unknown", "was not checked")
+    assert told["Calibration"] == ("unknown", "calibration; not checked")
     assert told["Disk"][1].endswith("GB are free for scans")
     assert health.cameras == (1, 5)
     assert not health.resumable
     assert over_nothing.state.name == "disconnected"
     assert over_nothing.picture(1) is None
+
+
+def test_heads_that_are_not_homed_are_a_warning(over_nothing: LiveAdapter, monkeypatch: pytest.MonkeyPatch) -> None:
+    report = Report("Idle", None, None)
+    for homed, level, words in (
+        (False, "warning", "where the heads stand is not known"),
+        (True, "ok", "the heads stand"),
+    ):
+        board = SimpleNamespace(watches_door=True, homed=homed)
+        log = SimpleNamespace(between=lambda *_: [])
+        state = state_from(report, homed=homed, alarm=None)
+        heads = SimpleNamespace(board=board, log=log, state=state, close=lambda: None)
+        monkeypatch.setattr(over_nothing._scanner, "_heads", heads)
+        controller, head, *_ = over_nothing.health().devices
+        assert (controller.name, controller.level, controller.words) == ("Controller", level, words)
+        assert controller.remedy == head.remedy == ("" if homed else "home the heads")
 
 
 def calibration_of(over: LiveAdapter) -> Device:
@@ -70,13 +90,28 @@ def test_the_last_check_of_the_calibration_is_told_before_a_scan(over_nothing: L
     store_check(calibration, made_check(calibration, yesterday.isoformat(), {1: 0.03, 5: 0.02}))
     device = calibration_of(over_nothing)
     assert (device.level, device.remedy) == ("ok", "")
-    assert device.words == f"checked on {yesterday.date()}, 1 day ago: every camera was within 0.03 mm"
+    assert device.words == f"calibration; checked on {yesterday.date()}, 1 day ago: every camera was within 0.03 mm"
     (tmp_path / "calibration.check.json").write_text("{}")
     device = calibration_of(over_nothing)
     assert (device.level, device.words.partition(": ")[0]) == ("bad", str(tmp_path / "calibration.check.json"))
     calibration.write_text("made anew")
     (tmp_path / "calibration.check.json").unlink()
-    assert calibration_of(over_nothing).words == "was not checked"
+    assert calibration_of(over_nothing).words == "calibration; not checked"
+
+
+def test_the_calibration_in_use_and_its_day_are_told(
+    over_nothing: LiveAdapter, tmp_path: Path, calibration: Callable[..., Calibration]
+) -> None:
+    now = datetime.datetime.now().astimezone()
+    for days, level, words in (
+        (0, "ok", "made today"),
+        (1, "unknown", f"made on {now.date() - datetime.timedelta(1)}"),
+    ):
+        made = calibration().model_copy(update={"created": now - datetime.timedelta(days)})
+        (tmp_path / "calibration.json").write_text(made.model_dump_json())
+        device = calibration_of(over_nothing)
+        age = ", 1 day ago" if days else ""
+        assert (device.level, device.words) == (level, f"calibration, {words}{age}; not checked since")
 
 
 def test_orders_to_nothing_are_faults_and_a_stop_is_none(over_nothing: LiveAdapter, tmp_path: Path) -> None:
@@ -108,5 +143,14 @@ def test_a_foot_that_is_put_onto_the_glass_is_told_and_can_be_stopped(tmp_path: 
     over = LiveAdapter(scanner, tmp_path / "archive", tmp_path / "results", glass=OfTest())
     with pytest.raises(FootscanError, match="stopped"):
         over.film("P1", "left", keep_partial=False)
-    words = "a virtual left foot is put onto the glass"
-    assert told == [f"idle: {words}", f"idle 25 %: {words}", f"failed: {STOPPED}"]
+    words = "putting the virtual left foot onto the glass"
+    assert told == [f"preparing: {words}", f"preparing 25 %: {words}", f"failed: {STOPPED}"]
+    assert guidance(ScannerState("preparing", words), over.health(), "scan") == "The scan is being prepared."
+    assert guidance(ScannerState("preparing", words), over.health(), "calibrate") == ""
+
+
+def test_a_scanner_that_was_not_connected_is_not_ready_after_a_preparation() -> None:
+    scanner = LiveScanner(Rig.model_validate(RIG))
+    with scanner.waiting_for("judging the placement"):
+        assert str(scanner.state) == "preparing: judging the placement"
+    assert scanner.state.name == "disconnected"

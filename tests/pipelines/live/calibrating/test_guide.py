@@ -1,5 +1,8 @@
 """Sessions on a stand-in that shows the frames of a recorded capture of three placements by three cameras."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -61,6 +64,8 @@ def test_a_scanner_is_calibrated_checked_and_named(scanner: StandingStandIn, tmp
     named = read_rig(tmp_path / "rig.yaml").calibration
     assert named == scanner.rig.calibration == str(tmp_path / Path(named or "").name)
     guide.end()
+    assert scanner.busy == [*["putting the virtual object onto the glass", "judging the placement"] * 3,
+                            "calculating the calibration"]  # fmt: skip
     assert [view.step for view in views[:3]] == ["place", "place", "look"]
 
     assert guide.view.actions == ("check", "calibrate")
@@ -105,6 +110,8 @@ def test_what_is_wrong_is_told_while_the_object_stands_there(scanner: StandingSt
     [complaint] = guide.view.complaints
     assert (complaint.kind, complaint.cameras) == ("no stripe", (1, 2, 5))
     guide.put()
+    assert guide.view.complaints == ()
+    assert guide.view.words == "Placement 1 of 3: a virtual object stands there now. Film it."
     scanner.covered = {5}
     guide.take()
     assert [one.words.split(":")[0] for one in guide.view.complaints] == ["no stripe in camera 5"]
@@ -166,6 +173,27 @@ def test_an_interrupted_session_is_gone_on_with_or_discarded(scanner: StandingSt
     assert "interrupted" not in again.view.words
 
 
+def test_a_placement_whose_judging_was_stopped_is_not_kept(
+    scanner: StandingStandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    guide = guide_of(scanner, tmp_path)
+    guide.begin("calibration")
+    guide.put()
+
+    @contextmanager
+    def stopped(_words: str) -> Iterator[None]:
+        yield
+        raise Fault("stopped; what was filmed before is kept")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(scanner, "waiting_for", stopped)
+        with pytest.raises(Fault):
+            guide.take()
+    assert (guide.view.step, guide.view.taken) == ("place", ())
+    guide.go(1)
+    assert guide.view.taken == ()
+
+
 def test_a_refused_capture_leads_back_to_its_placement(scanner: StandingStandIn, tmp_path: Path) -> None:
     guide = guide_of(scanner, tmp_path)
     guide.begin("calibration")
@@ -216,3 +244,11 @@ def test_light_that_was_wrong_is_chosen_anew(scanner: StandingStandIn, tmp_path:
     guide.take()
     guide.take()
     assert [light is None for light in scanner.lights] == [True, False]
+
+
+def test_a_calibration_from_few_placements_has_a_price() -> None:
+    view = View("look", "", ("next", "finish"), "calibration", placements=((0, 0),) * 10, taken=range(5))
+    assert view.price.startswith("5 of 10 placements: the calibration holds only in the regions")
+    assert view.as_json()["price"] == view.price
+    for free in ({"taken": range(10)}, {"actions": ("next",)}, {"purpose": "check"}):
+        assert replace(view, **free).price == ""
