@@ -7,12 +7,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from footscan.cloud.points import coordinates, make_points
+from footscan.cloud.points import POINT_DTYPE, coordinates, make_points
 from footscan.mesh.topology import vertex_normals
 from footscan.surface.quality import mesh_quality
 from footscan.virtual.foot.foot import make_foot
 from pipelines.arrays import pack, unpack
 from pipelines.steps import measure, surface
+from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.measures import Measure, Measures
@@ -24,6 +25,8 @@ WINDOW_MM = 30.0
 NOWHERE: dict[str, Path] = {}
 IN_PLACE = pack(glass=np.frombuffer(GlassPlane().model_dump_json().encode(), np.uint8))
 """What cleaning says of a plate that was not moved."""
+ALONE = pack(cloud=np.empty(0, POINT_DTYPE), report=np.frombuffer(FusionReport().model_dump_json().encode(), np.uint8))
+"""What `fuse` says of one camera."""
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +84,7 @@ def surface_of(oriented: bytes, **values: object) -> bytes:
 
 def measures_of(mesh: bytes) -> dict[str, Measure]:
     document = measure.run(
-        {"surface": mesh, "clean": IN_PLACE, "heads": HeadsReport().model_dump_json().encode()},
+        {"surface": mesh, "clean": IN_PLACE, "fused": ALONE, "heads": HeadsReport().model_dump_json().encode()},
         FootParameters(side="right"),
         NOWHERE,
     )
