@@ -20,6 +20,7 @@ from footscan.measure.replicates import replicates
 from footscan.measure.roughness import Roughness
 from footscan.measure.uncertainty import Scatter, SurfaceErrors, scatter_of
 from footscan.mesh.rigid_transform import apply
+from schemas.base.errors import Finding
 from schemas.base.model import Side
 from schemas.glass import GlassPlane
 from schemas.measures import Axis, Measure, MeasuredLandmark, Measures, Position, Status, Unit
@@ -287,8 +288,11 @@ def take_measures(
 
 def _values(replicate: FootFrame, rough: Roughness) -> dict[str, float]:
     """The lengths, angles and indices that can be taken of a replicate; areas and volumes hardly rest on landmarks."""
-    surface = FootSurface(replicate, find_landmarks(replicate), rough)
-    values = {}
+    values: dict[str, float] = {}
+    try:
+        surface = FootSurface(replicate, find_landmarks(replicate), rough)
+    except Finding:  # it is no foot any more
+        return values
     for name, definition in _definitions().items():
         if definition.unit not in ("mm2", "mm3"):
             with suppress(NotMeasurable):
