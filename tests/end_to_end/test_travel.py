@@ -63,6 +63,21 @@ def test_heads_that_are_off_are_found_in_a_film(
     assert json.loads(made.read_text())["format"] == "footscan.calibration/4"
 
 
+def test_a_camera_that_lost_a_frame_is_named(
+    film: Path, body: Path, recorded: Path, footscan: Callable[..., subprocess.CompletedProcess[str]],
+    mistake: Callable[[subprocess.CompletedProcess[str]], str],
+) -> None:  # fmt: skip
+    place = film / "scan.yaml"
+    document = yaml.safe_load(place.read_text())
+    document["cameras"][5]["travel"]["start_mm"] += STEP_MM
+    place.write_text(yaml.safe_dump(document))
+    done = footscan(
+        "calibrate", "travel", film, "--calibration", recorded / "calibration.json", "--body", body / "body.stl"
+    )
+    assert done.returncode == 2
+    assert "camera 6 was 1.0 frames off the other cameras of its head" in mistake(done)
+
+
 def test_a_film_of_a_foot_is_refused(
     recorded: Path, footscan: Callable[..., subprocess.CompletedProcess[str]],
     mistake: Callable[[subprocess.CompletedProcess[str]], str],
