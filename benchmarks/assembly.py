@@ -18,6 +18,7 @@ import numpy as np
 
 from footscan.calibration.models.laser_plane import MIDDLE_Z_MM, terms_of_plane
 from footscan.calibration.travel.body import standard_body
+from footscan.calibration.travel.fit import OF_CAMERA, OF_HEAD
 from footscan.recordings.scans import read_scan
 from footscan.virtual.worlds.chart import on_sheet
 from footscan.virtual.worlds.draw import as_designed, draw_assembled
@@ -33,8 +34,6 @@ from schemas.parameters.scan import ScanParameters
 from schemas.world import World
 
 FIRST, COUNT = 1, 50
-OF_HEAD = ("offset_mm", "yaw", "pitch", "bend_mm", "scale")
-OF_CAMERA = ("delay_frames", "shutter_frames")
 
 
 def main() -> None:

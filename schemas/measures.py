@@ -85,8 +85,7 @@ class Measures(Document):
 
     def own_note(self, name: str) -> str | None:
         """The note of a measure without the reasons that all measures have in common; None if nothing is left."""
-        note = self.measures[name].note
-        for reason in (*self.doubts, *self.things) if note else ():
-            note = note.replace(reason, "") if note else None
-        parts = [part for part in (note or "").split("; ") if part.strip()]
-        return "; ".join(parts) or None
+        note = self.measures[name].note or ""
+        for reason in (*self.doubts, *self.things):
+            note = note.replace(reason, "")
+        return "; ".join(part for part in note.split("; ") if part.strip()) or None

@@ -41,9 +41,11 @@ def replicates(foot: FootFrame, errors: Sequence[ErrorField], count: int) -> Ite
     normals = vertex_normals(foot.vertices, foot.faces)
     random = np.random.default_rng(SEED)
     for _ in range(count):
-        away = sum(error.deviations * smooth_field(foot.vertices, error.reach_mm, random) for error in errors)
+        away = np.zeros(len(foot.vertices))
+        for error in errors:
+            away += error.deviations * smooth_field(foot.vertices, error.reach_mm, random)
         try:
-            yield _reframed(foot, foot.vertices + np.multiply.outer(away, np.ones(3)) * normals)
+            yield _reframed(foot, foot.vertices + away[:, None] * normals)
         except Finding:
             continue
 

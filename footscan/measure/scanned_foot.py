@@ -44,13 +44,22 @@ RELIABLE_MM = 5.0
 hand."""
 
 
+class SeenEnds(NamedTuple):
+    """Where the skin ends along the travel."""
+
+    confirmed_mm: tuple[float, float]
+    """Least and greatest X at which two cameras or more agree on it"""
+    seen_mm: tuple[float, float]
+    """Least and greatest X at which any camera saw it"""
+
+
 def measure_scanned_foot(
     mesh: Mesh,
     side: Side,
     glass: GlassPlane,
     doubts: Sequence[str] = (),
     disagreement_mm: float = 0.0,
-    ends: "SeenEnds | None" = None,
+    ends: SeenEnds | None = None,
 ) -> Measures:
     """Measure a scanned surface; the uncertainties follow from the errors of the scanner.
 
@@ -105,21 +114,12 @@ def _beyond(vertices: NDArray[np.float64], filled: NDArray[np.bool_]) -> NDArray
     return np.asarray(np.maximum(x[~filled].min() - x, x - x[~filled].max()))
 
 
-def _alone(x: NDArray[np.float64], ends: "SeenEnds | None") -> NDArray[np.float64]:
+def _alone(x: NDArray[np.float64], ends: SeenEnds | None) -> NDArray[np.float64]:
     """Return (V,) how far the surface up to each vertex rests on what one camera alone saw of its end, mm."""
     if ends is None:
         return np.zeros(len(x))
     first = np.clip(ends.confirmed_mm[0] - x, 0.0, ends.confirmed_mm[0] - ends.seen_mm[0])
     return np.asarray(first + np.clip(x - ends.confirmed_mm[1], 0.0, ends.seen_mm[1] - ends.confirmed_mm[1]))
-
-
-class SeenEnds(NamedTuple):
-    """Where the skin ends along the travel."""
-
-    confirmed_mm: tuple[float, float]
-    """Least and greatest X at which two cameras or more agree on it"""
-    seen_mm: tuple[float, float]
-    """Least and greatest X at which any camera saw it"""
 
 
 def seen_ends(cloud: NDArray[np.void]) -> SeenEnds | None:
