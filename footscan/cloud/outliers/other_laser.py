@@ -46,6 +46,10 @@ CLOSE = 0.3
 that it is moved. Chosen by hand."""
 LINKED_MM = 1.0
 """Distance up to which successive points are of one stripe; they are sampled every 0.3 mm. Chosen by hand."""
+FEWEST_AT_END = 20
+"""Confirmed points that make an end of the skin along the travel. Chosen by hand."""
+EXTRAPOLATED = 0.15
+"""Error of an end of the foot that is extrapolated, in mm per mm: `END_GROWS` of the uncertainty of measures."""
 FEW = 0.1
 """Share of the points of another head below which a head has not met the skin yet, or no longer. Chosen by hand."""
 SMOOTHED = 20
@@ -67,9 +71,9 @@ def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Ma
 
     A point that no other camera confirms is of the laser of most points of its stripe, or of another head if hardly
     anything is confirmed of its own one in this frame. Where that says nothing, it is selected if it lies on the skin
-    that the confirmed points make in the plane of the other laser, and off it in its own one. Cameras whose calibration
-    does not say where their laser plane lies are left as they are, unless the construction of a head says how far apart
-    two lasers are.
+    that the confirmed points make in the plane of the other laser, and off it in its own one, or if it lies beyond all
+    confirmed ones along the travel. Cameras whose calibration does not say where their laser plane lies are left as
+    they are, unless the construction of a head says how far apart two lasers are.
     """
     strange = np.zeros(len(points), np.bool_)
     views = _with_planes(views)
@@ -160,7 +164,9 @@ def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mappin
     strange |= ~decided & _vote(strange, decided, linked)
     strange |= _not_yet_met(points, own, decided & ~strange)
     decided |= strange
-    return strange | _met_other_laser(points, np.flatnonzero(~decided), decided & ~strange, places, planes)
+    confirmed = decided & ~strange
+    strange |= ~decided & _beyond_ends(points, own, confirmed, planes)
+    return strange | _met_other_laser(points, np.flatnonzero(~decided & ~strange), confirmed, places, planes)
 
 
 def _vote(strange: Mask, decided: Mask, linked: Mask) -> Mask:
@@ -182,6 +188,24 @@ def _not_yet_met(points: NDArray[np.void], head: Ints, confirmed: Mask) -> Mask:
     says = filled.sum(axis=1) > 0.5 * filled.any(axis=0).sum()
     few = (counts < FEW * counts.max(axis=0)) & says[:, None]
     return np.asarray(few[head, frame])
+
+
+def _beyond_ends(points: NDArray[np.void], head: Ints, confirmed: Mask, planes: Floats) -> Mask:
+    """Select the points (N,) that lie beyond the first or the last confirmed place along the travel, and are worth less
+    than an end that is extrapolated: planes (H, N) of other heads are far from theirs.
+
+    The first stripes on a heel or on toes are often those of one laser, seen by the cameras of all heads. Points of
+    heads of which hardly any is confirmed, as with a single camera, are not selected.
+    """
+    x = np.sort(points["x"][confirmed])
+    if len(x) < 2 * FEWEST_AT_END:
+        return np.zeros(len(points), np.bool_)
+    beyond = np.maximum(x[FEWEST_AT_END - 1] - points["x"], points["x"] - x[-FEWEST_AT_END])
+    way = np.nan_to_num(np.abs(planes - points["plane"]))
+    doubt = np.where(way < FARTHEST_MM, way, 0.0).max(axis=0)
+    counts = np.bincount(head[confirmed], minlength=int(head.max()) + 1)
+    says = counts > FEW * counts.max()
+    return np.asarray((beyond > 0.0) & (doubt > np.maximum(LEAST_MM, EXTRAPOLATED * beyond)) & says[head])
 
 
 def _met_other_laser(
