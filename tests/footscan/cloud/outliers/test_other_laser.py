@@ -96,3 +96,13 @@ def test_lasers_that_are_apart_by_construction_need_no_film_of_a_body() -> None:
     found = is_of_other_laser(points, views)
     assert found[strange].mean() > 0.99
     assert not found[~strange].any()
+
+
+def test_what_one_camera_alone_sees_beyond_the_end_is_dropped_if_an_extrapolated_end_is_worth_more() -> None:
+    points, _ = scene()
+    for beyond, dropped in ((2.0, True), (30.0, False)):  # the planes of the two heads are 3 mm apart
+        x = points["x"].max() + beyond
+        seen = np.column_stack([np.full(30, x), np.linspace(-4.0, 4.0, 30), np.full(30, 80.0)])
+        alone = make_points(seen, 1, 20, plane=seen[:, 0])
+        found = is_of_other_laser(np.concatenate([points, alone]), VIEWS)
+        np.testing.assert_array_equal(found[len(points) :], dropped)
