@@ -24,7 +24,7 @@ from footscan.frames.film import open_background, open_film
 from footscan.frames.image import Rgb
 from footscan.frames.reader import FrameReader, backgrounds_of, noting_lost, pixel_frames
 from footscan.frames.travel import read_positions, travelled
-from footscan.measure.scanned_foot import measure_scanned_foot, seen_ends
+from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from footscan.recordings.calibration_checks import check_of_scan, checks_of
 from footscan.recordings.scans import RecordedScan, read_scan
@@ -146,8 +146,8 @@ class OpenScan:
             self.recorded.document.side,
             self.glass,
             doubts,
-            self._fused.report.rms_mm,
-            seen_ends(self.cloud),
+            self._fused.cloud,
+            self._fused.report,
         )
 
     @cached_property

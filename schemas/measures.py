@@ -8,6 +8,10 @@ from schemas.base.model import Document, Side
 
 Unit = Literal["mm", "mm2", "mm3", "deg", "1"]
 Status = Literal["ok", "uncertain", "incomplete"]
+ErrorCause = Literal["noise", "filling", "ends", "cameras", "landmarks"]
+"""Why a measure errs: noise of the stripes and of the surface through them; surface that was filled; ends of the foot
+that no stripe shows, or one camera alone; cameras that disagree; landmarks that lie on a plateau, and move with the
+others."""
 Position = tuple[float, float, float]
 
 
@@ -24,6 +28,8 @@ class Measure(Document):
     note: str | None = None
     uncertainty: float | None = None
     """Standard deviation due to the errors of the mesh, in the unit of the value; None if unknown."""
+    budget: dict[ErrorCause, float] | None = None
+    """Standard deviation by its cause; the uncertainty is the root of the sum of their squares. None if unknown."""
     surface_length: float | None = None
     """For a girth: the length along the surface in mm, hollows included; the value is that of a tape, which bridges
     them."""

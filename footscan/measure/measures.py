@@ -1,5 +1,6 @@
 """The measures of a foot: their definitions, and their values for a mesh."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -18,7 +19,7 @@ from footscan.measure.frame.glass import glass_doubt
 from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.measure.replicates import replicates
 from footscan.measure.roughness import Roughness
-from footscan.measure.uncertainty import Scatter, SurfaceErrors, scatter_of
+from footscan.measure.uncertainty import ErrorField, Scatter, SurfaceErrors, scatter_of, with_landmarks
 from footscan.mesh.rigid_transform import apply
 from schemas.base.errors import Finding
 from schemas.base.model import Side
@@ -193,9 +194,7 @@ def measure_foot(
     *,
     axis: Axis = "toe2",
     manual: Mapping[str, Floats] | None = None,
-    errors_mm: NDArray[np.floating] | None = None,
-    reach_mm: float = 0.0,
-    wide_mm: float = 0.0,
+    errors: Sequence[ErrorField] | None = None,
     count: int = 0,
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
@@ -211,9 +210,7 @@ def measure_foot(
     side : "unknown" is inferred from the form
     axis : the requested foot axis
     manual : landmarks set by a person: name to (3,) mm in the frame of the mesh
-    errors_mm : (V,) standard deviations of the vertices; default: inferred from the roughness of the mesh
-    reach_mm : vertices in the same cube of this edge share their error, as on a smoothed surface; 0: independent errors
-    wide_mm : standard deviation of a further error, which vertices share over `WIDE_MM`
+    errors : errors of the V vertices by their cause; default: inferred from the roughness of the mesh
     count : number of replicates by which the errors of the vertices are propagated, see `replicates`; 0: propagation is
         linear
     filled : (V,) true for vertices that were filled, not measured
@@ -229,10 +226,10 @@ def measure_foot(
     glass = glass or GlassPlane()
     foot = foot_frame(vertices, faces, side, axis, manual, glass.plane)
     landmarks = find_landmarks(foot, manual or {})
-    if errors_mm is not None or filled is not None:  # the foot's vertices are those of the mesh without its strays
+    if errors is not None or filled is not None:  # the foot's vertices are those of the mesh without its strays
         back = apply(np.linalg.inv(foot.transform), foot.vertices)
-        source = KDTree(vertices).query(back)[1]
-        errors_mm = None if errors_mm is None else np.asarray(errors_mm, np.float64)[source]
+        source = np.asarray(KDTree(vertices).query(back)[1])
+        errors = None if errors is None else [field.of(source) for field in errors]
         filled = None if filled is None else filled[source]
     things = things_at_foot(foot)
     reasons = [*doubts, *filter(None, [glass_doubt(glass)])]
@@ -246,9 +243,7 @@ def measure_foot(
         measures=take_measures(
             foot,
             landmarks,
-            errors_mm=errors_mm,
-            reach_mm=reach_mm,
-            wide_mm=wide_mm,
+            errors=errors,
             count=count,
             filled=filled,
             calibration=calibration,
@@ -262,9 +257,7 @@ def take_measures(
     foot: FootFrame,
     landmarks: Mapping[str, Landmark],
     *,
-    errors_mm: Floats | None = None,
-    reach_mm: float = 0.0,
-    wide_mm: float = 0.0,
+    errors: Sequence[ErrorField] | None = None,
     count: int = 0,
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
@@ -276,12 +269,12 @@ def take_measures(
     measures are uncertain.
     """
     surface = FootSurface(foot, landmarks)
-    errors = SurfaceErrors(foot.vertices, surface.errors if errors_mm is None else errors_mm, reach_mm, wide_mm)
-    scatter = scatter_of([_values(one, surface.roughness) for one in replicates(foot, errors.fields, count)], count)
+    known = SurfaceErrors(foot.vertices, [ErrorField("noise", surface.errors)] if errors is None else errors)
+    scatter = scatter_of([_values(one, surface.roughness) for one in replicates(foot, known.fields, count)], count)
     calibrations = calibration or {}
     to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
     return {
-        name: _measure(definition, surface, (errors, scatter.get(name)), filled, calibrations.get(name), to_mesh, doubt)
+        name: _measure(definition, surface, (known, scatter.get(name)), filled, calibrations.get(name), to_mesh, doubt)
         for name, definition in _definitions().items()
     }
 
@@ -325,8 +318,7 @@ def _measure(
     if scatter is not None and scatter.missing > MISSING_SHARE:
         doubts.append(f"it cannot be measured in {100 * scatter.missing:.0f} % of the ways in which the scan may err")
     status: Status = "uncertain" if doubts else "ok"
-    sds = surface_errors.linear_sd(quantity), None if scatter is None else scatter.sd
-    deviation = max((sd for sd in sds if sd is not None), default=None)
+    budget = with_landmarks(surface_errors.budget(quantity), None if scatter is None else scatter.sd)
     notes = [*doubts, *([] if quantity.note is None else [quantity.note])]
     return Measure(
         value=round(offset + factor * quantity.value, digits),
@@ -334,7 +326,8 @@ def _measure(
         status=status,
         definition=definition.text,
         note="; ".join(notes) or None,
-        uncertainty=None if deviation is None else round(abs(factor) * deviation, digits + 1),
+        uncertainty=None if budget is None else round(abs(factor) * math.hypot(*budget.values()), digits + 1),
+        budget=None if budget is None else {cause: round(abs(factor) * sd, digits + 1) for cause, sd in budget.items()},
         surface_length=None if quantity.surface_length is None else round(quantity.surface_length, 3),
         plane=None if quantity.plane is None else _plane_in_mesh(*quantity.plane, to_mesh),
         filled_share=share,

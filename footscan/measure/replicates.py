@@ -6,7 +6,6 @@ moves by hundredths. What that does to a measure is not linear, and is found by 
 """
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from footscan.measure.frame.axis import along_axis
 from footscan.measure.frame.foot_frame import SPACING_MM, FootFrame, forefoot_points
 from footscan.measure.landmarks.dense_points import dense_points
+from footscan.measure.uncertainty import ErrorField
 from footscan.mesh.rigid_transform import apply, low_height
 from footscan.mesh.topology import vertex_normals
 from schemas.base.errors import Finding
@@ -24,15 +24,6 @@ SEED = 101
 Floats = NDArray[np.float64]
 
 
-class ErrorField(NamedTuple):
-    """Errors of the vertices that vary smoothly over the surface."""
-
-    deviations: Floats
-    """(V,) standard deviations of the displacement along the normal, mm"""
-    reach_mm: float
-    """Distance over which vertices share their error"""
-
-
 def replicates(foot: FootFrame, errors: Sequence[ErrorField], count: int) -> Iterator[FootFrame]:
     """Displace a foot at random, `count` times, and find its axis anew.
 
@@ -40,10 +31,13 @@ def replicates(foot: FootFrame, errors: Sequence[ErrorField], count: int) -> Ite
     """
     normals = vertex_normals(foot.vertices, foot.faces)
     random = np.random.default_rng(SEED)
+    variances: dict[float, Floats] = {}
+    for error in errors:  # independent errors that reach as far are one field
+        variances[error.reach_mm] = variances.get(error.reach_mm, 0.0) + error.deviations**2
     for _ in range(count):
         away = np.zeros(len(foot.vertices))
-        for error in errors:
-            away += error.deviations * smooth_field(foot.vertices, error.reach_mm, random)
+        for reach_mm, variance in variances.items():
+            away += np.sqrt(variance) * smooth_field(foot.vertices, reach_mm, random)
         try:
             yield _reframed(foot, foot.vertices + away[:, None] * normals)
         except Finding:

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from footscan.measure.measures import measure_foot
+from footscan.measure.uncertainty import ErrorField
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
 from schemas.base.model import Side
+from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
 from schemas.measures import Measures
 
@@ -32,6 +34,8 @@ AGREEMENT_MM, OF_DISAGREEMENT = 0.03, 2.0
 errors that their mean has too, this many times as large, and as broad as a camera's view: each camera errs, and what
 all of them have in common does not show. Tuned with `END_GROWS` on thirteen worlds without pictures: `draw_assembled`,
 seeds 405, 406, 412, 418, and `draw_world`, seeds 3001 to 3010."""
+WIDE_MM = 60.0
+"""Distance over which errors of whole cameras and heads vary on the foot. Chosen by hand."""
 REPLICATES = 16
 """Number of replicates of the foot: a bound of time, at which a standard deviation is known to 20 %."""
 DOWN, SOLE_MM = -0.7, 20.0
@@ -58,8 +62,8 @@ def measure_scanned_foot(
     side: Side,
     glass: GlassPlane,
     doubts: Sequence[str] = (),
-    disagreement_mm: float = 0.0,
-    ends: SeenEnds | None = None,
+    cloud: NDArray[np.void] | None = None,
+    agreement: FusionReport | None = None,
 ) -> Measures:
     """Measure a scanned surface; the uncertainties follow from the errors of the scanner.
 
@@ -69,8 +73,8 @@ def measure_scanned_foot(
         cameras above alone, all measures are uncertain: each is taken in the foot's own frame, which rests on the sole.
     glass : on which the foot stands
     doubts : as of `measure_foot`
-    disagreement_mm : root mean square of the distances at which two cameras saw the same skin
-    ends : where the skin ends; default: two cameras agree on it everywhere
+    cloud : (N,) of `POINT_DTYPE`, fused; it shows where one camera alone saw the ends of the foot
+    agreement : of the cameras; default: exact
 
     Raises
     ------
@@ -79,17 +83,20 @@ def measure_scanned_foot(
     """
     filled = np.zeros(len(mesh.vertices), bool) if mesh.filled is None else mesh.filled
     beyond_mm = _beyond(mesh.vertices, filled)
-    alone_mm = _alone(mesh.vertices[:, 0], ends)
+    alone_mm = _alone(mesh.vertices[:, 0], None if cloud is None else seen_ends(cloud))
     gap_mm = np.where(beyond_mm > 0, beyond_mm, KDTree(mesh.vertices[~filled]).query(mesh.vertices)[0])
+    apart_mm = 0.0 if agreement is None else math.sqrt(max(agreement.rms_mm**2 - AGREEMENT_MM**2, 0.0))
+    ends = END_GROWS * np.maximum(beyond_mm, 0.0) + ALONE_GROWS * alone_mm
     return measure_foot(
         mesh.vertices,
         mesh.faces,
         side,
-        errors_mm=ERROR_MM
-        + np.where(beyond_mm > 0, END_GROWS * beyond_mm, ERROR_GROWS * gap_mm)
-        + ALONE_GROWS * alone_mm,
-        reach_mm=REACH_MM,
-        wide_mm=OF_DISAGREEMENT * math.sqrt(max(disagreement_mm**2 - AGREEMENT_MM**2, 0.0)),
+        errors=[
+            ErrorField("noise", np.full(len(gap_mm), ERROR_MM), REACH_MM),
+            ErrorField("filling", np.where(beyond_mm > 0, 0.0, ERROR_GROWS * gap_mm), REACH_MM),
+            ErrorField("ends", ends, REACH_MM),
+            ErrorField("cameras", np.full(len(gap_mm), OF_DISAGREEMENT * apart_mm), WIDE_MM),
+        ],
         count=REPLICATES,
         filled=(gap_mm > RELIABLE_MM) | (alone_mm > ALONE_MM),
         glass=glass,

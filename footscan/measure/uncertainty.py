@@ -8,41 +8,68 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.measure.quantity import Quantity
-from footscan.measure.replicates import ErrorField
 from footscan.rows import distinct_rows
+from schemas.measures import ErrorCause
 
-WIDE_MM = 60.0
-"""Distance over which errors of whole cameras and heads vary on the foot. Chosen by hand."""
 FEWEST_REPLICATES = 5
 """Replicates that must have a measure for a standard deviation."""
 
 Floats = NDArray[np.float64]
 
 
+class ErrorField(NamedTuple):
+    """Errors of the vertices that have one cause."""
+
+    cause: ErrorCause
+    deviations: Floats
+    """(V,) standard deviations of the displacement along the normal, mm"""
+    reach_mm: float = 0.0
+    """Distance over which vertices share their error; 0: each has its own."""
+
+    def of(self, source: NDArray[np.intp]) -> "ErrorField":
+        """The errors of W other vertices; source : (W,) index of the vertex that each of them was."""
+        return self._replace(deviations=self.deviations[source])
+
+
 class SurfaceErrors:
-    """Errors of the vertices of a foot.
+    """Errors of the vertices of a foot, from independent causes.
 
     Parameters
     ----------
     vertices : (V, 3) mm
-    errors_mm : (V,) standard deviations, mm
-    reach_mm : vertices in the same cube of this edge share their error; 0: independent errors
-    wide_mm : standard deviation of a further error, which vertices share over `WIDE_MM`
+    fields : one a cause
     """
 
-    def __init__(self, vertices: Floats, errors_mm: Floats, reach_mm: float, wide_mm: float) -> None:
-        self.fields = [
-            ErrorField(deviations, reach)
-            for deviations, reach in ((errors_mm, reach_mm), (np.full(len(vertices), wide_mm), WIDE_MM))
-            if deviations.any()
-        ]
+    def __init__(self, vertices: Floats, fields: Sequence[ErrorField]) -> None:
+        self.fields = [field for field in fields if field.deviations.any()]
         self._patches = [_cubes(vertices, field.reach_mm) for field in self.fields]
 
-    def linear_sd(self, quantity: Quantity) -> float | None:
-        """Standard deviation of a quantity by linear propagation; None where its derivatives are not known."""
-        parts = [quantity.sd(field.deviations, patch) for field, patch in zip(self.fields, self._patches, strict=True)]
-        known = [part for part in parts if part is not None]
-        return math.hypot(*known) if len(known) == len(parts) else None
+    def budget(self, quantity: Quantity) -> dict[ErrorCause, float] | None:
+        """Standard deviation of a quantity from each cause by linear propagation; None where its derivatives are not
+        known. Vertices in the same cube, as wide as a field reaches, share their error.
+        """
+        parts: dict[ErrorCause, float] = {}
+        for field, patch in zip(self.fields, self._patches, strict=True):
+            sd = quantity.sd(field.deviations, patch)
+            if sd is None:
+                return None
+            parts[field.cause] = sd
+        return parts
+
+
+def with_landmarks(budget: Mapping[ErrorCause, float] | None, scatter: float | None) -> dict[ErrorCause, float] | None:
+    """Add what a measure scatters by over replicates beyond its linear budget: landmarks that move on plateaus.
+
+    >>> with_landmarks({"noise": 0.03, "cameras": 0.04}, 0.13)
+    {'noise': 0.03, 'cameras': 0.04, 'landmarks': 0.12}
+    >>> with_landmarks({"noise": 0.03, "cameras": 0.04}, 0.02)
+    {'noise': 0.03, 'cameras': 0.04}
+    """
+    if scatter is None:
+        return None if budget is None else dict(budget)
+    linear = budget or {}
+    left = scatter**2 - sum(sd**2 for sd in linear.values())
+    return {**linear, **({"landmarks": round(math.sqrt(left), 9)} if left > 0.0 else {})}
 
 
 def _cubes(vertices: Floats, edge: float) -> NDArray[np.int64] | None:

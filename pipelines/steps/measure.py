@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.measure.scanned_foot import measure_scanned_foot, seen_ends
+from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from pipelines.arrays import unpack
 from schemas.base.errors import Finding
@@ -30,13 +30,10 @@ def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping
     checked = json.loads(inputs["calibration-doubt"]) if "calibration-doubt" in inputs else None
     doubts = [*filter(None, [checked, HeadsReport.model_validate_json(inputs["heads"]).doubt])]
     fused = unpack(inputs["fused"])
-    agreement, ends = (
-        FusionReport.model_validate_json(fused["report"].tobytes()),
-        seen_ends(fused["cloud"]),
-    )
+    agreement = FusionReport.model_validate_json(fused["report"].tobytes())
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface["filled"])
     try:
-        measures = measure_scanned_foot(mesh, parameters.side, glass, doubts, agreement.rms_mm, ends)
+        measures = measure_scanned_foot(mesh, parameters.side, glass, doubts, fused["cloud"], agreement)
     except Finding as finding:  # the other results are still of use
         unmoved = np.eye(4).tolist()
         measures = Measures(

@@ -194,6 +194,9 @@ def _note(measure: Measure, own: str | None) -> str:
     sigma = None
     if measure.uncertainty is not None:
         sigma = f"standard deviation {number(measure.uncertainty, decimals + 1)} {unit}".rstrip()
+        causes = sorted((measure.budget or {}).items(), key=lambda cause: -cause[1])
+        shown = [f"{cause} {number(sd, decimals + 1)}" for cause, sd in causes if round(sd, decimals + 1) > 0]
+        sigma += f" ({', '.join(shown)})" if len(shown) > 1 else ""
     note = "; ".join(part for part in (own, sigma) if part)
     return f'<p class="note">{text(note)}</p>' if note else ""
 

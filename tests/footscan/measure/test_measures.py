@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from footscan.measure.foot_landmarks import Landmark
 from footscan.measure.frame.foot_frame import FootFrame
 from footscan.measure.measures import measure_foot, take_measures
+from footscan.measure.uncertainty import ErrorField
 from footscan.mesh.formats.files import read_mesh
 from footscan.mesh.topology import vertex_normals
 from footscan.virtual.foot.foot import Foot, make_foot
@@ -136,14 +137,18 @@ def test_the_uncertainty_is_the_scatter() -> None:
 def test_given_errors_take_the_place_of_roughness() -> None:
     count = len(foot().vertices)
     small, large = (
-        measure_foot(foot().vertices, foot().faces, "right", errors_mm=np.full(count, error)).measures["ball_girth"]
+        measure_foot(
+            foot().vertices, foot().faces, "right", errors=[ErrorField("noise", np.full(count, error))]
+        ).measures["ball_girth"]
         for error in (0.1, 0.4)
     )
     assert small.value == large.value == measured().measures["ball_girth"].value
     together = measure_foot(
-        foot().vertices, foot().faces, "right", errors_mm=np.full(count, 0.1), reach_mm=10.0
+        foot().vertices, foot().faces, "right", errors=[ErrorField("noise", np.full(count, 0.1), 10.0)]
     ).measures["foot_length"]
-    alone = measure_foot(foot().vertices, foot().faces, "right", errors_mm=np.full(count, 0.1)).measures["foot_length"]
+    alone = measure_foot(
+        foot().vertices, foot().faces, "right", errors=[ErrorField("noise", np.full(count, 0.1))]
+    ).measures["foot_length"]
     assert (together.uncertainty or 0.0) > 1.2 * (alone.uncertainty or 0.0)
     assert 0.05 < (together.uncertainty or 0.0) < 0.25  # at most 0.1 at each end, and the fits lean a little beyond
     assert large.uncertainty == pytest.approx(4 * (small.uncertainty or 0.0), rel=0.01)

@@ -5,8 +5,8 @@ import pytest
 
 from footscan.measure.frame.foot_frame import foot_frame
 from footscan.measure.measures import measure_foot
-from footscan.measure.replicates import ErrorField, replicates, smooth_field
-from footscan.measure.uncertainty import scatter_of
+from footscan.measure.replicates import replicates, smooth_field
+from footscan.measure.uncertainty import ErrorField, scatter_of
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
 from footscan.virtual.foot.foot import make_foot
@@ -23,12 +23,13 @@ def foot() -> Mesh:
 def sigmas(foot: Mesh, count: int) -> np.ndarray:
     """Errors of measures of four feet whose surface errs, in standard deviations as reported."""
     true = measure_foot(foot.vertices, foot.faces, "right").measures
-    normals, errors = vertex_normals(foot.vertices, foot.faces), np.full(len(foot.vertices), SD_MM)
+    normals = vertex_normals(foot.vertices, foot.faces)
+    errors = [ErrorField("noise", np.full(len(foot.vertices), SD_MM), REACH_MM)]
     found = []
     for seed in range(4):
         away = SD_MM * smooth_field(foot.vertices, REACH_MM, np.random.default_rng(seed))
         moved = foot.vertices + away[:, None] * normals
-        measures = measure_foot(moved, foot.faces, "right", errors_mm=errors, reach_mm=REACH_MM, count=count).measures
+        measures = measure_foot(moved, foot.faces, "right", errors=errors, count=count).measures
         for name, measure in measures.items():
             if measure.value is not None and measure.uncertainty and true[name].value is not None:
                 found.append(abs(measure.value - true[name].value) / measure.uncertainty)
@@ -51,7 +52,7 @@ def test_a_field_has_unit_variance_everywhere() -> None:
 
 def test_replicates_are_the_same_in_every_run(foot: Mesh) -> None:
     frame = foot_frame(foot.vertices, foot.faces, "right")
-    errors = [ErrorField(np.full(len(frame.vertices), SD_MM), REACH_MM)]
+    errors = [ErrorField("noise", np.full(len(frame.vertices), SD_MM), REACH_MM)]
     first, again = (list(replicates(frame, errors, 2)) for _ in range(2))
     for one, other in zip(first, again, strict=True):
         np.testing.assert_array_equal(one.vertices, other.vertices)

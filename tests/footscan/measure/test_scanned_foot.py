@@ -8,6 +8,7 @@ from footscan.measure.scanned_foot import SeenEnds, measure_scanned_foot, seen_e
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
 from footscan.virtual.foot.foot import make_foot
+from schemas.fusion import Disagreement, FusionReport, PairDisagreement
 from schemas.glass import GlassPlane
 
 
@@ -22,6 +23,19 @@ def with_filled(foot: Mesh, share: float) -> Mesh:
     down = (vertex_normals(foot.vertices, foot.faces)[:, 2] < -0.7) & (foot.vertices[:, 2] < 20.0)
     x = foot.vertices[:, 0]
     return Mesh(foot.vertices, foot.faces, filled=down & (x <= np.quantile(x[down], share)))
+
+
+def agreement(mm: float) -> FusionReport:
+    """Two cameras that disagree by `mm`."""
+    apart = Disagreement(median_mm=0.0, deviation_mm=mm, rms_mm=mm)
+    return FusionReport(pairs=[PairDisagreement(cameras=(1, 2), points=1000, before=apart, after=apart)])
+
+
+def alone_up_to(foot: Mesh, mm: float) -> np.ndarray:
+    """The cloud of a foot of whose heel one camera alone saw the first millimetres."""
+    cloud = make_points(foot.vertices, camera=1)
+    cloud["cameras"] = np.where(foot.vertices[:, 0] < foot.vertices[:, 0].min() + mm, 1, 2)
+    return cloud
 
 
 def test_a_foot_whose_sole_was_not_seen_has_no_good_measure(foot: Mesh) -> None:
@@ -45,22 +59,31 @@ def test_a_reason_that_all_measures_share_is_no_note_of_one(foot: Mesh) -> None:
 
 def test_cameras_that_disagree_widen_every_measure(foot: Mesh) -> None:
     agreeing, apart = (
-        measure_scanned_foot(foot, "right", GlassPlane(), disagreement_mm=mm).measures for mm in (0.03, 0.2)
+        measure_scanned_foot(foot, "right", GlassPlane(), agreement=agreement(mm)).measures for mm in (0.03, 0.2)
     )
     for name in ("foot_length", "foot_breadth", "ball_girth", "instep_height"):
         assert (apart[name].uncertainty or 0.0) > 2 * (agreeing[name].uncertainty or np.inf)
+        assert (apart[name].budget or {})["cameras"] > 0.05
+        assert "cameras" not in (agreeing[name].budget or {"cameras": 0.0})
+
+
+def test_the_causes_of_an_uncertainty_make_it_up(foot: Mesh) -> None:
+    measures = measure_scanned_foot(with_filled(foot, 0.1), "right", GlassPlane(), agreement=agreement(0.1)).measures
+    for name, measure in measures.items():
+        if measure.budget is not None and measure.unit == "mm":
+            assert measure.uncertainty == pytest.approx(np.hypot.reduce([*measure.budget.values()]), abs=2e-3), name
+    assert "filling" in (measures["heel_girth"].budget or {})
 
 
 def test_an_end_that_one_camera_alone_saw_makes_the_length_uncertain(foot: Mesh) -> None:
-    first, last = foot.vertices[:, 0].min(), foot.vertices[:, 0].max()
-    seen = SeenEnds((first + 2.0, last), (first, last))
-    alone = measure_scanned_foot(foot, "right", GlassPlane(), ends=seen).measures
+    alone = measure_scanned_foot(foot, "right", GlassPlane(), cloud=alone_up_to(foot, 2.0)).measures
     assert alone["foot_length"].status == "uncertain"
     assert "one camera alone" in (alone["foot_length"].note or "")
     assert alone["foot_breadth"].status == "ok"
     assert (alone["foot_length"].uncertainty or 0.0) > 0.5
-    slightly = SeenEnds((first + 0.2, last), (first, last))
-    assert measure_scanned_foot(foot, "right", GlassPlane(), ends=slightly).measures["foot_length"].status == "ok"
+    assert (alone["foot_length"].budget or {})["ends"] > 0.5
+    slightly = measure_scanned_foot(foot, "right", GlassPlane(), cloud=alone_up_to(foot, 0.2)).measures
+    assert slightly["foot_length"].status == "ok"
 
 
 def test_the_ends_that_cameras_confirm() -> None:
