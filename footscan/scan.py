@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from footscan.cloud.fusion.fuse import Fusion, fuse
 from footscan.cloud.heads.find import find_heads
-from footscan.cloud.heads.planes import corrected
+from footscan.cloud.heads.planes import corrected, heads_of
 from footscan.cloud.mapping import map_stripe, refuse_other_size
+from footscan.cloud.movement import steadied
 from footscan.cloud.normals import estimate_normals
 from footscan.cloud.outliers.remove import Removed, remove_outliers
 from footscan.cloud.points import POINT_DTYPE, of_cameras
@@ -39,6 +40,7 @@ from schemas.calibration_check import ScanCheck
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.measures import Measures
+from schemas.movement import MovementReport
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm, Travel
 
@@ -102,10 +104,19 @@ class OpenScan:
     @cached_property
     def _fused(self) -> Fusion:
         """`cloud` with the numbers of views, and how the cameras agree."""
+        return fuse(self._steadied[0], self.parameters.fusion)
+
+    @property
+    def movement(self) -> MovementReport:
+        """How far the foot moved during the scan; the points of `cloud` are moved back."""
+        return self._steadied[1]
+
+    @cached_property
+    def _steadied(self) -> tuple[NDArray[np.void], MovementReport]:
         kept, _ = self._cleaned
         if not len(kept):
             raise Finding("every point is an outlier, expected a foot in the control volume")
-        return fuse(kept, self.parameters.fusion)
+        return steadied(kept, heads_of(views_of(self._used.cameras)))
 
     @property
     def glass(self) -> GlassPlane:
@@ -148,6 +159,7 @@ class OpenScan:
             doubts,
             self._fused.cloud,
             self._fused.report,
+            self.movement,
         )
 
     @cached_property

@@ -68,13 +68,15 @@ class FusionReport(Document):
     pairs: list[PairDisagreement] = Field(default_factory=list)
     corrections: list[CameraCorrection] = Field(default_factory=list)
     """One a camera."""
+    distrusted: list[Camera] = Field(default_factory=list)
+    """Cameras that deviate too far from the others to be moved; they count only where no other camera saw the skin."""
     contradicted: dict[Camera, Count] = Field(default_factory=dict)
     """Number of points by camera that were dropped in favour of other cameras."""
     warnings: list[str] = Field(default_factory=list)
 
     @property
     def rms_mm(self) -> float:
-        """Root mean square of the distances of all pairs of cameras, after the corrections; 0 without pairs.
+        """Root mean square of the distances of all pairs of trusted cameras, after the corrections; 0 without pairs.
 
         >>> one = Disagreement(median_mm=0.0, deviation_mm=0.1, rms_mm=0.3)
         >>> other = one.model_copy(update={"rms_mm": 0.1})
@@ -83,6 +85,7 @@ class FusionReport(Document):
         >>> print(f"{FusionReport(pairs=pairs).rms_mm:.3f}")
         0.141
         """
-        points = sum(pair.points for pair in self.pairs)
-        squares = sum(pair.points * pair.after.rms_mm**2 for pair in self.pairs)
+        trusted = [pair for pair in self.pairs if not set(pair.cameras) & set(self.distrusted)]
+        points = sum(pair.points for pair in trusted)
+        squares = sum(pair.points * pair.after.rms_mm**2 for pair in trusted)
         return math.sqrt(squares / points) if points else 0.0

@@ -11,6 +11,7 @@ from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.laser import Laser
+from schemas.movement import MovementReport
 
 Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -129,6 +130,8 @@ class Quality(Document):
     """Sentences on cameras much of whose points are not the foot."""
     heads: HeadsReport = Field(default_factory=HeadsReport)
     """Places of the heads along the travel, from the skin that cameras of two heads saw."""
+    movement: MovementReport = Field(default_factory=MovementReport)
+    """How far the foot moved during the scan."""
     glass: GlassPlane | None = None
     """The glass during the scan, from the skin on it; null in files of earlier versions."""
     fusion: FusionReport = Field(default_factory=FusionReport)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from footscan.cloud.points import coordinates
 from footscan.measure.measures import measure_foot
 from footscan.measure.uncertainty import ErrorField
 from footscan.mesh.mesh import Mesh
@@ -16,10 +17,14 @@ from schemas.base.model import Side
 from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
 from schemas.measures import Measures
+from schemas.movement import MovementReport
 
 ERROR_MM, ERROR_GROWS, REACH_MM = 0.03, 0.04, 10.0
 """Standard deviation of a measured vertex, its growth per mm into filled surface, and the edge of the cubes whose
 vertices share their error. Tuned on virtual feet: docs/surface.md."""
+NEAREST, SHARED = 4, 0.5
+"""Points nearest to a vertex, and the part of their standard deviation that all points around it share. Chosen by
+hand."""
 END_GROWS = 0.15
 """Growth of the standard deviation per mm along the travel beyond the outermost stripe, at heel and toes."""
 ALONE_GROWS, ALONE_MM = 0.5, 0.5
@@ -34,6 +39,8 @@ AGREEMENT_MM, OF_DISAGREEMENT = 0.03, 2.0
 errors that their mean has too, this many times as large, and as broad as a camera's view: each camera errs, and what
 all of them have in common does not show. Tuned with `END_GROWS` on thirteen worlds without pictures: `draw_assembled`,
 seeds 405, 406, 412, 418, and `draw_world`, seeds 3001 to 3010."""
+LEFT_OF_TREMOR = 0.2
+"""Share of a tremor that is left when the foot was moved back: 0.1 to 0.15 on the feet that `movement` was tuned on."""
 WIDE_MM = 60.0
 """Distance over which errors of whole cameras and heads vary on the foot. Chosen by hand."""
 REPLICATES = 16
@@ -64,6 +71,7 @@ def measure_scanned_foot(
     doubts: Sequence[str] = (),
     cloud: NDArray[np.void] | None = None,
     agreement: FusionReport | None = None,
+    movement: MovementReport | None = None,
 ) -> Measures:
     """Measure a scanned surface; the uncertainties follow from the errors of the scanner.
 
@@ -73,8 +81,9 @@ def measure_scanned_foot(
         cameras above alone, all measures are uncertain: each is taken in the foot's own frame, which rests on the sole.
     glass : on which the foot stands
     doubts : as of `measure_foot`
-    cloud : (N,) of `POINT_DTYPE`, fused; it shows where one camera alone saw the ends of the foot
+    cloud : (N,) of `POINT_DTYPE`, fused; it shows how sure each place is, and where one camera alone saw the ends
     agreement : of the cameras; default: exact
+    movement : of the foot; default: it stood still
 
     Raises
     ------
@@ -82,6 +91,7 @@ def measure_scanned_foot(
         The surface is no foot.
     """
     filled = np.zeros(len(mesh.vertices), bool) if mesh.filled is None else mesh.filled
+    normals = vertex_normals(mesh.vertices, mesh.faces) if mesh.normals is None else mesh.normals
     beyond_mm = _beyond(mesh.vertices, filled)
     alone_mm = _alone(mesh.vertices[:, 0], None if cloud is None else seen_ends(cloud))
     gap_mm = np.where(beyond_mm > 0, beyond_mm, KDTree(mesh.vertices[~filled]).query(mesh.vertices)[0])
@@ -92,22 +102,41 @@ def measure_scanned_foot(
         mesh.faces,
         side,
         errors=[
-            ErrorField("noise", np.full(len(gap_mm), ERROR_MM), REACH_MM),
+            ErrorField("noise", _noise(mesh.vertices, cloud), REACH_MM),
             ErrorField("filling", np.where(beyond_mm > 0, 0.0, ERROR_GROWS * gap_mm), REACH_MM),
             ErrorField("ends", ends, REACH_MM),
             ErrorField("cameras", np.full(len(gap_mm), OF_DISAGREEMENT * apart_mm), WIDE_MM),
+            ErrorField("movement", _moved_mm(movement) * np.abs(normals[:, 0]), REACH_MM),
         ],
         count=REPLICATES,
         filled=(gap_mm > RELIABLE_MM) | (alone_mm > ALONE_MM),
         glass=glass,
-        doubts=[*doubts, *filter(None, [_unseen_sole(mesh, filled)])],
+        doubts=[
+            *doubts,
+            *filter(None, [_unseen_sole(mesh.vertices, normals, filled), None if movement is None else movement.doubt]),
+        ],
     )
 
 
-def _unseen_sole(mesh: Mesh, filled: NDArray[np.bool_]) -> str | None:
+def _noise(vertices: NDArray[np.float64], cloud: NDArray[np.void] | None) -> NDArray[np.float64]:
+    """Return (V,) the standard deviations of vertices through the points of a cloud, mm."""
+    noise = np.full(len(vertices), ERROR_MM)
+    if cloud is None or len(cloud) < NEAREST:
+        return noise
+    nearest = KDTree(coordinates(cloud)).query(vertices, NEAREST)[1]
+    return np.asarray(np.maximum(noise, SHARED * cloud["sigma"][nearest].mean(axis=1)))
+
+
+def _moved_mm(movement: MovementReport | None) -> float:
+    """Standard deviation of the X of a stripe after the foot was moved back, mm."""
+    if movement is None:
+        return 0.0
+    return LEFT_OF_TREMOR * movement.tremor_mm if movement.x_mm else movement.tremor_mm
+
+
+def _unseen_sole(vertices: NDArray[np.float64], normals: NDArray[np.float64], filled: NDArray[np.bool_]) -> str | None:
     """Say that the sole was not seen, if it was not."""
-    normals = vertex_normals(mesh.vertices, mesh.faces) if mesh.normals is None else mesh.normals
-    is_sole = (normals[:, 2] < DOWN) & (mesh.vertices[:, 2] < mesh.vertices[:, 2].min() + SOLE_MM)
+    is_sole = (normals[:, 2] < DOWN) & (vertices[:, 2] < vertices[:, 2].min() + SOLE_MM)
     unseen = float(filled[is_sole].mean()) if is_sole.any() else 1.0
     return f"{100 * unseen:.0f} % of the sole was filled, not measured" if unseen > MOST_UNSEEN else None
 

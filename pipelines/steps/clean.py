@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.heads.planes import corrected
+from footscan.cloud.heads.planes import corrected, heads_of
+from footscan.cloud.movement import steadied
 from footscan.cloud.outliers.remove import remove_outliers
 from footscan.cloud.views import views_of
 from pipelines.arrays import pack, unpack
@@ -21,8 +22,8 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
     """Remove the outliers from the points of all cameras.
 
     `inputs`: `points-N` of each camera, the `calibration` of all, and `heads`, where they were. The result holds the
-    kept `points`, the `codes` of all points, the counts of `removed` points by camera and reason, `warnings`, and the
-    `glass` below the foot.
+    kept `points`, with the foot held still, the `codes` of all points, the counts of `removed` points by camera and
+    reason, `warnings`, the `glass` below the foot, and its `movement`.
 
     Raises
     ------
@@ -42,13 +43,15 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
     kept, removed = remove_outliers(points, views, parameters, filmed)
     if not len(kept):
         raise Finding("every point is an outlier, expected a foot in the control volume")
+    kept, movement = steadied(kept, heads_of(views))
     counts = {str(camera): reasons for camera, reasons in removed.counts.items()}
     return pack(
         points=kept,
         codes=removed.codes,
         removed=_json(counts),
-        warnings=_json(removed.warnings),
+        warnings=_json([*removed.warnings, *movement.warnings]),
         glass=_json(removed.glass.model_dump(mode="json")),
+        movement=_json(movement.model_dump(mode="json")),
     )
 
 

@@ -14,26 +14,29 @@ from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.measures import Measures
+from schemas.movement import MovementReport
 from schemas.parameters.foot import FootParameters
 
 
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
     """Measure the foot, as measures.json.
 
-    `inputs`: `surface`, `clean` for the glass, `heads`, where they were, `fused` for how cameras agree, and
-    `calibration-doubt`, a sentence, if a check of the calibration gave reason for one. A foot that cannot be measured
-    gives a document with the finding.
+    `inputs`: `surface`, `clean` for the glass and how the foot moved, `heads`, where they were, `fused` for how cameras
+    agree, and `calibration-doubt`, a sentence, if a check of the calibration gave reason for one. A foot that cannot be
+    measured gives a document with the finding.
     """
     del places
     surface = unpack(inputs["surface"])
-    glass = GlassPlane.model_validate_json(unpack(inputs["clean"])["glass"].tobytes())
+    cleaned = unpack(inputs["clean"])
+    glass = GlassPlane.model_validate_json(cleaned["glass"].tobytes())
+    movement = MovementReport.model_validate_json(cleaned["movement"].tobytes())
     checked = json.loads(inputs["calibration-doubt"]) if "calibration-doubt" in inputs else None
     doubts = [*filter(None, [checked, HeadsReport.model_validate_json(inputs["heads"]).doubt])]
     fused = unpack(inputs["fused"])
     agreement = FusionReport.model_validate_json(fused["report"].tobytes())
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface["filled"])
     try:
-        measures = measure_scanned_foot(mesh, parameters.side, glass, doubts, fused["cloud"], agreement)
+        measures = measure_scanned_foot(mesh, parameters.side, glass, doubts, fused["cloud"], agreement, movement)
     except Finding as finding:  # the other results are still of use
         unmoved = np.eye(4).tolist()
         measures = Measures(

@@ -17,6 +17,7 @@ from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.laser import Laser
+from schemas.movement import MovementReport
 from schemas.quality import CameraQuality, Comparison, Quality
 
 
@@ -39,6 +40,7 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
         cameras=[_camera(camera, inputs, removed.get(str(camera), {})) for camera in ids],
         warnings=json.loads(cleaned["warnings"].tobytes()),
         heads=HeadsReport.model_validate_json(inputs["heads"]),
+        movement=MovementReport.model_validate_json(cleaned["movement"].tobytes()),
         glass=GlassPlane.model_validate_json(cleaned["glass"].tobytes()),
         fusion=FusionReport.model_validate_json(fused["report"].tobytes()),
         cloud_points=len(fused["cloud"]),

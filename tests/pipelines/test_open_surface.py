@@ -17,13 +17,17 @@ from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.measures import Measure, Measures
+from schemas.movement import MovementReport
 from schemas.parameters.foot import FootParameters
 from schemas.parameters.surface import SurfaceParameters
 
 STEP_MM = 4.0
 WINDOW_MM = 30.0
 NOWHERE: dict[str, Path] = {}
-IN_PLACE = pack(glass=np.frombuffer(GlassPlane().model_dump_json().encode(), np.uint8))
+IN_PLACE = pack(
+    glass=np.frombuffer(GlassPlane().model_dump_json().encode(), np.uint8),
+    movement=np.frombuffer(MovementReport().model_dump_json().encode(), np.uint8),
+)
 """What cleaning says of a plate that was not moved."""
 ALONE = pack(cloud=np.empty(0, POINT_DTYPE), report=np.frombuffer(FusionReport().model_dump_json().encode(), np.uint8))
 """What `fuse` says of one camera."""

@@ -81,6 +81,7 @@ def fuse(points: NDArray[np.void] | Iterable[NDArray[np.void]], parameters: Fusi
             for pair, (count, disagreement) in before.items()
         ],
         corrections=corrected.corrections,
+        distrusted=sorted(corrected.too_far),
         contradicted={camera: count + int(lonely[camera]) for camera, count in merged.contradicted.items()},
         warnings=[
             f"camera {view_name(camera)} deviates from the others by {away:.2f} mm, expected "

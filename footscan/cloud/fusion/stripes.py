@@ -176,6 +176,43 @@ def meet(
     return nearest, share, distance
 
 
+@compiled
+def ways_to_neighbours(sample: NDArray[np.intp], reach: float, gap: float, cameras: int, traces: Traces) -> Floats:
+    """Find the stripes of the same camera before and after some points.
+
+    Parameters
+    ----------
+    sample : (M,) indices of the points
+    reach, gap : largest distances, mm, along the normal and along X
+    cameras : number of all cameras
+
+    Returns
+    -------
+    (M, 4) distance along the point's normal to the stripe before and X there, then the same of the stripe after, mm;
+    NaN from the first of them that is not found.
+    """
+    camera, plane, starts, x, yz, _, normals, linked, around = traces
+    planes = (len(starts) - 1) // cameras
+    found = np.full((len(sample), 4), np.nan)
+    for row in range(len(sample)):
+        n = sample[row]
+        for side in range(2):
+            near = plane[n] + 2 * side - 1
+            while 0 <= near < planes and starts[near * cameras + camera[n]] == starts[near * cameras + camera[n] + 1]:
+                near += 2 * side - 1
+            if not 0 <= near < planes:
+                break
+            first, last = starts[near * cameras + camera[n]], starts[near * cameras + camera[n] + 1]
+            if abs(x[first] - x[n]) > gap:
+                break
+            k, share, way = meet(n, first, last, reach, yz, normals, linked, around)
+            if k < 0:
+                break
+            found[row, 2 * side] = way
+            found[row, 2 * side + 1] = x[k] + share * (x[k + 1] - x[k])
+    return found
+
+
 def _planes(x: NDArray[np.float32]) -> NDArray[np.intp]:
     """(N,) the number of the laser plane at each X (N,): a plane extends by `PLANE_MM` from its first X."""
     places, place = np.unique(x, return_inverse=True)

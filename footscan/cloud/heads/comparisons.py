@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from footscan.calibration.models.laser_plane import MIDDLE_Z_MM
 from footscan.cloud.fusion.agreement import GAP_STEPS, find_overlaps
 from footscan.cloud.fusion.motion import TERMS, motion_terms
-from footscan.cloud.fusion.stripes import Floats, Traces, meet, sort_stripes, traces_of
+from footscan.cloud.fusion.stripes import Floats, Traces, sort_stripes, traces_of, ways_to_neighbours
 from footscan.cloud.points import stripe_step
 from footscan.cloud.views import View
-from footscan.compiled import compiled
 
 Ints = NDArray[np.intp]
 
@@ -100,7 +99,6 @@ def compare(
     distinct, place = np.unique(point, return_inverse=True)
     slopes = _slopes(
         distinct,
-        SLOPE_REACH_MM,
         GAP_STEPS * stripe_step(stripes.points),
         max(len(stripes.cameras), 1),
         traces_of(stripes, stripes.yz, stripes.sigma),
@@ -131,32 +129,9 @@ def terms_of_head(xyz: Floats, x_mm: float) -> Floats:
     return np.column_stack([np.ones(len(x)), y, z - MIDDLE_Z_MM, x - x_mm])
 
 
-@compiled
-def _slopes(sample: Ints, reach: float, gap: float, cameras: int, traces: Traces) -> Floats:
+def _slopes(sample: Ints, gap: float, cameras: int, traces: Traces) -> Floats:
     """How far the skin moves along the normals of points per mm of X, from the stripes before and after; or NaN."""
-    camera, plane, starts, x, yz, _, normals, linked, around = traces
-    planes = (len(starts) - 1) // cameras
-    slopes = np.full(len(sample), np.nan)
-    ways, places = np.zeros(2), np.zeros(2)
-    for row in range(len(sample)):
-        n = sample[row]
-        met = 0
-        for side in range(2):
-            near = plane[n] + 2 * side - 1
-            while 0 <= near < planes and starts[near * cameras + camera[n]] == starts[near * cameras + camera[n] + 1]:
-                near += 2 * side - 1
-            if not 0 <= near < planes:
-                break
-            first, last = starts[near * cameras + camera[n]], starts[near * cameras + camera[n] + 1]
-            if abs(x[first] - x[n]) > gap:
-                break
-            k, share, ways[side] = meet(n, first, last, reach, yz, normals, linked, around)
-            if k < 0:
-                break
-            places[side] = x[k] + share * (x[k + 1] - x[k])
-            met += 1
-        if met == 2 and places[1] > places[0]:
-            slope = (ways[1] - ways[0]) / (places[1] - places[0])
-            if abs(slope) < STEEPEST:
-                slopes[row] = slope
-    return slopes
+    before, x_before, after, x_after = ways_to_neighbours(sample, SLOPE_REACH_MM, gap, cameras, traces).T
+    apart = x_after - x_before
+    slope = (after - before) / np.where(apart > 0.0, apart, np.nan)
+    return np.where(np.abs(slope) < STEEPEST, slope, np.nan)

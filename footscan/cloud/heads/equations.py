@@ -1,4 +1,4 @@
-"""The places of the heads by least squares, with small motions of the cameras as nuisance."""
+"""The places of the heads by least squares, with small motions of the cameras and of the foot as nuisance."""
 
 from typing import NamedTuple
 
@@ -13,13 +13,15 @@ PRIOR_SD = np.array([3.0, 0.03, 0.03, 0.01])
 CAMERA_MM = 0.02
 """Error of a camera's map, mm. A camera that was knocked is moved by much more, but that is rare: the distribution has
 long tails. Chosen by hand."""
+FOOT_MM = 1.0
+"""Standard deviation of the way, in Y and in Z, that a foot moves between the passes of two heads. Chosen by hand."""
 INDEPENDENT = 0.02
 """Weight of a comparison: errors of neighbouring points are correlated, 50 of them count as one. Chosen by hand."""
 GAUGE = 1e-3
 """Common places of all heads cannot be seen: the mean of each number is 0, to within this part of its standard
 deviation."""
-
-
+SHIFTS = 2
+"""Numbers of a motion of the foot: those of a camera's motion without the turn."""
 FAR = 4.0
 """Standard deviations beyond which an origin explains nothing. Chosen by hand."""
 CONVERGING, REJECTING = 3, 2
@@ -35,6 +37,8 @@ class HeadFit(NamedTuple):
     """(H, 4)"""
     motions: Floats
     """(C, 3) mm"""
+    shifts: Floats
+    """(H, 2) of all cameras of a head in Y and Z, mm: the foot has moved between the passes of two heads"""
     spread_mm: float
     """Robust standard deviation of what is left of the distances between cameras of two heads"""
 
@@ -50,7 +54,7 @@ class FoundPlaces(NamedTuple):
 
 def unmoved_heads(known: Floats, cameras: int) -> HeadFit:
     """A fit with the heads at places (H, 4), to begin with."""
-    return HeadFit(known, np.zeros(known.shape), np.zeros((cameras, RIGID)), 0.0)
+    return HeadFit(known, np.zeros(known.shape), np.zeros((cameras, RIGID)), np.zeros((len(known), SHIFTS)), 0.0)
 
 
 def same_line(comparisons: Comparisons, laser: Ints, heads: int) -> Floats:
@@ -87,7 +91,7 @@ def likeliest(comparisons: Comparisons, origins: list[Floats], distance: Floats,
     origins : (M, H) each, as of `same_line`. What one pair of cameras sees on a stretch of the travel has one origin:
     where both lasers reach the skin, one of them is brighter as a rule.
     """
-    rest = distance - motions_seen(comparisons, fit.motions)
+    rest = distance - motions_seen(comparisons, fit)
     left = np.array([rest - displacements(change, comparisons, fit.places) for change in origins])
     costs = np.minimum(left**2 / comparisons.variance, FAR**2)
     group = groups_of(comparisons)
@@ -107,9 +111,10 @@ def displacements(change: Floats, comparisons: Comparisons, places: Floats) -> F
     return np.asarray(np.einsum("mh,mh->m", change, comparisons.terms @ places.T))
 
 
-def motions_seen(comparisons: Comparisons, motions: Floats) -> Floats:
-    """(M,) distances that motions (C, 3) of the cameras explain, mm."""
-    apart = motions[comparisons.cameras[:, 0]] - motions[comparisons.cameras[:, 1]]
+def motions_seen(comparisons: Comparisons, fit: HeadFit) -> Floats:
+    """(M,) distances that the motions of the cameras and of the foot explain, mm."""
+    apart = fit.motions[comparisons.cameras[:, 0]] - fit.motions[comparisons.cameras[:, 1]]
+    apart[:, :SHIFTS] += fit.shifts[comparisons.heads[:, 0]] - fit.shifts[comparisons.heads[:, 1]]
     return np.asarray(np.einsum("mt,mt->m", comparisons.rigid, apart))
 
 
@@ -123,22 +128,23 @@ def solve(comparisons: Comparisons, change: Floats, distance: Floats, near: Head
     rows = _rows(comparisons, change, cameras)
     known = _priors(heads, near.motions)
     noise = np.sqrt(comparisons.variance)
-    unknowns = np.concatenate([near.places.ravel(), near.motions.ravel()])
+    unknowns = np.concatenate([near.places.ravel(), near.motions.ravel(), near.shifts.ravel()])
+    of_heads, of_cameras = HEAD_TERMS * heads, HEAD_TERMS * heads + RIGID * cameras
     weights, normal = np.zeros(len(noise)), known
     for weigh in (*[huber_weights] * CONVERGING, *[tukey_weights] * REJECTING):
         left = np.abs(distance - rows @ unknowns) / noise
         scale = max(1.0, MAD_TO_SD * float(np.median(left)) if len(left) else 1.0)
         weights = INDEPENDENT * weigh(left / scale) / (scale * noise) ** 2
-        known = _priors(heads, unknowns[HEAD_TERMS * heads :].reshape(cameras, RIGID))
+        known = _priors(heads, unknowns[of_heads:of_cameras].reshape(cameras, RIGID))
         normal = (rows.T * weights) @ rows + known
         unknowns = np.linalg.solve(normal, rows.T @ (weights * distance))
     left = distance - rows @ unknowns
     sd = _deviations(comparisons, rows * (weights * left)[:, None], normal, known)
-    of_heads = HEAD_TERMS * heads
     return HeadFit(
         unknowns[:of_heads].reshape(heads, HEAD_TERMS),
         sd[:of_heads].reshape(heads, HEAD_TERMS),
-        unknowns[of_heads:].reshape(cameras, RIGID),
+        unknowns[of_heads:of_cameras].reshape(cameras, RIGID),
+        unknowns[of_cameras:].reshape(heads, SHIFTS),
         spread_of(left[comparisons.is_across]),
     )
 
@@ -160,20 +166,23 @@ def spread_of(distances: Floats) -> float:
 
 
 def _rows(comparisons: Comparisons, change: Floats, cameras: int) -> Floats:
-    """(M, 4 H + 3 C) derivatives of what the unknowns explain of the distances."""
+    """(M, 4 H + 3 C + 2 H) derivatives of what the unknowns explain of the distances."""
     heads = change.shape[1]
     of_cameras = np.zeros((len(change), cameras, RIGID))
     number = np.arange(len(change))
     of_cameras[number, comparisons.cameras[:, 0]] += comparisons.rigid
     of_cameras[number, comparisons.cameras[:, 1]] -= comparisons.rigid
+    of_foot = np.zeros((len(change), heads, SHIFTS))
+    of_foot[number, comparisons.heads[:, 0]] += comparisons.rigid[:, :SHIFTS]
+    of_foot[number, comparisons.heads[:, 1]] -= comparisons.rigid[:, :SHIFTS]
     of_heads = change[:, :, None] * comparisons.terms[:, None, :]
-    return np.hstack([of_heads.reshape(-1, HEAD_TERMS * heads), of_cameras.reshape(-1, RIGID * cameras)])
+    return np.hstack([columns.reshape(len(change), -1) for columns in (of_heads, of_cameras, of_foot)])
 
 
 def _priors(heads: int, motions: Floats) -> Floats:
     """Precision of the unknowns before the scan; of a camera that moves by (3,) of `motions`, by Cauchy's weight."""
     of_cameras = np.hypot(CAMERA_MM, np.linalg.norm(motions, axis=1))
-    sd = np.concatenate([np.tile(PRIOR_SD, heads), np.repeat(of_cameras, RIGID)])
+    sd = np.concatenate([np.tile(PRIOR_SD, heads), np.repeat(of_cameras, RIGID), np.full(SHIFTS * heads, FOOT_MM)])
     precision = np.diag(sd**-2.0)
     for k in range(HEAD_TERMS):
         of_all = np.zeros(len(sd))

@@ -142,3 +142,16 @@ def test_planes_between_each_other_tell_the_tip_too(beyond: float) -> None:
     assert start.last_mm == pytest.approx(beyond)
     assert start.tip_mm == pytest.approx(beyond, abs=0.02)
     assert end.limit == pytest.approx(beyond + 0.9 + 8 * STEP)
+
+
+def test_a_broad_end_is_left_as_the_surface_continues_it() -> None:
+    for radius, is_broad in ((25.0, True), (6.0, False)):
+        angles = np.linspace(0.0, 2 * np.pi, 200)
+        ring = np.column_stack([np.zeros(200), np.cos(angles), np.sin(angles)])
+        x = np.arange(-radius + 0.7, radius, 2.0)
+        points = np.concatenate([[place, 0.0, 0.0] + np.sqrt(radius**2 - place**2) * ring for place in x])
+        _, ends = travel_ends(points, step_mm=2.0)
+        assert ends[0].is_broad == is_broad
+        reached = np.array([[-radius + 0.3, 0.0, 0.0], [0.0, 0.0, radius]])  # 0.3 mm short of the tip
+        drawn = float(drawn_to_tips(reached, ends)[0, 0])
+        assert drawn == reached[0, 0] if is_broad else drawn < reached[0, 0]

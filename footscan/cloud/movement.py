@@ -1,0 +1,228 @@
+"""Movement of the foot from frame to frame.
+
+A foot trembles at 8 to 12 Hz (R. J. Elble, Journal of Clinical Neurophysiology 13(6), 1996), so that each stripe lies
+elsewhere than those before and after it say. Skin is smooth over a few millimetres of the travel: what all stripes of a
+frame have in common beside their neighbours is movement. Slow movement along the travel looks like another foot, and is
+not seen.
+"""
+
+from collections.abc import Mapping
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.cloud.fusion.agreement import GAP_STEPS
+from footscan.cloud.fusion.stripes import Floats, Stripes, sort_stripes, traces_of, ways_to_neighbours
+from footscan.cloud.points import stripe_step
+from footscan.robust import MAD_TO_SD, huber_weights
+from schemas.movement import MovementReport
+
+Ints = NDArray[np.intp]
+
+REACH_MM = 6.0
+"""Distance along the normal within which the stripe before and the one after show the same skin. Chosen by hand."""
+STEEPEST, FARTHEST_MM = 3.0, 2.5
+"""Slope of the skin along X, and distance from the chord, beyond which a comparison is left out. Chosen by hand."""
+EVERY = 2
+"""One point of so many is compared: they lie 0.3 mm apart along the stripe."""
+FEWEST = 20
+"""Comparisons that show the movement of a frame."""
+LEAST_MM = 0.005
+"""Least spread of the comparisons of a frame. Chosen by hand."""
+NOISE_MM, PRIOR_MM = 0.1, 0.15
+"""Standard deviations of what the skin's own form adds to a frame, and of the movement. Tuned on the points of one foot
+with and without tremor (`draw_assembled`, seed 601): 0.03 to 0.06 mm remain of 0.3 mm."""
+RIDGE = 1e-2
+"""Added to the normal equations of a frame: directions that its stripes do not show stay at zero."""
+FORM = 0.3
+"""Share of the standard deviation of a frame that does not follow from the form of the skin. Chosen by hand."""
+POOR, CONTINUED = 2, 4
+"""Frames at the ends whose movement is hardly known, since one neighbour is missing, and frames beyond them in which a
+tremor goes on as it was. Chosen by hand."""
+ROUNDS = 8
+"""Iterations of the reweighted least squares: a bound of time."""
+LEAST_TREMOR_MM, LEAST_AGREEMENT = 0.1, 0.5
+"""Tremor from which the foot is moved back, and correlation between heads that it has at least. The form of a still
+foot looks like 0.04 mm, heads that jitter like 0.08 mm. Tuned as `NOISE_MM`."""
+
+
+class FrameMoves(NamedTuple):
+    """How far the foot of each frame lies from the middle of the frames before and after."""
+
+    first: int
+    """Number of the first frame"""
+    way: Floats
+    """(F, 3) mm; NaN where it is not known"""
+    sd: Floats
+    """(F, 3) mm"""
+
+
+def steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArray[np.void], MovementReport]:
+    """Move the points of a foot that trembles back to where it is on average.
+
+    Parameters
+    ----------
+    points : (N,) of `POINT_DTYPE`, mm, scanner frame, of all cameras, without outliers
+    heads : camera -> number of its head; frames of all heads with one number are of one moment
+    """
+    comparisons = _compare(points)
+    every = _moves(comparisons, np.ones(len(comparisons.frame), np.bool_))
+    if every is None:
+        return points, MovementReport()
+    x, known = _integrated(every), np.isfinite(every.way[:, 0])
+    tremor = float(np.sqrt(np.mean(x[known] ** 2)))
+    agreement = _agreement(comparisons, heads)
+    report = MovementReport(tremor_mm=round(tremor, 4), agreement=agreement)
+    if tremor < LEAST_TREMOR_MM or (agreement is not None and agreement < LEAST_AGREEMENT):
+        return points, report
+    moved, way = points.copy(), _continued(x, known)
+    frame = points["frame"].astype(np.intp) - (every.first - CONTINUED)
+    is_near = (frame >= 0) & (frame < len(way))
+    for name in ("x", "plane"):
+        moved[name][is_near] -= way[frame[is_near]].astype(np.float32)
+    return moved, report.model_copy(
+        update={
+            "first_frame": max(every.first - CONTINUED, 0),
+            "x_mm": np.round(way[max(CONTINUED - every.first, 0) :], 4).tolist(),
+            "warnings": [f"the foot trembled by {tremor:.2f} mm (root mean square), and was moved back"],
+        }
+    )
+
+
+class _Comparisons(NamedTuple):
+    """M points, beside the stripes of the same camera before and after."""
+
+    frame: Ints
+    camera: Ints
+    """Its number"""
+    away: Floats
+    """(M,) from the chord between those stripes, along the normal, mm"""
+    change: Floats
+    """(M, 3) derivatives of that by a movement of the foot in X, Y and Z"""
+
+
+def _compare(points: NDArray[np.void]) -> _Comparisons:
+    stripes = sort_stripes([points])
+    sample = np.flatnonzero(stripes.points["supported"] & ~stripes.bent & np.any(stripes.normals != 0, axis=1))[::EVERY]
+    ways = ways_to_neighbours(
+        sample,
+        REACH_MM,
+        GAP_STEPS * stripe_step(stripes.points),
+        max(len(stripes.cameras), 1),
+        traces_of(stripes, stripes.yz, stripes.sigma),
+    )
+    before, x_before, after, x_after = ways.T
+    x, apart = stripes.x[sample], np.maximum(x_after - x_before, LEAST_MM)
+    away = -(before * (x_after - x) + after * (x - x_before)) / apart
+    slope = (after - before) / apart
+    good = (np.abs(slope) < STEEPEST) & (np.abs(away) < FARTHEST_MM)  # false for NaN
+    return _of(stripes, sample[good], away[good], slope[good])
+
+
+def _of(stripes: Stripes, sample: Ints, away: Floats, slope: Floats) -> _Comparisons:
+    change = np.column_stack([-slope, stripes.normals[sample]])
+    camera = stripes.cameras[stripes.camera[sample]]
+    return _Comparisons(stripes.points["frame"][sample].astype(np.intp), camera, away, change)
+
+
+def _moves(comparisons: _Comparisons, use: NDArray[np.bool_]) -> FrameMoves | None:
+    """Movement of each frame by robust least squares; None without any frame that shows it."""
+    if not use.any():
+        return None
+    first = int(comparisons.frame.min())
+    count = int(comparisons.frame.max()) + 1 - first
+    frame, away, change = comparisons.frame[use] - first, comparisons.away[use], comparisons.change[use]
+    numbers = np.bincount(frame, minlength=count)
+    weights, spread = np.ones(len(frame)), np.full(count, LEAST_MM)
+    way, normal = np.zeros((count, 3)), np.zeros((count, 3, 3))
+    for _ in range(ROUNDS):
+        normal, right = np.zeros((count, 3, 3)), np.zeros((count, 3))
+        np.add.at(normal, frame, weights[:, None, None] * change[:, :, None] * change[:, None, :])
+        np.add.at(right, frame, (weights * away)[:, None] * change)
+        way = np.asarray(np.linalg.solve(normal + RIDGE * np.eye(3), right[:, :, None])[:, :, 0])
+        left = np.abs(away - np.einsum("mk,mk->m", change, way[frame]))
+        spread = np.maximum(MAD_TO_SD * _medians(left, frame, count), LEAST_MM)
+        weights = huber_weights(left / spread[frame])
+    # Errors of neighbouring points are correlated: of 20 of them, one counts.
+    variance = FEWEST * np.diagonal(np.linalg.inv(normal + RIDGE * np.eye(3)), axis1=1, axis2=2)
+    sd = np.sqrt(variance) * spread[:, None]
+    shown = (numbers >= FEWEST)[:, None]
+    if not shown.any():
+        return None
+    return FrameMoves(first, np.where(shown, way, np.nan), np.where(shown, sd, np.nan))
+
+
+def _medians(values: Floats, group: Ints, count: int) -> Floats:
+    """(count,) medians of the values (M,) of each group; 0 of groups without any.
+
+    >>> _medians(np.array([3.0, 1.0, 2.0, 7.0]), np.array([0, 0, 0, 2]), 3).tolist()
+    [2.0, 0.0, 7.0]
+    """
+    order = np.lexsort((values, group))
+    starts = np.searchsorted(group[order], np.arange(count + 1))
+    middle = np.minimum((starts[:-1] + starts[1:]) // 2, max(len(values) - 1, 0))
+    return np.where(starts[1:] > starts[:-1], values[order][middle], 0.0) if len(values) else np.zeros(count)
+
+
+def _integrated(moves: FrameMoves) -> Floats:
+    """(F,) X of the foot in each frame, mm, from how far each lies beside its neighbours.
+
+    The form of the skin also displaces a frame from the middle of its neighbours, but frames that follow each other
+    about alike: second differences of the displacement are taken. They say nothing of slow movement; the prior leaves
+    it at zero.
+    """
+    way, sd = moves.way[:, 0], moves.sd[:, 0]
+    count = len(way)
+    second = np.eye(count) - 0.5 * (np.eye(count, k=1) + np.eye(count, k=-1))
+    inner = np.arange(2, count - 2)
+    known = inner[np.isfinite(way[inner - 1] + way[inner] + way[inner + 1])]
+    if not known.size:
+        return np.zeros(count)
+    rows = (second @ second)[known]
+    right = way[known] - 0.5 * (way[known - 1] + way[known + 1])
+    noise = np.hypot(NOISE_MM, FORM * np.sqrt(sd[known] ** 2 + 0.25 * (sd[known - 1] ** 2 + sd[known + 1] ** 2)))
+    weights, x, prior = noise**-2.0, np.zeros(count), np.eye(count) / PRIOR_MM**2
+    for _ in range(ROUNDS):
+        x = np.asarray(np.linalg.solve((rows.T * weights) @ rows + prior, rows.T @ (weights * right)))
+        weights = noise**-2.0 / (1.0 + ((right - rows @ x) / (2.0 * noise)) ** 2)
+    return np.asarray(x)
+
+
+def _continued(x: Floats, known: NDArray[np.bool_]) -> Floats:
+    """(F + 2 `CONTINUED`,) the movement x (F,) up to `CONTINUED` frames before and after, and at the ends of what is
+    known: each frame by the two that follow it inwards. That is exact for a tremor of one frequency.
+
+    >>> tremor = np.sin(2.5 * np.arange(40.0))
+    >>> found = _continued(tremor, np.ones(40, np.bool_))
+    >>> print(np.abs(found - np.sin(2.5 * np.arange(-CONTINUED, 40.0 + CONTINUED))).max().round(9))
+    0.0
+    """
+    way = np.concatenate([np.zeros(CONTINUED), np.where(known, x, 0.0), np.zeros(CONTINUED)])
+    first, last = np.flatnonzero(known)[[0, -1]] + CONTINUED + np.array([POOR, -POOR])
+    if last - first < FEWEST:
+        return way
+    inner = way[first : last + 1]
+    pairs = np.column_stack([inner[1:-1], inner[2:]]), np.column_stack([inner[1:-1], inner[:-2]])
+    ends = np.concatenate([inner[:-2], inner[2:]])
+    (near, far), *_ = np.linalg.lstsq(np.concatenate(pairs), ends, rcond=None)
+    for k in range(first - 1, max(first - POOR - CONTINUED, 0) - 1, -1):
+        way[k] = near * way[k + 1] + far * way[k + 2]
+    for k in range(last + 1, min(last + POOR + CONTINUED, len(way) - 1) + 1):
+        way[k] = near * way[k - 1] + far * way[k - 2]
+    return way
+
+
+def _agreement(comparisons: _Comparisons, heads: Mapping[int, int]) -> float | None:
+    """Least correlation between the movements that two heads show; None with fewer than two."""
+    numbers = np.array([heads.get(int(camera), 0) for camera in range(int(comparisons.camera.max(initial=0)) + 1)])
+    of_head = numbers[comparisons.camera] if len(comparisons.camera) else np.zeros(0, np.intp)
+    found = [_moves(comparisons, of_head == head) for head in np.unique(of_head[of_head > 0])]
+    courses = [(_integrated(moves), np.isfinite(moves.way[:, 0])) for moves in found if moves is not None]
+    correlations = [
+        float(np.corrcoef(first[known & also], second[known & also])[0, 1])
+        for (first, known), (second, also) in combinations(courses, 2)
+        if np.count_nonzero(known & also) > FEWEST and first.any() and second.any()
+    ]
+    return round(min(correlations), 3) if correlations else None

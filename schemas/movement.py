@@ -1,0 +1,27 @@
+"""How far the foot moved while it was filmed."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from schemas.base.model import Document
+
+Length = Annotated[float, Field(ge=0)]
+Way = Annotated[float, Field(ge=-1e3, le=1e3)]
+
+
+class MovementReport(Document):
+    """Movement of the foot from frame to frame, as its stripes show it."""
+
+    tremor_mm: Length = 0.0
+    """Root mean square of the fast movement along X, of 2 to about 8 frames to and fro."""
+    agreement: Annotated[float, Field(ge=-1, le=1)] | None = None
+    """Correlation between the movements that the cameras of two heads show; None with one head."""
+    first_frame: Annotated[int, Field(ge=0)] = 0
+    x_mm: list[Way] = Field(default_factory=list)
+    """Way along X by which the foot was moved back, from `first_frame` on; empty if it was not."""
+    sway_mm: Length = 0.0
+    """Amplitude of slow movement across the travel."""
+    warnings: list[str] = Field(default_factory=list)
+    doubt: str | None = None
+    """Reason for which measures are uncertain, if the foot moved so that it cannot be moved back."""
