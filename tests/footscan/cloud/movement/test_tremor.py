@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from footscan.cloud.movement import steadied
+from footscan.cloud.movement.tremor import steadied
 from footscan.cloud.points import make_points
 from footscan.virtual.foot.foot import make_foot
 

@@ -1,0 +1,1 @@
+"""Movement of the foot while it is filmed, from what all stripes of a frame have in common."""
