@@ -60,6 +60,8 @@ class Landmark(NamedTuple):
     note: str | None = None
     cap: Cap | None = None
     """The fitted part of the surface, if the landmark is a summit or a crease."""
+    at_border: bool = False
+    """True if the surface goes on rising beside the window in which the landmark was sought: it is elsewhere."""
 
 
 def check_manual(manual: Mapping[str, Point], vertices: Floats) -> None:
@@ -222,7 +224,7 @@ def _outermost(most: Summit | None, confidence: float) -> Landmark | None:
         return None
     note = "the surface reaches farther out beside the place where this is sought" if most.at_border else None
     trust = _trust(confidence, most) * (AT_BORDER if most.at_border else 1.0)
-    return Landmark(most.point, "geometric", trust, note, most.cap)
+    return Landmark(most.point, "geometric", trust, note, most.cap, most.at_border)
 
 
 def _trust(confidence: float, most: Summit) -> float:

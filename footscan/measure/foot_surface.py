@@ -112,7 +112,10 @@ class FootSurface:
             if name not in self.landmarks:
                 raise NotMeasurable(f"{name.replace('_', ' ')} was not found")
             landmark = self.landmarks[name]
-            doubt = f"{name.replace('_', ' ')} by a fallback" if landmark.method == "fallback" else None
+            doubt = None
+            if landmark.method == "fallback" or landmark.at_border:
+                why = "by a fallback" if landmark.method == "fallback" else "at the border of where it is sought"
+                doubt = f"{name.replace('_', ' ')} {why}"
             gradient = self._landmark_gradient(name, landmark)
             self._places[name] = LandmarkQuantities(
                 *(Quantity(float(value), row, doubt) for value, row in zip(landmark.point, gradient, strict=True))

@@ -30,6 +30,9 @@ Floats = NDArray[np.float64]
 
 FILLED_SHARE = 0.05
 """A measure of which more than this share rests on filled surface is uncertain; chosen by hand."""
+LARGEST_SD_MM, LARGEST_GIRTH_SD_MM = 1.0, 2.0
+"""Standard deviations from which a length and a girth are uncertain: half of what ISO 20685-1:2018 allows a scanner to
+be off, 2 mm for the foot and 4 mm for small circumferences."""
 MISSING_SHARE = 0.2
 """A measure that more than this share of the replicates does not have is uncertain. Chosen by hand."""
 DIGITS: dict[Unit, int] = {"mm": 3, "mm2": 0, "mm3": 0, "deg": 2, "1": 4}
@@ -317,8 +320,12 @@ def _measure(
     surface_errors, scatter = errors
     if scatter is not None and scatter.missing > MISSING_SHARE:
         doubts.append(f"it cannot be measured in {100 * scatter.missing:.0f} % of the ways in which the scan may err")
-    status: Status = "uncertain" if doubts else "ok"
     budget = with_landmarks(surface_errors.budget(quantity), None if scatter is None else scatter.sd)
+    sd = None if budget is None else abs(factor) * math.hypot(*budget.values())
+    largest = LARGEST_SD_MM if quantity.plane is None else LARGEST_GIRTH_SD_MM
+    if sd is not None and sd > largest and definition.unit == "mm":
+        doubts.append(f"its standard deviation exceeds {largest:g} mm")
+    status: Status = "uncertain" if doubts else "ok"
     notes = [*doubts, *([] if quantity.note is None else [quantity.note])]
     return Measure(
         value=round(offset + factor * quantity.value, digits),
@@ -326,7 +333,7 @@ def _measure(
         status=status,
         definition=definition.text,
         note="; ".join(notes) or None,
-        uncertainty=None if budget is None else round(abs(factor) * math.hypot(*budget.values()), digits + 1),
+        uncertainty=None if sd is None else round(sd, digits + 1),
         budget=None if budget is None else {cause: round(abs(factor) * sd, digits + 1) for cause, sd in budget.items()},
         surface_length=None if quantity.surface_length is None else round(quantity.surface_length, 3),
         plane=None if quantity.plane is None else _plane_in_mesh(*quantity.plane, to_mesh),

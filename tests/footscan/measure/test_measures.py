@@ -269,3 +269,24 @@ def test_glass_too_far_from_its_place_makes_measures_uncertain() -> None:
     assert values(measures.measures) == pytest.approx(values(measured().measures), rel=1e-3, abs=2e-3)
     for name in values(measures.measures):
         assert "the glass is up to 3.4 mm from where it was calibrated" in (measures.measures[name].note or "")
+
+
+def test_a_landmark_at_the_border_of_its_window_passes_its_doubt_on() -> None:
+    frame = FootFrame(foot().vertices, foot().faces, foot().vertices, np.eye(4), "toe2", foot().measures["foot_length"])
+    landmarks = {name: Landmark(foot().landmarks[name], "geometric", 1.0) for name in KNOWN_LANDMARKS}
+    landmarks["metatarsale_tibiale"] = landmarks["metatarsale_tibiale"]._replace(at_border=True)
+    measures = take_measures(frame, landmarks)
+    for name in ("ball_length", "foot_breadth", "ball_girth", "ball_angle"):
+        assert measures[name].status == "uncertain", name
+        assert "metatarsale tibiale at the border" in (measures[name].note or "")
+    assert measures["lateral_ball_length"].status == measures["instep_girth"].status == "ok"
+
+
+def test_a_value_that_is_hardly_known_is_uncertain() -> None:
+    count = len(foot().vertices)
+    for sd, breadth, girth in ((0.3, "ok", "ok"), (0.6, "ok", "uncertain"), (1.0, "uncertain", "uncertain")):
+        errors = [ErrorField("cameras", np.full(count, sd), 60.0)]
+        measures = measure_foot(foot().vertices, foot().faces, "right", errors=errors).measures
+        assert measures["foot_breadth"].status == breadth, sd
+        assert measures["instep_girth"].status == girth, sd
+    assert "its standard deviation exceeds 1 mm" in (measures["foot_breadth"].note or "")
