@@ -8,10 +8,10 @@ from schemas.base.model import Document, Side
 
 Unit = Literal["mm", "mm2", "mm3", "deg", "1"]
 Status = Literal["ok", "uncertain", "incomplete"]
-ErrorCause = Literal["noise", "filling", "ends", "cameras", "movement", "landmarks"]
+ErrorCause = Literal["noise", "filling", "ends", "cameras", "tremor", "sway", "landmarks"]
 """Why a measure errs: noise of the stripes and of the surface through them; surface that was filled; ends of the foot
-that no stripe shows, or one camera alone; cameras that disagree; movement of the foot, or of heads that do not run
-evenly; landmarks that lie on a plateau, and move with the others."""
+that no stripe shows, or one camera alone; cameras that disagree; tremor of the foot, or heads that do not run evenly;
+slow movement of the foot, which cannot be seen; landmarks that lie on a plateau, and move with the others."""
 Position = tuple[float, float, float]
 
 
