@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from footscan.cloud.points import coordinates
+from footscan.cloud.points import coordinates, stripe_step
 from footscan.measure.measures import measure_foot
 from footscan.measure.uncertainty import ErrorField
 from footscan.mesh.mesh import Mesh
@@ -22,6 +22,9 @@ from schemas.movement import MovementReport
 ERROR_MM, ERROR_GROWS, REACH_MM = 0.03, 0.04, 10.0
 """Standard deviation of a measured vertex, its growth per mm into filled surface, and the edge of the cubes whose
 vertices share their error. Tuned on virtual feet: docs/surface.md."""
+USUAL_STEP_MM = 2.0
+"""Distance of stripes at which that holds. It grows with the square of a longer one, as the sagitta of the skin between
+two stripes does."""
 NEAREST, SHARED = 4, 0.5
 """Points nearest to a vertex, and the part of their standard deviation that all points around it share. Chosen by
 hand."""
@@ -95,7 +98,7 @@ def measure_scanned_foot(
     """
     filled = np.zeros(len(mesh.vertices), bool) if mesh.filled is None else mesh.filled
     normals = vertex_normals(mesh.vertices, mesh.faces) if mesh.normals is None else mesh.normals
-    beyond_mm = _beyond(mesh.vertices, filled)
+    beyond_mm = _beyond(mesh.vertices, filled, cloud)
     alone_mm = _alone(mesh.vertices[:, 0], None if cloud is None else seen_ends(cloud))
     gap_mm = np.where(beyond_mm > 0, beyond_mm, KDTree(mesh.vertices[~filled]).query(mesh.vertices)[0])
     apart_mm = 0.0 if agreement is None else math.sqrt(max(agreement.rms_mm**2 - AGREEMENT_MM**2, 0.0))
@@ -124,7 +127,8 @@ def measure_scanned_foot(
 
 def _noise(vertices: NDArray[np.float64], cloud: NDArray[np.void] | None) -> NDArray[np.float64]:
     """Return (V,) the standard deviations of vertices through the points of a cloud, mm."""
-    noise = np.full(len(vertices), ERROR_MM)
+    step_mm = USUAL_STEP_MM if cloud is None else stripe_step(cloud)
+    noise = np.full(len(vertices), ERROR_MM * max(1.0, (step_mm / USUAL_STEP_MM) ** 2))
     if cloud is None or len(cloud) < NEAREST:
         return noise
     nearest = KDTree(coordinates(cloud)).query(vertices, NEAREST)[1]
@@ -145,13 +149,18 @@ def _unseen_sole(vertices: NDArray[np.float64], normals: NDArray[np.float64], fi
     return f"{100 * unseen:.0f} % of the sole was filled, not measured" if unseen > MOST_UNSEEN else None
 
 
-def _beyond(vertices: NDArray[np.float64], filled: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return (V,) how far each vertex lies beyond the measured surface along the travel, mm; 0 or less for most.
+def _beyond(
+    vertices: NDArray[np.float64], filled: NDArray[np.bool_], cloud: NDArray[np.void] | None
+) -> NDArray[np.float64]:
+    """Return (V,) how far each vertex lies beyond the outermost stripes along the travel, mm; 0 or less for most.
 
-    The caps of heel and toes beyond the outermost stripes are broad, but less than one step high.
+    Without a cloud it is measured from the outermost vertices that are not filled. The caps of heel and toes beyond the
+    stripes are broad, but less than one step high.
     """
-    x = vertices[:, 0]
-    return np.asarray(np.maximum(x[~filled].min() - x, x - x[~filled].max()))
+    x, seen = vertices[:, 0], vertices[~filled, 0]
+    if cloud is not None and len(cloud) > 2 * FEWEST_AT_END:
+        seen = np.sort(cloud["x"].astype(np.float64))[FEWEST_AT_END - 1 : 1 - FEWEST_AT_END]
+    return np.asarray(np.maximum(seen.min() - x, x - seen.max()))
 
 
 def _alone(x: NDArray[np.float64], ends: SeenEnds | None) -> NDArray[np.float64]:
