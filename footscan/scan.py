@@ -141,7 +141,7 @@ class OpenScan:
         """The measures of the foot; Finding where the surface is no foot."""
         checked = None if self.calibration_check is None else self.calibration_check.doubt
         doubts = [*filter(None, [checked, self.heads.doubt])]
-        return measure_scanned_foot(
+        measures = measure_scanned_foot(
             self.mesh,
             self.recorded.document.side,
             self.glass,
@@ -149,6 +149,7 @@ class OpenScan:
             self._fused.report.rms_mm,
             seen_ends(self.cloud),
         )
+        return measures.model_copy(update={"posture": self.recorded.document.posture})
 
     @cached_property
     def _used(self) -> Calibration:

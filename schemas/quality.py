@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AwareDatetime, Field
 
 from schemas.base.model import Document
 from schemas.calibration import Source
@@ -116,12 +116,20 @@ class Comparison(Figures):
     completeness: Completeness | None = None
 
 
+class UsedCalibration(Source):
+    """The calibration that mapped the pixels of a scan."""
+
+    created: AwareDatetime | None = None
+    """Time of its creation; null if a step of the scan's own graph made it, and in files of earlier versions."""
+    software: str | None = None
+    """Name and version of the program that made it; null in files of earlier versions."""
+
+
 class Quality(Document):
     """The content of quality.json."""
 
     format: Literal["footscan.quality/1"] = "footscan.quality/1"
-    calibration: Source
-    """The calibration file that mapped the pixels."""
+    calibration: UsedCalibration
     calibration_check: ScanCheck | None = None
     """Whether it still held when it was last checked before the scan; null if it was not checked."""
     cameras: list[CameraQuality]
@@ -138,3 +146,6 @@ class Quality(Document):
     mesh: MeshQuality
     truth: Comparison | None = None
     """Distances of the surface to the reference model, if the scan names one."""
+    scan_warnings: list[str] | None = None
+    """All that speaks against the scan, the gravest first, each with what to do about it; null in files of earlier
+    versions. `warnings` here and in `heads` and `fusion` are where some of them come from."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from footscan.measure.definitions.conventions import CONVENTIONS, OWN
 from footscan.measure.foot_landmarks import Landmark
 from footscan.measure.frame.foot_frame import FootFrame
 from footscan.measure.measures import measure_foot, take_measures
@@ -264,3 +265,17 @@ def test_glass_too_far_from_its_place_makes_measures_uncertain() -> None:
     assert values(measures.measures) == pytest.approx(values(measured().measures), rel=1e-3, abs=2e-3)
     for name in values(measures.measures):
         assert "the glass is up to 3.4 mm from where it was calibrated" in (measures.measures[name].note or "")
+
+
+def test_each_measure_says_whose_definition_it_follows() -> None:
+    measures = measure_foot(foot().vertices, foot().faces, "right").measures
+    assert CONVENTIONS.keys() < measures.keys()
+    conventions = {name: measure.convention for name, measure in measures.items()}
+    assert conventions == {name: CONVENTIONS.get(name, OWN) for name in measures}
+    iso = {name: one.iso for name, one in CONVENTIONS.items() if one.iso is not None}
+    assert iso == {
+        "foot_length": "ISO 7250-1, ISO 20685-1: foot length",
+        "foot_breadth": "ISO 9407: foot width",
+        "foot_breadth_max": "ISO 7250-1, ISO 20685-1: foot breadth",
+    }
+    assert all(CONVENTIONS[name].iso_differs for name in iso)
