@@ -18,11 +18,10 @@ from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
 from schemas.base.json_files import read_text
 from schemas.base.model import Document, canonical_json
-from schemas.calibration import Calibration, calibration_from_json, maps_to_json
+from schemas.calibration import Calibration, UsedCalibration, calibration_from_json, maps_to_json
 from schemas.calibration_check import CalibrationCheck, ScanCheck
 from schemas.parameters.foot import FootParameters, MeasureParameters
 from schemas.parameters.scan import ScanParameters
-from schemas.quality import UsedCalibration
 from schemas.scan import CameraFilm
 
 STEPS = "pipelines.steps"

@@ -2,10 +2,10 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AwareDatetime, Field
+from pydantic import Field
 
 from schemas.base.model import Document
-from schemas.calibration import Source
+from schemas.calibration import UsedCalibration
 from schemas.calibration_check import ScanCheck
 from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
@@ -114,15 +114,6 @@ class Comparison(Figures):
     """Distances by region of the foot, if the second surface is a foot; regions without points are left out."""
     histograms: list[Histogram] = Field(default_factory=list)
     completeness: Completeness | None = None
-
-
-class UsedCalibration(Source):
-    """The calibration that mapped the pixels of a scan."""
-
-    created: AwareDatetime | None = None
-    """Time of its creation; null if a step of the scan's own graph made it, and in files of earlier versions."""
-    software: str | None = None
-    """Name and version of the program that made it; null in files of earlier versions."""
 
 
 class Quality(Document):

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from schemas.base.model import canonical_json
-from schemas.calibration import calibration_from_json
-from schemas.quality import UsedCalibration
+from schemas.calibration import UsedCalibration, calibration_from_json
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:

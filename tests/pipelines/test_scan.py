@@ -21,18 +21,9 @@ from schemas.calibration import Calibration
 from schemas.parameters.scan import ScanParameters
 
 FROM_CLEAN = {
-    "clean",
-    "fuse",
-    "orient",
-    "surface",
-    "measure",
-    "quality",
-    "quality.json",
-    "cloud.ply",
-    "foot.stl",
-    "foot.ply",
+    "clean", "fuse", "orient", "surface", "measure", "quality", "quality.json", "cloud.ply", "foot.stl", "foot.ply",
     "report",
-}
+}  # fmt: skip
 CAMERAS = {f"{kind}-{camera}" for kind in ("ingest", "extract", "map") for camera in (1, 5)}
 ALL = CAMERAS | {"heads"} | FROM_CLEAN
 
