@@ -18,11 +18,12 @@ from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
 from schemas.base.json_files import read_text
 from schemas.base.model import Document, canonical_json
-from schemas.calibration import Calibration, UsedCalibration, calibration_from_json, maps_to_json
+from schemas.calibration import Calibration, calibration_from_json, maps_to_json
 from schemas.calibration_check import CalibrationCheck, ScanCheck
 from schemas.parameters.foot import FootParameters, MeasureParameters
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm
+from schemas.used_calibration import UsedCalibration
 
 STEPS = "pipelines.steps"
 """Package of the steps' modules; they are imported when they run, because a plan needs none of their libraries."""

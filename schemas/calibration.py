@@ -263,15 +263,6 @@ class Source(Document):
     sha256: str
 
 
-class UsedCalibration(Source):
-    """The calibration that mapped the pixels of a scan."""
-
-    created: AwareDatetime | None = None
-    """Time of its creation; null if a step of the scan's own graph made it, and in files of earlier versions."""
-    software: str | None = None
-    """Name and version of the program that made it; null in files of earlier versions."""
-
-
 class _Calibration(Document):
     """What versions 3 and 4 have in common: version 3 has neither planes nor a body."""
 

@@ -5,12 +5,12 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from schemas.base.model import Document
-from schemas.calibration import UsedCalibration
 from schemas.calibration_check import ScanCheck
 from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.laser import Laser
+from schemas.used_calibration import UsedCalibration
 
 Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]

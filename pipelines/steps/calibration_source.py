@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from schemas.base.model import canonical_json
-from schemas.calibration import UsedCalibration, calibration_from_json
+from schemas.calibration import calibration_from_json
+from schemas.used_calibration import UsedCalibration
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from footscan.surface.quality import mesh_quality
 from pipelines.arrays import unpack
-from schemas.calibration import UsedCalibration
 from schemas.calibration_check import ScanCheck
 from schemas.frames import FrameManifest
 from schemas.fusion import FusionReport
@@ -18,6 +17,7 @@ from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.laser import Laser
 from schemas.quality import CameraQuality, Comparison, Quality
+from schemas.used_calibration import UsedCalibration
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from footscan.report.quality_lights import apart_mm, quality_lights, worst
-from schemas.calibration import UsedCalibration
 from schemas.fusion import Disagreement, FusionReport, PairDisagreement
 from schemas.measures import Measure, Measures
 from schemas.quality import CameraQuality, MeshQuality, Quality
+from schemas.used_calibration import UsedCalibration
 
 IDENTITY = [[float(row == column) for column in range(4)] for row in range(4)]
 

@@ -12,12 +12,13 @@ from footscan.report.sample_frames import FrameSample
 from footscan.report.scan.foot_colours import FootSurface
 from footscan.report.scan.page import ScanPoints, ScanTitle, scan_page
 from footscan.report.surface_views import upright
-from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, UsedCalibration
+from schemas.calibration import Calibration, CameraCalibration, PolynomialMap
 from schemas.calibration_check import ScanCheck
 from schemas.fusion import CameraCorrection, Disagreement, FusionReport, PairDisagreement
 from schemas.glass import GlassPlane
 from schemas.measures import Measure, Measures
 from schemas.quality import CameraQuality, Comparison, MeshQuality, Quality
+from schemas.used_calibration import UsedCalibration
 
 IDENTITY = np.eye(4).tolist()
 HOSTILE = '<script>alert("x")</script>'
