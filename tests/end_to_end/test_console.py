@@ -161,6 +161,7 @@ def test_a_scan_is_stopped(way: str, show: Callable[..., Opened], scanner: Any, 
     page = opened.page
     opened.state("Done" if way == "key on a result" else "Ready")
     scanner.pause = {"filming"}
+    page.select_option("#posture", "half_weight")
     page.fill("#patient", "P1")
     page.locator("#patient").press("Enter")
     opened.state("Filming")
