@@ -114,8 +114,8 @@ def _run(
             _tell(end.scan, end.problem)
         elif not as_json:
             print_line(f"{end.scan}: {end.folder}")
-        for warning in end.warnings:
-            message(f"{end.scan}: {warning}")
+            for warning in end.warnings:
+                message(f"{end.scan}: {warning}")
     return ends
 
 

@@ -17,5 +17,7 @@ def test_warnings_stand_in_the_terminal_and_in_the_document(done: Any, capsys: p
         f"P0001/S1: {warning}" for warning in warnings
     ]
     assert run(done.workflow, as_json=True) == 0
-    [scan] = json.loads(capsys.readouterr().out)["scans"]
+    shown = capsys.readouterr()
+    [scan] = json.loads(shown.out)["scans"]
+    assert "P0001/S1: " not in shown.err
     assert (scan["scan"], scan["warnings"]) == ("P0001/S1", warnings)
