@@ -152,7 +152,7 @@ class OpenScan:
         """The measures of the foot; Finding where the surface is no foot."""
         checked = None if self.calibration_check is None else self.calibration_check.doubt
         doubts = [*filter(None, [checked, self.heads.doubt])]
-        return measure_scanned_foot(
+        measures = measure_scanned_foot(
             self.mesh,
             self.recorded.document.side,
             self.glass,
@@ -161,6 +161,7 @@ class OpenScan:
             self._fused.report,
             self.movement,
         )
+        return measures.model_copy(update={"posture": self.recorded.document.posture})
 
     @cached_property
     def _used(self) -> Calibration:

@@ -17,12 +17,13 @@ from pipelines.engine.actions.step import Input, Output, SourceFile, Step, Value
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
 from schemas.base.json_files import read_text
-from schemas.base.model import Document, Side, canonical_json
-from schemas.calibration import Calibration, Source, calibration_from_json, maps_to_json
+from schemas.base.model import Document, canonical_json
+from schemas.calibration import Calibration, calibration_from_json, maps_to_json
 from schemas.calibration_check import CalibrationCheck, ScanCheck
-from schemas.parameters.foot import FootParameters
+from schemas.parameters.foot import FootParameters, MeasureParameters
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm
+from schemas.used_calibration import UsedCalibration
 
 STEPS = "pipelines.steps"
 """Package of the steps' modules; they are imported when they run, because a plan needs none of their libraries."""
@@ -31,7 +32,7 @@ DELIVERED = {
     "foot.stl": "foot.stl",
     "foot.ply": "foot.ply",
     "measures.json": "measure",
-    "quality.json": "quality",
+    "quality.json": "quality.json",
     "report.html": "report",
 }
 """The files of a scan's results, and the kind of step that makes each."""
@@ -42,7 +43,7 @@ class ScanCalibration(Protocol):
 
     @property
     def source(self) -> Input:
-        """Name and digest of the calibration."""
+        """Name, digest and origin of the calibration, a `UsedCalibration`."""
 
     def camera(self, camera: int) -> Input:
         """The maps of one camera, one for each laser that it sees; RefusedInput if there is none."""
@@ -72,8 +73,10 @@ class CalibrationFile:
 
     @property
     def source(self) -> Value:
-        """Name and digest of the calibration."""
-        return self._cached("source", lambda: _text(Source(name=self.path.name, sha256=self.digest)))
+        """Name, digest and origin of the calibration."""
+        made = self.content
+        used = UsedCalibration(name=self.path.name, sha256=self.digest, created=made.created, software=made.software)
+        return self._cached("source", lambda: _text(used))
 
     @property
     def whole(self) -> Value:
@@ -124,8 +127,9 @@ def scan_steps(
     colours = {f"colours-{camera.id}": camera.colours for camera in cameras if camera.colours is not None}
     maps = calibration.cameras(frozenset(camera.id for camera in scan.document.cameras))
     foot = FootParameters(side=scan.document.side)
+    measured = MeasureParameters(side=scan.document.side, posture=scan.document.posture)
     doubt = None if check is None else check.doubt
-    made = reconstruction_steps(scan.name, points, maps, parameters, scan.document.side, steps, doubt)
+    made = reconstruction_steps(scan.name, points, maps, parameters, measured, steps, doubt)
     heads, cleaned, fused, oriented, mesh, measures = made
     verified: dict[str, Output] = {}
     if (truth := scan.truth) is not None:
@@ -138,7 +142,11 @@ def scan_steps(
     }  # fmt: skip
     if check is not None:
         quality_inputs["calibration-check"] = _document(check, scan.file)
-    quality = add(Step(scan.name, "quality", f"{STEPS}.quality", None, quality_inputs))
+    figures = add(Step(scan.name, "quality", f"{STEPS}.quality", None, quality_inputs))
+    warned: dict[str, Input] = {"quality": figures, "measures": measures}
+    recorded = {} if scan.recording is None else {"recording": scan.recording}
+    warned |= {name: source_files(file, digests) for name, file in recorded.items()}
+    quality = add(Step(scan.name, "quality.json", f"{STEPS}.quality_json", None, warned, places=recorded))
     add(Step(scan.name, "cloud.ply", f"{STEPS}.cloud_ply", None, {"oriented": oriented}))
     add(Step(scan.name, "foot.stl", f"{STEPS}.foot_stl", foot, {"surface": mesh}))
     ply_inputs: dict[str, Input] = {"surface": mesh, "name": _name(scan)}
@@ -181,7 +189,7 @@ def reconstruction_steps(
     points: Mapping[str, Input],
     maps: Input,
     parameters: ScanParameters,
-    side: Side,
+    foot: MeasureParameters,
     steps: list[Step],
     calibration_doubt: str | None = None,
 ) -> Reconstruction:
@@ -203,7 +211,7 @@ def reconstruction_steps(
     measure_inputs: dict[str, Input] = {"surface": surface, "fused": fused, "clean": cleaned, "heads": heads}
     if calibration_doubt is not None:
         measure_inputs["calibration-doubt"] = Value(canonical_json(calibration_doubt).encode())
-    measures = add("measure", FootParameters(side=side), measure_inputs)
+    measures = add("measure", foot, measure_inputs)
     return Reconstruction(heads, cleaned, fused, oriented, surface, measures)
 
 

@@ -46,6 +46,8 @@ class Foot(Document):
     side: Side = "unknown"
     side_note: str | None = None
     """Warning that the form of the foot contradicts its side."""
+    posture: str = "unknown"
+    """As in `schemas.base.model.Posture`, or in the words of another program."""
     axis: str | None = None
     measures: dict[str, Reading]
     finding: str | None = None

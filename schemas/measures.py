@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.base.model import Document, Side
+from schemas.base.model import Document, Posture, Side
 
 Unit = Literal["mm", "mm2", "mm3", "deg", "1"]
 Status = Literal["ok", "uncertain", "incomplete"]
@@ -13,6 +13,17 @@ ErrorCause = Literal["noise", "filling", "ends", "cameras", "tremor", "sway", "l
 that no stripe shows, or one camera alone; cameras that disagree; tremor of the foot, or heads that do not run evenly;
 slow movement of the foot, which cannot be seen; landmarks that lie on a plateau, and move with the others."""
 Position = tuple[float, float, float]
+
+
+class Convention(Document):
+    """The definition that a measure follows."""
+
+    follows: str
+    """Publication and its name for the measure; "footscan" if the definition is our own."""
+    iso: str | None = None
+    """Names of the measure in ISO standards, if it has one there."""
+    iso_differs: str | None = None
+    """How the definition differs from that of the ISO standard."""
 
 
 class Measure(Document):
@@ -25,6 +36,8 @@ class Measure(Document):
     """"uncertain" has a value that rests on a fallback or on filled surface; "incomplete" has none, and a note that
     says why."""
     definition: str
+    convention: Convention | None = None
+    """The definition that it follows; None in files of earlier versions."""
     note: str | None = None
     uncertainty: float | None = None
     """Standard deviation due to the errors of the mesh, in the unit of the value; None if unknown."""
@@ -68,6 +81,8 @@ class Measures(Document):
     side: Side
     side_note: str | None = None
     """Warning that the form of the foot contradicts the side."""
+    posture: Posture = "unknown"
+    """Posture of the person and load on the foot, as scan.yaml has it; lengths and girths depend on it."""
     things: list[str] = Field(default_factory=list)
     """Steps of the surface that no foot has: where something was held at the foot. All measures are uncertain then."""
     doubts: list[str] = Field(default_factory=list)

@@ -5,13 +5,13 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from schemas.base.model import Document
-from schemas.calibration import Source
 from schemas.calibration_check import ScanCheck
 from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.laser import Laser
 from schemas.movement import MovementReport
+from schemas.used_calibration import UsedCalibration
 
 Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -121,8 +121,7 @@ class Quality(Document):
     """The content of quality.json."""
 
     format: Literal["footscan.quality/1"] = "footscan.quality/1"
-    calibration: Source
-    """The calibration file that mapped the pixels."""
+    calibration: UsedCalibration
     calibration_check: ScanCheck | None = None
     """Whether it still held when it was last checked before the scan; null if it was not checked."""
     cameras: list[CameraQuality]
@@ -141,3 +140,6 @@ class Quality(Document):
     mesh: MeshQuality
     truth: Comparison | None = None
     """Distances of the surface to the reference model, if the scan names one."""
+    scan_warnings: list[str] | None = None
+    """All that speaks against the scan, the gravest first, each with what to do about it; null in files of earlier
+    versions. `warnings` here and in `heads` and `fusion` are where some of them come from."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from schemas.base.model import Document, Pseudonym, RelativePath, Side
+from schemas.base.model import Document, Posture, Pseudonym, RelativePath, Side
 from schemas.laser import Laser
 
 MOST_CAMERA, MOST_LASERS = 64, 2
@@ -55,6 +55,8 @@ class Scan(Document):
     """The check of the calibration that was in force when the scan was filmed."""
     scanner: Pseudonym | None = None
     """The scanner that filmed it: a workflow may have a calibration for each scanner."""
+    posture: Posture = "unknown"
+    """Posture of the person and load on the foot."""
     laser: Laser | None = None
     """Colour of the laser in the pictures; default: found in the film of each camera."""
     date: datetime.date | None = None

@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 
 from footscan.measure import girths, linear, plantar, solid
 from footscan.measure.attached import things_at_foot
+from footscan.measure.definitions.conventions import CONVENTIONS, OWN
 from footscan.measure.foot_landmarks import Landmark, find_landmarks
 from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame.foot_frame import FootFrame, foot_frame
@@ -276,9 +277,13 @@ def take_measures(
     scatter = scatter_of([_values(one, surface.roughness) for one in replicates(foot, known.fields, count)], count)
     calibrations = calibration or {}
     to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
-    return {
+    measures = {
         name: _measure(definition, surface, (known, scatter.get(name)), filled, calibrations.get(name), to_mesh, doubt)
         for name, definition in _definitions().items()
+    }
+    return {
+        name: measure.model_copy(update={"convention": CONVENTIONS.get(name, OWN)})
+        for name, measure in measures.items()
     }
 
 

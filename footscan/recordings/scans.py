@@ -12,7 +12,7 @@ from schemas.base.yaml_files import read_yaml
 from schemas.frames import GROUP
 from schemas.scan import CameraFilm, Scan
 
-SCAN_FILE = "scan.yaml"
+SCAN_FILE, RECORDING_FILE = "scan.yaml", "recording.json"
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,12 @@ class RecordedScan:
     def truth(self) -> Path | None:
         """The reference model that the scan names."""
         return self._optional(self.document.truth, "truth")
+
+    @property
+    def recording(self) -> Path | None:
+        """How it was filmed, its recording.json; None for a scan of another program."""
+        file = self._inside(RECORDING_FILE, "recording")
+        return file if file.is_file() else None
 
     def _optional(self, named: str | None, field: str) -> Path | None:
         return None if named is None else self._inside(named, field)

@@ -65,4 +65,15 @@ def doubts(first: Foot, second: Foot) -> list[str]:
         reasons.append(f"of two patients: {first.patient} and {second.patient}")
     if first.axis != second.axis:
         reasons.append(f"measured along different axes: {first.axis} and {second.axis}")
+    if first.posture != second.posture:
+        reasons.append(_other_posture(first, second))
     return reasons
+
+
+def _other_posture(first: Foot, second: Foot) -> str:
+    postures = f"{first.source}: {first.posture}, {second.source}: {second.posture}"
+    known = "not known for both" if "unknown" in {first.posture, second.posture} else "not the same"
+    return (
+        f"the posture is {known} ({postures}): a foot grows under load, so differences may come from the posture; scan "
+        "both in one posture, and state it"
+    )

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -12,8 +12,10 @@ from footscan.recordings.calibration_checks import check_of_scan
 from footscan.recordings.scans import RecordedScan, read_scan, scan_folders
 from pipelines.archive.workflow_file import check_archives, read_workflow
 from pipelines.calibrate import CaptureInputs, CaptureOfScan, recorded_inputs
+from pipelines.engine.actions.key import parameters_text
 from pipelines.engine.actions.step import Failure, Outcome, Step, Success
 from pipelines.engine.files.access import group_number, share
+from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.places import open_files
 from pipelines.engine.plan import Plan
 from pipelines.engine.pool import OnStepEnd, Pool, cores
@@ -27,6 +29,7 @@ from schemas.base.errors import RefusedInput
 from schemas.frames import GROUP
 from schemas.measures import Measures
 from schemas.parameters.scan import ScanParameters
+from schemas.quality import Quality
 from schemas.scan import Scan
 
 CACHE = ".footscan"
@@ -122,6 +125,11 @@ class PlannedJob:
         """Number of steps of all scans that are not hits."""
         return sum(planned.to_run for planned in self.scans)
 
+    @property
+    def parameters_sha256(self) -> str:
+        """Digest of the parameters of all steps."""
+        return sha256(parameters_text(self.job.parameters).encode())
+
 
 @dataclass(frozen=True)
 class ScanEnd:
@@ -141,6 +149,10 @@ class ScanEnd:
     """True if all its steps were hits."""
     document: Scan | None = None
     """Content of its scan.yaml; None if that was refused."""
+    parameters_sha256: str | None = None
+    """Digest of the parameters of all steps, as canonical JSON; None if unknown."""
+    warnings: Sequence[str] = ()
+    """All that speaks against its results, as `scan_warnings` of quality.json has it."""
 
 
 def job_of_workflow(path: Path, threads: int | None = None, *, may_be_empty: bool = False) -> Job:
@@ -249,7 +261,7 @@ def draw_steps(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
 def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
     """Run the steps of a planned job that are not hits, and deliver the results; yields the end of each scan."""
     for name, folder, error in planned.refused:
-        yield ScanEnd(name, folder, None, str(error), "refused")
+        yield ScanEnd(name, folder, None, str(error), "refused", parameters_sha256=planned.parameters_sha256)
     waiting = iter(planned.scans)
     share_written(planned)
     warn_if_others_can_write(planned.workspace.store, planned.job.group)
@@ -319,24 +331,32 @@ def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planne
     """Deliver the results of a scan, if it has them."""
     scan = planned_scan.scan
     target = planned.job.results / scan.document.patient / scan.document.scan
+    ended = ScanEnd(
+        scan.name, scan.folder, None, None, None, document=scan.document, parameters_sha256=planned.parameters_sha256
+    )
     digests: dict[str, str] = {}
     for file, kind in DELIVERED.items():
         planned_outcome = planned_scan.failure or Success(planned_scan.delivered.get(file, ""))
         outcome = outcomes.get(f"{scan.name}/{kind}", planned_outcome)
         if isinstance(outcome, Failure):
-            problem_text = outcome.problem + _older_results(target)
-            return ScanEnd(scan.name, scan.folder, None, problem_text, outcome.kind, document=scan.document)
+            return replace(ended, problem=outcome.problem + _older_results(target), kind=outcome.kind)
         digests[file] = outcome.digest
     problem = planned.workspace.deliver(digests, target)
     if problem is not None:
         has = planned.workspace.store.has  # damaged blobs have been removed
         is_complete = all(has(digest) for digest in digests.values())
-        kind = "fault" if is_complete else "damaged"
-        return ScanEnd(scan.name, scan.folder, None, problem, kind, document=scan.document)
+        return replace(ended, problem=problem, kind="fault" if is_complete else "damaged")
     finding = Measures.model_validate_json((target / "measures.json").read_bytes()).finding
-    kind_of_end = None if finding is None else "finding"
-    was_cached = not planned_scan.to_run
-    return ScanEnd(scan.name, scan.folder, target, finding, kind_of_end, digests, was_cached, scan.document)
+    quality = Quality.model_validate_json((target / "quality.json").read_bytes())
+    return replace(
+        ended,
+        folder=target,
+        problem=finding,
+        kind=None if finding is None else "finding",
+        digests=digests,
+        was_cached=not planned_scan.to_run,
+        warnings=quality.scan_warnings or (),
+    )
 
 
 def _older_results(target: Path) -> str:

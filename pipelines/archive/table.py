@@ -4,23 +4,31 @@ import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pipelines.archive.job import ScanEnd
 from pipelines.archive.page import write_archive_page
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.scan import DELIVERED
 from pipelines.version import SOFTWARE
+from schemas.measures import Unit
 from schemas.quality import MeshQuality
 from schemas.tables import Cell, csv_text
 
 CSV, PARQUET = "results.csv", "results.parquet"
 """File names of the table."""
 
-TEXTS = {"scan", "status", "problem", "side", "software", "calibration_sha256"} | {
-    f"{file}_sha256" for file in DELIVERED
-}
-"""Names of the columns with text."""
+TEXTS = {
+    "scan", "status", "problem", "side", "software", "calibration_sha256", "scanner", "date", "posture",
+    "calibration_file", "calibration_created", "calibration_software", "parameters_sha256", "warnings",
+} | {f"{file}_sha256" for file in DELIVERED}  # fmt: skip
+"""Names of the columns with text, beside those of the measures' status."""
+UNITS = {*get_args(Unit)}
+"""Units at the end of a column's name."""
+BETWEEN = " | "
+"""Between two warnings of a scan."""
+_CALIBRATION = {"file": "name", "created": "created", "software": "software"}
+"""Columns on the origin of the calibration, without `calibration_`, and the fields of quality.json."""
 COUNTS = {"cameras", "frames_lost", "stripe_points", "cloud_points"} | {
     f"mesh_{name}"
     for name, field in MeshQuality.model_json_schema()["properties"].items()
@@ -33,11 +41,13 @@ def write_results_table(ends: Sequence[ScanEnd], folder: Path) -> None:
     """Write `results.csv`, `results.parquet` and `index.html` into the folder of the results, if their content changes.
 
     A row holds the scan and its status, the foot's side, its measures (the unit is in the name of the column), quality
-    figures, the version of this program and the digests of the scan's files.
+    figures, the version of this program and the digests of the scan's files; then scanner, date, posture, origin of the
+    calibration, digest of the parameters, warnings, and the status and standard deviation of each measure.
     """
     write_archive_page(ends, folder)
-    rows = [_row(end) for end in ends]
-    columns = list(dict.fromkeys(name for row in rows for name in row))
+    parts = [_row(end) for end in ends]
+    rows = [values | trust for values, trust in parts]
+    columns = list(dict.fromkeys(name for part in zip(*parts, strict=True) for row in part for name in row))
     table = _as_csv(columns, rows).encode()
     if (folder / PARQUET).exists() and _has_content(folder / CSV, table):
         return
@@ -45,16 +55,26 @@ def write_results_table(ends: Sequence[ScanEnd], folder: Path) -> None:
     write_atomically(folder / CSV, table)
 
 
-def _row(end: ScanEnd) -> dict[str, Cell]:
+def _row(end: ScanEnd) -> tuple[dict[str, Cell], dict[str, Cell]]:
+    """The columns of a scan with what was found, and those that say how far to trust it, which stand after them."""
     row: dict[str, Cell] = {"scan": end.scan, "status": end.kind or "done", "problem": end.problem}
+    trust: dict[str, Cell] = {"scanner": None, "date": None, "posture": None}
+    if end.document is not None:
+        day = end.document.day
+        trust |= {"scanner": end.document.scanner, "date": None if day is None else day.isoformat()}
+    trust["parameters_sha256"] = end.parameters_sha256
     if end.folder is None:
-        return row
+        return row, trust
     measures = _read(end.folder / "measures.json")
-    row["side"] = measures.get("side")
-    for name, measure in measures.get("measures", {}).items():
-        unit = measure["unit"]
-        row[name if unit == "1" else f"{name}_{unit}"] = measure["value"]
+    row["side"], trust["posture"] = measures.get("side"), measures.get("posture")
     quality = _read(end.folder / "quality.json")
+    calibration = quality.get("calibration", {})
+    trust |= {f"calibration_{name}": calibration.get(field) for name, field in _CALIBRATION.items()}
+    trust["warnings"] = BETWEEN.join(quality.get("scan_warnings") or ()) or None
+    for name, measure in measures.get("measures", {}).items():
+        suffix = "" if measure["unit"] == "1" else f"_{measure['unit']}"
+        row[f"{name}{suffix}"] = measure["value"]
+        trust |= {f"{name}_status": measure["status"], f"{name}_sd{suffix}": measure.get("uncertainty")}
     cameras = quality.get("cameras", [])
     row["cameras"] = len(cameras)
     row["frames_lost"] = sum(camera["frames_lost"] for camera in cameras)
@@ -63,10 +83,10 @@ def _row(end: ScanEnd) -> dict[str, Cell]:
     row |= {f"mesh_{name}": value for name, value in quality.get("mesh", {}).items()}
     truth = quality.get("truth") or {}
     row |= {f"truth_{name}_mm": truth[name] for name in ("mean", "p95", "max") if name in truth}
-    row["calibration_sha256"] = quality.get("calibration", {}).get("sha256")
+    row["calibration_sha256"] = calibration.get("sha256")
     row["software"] = SOFTWARE
     row |= {f"{file}_sha256": digest for file, digest in sorted(end.digests.items())}
-    return row
+    return row, trust
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -92,17 +112,18 @@ def _as_parquet(columns: Sequence[str], rows: Sequence[dict[str, Cell]]) -> byte
     import pyarrow
     from pyarrow import parquet
 
-    types = {column: _type(column) for column in columns}
-    table = pyarrow.Table.from_pylist(rows, pyarrow.schema(types.items()))
+    table = pyarrow.Table.from_pylist(rows, pyarrow.schema([_field(column) for column in columns]))
     out = io.BytesIO()
     parquet.write_table(table, out)
     return out.getvalue()
 
 
-def _type(column: str) -> Any:
-    """Type of a column: the same in every table, so that tables of several archives can be joined."""
+def _field(column: str) -> Any:
+    """Name, type and unit of a column: the same in every table, so that tables of several archives can be joined."""
     import pyarrow
 
-    if column in TEXTS:
-        return pyarrow.string()
-    return pyarrow.int64() if column in COUNTS else pyarrow.float64()
+    if column in TEXTS or column.endswith("_status"):
+        return pyarrow.field(column, pyarrow.string())
+    kind = pyarrow.int64() if column in COUNTS else pyarrow.float64()
+    unit = column.rpartition("_")[2]
+    return pyarrow.field(column, kind, metadata={"unit": unit if unit in UNITS else "1"})

@@ -34,6 +34,8 @@ def demo(
     measures = Measures.model_validate_json((result.results / "measures.json").read_bytes())
     print_measures(measures, result.true_measures)
     quality = Quality.model_validate_json((result.results / "quality.json").read_bytes())
+    for warning in quality.scan_warnings or ():
+        message(f"Warning: {warning}")
     if quality.truth is not None:
         figures = quality.truth.model_dump(include={"mean", "p50", "p95", "p99", "max"})
         rows = [[name, f"{value:.3f}"] for name, value in figures.items()]

@@ -14,7 +14,7 @@ from pipelines.console.scanner import Scanner, Side
 from pipelines.console.sitting import ScannedFoot, Sitting, judge_scan
 from pipelines.live.calibrating.guide import Guide
 from schemas.base.errors import FootscanError, RefusedInput
-from schemas.base.model import pseudonym
+from schemas.base.model import Posture, pseudonym
 
 log = logging.getLogger("footscan.console")
 
@@ -33,10 +33,9 @@ WARNING_SECONDS = 60.0
 class Console:
     """The state behind the pages; usable from any thread. A context manager that closes the scanner, lasers off."""
 
-    def __init__(self, scanner: Scanner, archive: Path, results: Path, guide: Guide | None = None) -> None:
+    def __init__(self, scanner: Scanner, results: Path, guide: Guide | None = None) -> None:
         """`guide` leads through calibrations; None if the scanner has no reference object."""
-        self.archive, self.results = archive, results
-        self.scanner, self.guide = scanner, guide
+        self.scanner, self.results, self.guide = scanner, results, guide
         self._lock = threading.Lock()
         self._operator = OperatorLock()
         self._sitting = Sitting()
@@ -118,14 +117,15 @@ class Console:
         """Start to light the heads for a few seconds."""
         self._begin(page, "shine", self.scanner.shine)
 
-    def scan(self, page: str, patient: str, side: Side, keep_partial: bool) -> None:
+    def scan(self, page: str, patient: str, side: Side, posture: Posture, keep_partial: bool) -> None:
         """Start a scan."""
         pseudonym(patient, "patient")
 
         def film() -> ScannedFoot:
             with self._lock:
                 self._sitting = self._sitting.begun(patient)
-            return judge_scan(self.scanner.film(patient, side, keep_partial=keep_partial), self.results)
+            filmed = self.scanner.film(patient, side, posture=posture, keep_partial=keep_partial)
+            return judge_scan(filmed, self.results)
 
         self._begin(page, "scan", film)
 

@@ -19,6 +19,7 @@ from pipelines.live.scanner import REPORT_SECONDS, LiveScanner
 from pipelines.live.state import OnState, ScannerState
 from pipelines.live.storing import ScanName, next_scan_name
 from schemas.base.errors import FootscanError
+from schemas.base.model import Posture
 from schemas.calibration import read_calibration
 
 JOG_MM_PER_S = 20.0
@@ -113,13 +114,13 @@ class LiveAdapter:
         """As `Scanner.shine`."""
         self._scanner.shine(SHINE_POWER if self._light is None else self._light.power, SHINE_SECONDS)
 
-    def film(self, patient: str, side: Side, *, keep_partial: bool) -> Scanned:
+    def film(self, patient: str, side: Side, *, posture: Posture = "unknown", keep_partial: bool) -> Scanned:
         """As `Scanner.film`."""
         if self._glass is not None and side != self._glass.subject:
             with self._scanner.waiting_for(f"putting the virtual {side} foot onto the glass") as progress:
                 self._glass.put(side, progress)
         today = datetime.datetime.now().astimezone().date()
-        name = ScanName(patient, next_scan_name(self._archive, patient, side, today), side, today)
+        name = ScanName(patient, next_scan_name(self._archive, patient, side, today), side, today, posture)
         order = ScanOrder(name, self._archive, self._results, light=self._light, keep_partial=keep_partial)
         result = self._scanner.scan(order)
         problem = None if result.measured is None else result.measured.problem

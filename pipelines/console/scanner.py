@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 from pipelines.live.state import OnState, ScannerState
+from schemas.base.model import Posture
 
 Side = Literal["right", "left"]
 Level = Literal["ok", "warning", "bad", "unknown"]
@@ -86,7 +87,7 @@ class Scanner(Protocol):
         """Switch the lasers on for a few seconds; the heads do not move."""
         ...
 
-    def film(self, patient: str, side: Side, *, keep_partial: bool) -> Scanned:
+    def film(self, patient: str, side: Side, *, posture: Posture = "unknown", keep_partial: bool) -> Scanned:
         """Make a scan, from homing to measures."""
         ...
 

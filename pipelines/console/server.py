@@ -39,7 +39,7 @@ from pipelines.console.pages.sitting import sitting_page
 from pipelines.console.scanner import Side
 from pipelines.console.stopping import stop_asked
 from schemas.base.errors import Fault, FootscanError, RefusedInput
-from schemas.base.model import Document, Pseudonym
+from schemas.base.model import Document, Posture, Pseudonym
 from schemas.rig import HeadNumber
 
 _Made = TypeVar("_Made")
@@ -69,6 +69,7 @@ class ScanRequest(Document):
 
     patient: Pseudonym
     side: Side
+    posture: Posture = "unknown"
     keep_partial: bool = False
 
 
@@ -219,7 +220,7 @@ class _Pages:
         self._foot = lru_cache(PAGES_KEPT)(self._foot_page)
 
     def _foot_page(self, patient: str, scan: str, _version: tuple[int, ...]) -> str:
-        return foot_page(self._console.archive, self._console.results, patient, scan)
+        return foot_page(self._console.results, patient, scan)
 
     async def _in_worker(self, make: Callable[[], _Made]) -> _Made:
         """Run `make` in one of `WORKERS` threads and return its result."""
@@ -351,7 +352,7 @@ async def _body(request: Request) -> bytes:
 
 def _scan(console: Console, page: str, body: bytes) -> None:
     order = ScanRequest.model_validate_json(body)
-    console.scan(page, order.patient, order.side, order.keep_partial)
+    console.scan(page, order.patient, order.side, order.posture, order.keep_partial)
 
 
 def _jog(console: Console, page: str, body: bytes) -> None:

@@ -80,7 +80,8 @@ def _end(row: dict[str, str], results: Path, documents: dict[str, tuple[Path, Sc
     digests = {file: row[f"{file}_sha256"] for file in DELIVERED if row.get(f"{file}_sha256")}
     results_folder = folder if status in {"done", "finding"} else None
     kind = None if status == "done" else status
-    return ScanEnd(scan, source, results_folder, row.get("problem") or None, kind, digests, True, document)
+    parameters = row.get("parameters_sha256") or None
+    return ScanEnd(scan, source, results_folder, row.get("problem") or None, kind, digests, True, document, parameters)
 
 
 def _documents(archives: tuple[Path, ...]) -> dict[str, tuple[Path, Scan]]:

@@ -1,6 +1,6 @@
 """Measurement of a new scan by the same dataflow as `footscan run --scan`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +20,8 @@ class Measured:
     problem: str | None
     kind: str | None
     """Kind of the problem: `refused`, `finding`, `fault` or `damaged`, as in `ScanEnd`."""
+    warnings: Sequence[str] = ()
+    """All that speaks against the measures, as in `ScanEnd`."""
 
 
 def measure_scan(scan: Path, calibration: Path, results: Path, on_progress: Callable[[float], None]) -> Measured:
@@ -36,5 +38,5 @@ def measure_scan(scan: Path, calibration: Path, results: Path, on_progress: Call
         measures = None
         if end.folder is not None:
             measures = Measures.model_validate_json((end.folder / "measures.json").read_bytes())
-        return Measured(end.folder, measures, end.problem, end.kind)
+        return Measured(end.folder, measures, end.problem, end.kind, end.warnings)
     raise Fault(f"{scan}: the run ended without a result")

@@ -16,9 +16,10 @@ from footscan.capture.film_frames import (
 from footscan.capture.frame_positions import write_positions
 from footscan.capture.passes import FilmedPass, film_name
 from footscan.capture.recording import ScanRecording
+from footscan.recordings.scans import RECORDING_FILE
 from pipelines.live.recording_document import ScanStory, recording_document
 from schemas.base.errors import Finding, FootscanError, RefusedInput
-from schemas.base.model import Side
+from schemas.base.model import Posture, Side
 from schemas.frames import GROUP
 from schemas.rig import Rig, RigCamera
 from schemas.scan import Scan
@@ -33,12 +34,13 @@ MOST_SCANS = 999
 
 @dataclass(frozen=True)
 class ScanName:
-    """Patient, name, side and date of a scan."""
+    """Patient, name, side, date and posture of a scan."""
 
     patient: str
     scan: str
     side: Side
     date: datetime.date
+    posture: Posture = "unknown"
 
 
 @dataclass(frozen=True)
@@ -100,13 +102,14 @@ def store_scan(
             "scan": name.scan,
             "side": name.side,
             "date": name.date,
+            "posture": name.posture,
             "scanner": rig.scanner,
             "calibration_check": None if check is None else CHECK_FILE,
             "cameras": sorted(entries, key=lambda entry: int(str(entry["id"]))),
         }
     )
     document = recording_document(rig, story, films, left_out, heads)
-    recording.file("recording.json").write_text(document.model_dump_json(indent=2) + "\n", encoding="utf-8")
+    recording.file(RECORDING_FILE).write_text(document.model_dump_json(indent=2) + "\n", encoding="utf-8")
     return FilmedScan(recording.finish(scan), films, left_out)
 
 

@@ -15,10 +15,10 @@ from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.measures import Measures
 from schemas.movement import MovementReport
-from schemas.parameters.foot import FootParameters
+from schemas.parameters.foot import MeasureParameters
 
 
-def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
+def run(inputs: Mapping[str, bytes], parameters: MeasureParameters, places: Mapping[str, Path]) -> bytes:
     """Measure the foot, as measures.json.
 
     `inputs`: `surface`, `clean` for the glass and how the foot moved, `heads`, where they were, `fused` for how cameras
@@ -42,4 +42,5 @@ def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping
         measures = Measures(
             side=parameters.side, doubts=doubts, axis=None, transform=unmoved, measures={}, finding=str(finding)
         )
+    measures = measures.model_copy(update={"posture": parameters.posture})
     return (measures.model_dump_json(indent=2) + "\n").encode()

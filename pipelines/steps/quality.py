@@ -1,4 +1,4 @@
-"""The quality of a scan, as quality.json."""
+"""The quality of a scan, as quality.json without its warnings."""
 
 import json
 from collections.abc import Mapping
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from footscan.surface.quality import mesh_quality
 from pipelines.arrays import unpack
-from schemas.calibration import Source
 from schemas.calibration_check import ScanCheck
 from schemas.frames import FrameManifest
 from schemas.fusion import FusionReport
@@ -19,13 +18,15 @@ from schemas.heads import HeadsReport
 from schemas.laser import Laser
 from schemas.movement import MovementReport
 from schemas.quality import CameraQuality, Comparison, Quality
+from schemas.used_calibration import UsedCalibration
 
 
 def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
-    """Collect the quality figures of a scan, as quality.json.
+    """Collect the quality figures of a scan, as quality.json without its warnings.
 
-    `inputs`: `calibration` (its name and digest), `heads`, `clean`, `fused`, `surface`, `manifest-N` and `stripe-N` of
-    each camera, `calibration-check` if the calibration was checked, and `verified` if the scan has a truth.
+    `inputs`: `calibration` (its name, digest and origin), `heads`, `clean`, `fused`, `surface`, `manifest-N` and
+    `stripe-N` of each camera, `calibration-check` if the calibration was checked, and `verified` if the scan has a
+    truth.
     """
     del parameters, places
     cleaned = unpack(inputs["clean"])
@@ -35,7 +36,7 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
     cut_mm = surface["cut_mm"].item() if "cut_mm" in surface else None
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
     quality = Quality(
-        calibration=Source.model_validate_json(inputs["calibration"]),
+        calibration=UsedCalibration.model_validate_json(inputs["calibration"]),
         calibration_check=_check(inputs),
         cameras=[_camera(camera, inputs, removed.get(str(camera), {})) for camera in ids],
         warnings=json.loads(cleaned["warnings"].tobytes()),

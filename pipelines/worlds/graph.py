@@ -17,6 +17,7 @@ from schemas.base.model import canonical_json
 from schemas.campaign import WorldKind
 from schemas.frames import FrameManifest
 from schemas.parameters.calibration import CalibrationParameters
+from schemas.parameters.foot import MeasureParameters
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import Travel
 from schemas.world import World
@@ -141,7 +142,8 @@ def point_steps(world: World, parameters: ScanParameters, body: Body | None = No
         }
         points[f"points-{camera}"] = graph.add("map", "map_points", mapped, parameters.mapping, camera)
     maps = graph.cameras(frozenset(machine.cameras))
-    made = reconstruction_steps(graph.name, points, maps, parameters, world.subject.side, graph.steps)
+    foot = MeasureParameters(side=world.subject.side)
+    made = reconstruction_steps(graph.name, points, maps, parameters, foot, graph.steps)
     return graph.compare("points", {name: getattr(made, name) for name in RESULTS})
 
 

@@ -22,6 +22,10 @@ Pseudonym = Annotated[str, AfterValidator(_pseudonym)]
 Side = Literal["right", "left", "unknown"]
 """The side of a foot."""
 
+Posture = Literal["sitting", "half_weight", "standing", "unknown"]
+"""Posture of the person and load on the foot: seated, the foot on the glass without body weight; standing, the weight
+equally on both feet, as ISO 7250-1 requires; standing, the weight on the scanned foot."""
+
 
 def _relative(path: str) -> str:
     if not path or "\0" in path or path.startswith(("/", "\\", "~")) or ":" in path.split("/", maxsplit=1)[0]:

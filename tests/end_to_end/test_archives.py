@@ -21,7 +21,7 @@ from pyarrow import parquet
 Footscan = Callable[..., CompletedProcess[str]]
 Mistake = Callable[[CompletedProcess[str]], str]
 CAMERAS = (1, 5)
-STEPS = 17
+STEPS = 18
 """Ingest, extract and map of 2 cameras; fuse, clean, orient, surface, measure, quality, 2 exports, report."""
 PATIENCE_S = 300.0
 """No test waits as long, unless it fails."""
@@ -187,14 +187,15 @@ def test_processes_give_the_bytes_of_threads(command: Footscan, footscan: Footsc
     done = command("run", workflow, "--workers", 2)
     assert done.returncode == 0, done.stderr
     assert done.stdout == f"P0001/S1: {bench / 'results/P0001/S1'}\n"
-    assert done.stderr == f"{STEPS} of {STEPS} steps to run\n"  # and no status page
+    said = [line for line in done.stderr.splitlines() if not line.startswith("P0001/S1: ")]  # its warnings
+    assert said == [f"{STEPS} of {STEPS} steps to run"]  # and no status page
     by_processes = results(bench)
     again = command("run", workflow, "--workers", 2)  # nothing is to run: no processes are started for it
-    assert (again.returncode, again.stderr) == (0, f"0 of {STEPS} steps to run\n")
+    assert (again.returncode, again.stderr.splitlines()[0]) == (0, f"0 of {STEPS} steps to run")
     shutil.rmtree(bench / "results")
     shutil.rmtree(bench / "archive/P0001/S1/frames.zarr")
     done = footscan("run", workflow, "--threads", 2)
-    assert (done.returncode, done.stderr.strip()) == (0, f"{STEPS} of {STEPS} steps to run")
+    assert (done.returncode, done.stderr.splitlines()[0]) == (0, f"{STEPS} of {STEPS} steps to run")
     assert results(bench) == by_processes
 
 

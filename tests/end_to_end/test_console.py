@@ -46,7 +46,7 @@ def scanner(tmp_path: Path) -> Any:
 
 @pytest.fixture
 def console(scanner: Any, tmp_path: Path) -> Iterator[Console]:
-    with Console(scanner, tmp_path / "archive", tmp_path / "results") as one:
+    with Console(scanner, tmp_path / "results") as one:
         yield one
 
 
@@ -79,6 +79,8 @@ def test_two_feet_by_mouse(show: Callable[..., Opened], scanner: Any) -> None:
     page.click("#home")
     expect(page.locator("#device-list")).to_contain_text("Head 3 at X = -18.0 mm")
     page.fill("#patient", "P0001")
+    expect(page.locator("#start-told")).to_have_text("Choose the posture.")
+    page.select_option("#posture", "standing")
     page.click("#start")
     page.wait_for_selector("#verdict.good")
     assert page.locator("h1").inner_text() == "Right foot P0001 2026-11-20-R"
@@ -92,7 +94,7 @@ def test_two_feet_by_mouse(show: Callable[..., Opened], scanner: Any) -> None:
     page.wait_for_url(opened.address + "/")
     expect(page.locator("#who")).to_have_text("Nobody yet.")
     assert page.input_value("#patient") == ""
-    assert scanner.calls == ["connect", "home", "film P0001 right False", "film P0001 left False"]
+    assert scanner.calls == ["connect", "home", "film P0001 right standing False", "film P0001 left standing False"]
     opened.is_clean()
 
 
@@ -108,6 +110,8 @@ def test_two_feet_by_keyboard_on_a_tablet(show: Callable[..., Opened], scanner: 
     opened.tab_to("input[name=side]")
     keyboard.press("ArrowLeft")
     expect(page.locator("#start")).to_have_text("Scan the left foot")
+    opened.tab_to("#posture")
+    keyboard.press("ArrowDown")
     opened.tab_to("#start")
     keyboard.press("Enter")
     page.wait_for_url("**/foot/P-2_b/2026-11-20-L")
@@ -121,7 +125,7 @@ def test_two_feet_by_keyboard_on_a_tablet(show: Callable[..., Opened], scanner: 
     opened.tab_to("#pair")
     keyboard.press("Enter")
     page.wait_for_url("**/pair/P-2_b/2026-11-20-L/2026-11-20-R")
-    assert scanner.calls == ["connect", "film P-2_b left False", "film P-2_b right False"]
+    assert scanner.calls == ["connect", "film P-2_b left half_weight False", "film P-2_b right half_weight False"]
     opened.is_clean()
 
 
@@ -142,6 +146,7 @@ def test_a_pseudonym_is_checked_as_typed(show: Callable[..., Opened], scanner: A
     expect(told).to_contain_text("“<”")
     assert page.title() == "footscan"
     page.fill("#patient", "P1")
+    page.select_option("#posture", "unknown")
     expect(start).to_have_attribute("aria-disabled", "false")
     assert scanner.calls == ["connect"]
     opened.is_clean()
@@ -156,6 +161,7 @@ def test_a_scan_is_stopped(way: str, show: Callable[..., Opened], scanner: Any, 
     page = opened.page
     opened.state("Done" if way == "key on a result" else "Ready")
     scanner.pause = {"filming"}
+    page.select_option("#posture", "half_weight")
     page.fill("#patient", "P1")
     page.locator("#patient").press("Enter")
     opened.state("Filming")
@@ -185,6 +191,7 @@ def test_door_alarm_lost_camera_and_the_way_back(show: Callable[..., Opened], sc
     opened.state("Ready")
     expect(page.locator("#device-list")).to_contain_text(HOSTILE)
     page.fill("#patient", "P1")
+    page.select_option("#posture", "sitting")
     page.click("#start")
     opened.state("Filming")
     assert scanner.reached.wait(60)

@@ -30,7 +30,7 @@ def address(glass: StandingStandIn, tmp_path: Path) -> Iterator[str]:
     guide = Guide(glass, settings, glass.put)
     scanner = console_stand_in(tmp_path / "results")
     scanner.connect()
-    with Console(scanner, tmp_path / "archive", tmp_path / "results", guide) as console, served(console) as at:
+    with Console(scanner, tmp_path / "results", guide) as console, served(console) as at:
         yield at
 
 

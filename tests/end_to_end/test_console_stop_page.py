@@ -57,6 +57,7 @@ def test_a_page_with_a_token_stops_by_the_port_of_stop(
     page = opened.page
     expect(page.locator("#state-name")).to_have_text("Ready")
     page.fill("#patient", "P1")
+    page.select_option("#posture", "half_weight")
     page.click("#start")
     scanner.wait_until_busy("console", process)
     with page.expect_response(lambda answer: answer.url.endswith("/do/stop")) as answered:

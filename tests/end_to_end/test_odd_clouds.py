@@ -23,7 +23,7 @@ from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, S
 from schemas.frames import FrameManifest
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
-from schemas.parameters.foot import FootParameters
+from schemas.parameters.foot import MeasureParameters
 from schemas.parameters.fusion import FusionParameters
 from schemas.parameters.normals import NormalParameters
 from schemas.parameters.surface import SurfaceParameters
@@ -139,7 +139,7 @@ def test_a_surface_is_verified_and_reported(name: str, calibration: bytes, truth
     cloud = SURFACE[name]()
     done = meshed(cloud, calibration, SurfaceParameters())
     verified = verify.run({"surface": done["surface"]}, None, {"truth": truth})
-    side = FootParameters(side="unknown")
+    side = MeasureParameters(side="unknown")
     measures = measure.run(done, side, {})
     manifest = FrameManifest(encoding="image", height=480, width=640, frames=["0" * 64] * FRAMES)
     of_cameras: dict[str, bytes] = {}

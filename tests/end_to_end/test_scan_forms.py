@@ -138,7 +138,7 @@ def test_a_scan_that_breaks_its_format_costs_itself_alone(footscan: Footscan, mi
     (archive / "archive/P0002/small/scan.yaml").write_text("patient: [")
     planned = footscan("plan", archive / "workflow.yaml", "--json")
     assert planned.returncode == 1
-    assert json.loads(planned.stdout)["steps"] == 72
+    assert json.loads(planned.stdout)["steps"] == 74
     done = footscan("run", archive / "workflow.yaml")
     assert done.returncode == 1
     assert mistake(done).startswith(f"{archive / 'archive/P0002/small/scan.yaml'}: line 1")

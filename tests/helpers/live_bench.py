@@ -45,7 +45,7 @@ class Bench:
     def order(self, **changes: Any) -> ScanOrder:
         scan = next_scan_name(self.home / "archive", "P7", "right", DAY)
         order = ScanOrder(
-            ScanName("P7", scan, "right", DAY),
+            ScanName("P7", scan, "right", DAY, "sitting"),
             self.home / "archive",
             light=light_by_hand(self.scanner.rig, 1.0, 10.0),
         )

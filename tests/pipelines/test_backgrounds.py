@@ -286,7 +286,7 @@ def test_plan_says_why_a_camera_is_extracted_again(done: Any, unfinished: pytest
     assert not ran & {"ingest-5", "ingest-1", "extract-1", "map-1"}
 
     document.write_text(text)
-    assert done.plan() == (17, {})  # the scan without a background is what it was
+    assert done.plan() == (18, {})  # the scan without a background is what it was
 
 
 def test_a_background_of_the_same_content_is_not_read_again(done: Any) -> None:

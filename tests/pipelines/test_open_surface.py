@@ -18,7 +18,7 @@ from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.measures import Measure, Measures
 from schemas.movement import MovementReport
-from schemas.parameters.foot import FootParameters
+from schemas.parameters.foot import MeasureParameters
 from schemas.parameters.surface import SurfaceParameters
 
 STEP_MM = 4.0
@@ -89,7 +89,7 @@ def surface_of(oriented: bytes, **values: object) -> bytes:
 def measures_of(mesh: bytes) -> dict[str, Measure]:
     document = measure.run(
         {"surface": mesh, "clean": IN_PLACE, "fused": ALONE, "heads": HeadsReport().model_dump_json().encode()},
-        FootParameters(side="right"),
+        MeasureParameters(side="right"),
         NOWHERE,
     )
     found = Measures.model_validate_json(document)

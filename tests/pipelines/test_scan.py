@@ -1,5 +1,7 @@
 """The graph of a scan: the steps that run again after a change."""
 
+import html
+import json
 import os
 import re
 from collections.abc import Callable
@@ -7,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from made_up_scan import recorded
 
 from footscan.frames.ingest import chunk_name
 from footscan.recordings.scans import read_scan
@@ -17,7 +20,10 @@ from schemas.base.errors import RefusedInput
 from schemas.calibration import Calibration
 from schemas.parameters.scan import ScanParameters
 
-FROM_CLEAN = {"clean", "fuse", "orient", "surface", "measure", "quality", "cloud.ply", "foot.stl", "foot.ply", "report"}
+FROM_CLEAN = {
+    "clean", "fuse", "orient", "surface", "measure", "quality", "quality.json", "cloud.ply", "foot.stl", "foot.ply",
+    "report",
+}  # fmt: skip
 CAMERAS = {f"{kind}-{camera}" for kind in ("ingest", "extract", "map") for camera in (1, 5)}
 ALL = CAMERAS | {"heads"} | FROM_CLEAN
 
@@ -46,7 +52,7 @@ def test_steps_stand_behind_those_whose_results_they_take(
 
 def test_nothing_has_run(archive: Any) -> None:
     steps, reasons = archive.plan()
-    assert (steps, set(reasons)) == (17, ALL)
+    assert (steps, set(reasons)) == (18, ALL)
     assert reasons["ingest-1"] == "never run"
     assert reasons["extract-5"] == "waits for ingest of camera 5"
     assert reasons["clean"] == "waits for map of camera 1"
@@ -54,7 +60,7 @@ def test_nothing_has_run(archive: Any) -> None:
 
 
 def test_second_run_does_nothing(done: Any) -> None:
-    assert done.plan() == (17, {})
+    assert done.plan() == (18, {})
     before = {path: path.stat().st_mtime_ns for path in done.root.rglob("*") if path.is_file()}
     [scan], ran = done.run()
     assert (scan.problem, ran) == (None, set())
@@ -73,9 +79,9 @@ def test_another_outlier_parameter_runs_from_the_filter_on(done: Any) -> None:
     _, ran = done.run()
     assert "clean" in ran
     assert ran <= FROM_CLEAN
-    assert done.plan() == (17, {})
+    assert done.plan() == (18, {})
     done.set_parameters("{}")
-    assert done.plan() == (17, {})
+    assert done.plan() == (18, {})
 
 
 def test_another_calibration_leaves_the_extraction_alone(done: Any, calibration: Callable[..., Calibration]) -> None:
@@ -105,7 +111,7 @@ def test_changed_byte_runs_its_camera_and_what_follows(done: Any) -> None:
     assert scan.problem is None
     assert {"ingest-5", "extract-5"} <= ran
     assert not ran & {"ingest-1", "extract-1", "map-1"}
-    assert done.plan() == (17, {})
+    assert done.plan() == (18, {})
 
 
 def test_film_that_is_put_back_is_extracted_from_its_own_frames(done: Any) -> None:
@@ -118,7 +124,7 @@ def test_film_that_is_put_back_is_extracted_from_its_own_frames(done: Any) -> No
     [scan], ran = done.run()
     assert scan.problem is None
     assert {"ingest-5", "extract-5"} <= ran
-    assert done.plan() == (17, {})
+    assert done.plan() == (18, {})
 
 
 @pytest.mark.parametrize("damage", ["removed", "changed"])
@@ -129,7 +135,7 @@ def test_results_come_back_without_a_step(done: Any, damage: str) -> None:
         stl.unlink()
     else:
         stl.write_bytes(b"solid")
-    assert done.plan() == (17, {})
+    assert done.plan() == (18, {})
     [scan], ran = done.run()
     assert (scan.problem, ran) == (None, set())
     assert stl.read_bytes() == content
@@ -197,3 +203,34 @@ def test_source_files_of_a_folder_follow_names_and_contents(tmp_path: Path) -> N
     assert len(source_files(folder / "a.png", digests).states) == 1
     with pytest.raises(RefusedInput, match="no such film"):
         source_files(tmp_path / "missing.avi", digests)
+
+
+def test_a_posture_is_in_the_measures_and_only_they_are_taken_again(done: Any) -> None:
+    description = done.scan / "scan.yaml"
+    before = json.loads((done.results / "measures.json").read_bytes())
+    assert before["posture"] == "unknown"
+    description.write_text(f"{description.read_text()}posture: half_weight\n")
+    [scan], ran = done.run()
+    assert (scan.problem, ran) == (None, {"measure", "quality.json", "report"})
+    assert json.loads((done.results / "measures.json").read_bytes()) == before | {"posture": "half_weight"}
+
+
+def test_the_recording_of_a_scan_adds_to_its_warnings(done: Any) -> None:
+    """How a scan was filmed is read by the step that collects the warnings, and by no other."""
+    recording = done.scan / "recording.json"
+    recording.write_text(recorded(0, None, ["camera 7 is left out: no frame"]).model_dump_json())
+    before = json.loads((done.results / "quality.json").read_bytes())["scan_warnings"]
+    [scan], ran = done.run()
+    assert (scan.problem, ran) == (None, {"quality.json", "report"})
+    after = json.loads((done.results / "quality.json").read_bytes())["scan_warnings"]
+    assert list(scan.warnings) == after
+    assert {*after} - {*before} == {
+        "Camera 7 is left out: no frame.",
+        "The latency of camera 3 was never measured, so lengths along the foot may be off: run 'footscan calibrate "
+        "latency'.",
+    }
+    page = (done.results / "report.html").read_text()
+    assert all(f"<li>{html.escape(warning)}</li>" in page for warning in after)
+    recording.write_text("of another program")
+    done.run()
+    assert json.loads((done.results / "quality.json").read_bytes())["scan_warnings"] == before

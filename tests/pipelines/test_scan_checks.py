@@ -17,7 +17,7 @@ def dated(done: Any) -> Any:
     """A run archive whose scan has a date."""
     document = done.scan / "scan.yaml"
     document.write_text(document.read_text().replace("cameras:", "date: 2026-11-24\ncameras:"))
-    assert done.plan() == (17, {})
+    assert done.plan() == (18, {})
     return done
 
 
@@ -40,30 +40,33 @@ def test_a_steady_check_is_reported_and_leaves_the_measures_alone(dated: Any) ->
     assert "calibration was not checked" in (dated.results / "report.html").read_text()
     store(dated, "2026-11-22T08:00:00+01:00", STEADY)
     _, reasons = dated.plan()
-    assert reasons == {"quality": "input calibration-check changed", "report": "waits for quality"}
+    assert reasons == {
+        "quality": "input calibration-check changed", "quality.json": "waits for quality",
+        "report": "waits for quality.json",
+    }  # fmt: skip
     [scan], ran = dated.run()
-    assert (scan.problem, ran) == (None, {"quality", "report"})
+    assert (scan.problem, ran) == (None, {"quality", "quality.json", "report"})
     assert (dated.results / "measures.json").read_bytes() == before
     assert result(dated, "quality.json")["calibration_check"] == {
         "checked": "2026-11-22", "age_days": 2, "largest_mm": 0.03, "drifted": [], "unseen": []
     }  # fmt: skip
     summary = "checked on 2026-11-22, 2 days before the scan: every camera was within 0.03 mm"
     assert summary in (dated.results / "report.html").read_text()
-    assert dated.plan() == (17, {})
+    assert dated.plan() == (18, {})
 
 
 def test_a_drifted_check_makes_the_measures_uncertain(dated: Any) -> None:
     store(dated, "2026-11-24T08:00:00+01:00", DRIFTED)
-    assert to_run(dated) == {"measure", "quality", "report"}
+    assert to_run(dated) == {"measure", "quality", "quality.json", "report"}
     [scan], ran = dated.run()
-    assert (scan.problem, ran) == (None, {"measure", "quality", "report"})
+    assert (scan.problem, ran) == (None, {"measure", "quality", "quality.json", "report"})
     measures = result(dated, "measures.json")
     assert measures["doubts"] == [SENTENCE]
     statuses = {measure["status"] for measure in measures["measures"].values()}
     assert statuses <= {"uncertain", "incomplete"}
     assert "uncertain" in statuses
     assert SENTENCE.capitalize() in (dated.results / "report.html").read_text()
-    assert dated.plan() == (17, {})
+    assert dated.plan() == (18, {})
 
 
 def test_keys_do_not_change_with_what_does_not_matter(dated: Any) -> None:
@@ -71,9 +74,9 @@ def test_keys_do_not_change_with_what_does_not_matter(dated: Any) -> None:
     store(dated, "2026-11-24T08:00:00+01:00", DRIFTED)
     dated.run()
     store(dated, "2026-11-24T09:30:00+01:00", {1: 0.1, 5: 0.4149, 7: 0.9, 8: None})
-    assert dated.plan() == (17, {})
+    assert dated.plan() == (18, {})
     store(dated, "2026-11-25T08:00:00+01:00", STEADY)
-    assert dated.plan() == (17, {})
+    assert dated.plan() == (18, {})
 
 
 def test_keys_change_with_the_verdict_and_come_back_with_it(dated: Any) -> None:
@@ -81,21 +84,22 @@ def test_keys_change_with_the_verdict_and_come_back_with_it(dated: Any) -> None:
     store(dated, "2026-11-24T08:00:00+01:00", DRIFTED)
     dated.run()
     store(dated, "2026-11-24T12:00:00+01:00", STEADY)
-    assert to_run(dated) == {"quality", "report"}, "the measures are those of a scan that was never checked"
+    only = {"quality", "quality.json", "report"}
+    assert to_run(dated) == only, "the measures are those of a scan that was never checked"
     dated.run()
     assert (dated.results / "measures.json").read_bytes() == never_checked
     store(dated, "2026-11-24T13:00:00+01:00", {1: 0.03, 5: None})
-    assert to_run(dated) == {"measure", "quality", "report"}
+    assert to_run(dated) == {"measure", "quality", "quality.json", "report"}
     for path in dated.root.glob("calibration.check*"):
         path.unlink()
-    assert dated.plan() == (17, {})
+    assert dated.plan() == (18, {})
 
 
 def test_another_calibration_is_not_judged_by_the_check_of_the_former(dated: Any) -> None:
     store(dated, "2026-11-24T08:00:00+01:00", DRIFTED)
     path = dated.root / "calibration.json"
     path.write_text(path.read_text() + "\n")
-    assert to_run(dated) == {"quality", "report"}, "the digest of the calibration alone has changed"
+    assert to_run(dated) == {"quality", "quality.json", "report"}, "the digest of the calibration alone has changed"
     dated.run()
     assert result(dated, "quality.json")["calibration_check"] is None
 

@@ -86,7 +86,7 @@ def fuse(points: NDArray[np.void] | Iterable[NDArray[np.void]], parameters: Fusi
         warnings=[
             f"camera {view_name(camera)} deviates from the others by {away:.2f} mm, expected "
             f"{parameters.largest_correction_mm:g} mm at most: it was moved since the calibration, or its travel is "
-            "not what the scan says"
+            "not what the scan says; check the camera with 'footscan calibrate check'"
             for camera, away in sorted(corrected.too_far.items())
         ]
         + [*_worse(before, after)],
@@ -100,7 +100,8 @@ def _worse(before: Pairs, after: Pairs) -> Iterator[str]:
     >>> from schemas.fusion import Disagreement
     >>> disagreements = [Disagreement(median_mm=mm, deviation_mm=0.02, rms_mm=mm) for mm in (0.03, 0.2)]
     >>> next(_worse(*({(1, 5): (400, disagreement)} for disagreement in disagreements)))
-    'cameras 1 and 5 agree worse after the correction of the cameras: 0.03 mm apart before, 0.20 mm after'
+    'cameras 1 and 5 agree worse after the correction of the cameras: 0.03 mm apart before, 0.20 mm after; if the \
+foot moved, scan again'
     """
     for pair, (count, was) in before.items():
         now = after.get(pair, before[pair])[1]
@@ -108,7 +109,8 @@ def _worse(before: Pairs, after: Pairs) -> Iterator[str]:
             first, second = map(view_name, pair)
             yield (
                 f"cameras {first} and {second} agree worse after the correction of the cameras: "
-                f"{abs(was.median_mm):.2f} mm apart before, {abs(now.median_mm):.2f} mm after"
+                f"{abs(was.median_mm):.2f} mm apart before, {abs(now.median_mm):.2f} mm after; if the foot "
+                "moved, scan again"
             )
 
 

@@ -71,7 +71,8 @@ def _correction(numbers: list[int], places: Floats) -> str:
 
     >>> print(_correction([1, 3], np.array([[0.31, 0.0, 0.0, 0.0], [-0.31, 0.002, 0.0, 0.0]])))
     heads are not where the calibration says, and the scan was corrected: head 1 by +0.31 mm; head 3 by -0.31 mm, \
-turned by 0.11 degrees
+turned by 0.11 degrees; if other scans show the same, film the body that shows the laser planes (`footscan calibrate \
+film`, or “Calibrate or check” in the console)
     """
     parts = []
     for number, (offset, yaw, pitch, scale) in zip(numbers, places.tolist(), strict=True):
@@ -79,7 +80,8 @@ turned by 0.11 degrees
         part = f"head {number} by {offset:+.2f} mm"
         part += f", turned by {turn:.2f} degrees" if turn else ""
         parts.append(part + (f", its travel {100 * scale:+.2f} %" if scale else ""))
-    return "heads are not where the calibration says, and the scan was corrected: " + "; ".join(parts)
+    todo = f"if other scans show the same, film the body that shows the laser planes ({FILM_BODY})"
+    return "heads are not where the calibration says, and the scan was corrected: " + "; ".join([*parts, todo])
 
 
 def _doubt(places: Floats, largest: float, parameters: HeadParameters) -> str | None:

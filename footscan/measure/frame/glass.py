@@ -32,10 +32,11 @@ def glass_doubt(glass: GlassPlane) -> str | None:
     """Reason for which all measures are uncertain, if the glass is too far from where it was calibrated.
 
     >>> glass_doubt(GlassPlane(below_foot_mm=3.5, largest_mm=3.6, corrected=True))
-    'the glass is up to 3.6 mm from where it was calibrated, more than can be corrected safely'
+    'the glass is up to 3.6 mm from where it was calibrated, more than can be corrected safely: calibrate anew'
     """
     if not glass.corrected or glass.largest_mm <= UNSAFE_MM:
         return None
     return (
-        f"the glass is up to {glass.largest_mm:.1f} mm from where it was calibrated, more than can be corrected safely"
+        f"the glass is up to {glass.largest_mm:.1f} mm from where it was calibrated, more than can be corrected "
+        "safely: calibrate anew"
     )

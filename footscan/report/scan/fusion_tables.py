@@ -51,11 +51,6 @@ def corrections_table(report: FusionReport) -> str:
     return table(headings, rows, numeric=range(2, len(headings)), kind="dense")
 
 
-def warnings_list(report: FusionReport) -> str:
-    """The warnings of the fusion, a note each."""
-    return "".join(f'<p class="note">{text(warning)}</p>' for warning in report.warnings)
-
-
 def _row(correction: CameraCorrection, contradicted: int) -> list[str]:
     held_out = (correction.held_out_before_mm, correction.held_out_after_mm)
     return [

@@ -15,17 +15,16 @@ from footscan.report.page import page
 from footscan.report.sample_frames import FRAMES_SCRIPT, FrameSample, sample_frames
 from footscan.report.scan.coverage import coverage_plot
 from footscan.report.scan.foot_colours import FootSurface, foot_colourings
-from footscan.report.scan.fusion_tables import corrections_table, disagreement_table, heads_table, warnings_list
+from footscan.report.scan.fusion_tables import corrections_table, disagreement_table, heads_table
 from footscan.report.scan.glass_facts import glass_facts
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
 from footscan.report.scan.mesh_facts import mesh_facts
-from footscan.report.scan.missing import missing_list
 from footscan.report.scan.removed import removed_pictures, removed_table
+from footscan.report.scan_warnings import warnings_of
 from footscan.report.surface_views import surface_views, upright
 from footscan.report.viewer import Drawing, viewer
 from footscan.report.viewer_script import SCRIPT
 from schemas.calibration import Calibration
-from schemas.fusion import FusionReport
 from schemas.measures import Measure, Measures
 from schemas.quality import Comparison, Quality
 
@@ -98,7 +97,7 @@ def scan_page(
     )
     removed = removed_table(quality.cameras), removed_pictures(points.points, points.codes)
     parts = [
-        section("Refused or missing", missing_list(measures, quality)),
+        section("Warnings", _warnings(warnings_of(measures, quality))),
         section("Measures", _tiles(measures), _measures(measures, drawings, turned)),
         section("Surface", _GRID_NOTE, filled_key(quality.mesh), surface_views(seen, faces, plain, measures.side)),
         "" if distance is None else _distances(seen, faces, measures, quality.truth, distance),
@@ -106,7 +105,13 @@ def scan_page(
         section("Mesh", mesh_facts(quality.mesh, quality.cloud_points)),
         section("Cameras", _cameras_table(quality, cloud)),
         section("Removed points", _REMOVED_NOTE, *removed),
-        section("Agreement of the cameras", _AGREEMENT_NOTE, heads_table(quality.heads), *_agreement(quality.fusion)),
+        section(
+            "Agreement of the cameras",
+            _AGREEMENT_NOTE,
+            heads_table(quality.heads),
+            disagreement_table(quality.fusion),
+            corrections_table(quality.fusion),
+        ),
         section("Glass", glass_facts(quality.glass)),
         section("Stripe coverage", _COVERAGE_NOTE, coverage_plot(cloud, quality.cameras)),
         section("Calibration", _calibration(calibration, quality)),
@@ -119,6 +124,13 @@ def scan_page(
         parts=parts,
         scripts=[SCRIPT, *([FRAMES_SCRIPT] if samples else [])],
     )
+
+
+def _warnings(warnings: Sequence[str]) -> str:
+    """The list of warnings; one sentence without them."""
+    if not warnings:
+        return "<p>None: all measures were taken, and every camera saw the foot.</p>"
+    return '<ul class="missing">' + "".join(f"<li>{text(warning)}</li>" for warning in warnings) + "</ul>"
 
 
 def _distances(
@@ -189,7 +201,7 @@ def _name(name: str, measure: Measure, is_drawn: bool) -> str:
 
 
 def _note(measure: Measure, own: str | None) -> str:
-    """The note below the definition: the measure's own remark and the uncertainty of the value."""
+    """The note below the definition: the measure's own remark, the uncertainty of the value, and its ISO name."""
     unit, decimals = UNITS[measure.unit]
     sigma = None
     if measure.uncertainty is not None:
@@ -197,7 +209,8 @@ def _note(measure: Measure, own: str | None) -> str:
         causes = sorted((measure.budget or {}).items(), key=lambda cause: -cause[1])
         shown = [f"{cause} {number(sd, decimals + 1)}" for cause, sd in causes if round(sd, decimals + 1) > 0]
         sigma += f" ({', '.join(shown)})" if len(shown) > 1 else ""
-    note = "; ".join(part for part in (own, sigma) if part)
+    iso = None if measure.convention is None else measure.convention.iso
+    note = "; ".join(part for part in (own, sigma, iso) if part)
     return f'<p class="note">{text(note)}</p>' if note else ""
 
 
@@ -228,10 +241,6 @@ def _cameras_table(quality: Quality, cloud: NDArray[np.void]) -> str:
         for name, row, laser in zip(names, rows, lasers[: len(rows)], strict=True)
     )
     return table(headings, cells, numeric=range(1, len(headings) - 1))
-
-
-def _agreement(report: FusionReport) -> list[str]:
-    return [disagreement_table(report), corrections_table(report), warnings_list(report)]
 
 
 def _calibration(calibration: Calibration, quality: Quality) -> str:

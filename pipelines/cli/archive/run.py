@@ -114,6 +114,8 @@ def _run(
             _tell(end.scan, end.problem)
         elif not as_json:
             print_line(f"{end.scan}: {end.folder}")
+            for warning in end.warnings:
+                message(f"{end.scan}: {warning}")
     return ends
 
 
@@ -252,6 +254,7 @@ def _ends_json(planned: "PlannedJob", ends: "list[ScanEnd]", ran: int) -> dict[s
                 "status": "done" if end.problem is None else end.kind,
                 "results": None if end.folder is None else str(end.folder),
                 "problem": end.problem,
+                "warnings": list(end.warnings),
             }
             for end in ends
         ],

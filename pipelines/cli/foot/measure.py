@@ -24,6 +24,10 @@ def measure(
     side: Annotated[
         Literal["right", "left", "unknown"], typer.Option(help="Side of the foot; default: inferred from its shape.")
     ] = "unknown",
+    posture: Annotated[
+        Literal["sitting", "half_weight", "standing", "unknown"],
+        typer.Option(help="Posture of the person and load on the foot, for measures.json."),
+    ] = "unknown",
     axis: Annotated[
         Literal["toe2", "ball_center", "brannock"], typer.Option(help="Foot axis along which lengths are measured.")
     ] = "toe2",
@@ -62,7 +66,8 @@ def measure(
                 check_manual(manual, mesh.vertices)
             except ValueError as error:
                 raise RefusedInput(landmarks, str(error)) from None
-        measures = measure_foot(mesh.vertices, mesh.faces, side, axis=axis, manual=manual)
+        measured = measure_foot(mesh.vertices, mesh.faces, side, axis=axis, manual=manual)
+        measures = measured.model_copy(update={"posture": posture})
     except Finding as error:
         raise RefusedInput(file, str(error)) from None
     for note in (*mesh.notes, *measures.warnings):
@@ -115,7 +120,7 @@ def print_measures(measures: "Measures", known: dict[str, float]) -> None:
             row.append("-" if true is None or measured.value is None else f"{measured.value - true:+.2f}")
         rows.append([*row, measured.status])
     columns = ["measure", "value", "sd", "unit", *(["known", "difference"] if known else []), "status"]
-    print_table(f"Foot, side {measures.side}, axis {measures.axis}", columns, rows)
+    print_table(f"Foot, side {measures.side}, posture {measures.posture}, axis {measures.axis}", columns, rows)
     for name, measured in measures.measures.items():
         if measured.status != "ok" and measured.note is not None:
             print_line(f"{name} is {measured.status}: {measured.note}")

@@ -43,6 +43,12 @@ def scan(
     out: Annotated[Path, typer.Option(help="Folder of the archive.")] = Path("archive"),
     results: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
     name: Annotated[str | None, typer.Option(help="Name of the scan; default: day and side.")] = None,
+    posture: Annotated[
+        Literal["sitting", "half_weight", "standing", "unknown"],
+        typer.Option(
+            help="Sitting; standing with half the weight on the foot, as ISO 7250-1 requires; or standing on it."
+        ),
+    ] = "unknown",
     calibration: Annotated[Path | None, typer.Option(help="Calibration file; default: the rig's.")] = None,
     speed: Speed = None,
     from_mm: Annotated[float | None, typer.Option(help="X of the first frame, mm; default: the rig's.")] = None,
@@ -120,7 +126,7 @@ def scan(
         used = _with_travel(opened.rig, speed, from_mm, to_mm)
         today = datetime.datetime.now().astimezone().date()
         order = ScanOrder(
-            ScanName(patient, name or next_scan_name(out, patient, side, today), side, today),
+            ScanName(patient, name or next_scan_name(out, patient, side, today), side, today, posture),
             out,
             results if measure else None,
             calibration,
@@ -213,6 +219,8 @@ def _print(result: "LiveResult", known: dict[str, float], as_json: bool) -> None
     measured = result.measured
     if measured is not None and measured.problem is not None:
         message(f"footscan: {measured.problem}")
+    for warning in () if measured is None else measured.warnings:
+        message(f"Warning: {warning}")
     if as_json:
         print_json(_json(result))
         return
@@ -239,6 +247,7 @@ def _json(result: "LiveResult") -> dict[str, Any]:
         "left_out": {str(camera): problem for camera, problem in result.stored.left_out.items()},
         "results": None if measured is None or measured.folder is None else str(measured.folder),
         "problem": None if measured is None else measured.problem,
+        "warnings": [] if measured is None else list(measured.warnings),
         "measures": None
         if measured is None or measured.measures is None
         else measured.measures.model_dump(mode="json")["measures"],

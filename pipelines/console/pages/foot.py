@@ -1,4 +1,4 @@
-"""The page of a scanned foot: 3D view, measures, quality, and advice."""
+"""The page of a scanned foot: 3D view, measures, quality, and warnings with what to do."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,10 +12,10 @@ from footscan.report.markup import UNITS, key, number, section, table, text, wor
 from footscan.report.quality_lights import Level, TrafficLight, quality_lights, worst
 from footscan.report.scan.foot_colours import CAMERAS
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
+from footscan.report.scan_warnings import warnings_of
 from footscan.report.surface_views import upright
 from footscan.report.viewer import Colouring, Drawing, viewer
-from pipelines.console.pages.advice import advice
-from pipelines.console.pages.results import read_measures, read_quality, read_recording, read_result
+from pipelines.console.pages.results import read_measures, read_quality, read_result
 from pipelines.console.pages.shell import shell
 from schemas.base.errors import RefusedInput
 from schemas.base.limits import BeyondLimitError
@@ -32,8 +32,8 @@ FIRST = ("foot_length", "foot_breadth", "ball_girth", "instep_girth", "instep_he
 FILES = {"report.html": "Whole report", "foot.stl": "Surface (STL)", "measures.json": "Measures (JSON)"}
 
 
-def foot_page(archive: Path, results: Path, patient: str, scan: str) -> str:
-    """Return the page of the results of a scan; the recording in the archive is used for the advice.
+def foot_page(results: Path, patient: str, scan: str) -> str:
+    """Return the page of the results of a scan.
 
     Raises
     ------
@@ -56,8 +56,9 @@ def foot_page(archive: Path, results: Path, patient: str, scan: str) -> str:
     listed = _measures(measures, drawings)
     parts = [
         f'<h1 tabindex="-1" id="result" data-patient="{text(patient)}" data-scan="{text(scan)}" '
-        f'data-side="{measures.side}" data-level="{level}">{heading} <span>{text(patient)} {text(scan)}</span></h1>',
-        _verdict(level, lights, advice(measures, quality, read_recording(archive, patient, scan))),
+        f'data-side="{measures.side}" data-posture="{measures.posture}" data-level="{level}">'
+        f"{heading} <span>{text(patient)} {text(scan)}</span></h1>",
+        _verdict(level, lights, warnings_of(measures, quality)),
         _next(measures.side, patient, scan),
         section("Measures", f'<div class="foot">{turned}<div class="list">{listed}</div></div>'),
     ]

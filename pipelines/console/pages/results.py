@@ -17,11 +17,10 @@ from schemas.base.limits import limit, refuse_beyond
 from schemas.base.model import pseudonym
 from schemas.measures import Measures
 from schemas.quality import Quality
-from schemas.recording import Recording
 
 log = logging.getLogger("footscan.console")
 
-Parsed = TypeVar("Parsed", Measures, Quality, Recording)
+Parsed = TypeVar("Parsed", Measures, Quality)
 _Made = TypeVar("_Made")
 
 LARGEST_BYTES = 512 * 2**20
@@ -103,14 +102,6 @@ def read_measures(results: Path, patient: str, scan: str) -> Measures:
 def read_quality(results: Path, patient: str, scan: str) -> Quality:
     """Read quality.json of a scan; errors as in `read_result`."""
     return _parsed(Quality, results, patient, scan, "quality.json")
-
-
-def read_recording(archive: Path, patient: str, scan: str) -> Recording | None:
-    """Read recording.json of a scan; None if it is missing or invalid, as for scans of another program."""
-    try:
-        return _parsed(Recording, archive, patient, scan, "recording.json")
-    except RefusedInput:
-        return None
 
 
 def _read_inside(root: Path, patient: str, scan: str, name: str) -> bytes:

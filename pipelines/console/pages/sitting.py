@@ -22,6 +22,11 @@ _MAIN = """\
 <fieldset><legend>Foot on the glass</legend><div class="two">
 <label><input type="radio" name="side" value="left"><span>Left</span></label>
 <label><input type="radio" name="side" value="right" checked><span>Right</span></label></div></fieldset>
+<label for="posture">Posture and load</label>
+<select id="posture" name="posture"><option value="">choose</option>
+<option value="half_weight">Standing, weight on both feet</option>
+<option value="standing">Standing, weight on this foot</option>
+<option value="sitting">Sitting</option><option value="unknown">Not known</option></select>
 <button id="start" class="main" type="submit">Start the scan</button>
 <p id="start-told" class="note" aria-live="polite"></p>
 <details><summary>If a camera fails</summary>

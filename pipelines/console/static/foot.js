@@ -2,10 +2,11 @@
 "use strict";
 (() => {
   const {act, allow, element, hindrance, listen, press, say} = footscan;
-  const result = element("result"), {patient, scan, side, level} = result.dataset;
+  const result = element("result"), {patient, scan, side, posture, level} = result.dataset;
 
+  // A further scan of the sitting is in the posture of this one; the first page asks for another.
   async function film(which) {
-    if (!await act("scan", {patient, side: which})) location.assign("/");
+    if (!await act("scan", {patient, side: which, posture})) location.assign("/");
   }
 
   if (element("other")) press(element("other"), () => film(element("other").dataset.side));

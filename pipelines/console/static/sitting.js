@@ -33,7 +33,8 @@
     const why = hindrance(seen) || (seen.state.name === "disconnected" ? "Connect the scanner first." : "")
       || (seen.state.name === "door open" ? "Close the door first." : "")
       || (seen.state.name === "alarm" ? "Home the heads first." : "")
-      || (PSEUDONYM.test(patient.value) ? "" : patient.value ? "The pseudonym is not valid." : "A pseudonym is missing.");
+      || (PSEUDONYM.test(patient.value) ? "" : patient.value ? "The pseudonym is not valid." : "A pseudonym is missing.")
+      || (form.elements.posture.value ? "" : "Choose the posture.");
     allow(element("start"), why);
     say(element("start-told"), why);
     say(element("start"), `Scan the ${chosenSide()} foot`);
@@ -42,9 +43,13 @@
   async function start() {
     if (element("start").getAttribute("aria-disabled") === "true") {
       if (!PSEUDONYM.test(patient.value)) patient.focus();
+      else if (!form.elements.posture.value) form.elements.posture.focus();
       return;
     }
-    await act("scan", {patient: patient.value, side: chosenSide(), keep_partial: element("keep").checked});
+    await act("scan", {
+      patient: patient.value, side: chosenSide(), posture: form.elements.posture.value,
+      keep_partial: element("keep").checked,
+    });
   }
 
   function showSitting({patient: name, feet, pair}) {
@@ -130,7 +135,7 @@
     press(button, () => act("jog", {mm: Number(button.dataset.jog), head: Number(element("jog-head").value) || null}));
   press(element("new-person"), async () => {
     if (await act("new-person")) return;
-    patient.value = "";
+    patient.value = form.elements.posture.value = "";
     fed = "";
     patient.focus();
   });

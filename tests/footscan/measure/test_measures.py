@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from footscan.measure.definitions.conventions import CONVENTIONS, OWN
 from footscan.measure.foot_landmarks import Landmark
 from footscan.measure.frame.foot_frame import FootFrame
 from footscan.measure.measures import measure_foot, take_measures
@@ -290,3 +291,17 @@ def test_a_value_that_is_hardly_known_is_uncertain() -> None:
         assert measures["foot_breadth"].status == breadth, sd
         assert measures["instep_girth"].status == girth, sd
     assert "its standard deviation exceeds 1 mm" in (measures["foot_breadth"].note or "")
+
+
+def test_each_measure_says_whose_definition_it_follows() -> None:
+    measures = measure_foot(foot().vertices, foot().faces, "right").measures
+    assert CONVENTIONS.keys() < measures.keys()
+    conventions = {name: measure.convention for name, measure in measures.items()}
+    assert conventions == {name: CONVENTIONS.get(name, OWN) for name in measures}
+    iso = {name: one.iso for name, one in CONVENTIONS.items() if one.iso is not None}
+    assert iso == {
+        "foot_length": "ISO 7250-1, ISO 20685-1: foot length",
+        "foot_breadth": "ISO 9407: foot width",
+        "foot_breadth_max": "ISO 7250-1, ISO 20685-1: foot breadth",
+    }
+    assert all(CONVENTIONS[name].iso_differs for name in iso)

@@ -1,17 +1,15 @@
 """Lights and lines that judge a scan, at their limits and beyond."""
 
-import re
 from typing import Any
 
 import numpy as np
 import pytest
 
 from footscan.report.quality_lights import apart_mm, quality_lights, worst
-from footscan.report.scan.missing import missing_list
-from schemas.calibration import Source
 from schemas.fusion import Disagreement, FusionReport, PairDisagreement
 from schemas.measures import Measure, Measures
 from schemas.quality import CameraQuality, MeshQuality, Quality
+from schemas.used_calibration import UsedCalibration
 
 IDENTITY = [[float(row == column) for column in range(4)] for row in range(4)]
 
@@ -20,7 +18,7 @@ def quality(*, lost: int = 0, points: int = 9, rms: float = 0.05, **mesh: Any) -
     whole = {"vertices": 4, "triangles": 4, "open_edges": 0, "non_manifold_edges": 0, "components": 1, "holes": 0}
     apart = Disagreement(median_mm=0.0, deviation_mm=rms, rms_mm=rms)
     return Quality(
-        calibration=Source(name="c", sha256=""),
+        calibration=UsedCalibration(name="c", sha256=""),
         cameras=[
             CameraQuality(
                 camera=3, frames=100, frames_lost=lost, frames_with_stripe=1, points=points, removed={"end": 1}
@@ -79,28 +77,6 @@ def test_each_light_goes_by_its_own_figure(of_quality: dict[str, Any], statuses:
 def test_what_is_no_foot_has_a_poor_light() -> None:
     assert quality_lights(measures(finding="no foot"), quality())[3].why == "none: no foot"
     assert worst([]) == "unknown"
-
-
-def test_what_is_missing_has_a_line_each() -> None:
-    told = missing_list(
-        measures("ok", "uncertain", "incomplete", finding="too small", side_note="looks like a <right> one"),
-        quality(lost=2, points=0, holes=2, open_edges=9, largest_hole_mm=31.0, filled_share=0.2),
-    )
-    lines = re.findall("<li>(.*?)</li>", told)
-    assert lines == [
-        "Not measured: too small.",
-        "Looks like a &lt;right&gt; one.",
-        "Girth incomplete could not be taken: n.",
-        "Girth uncertain is uncertain: n.",
-        "Camera 3: 2 of 100 frames are lost.",
-        "Camera 3 saw no stripe.",
-        "The surface is open: holes 2, the largest 31 mm around.",
-        "20.0 % of the surface was seen by no camera and is filled.",
-    ]
-
-
-def test_a_scan_without_fault_says_so() -> None:
-    assert missing_list(measures("ok"), quality()).startswith("<p>Nothing")
 
 
 def test_a_camera_is_judged_by_all_that_it_shares_with_others() -> None:

@@ -24,7 +24,7 @@ def make_foot() -> MakeFoot:
 
 
 def _make_foot(side: str = "right", **told: Any) -> Foot:
-    names = {"patient", "scan", "source", "axis", "finding", "side_note"}
+    names = {"patient", "scan", "source", "axis", "finding", "side_note", "posture"}
     measures = {name: _reading(name, value) for name, value in told.items() if name not in names}
     document = {"format": "footscan.measures/1", "unit": "mm", "side": side, "measures": measures}
     return Foot.model_validate(document | {name: told[name] for name in names & told.keys()})

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from footscan.sizing.change import change_over_time, smallest_real_change
+from footscan.sizing.pairs import compare_pair
 from schemas.base.errors import RefusedInput
 from schemas.feet import Foot
 from schemas.pairs import Change, ChangeRow
@@ -87,3 +88,26 @@ def test_measures_that_cannot_be_compared(make_foot: MakeFoot, table: SizeTable)
     assert (waist.difference, waist.significant, waist.note) == (None, None, "later: incomplete")
     assert (heel.difference, heel.note) == (None, "in cm and in mm")
     assert "measured along different axes: toe2 and ball_center" in change.notes
+
+
+@pytest.mark.parametrize(
+    ("earlier", "later", "warning"),
+    [
+        ("unknown", "unknown", None),
+        ("sitting", "sitting", None),
+        ("sitting", "standing", "the posture is not the same (measures: sitting, measures: standing)"),
+        ("unknown", "half_weight", "the posture is not known for both (measures: unknown, measures: half_weight)"),
+        ("HWB", "half_weight", "the posture is not the same (measures: HWB, measures: half_weight)"),
+    ],
+)
+def test_another_posture_may_be_the_difference(
+    make_foot: MakeFoot, table: SizeTable, earlier: str, later: str, warning: str | None
+) -> None:
+    """For one foot at two times as for both feet."""
+    left, right = make_foot("left", posture=earlier), make_foot("right", posture=later)
+    for notes in (
+        change_over_time(make_foot(posture=earlier), right, table).notes,
+        compare_pair(left, right, table).notes,
+    ):
+        told = [note.partition(": a foot grows under load")[0] for note in notes if "posture" in note]
+        assert told == ([] if warning is None else [warning])

@@ -12,7 +12,7 @@ from pipelines.recordings.captures import read_capture
 from schemas.base.errors import RefusedInput
 from schemas.parameters.calibration import CaptureCalibrationParameters
 
-TAKES_THE_CALIBRATION = {"map-1", "map-5", "clean", "orient", "texture", "quality", "report"}
+TAKES_THE_CALIBRATION = {"map-1", "map-5", "clean", "heads", "orient", "texture", "quality", "quality.json", "report"}
 
 
 def use(archive: Any, calibration: str) -> None:

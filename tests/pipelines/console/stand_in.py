@@ -8,16 +8,17 @@ from pathlib import Path
 import numpy as np
 import simplejpeg
 import trimesh
+from made_up_scan import CAMERAS, measures_of, quality_of
 
 from footscan.mesh.formats.ply import ply_of
 from footscan.mesh.mesh import Mesh
 from pipelines.console.scanner import Device, Health, Scanned, Side
 from pipelines.live.state import OnState, ScannerState, StateBoard
 from schemas.base.errors import Fault, RefusedInput
+from schemas.base.model import Posture
 
-CAMERAS = tuple(range(1, 9))
 GENEROUS_SECONDS = 60.0
-Deliver = Callable[[Path, Side], None]
+Deliver = Callable[[Path, Side, Posture], None]
 """Puts the results of a scan into an existing folder."""
 
 
@@ -112,8 +113,8 @@ class StandIn:
             self._wait("shine")
             self.lit = False
 
-    def film(self, patient: str, side: Side, *, keep_partial: bool) -> Scanned:
-        self._note(f"film {patient} {side} {keep_partial}")
+    def film(self, patient: str, side: Side, *, posture: Posture = "unknown", keep_partial: bool) -> Scanned:
+        self._note(f"film {patient} {side} {posture} {keep_partial}")
         self._stopped.clear()
         with self._board.at_work("filming", "pass 1 of 1"):
             self.lit = True
@@ -128,7 +129,7 @@ class StandIn:
             self._wait("reconstructing")
             folder = self._results / patient / name
             folder.mkdir(parents=True)
-            self._deliver(folder, side)
+            self._deliver(folder, side, posture)
             self._board.tell("done", str(folder))
             return Scanned(patient, name, side)
 
@@ -190,59 +191,12 @@ def stripe_jpeg(lit: bool) -> bytes:
     return bytes(simplejpeg.encode_jpeg(image, 90, "RGB", "420"))
 
 
-def deliver_made_up(folder: Path, side: Side) -> None:
+def deliver_made_up(folder: Path, side: Side, posture: Posture = "unknown") -> None:
     """Write the results of a scan of an egg instead of a foot."""
     egg = trimesh.creation.icosphere(subdivisions=3)
     vertices = np.asarray(egg.vertices) * [130.0, 48.0, 40.0] + [200.0, 0.0, 40.0]
     mesh = Mesh(vertices, np.asarray(egg.faces, np.int32), camera=np.full(len(vertices), 3, np.uint8))
     (folder / "foot.ply").write_bytes(ply_of(mesh))
-    (folder / "measures.json").write_text(json.dumps(measures_of(side)))
+    (folder / "measures.json").write_text(json.dumps(measures_of(side) | {"posture": posture}))
     (folder / "quality.json").write_text(json.dumps(quality_of()))
     (folder / "report.html").write_text("<!DOCTYPE html><title>report</title><p>whole report")
-
-
-def measures_of(side: Side, length_mm: float = 262.0) -> dict[str, object]:
-    """The content of measures.json."""
-    values = {"foot_length": length_mm, "foot_breadth": 98.5, "ball_length": 194.0, "ball_girth": 243.5}
-    return {
-        "format": "footscan.measures/1",
-        "side": side,
-        "axis": "toe2",
-        "transform": [[1, 0, 0, -70], [0, -1 if side == "left" else 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
-        "measures": {
-            name: {"value": value, "unit": "mm", "status": "ok", "definition": "of an egg"}
-            for name, value in values.items()
-        },
-    }
-
-
-def quality_of(*, blind: int | None = None, lost: int = 0, apart_mm: float = 0.05) -> dict[str, object]:
-    """The content of quality.json; a camera may be blind, lose frames or stand askew."""
-    apart = {"median_mm": 0.0, "deviation_mm": apart_mm, "rms_mm": apart_mm}
-    return {
-        "calibration": {"name": "calibration.json", "sha256": "0" * 64},
-        "cameras": [
-            {
-                "camera": camera,
-                "frames": 200,
-                "frames_lost": lost if camera == 3 else 0,
-                "frames_with_stripe": 180,
-                "points": 0 if camera == blind else 50_000,
-                "removed": {},
-            }
-            for camera in CAMERAS
-        ],
-        "fusion": {
-            "pairs": [{"cameras": [1, camera], "points": 99, "before": apart, "after": apart} for camera in (2, 3)]
-        },
-        "cloud_points": 300_000,
-        "mesh": {
-            "vertices": 642,
-            "triangles": 1280,
-            "open_edges": 0,
-            "non_manifold_edges": 0,
-            "components": 1,
-            "holes": 0,
-            "filled_share": 0.03,
-        },
-    }

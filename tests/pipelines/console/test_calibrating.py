@@ -26,7 +26,7 @@ def glass(filmed_capture: Path) -> StandingStandIn:
 def console(scanner: StandIn, glass: StandingStandIn, results: Path) -> Iterator[Console]:
     home = results.parent
     guide = Guide(glass, GuideSettings(home / "captures", home / "rig.yaml", glass.capture.reference), glass.put)
-    with Console(scanner, home / "archive", results, guide) as one:
+    with Console(scanner, results, guide) as one:
         yield one
 
 
@@ -84,7 +84,7 @@ def test_only_the_page_in_charge_calibrates(web: TestClient, until: Until) -> No
 def test_a_scanner_without_a_reference_object_says_so(scanner: StandIn, results: Path) -> None:
     headers = {"origin": ADDRESS, "x-footscan-page": PAGE}
     with (
-        Console(scanner, results.parent / "archive", results) as console,
+        Console(scanner, results) as console,
         TestClient(application(console, "127.0.0.1", None), base_url=ADDRESS, headers=headers) as web,
     ):
         assert console.seen_by(PAGE)["guide"] is None

@@ -13,7 +13,7 @@ from pipelines.live.state import ScannerState
 from schemas.base.errors import Fault, RefusedInput
 
 PAGE, OTHER = "a" * 16, "b" * 16
-RIGHT = {"patient": "P1", "side": "right"}
+RIGHT = {"patient": "P1", "side": "right", "posture": "half_weight"}
 Until = Callable[[Callable[[dict[str, Any]], bool]], dict[str, Any]]
 
 
@@ -49,7 +49,8 @@ def test_two_feet_of_a_person_make_a_pair(web: TestClient, scanner: StandIn, unt
     assert web.post("/do/scan", json={"patient": "P2", "side": "left"}).status_code == 204
     assert until(lambda seen: seen["sitting"]["patient"] == "P2" and idle(seen))["sitting"]["pair"] is None
     assert scanner.calls == [
-        "connect", "film P1 right False", "film P1 left False", "film P1 right False", "film P2 left False",
+        "connect", "film P1 right half_weight False", "film P1 left unknown False", "film P1 right half_weight False",
+        "film P2 left unknown False",
     ]  # fmt: skip
 
 
@@ -66,7 +67,7 @@ def test_only_one_thing_is_done_at_a_time(web: TestClient, scanner: StandIn, unt
         ), order  # fmt: skip
     scanner.go.set()
     assert until(lambda seen: bool(seen["sitting"]["feet"]))["problem"] is None
-    assert scanner.calls == ["connect", "film P1 right False"]
+    assert scanner.calls == ["connect", "film P1 right half_weight False"]
 
 
 def test_a_second_page_looks_on_may_stop_and_may_take_over(
@@ -171,10 +172,10 @@ def test_the_end_of_the_console_stops_the_scan_and_lets_the_scanner_go(results: 
     scanner = StandIn(results)
     scanner.connect()
     scanner.pause = {"filming"}
-    with Console(scanner, results.parent / "archive", results) as console:
-        console.scan(PAGE, "P1", "right", keep_partial=False)
+    with Console(scanner, results) as console:
+        console.scan(PAGE, "P1", "right", "half_weight", keep_partial=False)
         assert scanner.reached.wait(GENEROUS_SECONDS)
-    assert scanner.calls == ["connect", "film P1 right False", "stop", "close"]
+    assert scanner.calls == ["connect", "film P1 right half_weight False", "stop", "close"]
     assert not scanner.lit
     assert list(results.iterdir()) == []
     with pytest.raises(RefusedInput, match="is busy"):

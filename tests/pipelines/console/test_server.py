@@ -125,6 +125,7 @@ def test_large_requests_are_refused_unread(web: TestClient, scanner: StandIn) ->
         {"patient": "x" * 65, "side": "right"},
         {"patient": "P1", "side": "both"},
         {"patient": "P1"},
+        {"patient": "P1", "side": "right", "posture": "lying"},
         {"patient": "P1", "side": "right", "archive": "/tmp"},
         [],
         None,

@@ -62,6 +62,7 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
     assert bench.board.laser_at(time.monotonic()) == 0.0
     scan = read_scan(result.stored.place)
     assert (scan.name, scan.document.scanner, scan.document.day) == ("P7/2026-11-20-R", "bench", DAY)
+    assert scan.document.posture == "sitting"
     recording = read_json(scan.folder / "recording.json", Recording)
     assert recording.board.lost_steps_mm == pytest.approx((0.0, 0.0, 0.0), abs=0.06)
     for camera, told in zip(scan.document.cameras, recording.cameras, strict=True):

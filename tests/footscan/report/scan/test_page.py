@@ -12,12 +12,13 @@ from footscan.report.sample_frames import FrameSample
 from footscan.report.scan.foot_colours import FootSurface
 from footscan.report.scan.page import ScanPoints, ScanTitle, scan_page
 from footscan.report.surface_views import upright
-from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
+from schemas.calibration import Calibration, CameraCalibration, PolynomialMap
 from schemas.calibration_check import ScanCheck
 from schemas.fusion import CameraCorrection, Disagreement, FusionReport, PairDisagreement
 from schemas.glass import GlassPlane
 from schemas.measures import Measure, Measures
 from schemas.quality import CameraQuality, Comparison, MeshQuality, Quality
+from schemas.used_calibration import UsedCalibration
 
 IDENTITY = np.eye(4).tolist()
 HOSTILE = '<script>alert("x")</script>'
@@ -67,7 +68,7 @@ def scan():
             cameras=[CameraCalibration(camera=1, map=identity_map(), region_px=[(9, 9), (99, 9), (9, 99)], points=3)],
         ),
         "quality": Quality(
-            calibration=Source(name=f"{HOSTILE}.json", sha256="12ab"),
+            calibration=UsedCalibration(name=f"{HOSTILE}.json", sha256="12ab"),
             cameras=[
                 CameraQuality(
                     camera=1,
@@ -174,7 +175,7 @@ def test_cameras_are_compared_before_and_after_they_were_moved(scan):
     assert ["1 and 2", "777", "0.300", "0.100", "0.210", "−0.010", "0.050", "0.050"] in rows
     assert ["1", "None", "0.000", "–", "–", "0"] in rows
     assert ["2", "Rigid", "0.250", "0.400", "0.100", "5"] in rows
-    assert "camera 2 &lt;script&gt;" in page
+    assert "<li>Camera 2 &lt;script&gt;" in page
     alone = scan["quality"].model_copy(update={"fusion": FusionReport()})
     assert "No two cameras see the same skin" in scan_page(**scan | {"quality": alone})
 
@@ -231,7 +232,7 @@ def test_the_check_of_the_calibration_stands_beside_it_and_a_doubt_among_the_war
     page = scan_page(**scan | {"quality": quality, "measures": measures})
     assert ["Check", "checked on 2026-11-24: camera 2 had moved"] in rows_of(page)
     sentence = "Camera 2 had moved by 0.41 mm when the calibration was checked on 2026-11-24: calibrate anew."
-    assert f"<li>{sentence}</li>" in page
+    assert f"<li>{sentence} All measures are uncertain. Put the reference object" in page
 
 
 @pytest.mark.parametrize("broken", [{"open_edges": 3}, {"non_manifold_edges": 1}])

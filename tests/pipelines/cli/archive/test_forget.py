@@ -1,5 +1,6 @@
 """`footscan forget`: nothing of a patient is left, nothing of another is touched."""
 
+import csv
 import json
 import shutil
 from collections.abc import Callable
@@ -65,6 +66,8 @@ def forget(two: Any, footscan: Command, *options: object) -> Any:
 def test_nothing_of_a_patient_is_left_and_nothing_of_another_is_touched(two: Any, footscan: Command) -> None:
     assert len(traces(two.root, "P0002")) > 20
     mine = all_bytes(two.root / "archive/P0001") | all_bytes(two.results)
+    with (two.root / "results/results.csv").open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["scan"] == "P0001/S1"]
     found = forget(two, footscan)
     assert (found["erased"], found["scans"], found["remains"]) == (True, ["P0002/S1"], [])
     assert traces(two.root, "P0002") == []
@@ -72,7 +75,9 @@ def test_nothing_of_a_patient_is_left_and_nothing_of_another_is_touched(two: Any
     assert all_bytes(two.root / "archive/P0001") | all_bytes(two.results) == mine
     assert two.run()[1] == set()
     assert footscan("cache", "verify", two.workflow)[0] == 0
-    assert "P0001/S1" in (two.root / "results/results.csv").read_text()
+    with (two.root / "results/results.csv").open(newline="") as file:
+        assert list(csv.DictReader(file)) == rows
+    assert rows[0]["parameters_sha256"]
     assert "P0001" in (two.root / "results/index.html").read_text()
     assert "P0001" in (two.root / "results/log.jsonl").read_text()
     assert any("backups" in words for words in found["out_of_reach"])

@@ -1,4 +1,7 @@
-"""Advice on a scan of poor quality: the camera, the reason, and what to do."""
+"""The warnings of a scan: all that a reader must know before trusting its measures, each with what to do about it.
+
+The quality step collects them once. Terminal, report, console and the table of results show that list.
+"""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -11,47 +14,65 @@ from schemas.recording import RecordedCamera, Recording
 
 MOST_MEASURES = 4
 """Most measures that are named one by one; chosen by hand."""
+_UNSEEN = "See that nothing covers the cameras below the glass, then scan again."
+"""What to do about a doubt that does not say so itself, which is that most of the sole was filled."""
 
 
-def advice(measures: Measures, quality: Quality, recording: Recording | None) -> list[str]:
-    """List the problems that a second scan or a repair may solve, a line each, the gravest first.
+def scan_warnings(measures: Measures, quality: Quality, recording: Recording | None = None) -> list[str]:
+    """Collect the warnings, the gravest first; empty for a scan that nothing speaks against.
 
     `recording` : how the scan was filmed; None if unknown
     """
     filmed = {} if recording is None else {camera.id: camera for camera in recording.cameras}
     return [
         *_finding(measures),
-        *_heads(quality),
-        *_calibration(quality),
+        *_doubts(measures, quality),
         *_cameras(quality, filmed),
+        *([] if recording is None else map(_sentence, recording.warnings)),
         *_latencies(filmed),
         *_agreement(quality),
         *_surface(quality),
+        *map(_sentence, [*quality.warnings, *quality.heads.warnings, *quality.fusion.warnings]),
         *_not_taken(measures),
-        *([] if recording is None else recording.warnings),
+        *_uncertain(measures),
     ]
+
+
+def warnings_of(measures: Measures, quality: Quality) -> list[str]:
+    """The warnings that quality.json holds; collected anew for a file of an earlier version."""
+    return scan_warnings(measures, quality) if quality.scan_warnings is None else quality.scan_warnings
+
+
+def _sentence(phrase: str) -> str:
+    """Begin with a capital letter, and end with a full stop.
+
+    >>> _sentence("camera 3 is left out")
+    'Camera 3 is left out.'
+    """
+    return f"{phrase[:1].upper()}{phrase[1:]}" + ("" if phrase.endswith((".", "?", "!")) else ".")
 
 
 def _finding(measures: Measures) -> Iterator[str]:
     if measures.finding is not None:
         yield f"Nothing was measured ({measures.finding}). Is a bare foot flat on the glass, toes forward? Scan again."
     if measures.side_note is not None:
-        yield f"{measures.side_note[:1].upper()}{measures.side_note[1:]}: was the right side chosen? Scan again if not."
+        yield f"{_sentence(measures.side_note)[:-1]}: was the right side chosen? Scan again if not."
     for thing in measures.things:
-        yield f"{thing[:1].upper()}{thing[1:]}. Take everything away from the foot, and scan again."
+        yield f"{_sentence(thing)} All measures are uncertain. Take everything away from the foot, and scan again."
 
 
-def _heads(quality: Quality) -> Iterator[str]:
-    if quality.heads.doubt is not None:
-        yield f"{quality.heads.doubt[:1].upper()}{quality.heads.doubt[1:]}. Then scan again."
-
-
-def _calibration(quality: Quality) -> Iterator[str]:
-    check = quality.calibration_check
-    if check is None or check.doubt is None:
-        return
-    again = "'footscan calibrate capture', then scan again" if check.drifted else "'footscan calibrate check' again"
-    yield f"{check.doubt[:1].upper()}{check.doubt[1:]}. Put the reference object onto the glass and run {again}."
+def _doubts(measures: Measures, quality: Quality) -> Iterator[str]:
+    """The reasons for which all measures are uncertain."""
+    check, heads = quality.calibration_check, quality.heads.doubt
+    remedies: dict[str, str] = {}
+    if heads is not None:
+        remedies[heads] = "Then scan again."
+    if check is not None and check.doubt is not None:
+        again = "'footscan calibrate capture', then scan again" if check.drifted else "'footscan calibrate check' again"
+        remedies[check.doubt] = f"Put the reference object onto the glass and run {again}."
+    for doubt in dict.fromkeys([*remedies, *measures.doubts]):
+        remedy = remedies.get(doubt, "" if ":" in doubt else _UNSEEN)
+        yield f"{_sentence(doubt)} All measures are uncertain. {remedy}".rstrip()
 
 
 def _cameras(quality: Quality, filmed: dict[int, RecordedCamera]) -> Iterator[str]:
@@ -97,7 +118,8 @@ def _agreement(quality: Quality) -> Iterator[str]:
 def _surface(quality: Quality) -> Iterator[str]:
     mesh = quality.mesh
     if mesh.holes:
-        yield f"The surface is open ({mesh.holes} holes). Scan again."
+        longest = f", the largest {number(mesh.largest_hole_mm)} mm around" if mesh.largest_hole_mm else ""
+        yield f"The surface is open ({mesh.holes} holes{longest}). Scan again."
     elif mesh.filled_share is not None and mesh.filled_share > FILLED_SHARES[1]:
         sparsest = min(quality.cameras, key=lambda camera: camera.points, default=None)
         fewest = "" if sparsest is None else f" Camera {sparsest.camera} gave the fewest points."
@@ -109,10 +131,22 @@ def _surface(quality: Quality) -> Iterator[str]:
 
 def _not_taken(measures: Measures) -> Iterator[str]:
     missing = {name: m.note for name, m in measures.measures.items() if m.status == "incomplete"}
-    if measures.finding is not None or not missing:
-        return
-    reasons = sorted({note for note in missing.values() if note})
-    named = ", ".join(words(name) for name in list(missing)[:MOST_MEASURES])
-    more = f" and {len(missing) - MOST_MEASURES} more" if len(missing) > MOST_MEASURES else ""
-    why = f": {'; '.join(reasons[:MOST_MEASURES])}" if reasons else ""
-    yield f"Not taken: {named}{more}{why}. Is the leg bare above the ankle, the foot in the middle? Then scan again."
+    if measures.finding is None and missing:
+        yield f"Not taken: {_named(missing)}. Is the leg bare above the ankle, the foot in the middle? Then scan again."
+
+
+def _uncertain(measures: Measures) -> Iterator[str]:
+    """The measures that are uncertain for reasons of their own."""
+    in_common = bool(measures.doubts or measures.things)
+    own = {n: measures.own_note(n) for n, m in measures.measures.items() if m.status == "uncertain"}
+    uncertain = {name: note for name, note in own.items() if note or not in_common}
+    if uncertain:
+        yield f"Uncertain: {_named(uncertain)}. Do not rely on them alone, or set the landmarks by hand."
+
+
+def _named(notes: dict[str, str | None]) -> str:
+    """The first names of measures, how many there are more, and the reasons."""
+    reasons = sorted({note for note in notes.values() if note})
+    named = ", ".join(words(name) for name in list(notes)[:MOST_MEASURES])
+    more = f" and {len(notes) - MOST_MEASURES} more" if len(notes) > MOST_MEASURES else ""
+    return f"{named}{more}" + (f": {'; '.join(reasons[:MOST_MEASURES])}" if reasons else "")

@@ -1,40 +1,23 @@
-"""Advice on a scan of poor quality: camera and reason."""
+"""The warnings of a scan: each names what is wrong and says what to do."""
 
 from typing import Any
 
 import pytest
-from stand_in import measures_of, quality_of
+from made_up_scan import measures_of, quality_of, recorded
 
-from pipelines.console.pages.advice import advice
+from footscan.cloud.contact import moved_warning
+from footscan.measure.frame.glass import glass_doubt
+from footscan.report.scan_warnings import scan_warnings, warnings_of
+from schemas.glass import GlassPlane
 from schemas.measures import Measures
 from schemas.quality import Quality
 from schemas.recording import Recording
 
+HEADS = "a head lies 3.10 mm off: film the body"
+
 
 def told(measures: dict[str, Any], quality: dict[str, Any], recording: Recording | None = None) -> list[str]:
-    return advice(Measures.model_validate(measures), Quality.model_validate(quality), recording)
-
-
-def recorded(lost: int, latency: dict[str, Any] | None, warnings: list[str]) -> Recording:
-    reasons = ["dropped: it never came", *["torn: ends too early"] * (lost - 1)][:lost]
-    camera = {
-        "id": 3, "device": "/dev/video3", "head": 2, "expected": 200, "stored": 200 - lost,
-        "lost": [{"number": number, "reason": reason} for number, reason in enumerate(reasons)],
-        "latency": latency, "position_sd_mm": 0.1, "largest_position_sd_mm": 0.2, "mm_per_s": 36.4,
-        "frames_per_second": 18.2,
-    }  # fmt: skip
-    return Recording.model_validate(
-        {
-            "scanner": "S1",
-            "started": "2026-11-20T10:00:00Z",
-            "software": "footscan 1",
-            "board": {"port": "p", "version": "1.1h", "settings_sha256": "0" * 64, "reports": 9, "report_sd_s": 0.002},
-            "light": {"power": 0.8, "looks": 2},
-            "passes": [{"cameras": [3], "reason": "all", "start_mm": 0, "end_mm": 400, "mm_per_s": 36, "seconds": 11}],
-            "cameras": [camera],
-            "warnings": warnings,
-        }
-    )
+    return scan_warnings(Measures.model_validate(measures), Quality.model_validate(quality), recording)
 
 
 def test_a_good_scan_needs_nothing() -> None:
@@ -47,13 +30,14 @@ def test_a_good_scan_needs_nothing() -> None:
         ({"largest_mm": 0.04}, None),
         (
             {"largest_mm": 0.41, "drifted": [3]},
-            "Camera 3 had moved by 0.41 mm when the calibration was checked on 2026-11-24: calibrate anew. Put the "
-            "reference object onto the glass and run 'footscan calibrate capture', then scan again.",
+            "Camera 3 had moved by 0.41 mm when the calibration was checked on 2026-11-24: calibrate anew. All "
+            "measures are uncertain. Put the reference object onto the glass and run 'footscan calibrate capture', "
+            "then scan again.",
         ),
         (
             {"largest_mm": 0.04, "unseen": [7]},
-            "Camera 7 could not be judged when the calibration was checked on 2026-11-24: check again. Put the "
-            "reference object onto the glass and run 'footscan calibrate check' again.",
+            "Camera 7 could not be judged when the calibration was checked on 2026-11-24: check again. All "
+            "measures are uncertain. Put the reference object onto the glass and run 'footscan calibrate check' again.",
         ),
     ],
 )
@@ -72,7 +56,7 @@ def test_lost_frames_are_told_with_the_reason_of_most() -> None:
     known = recorded(31, {"seconds": 0.05, "sd_s": 0.001}, ["the lid has no switch"])
     [line, warning] = told(measures_of("right"), quality_of(lost=31), known)
     assert line.startswith("Camera 3 lost 31 of 200 frames, 30 of them: torn: ends too early. Check its cable")
-    assert warning == "the lid has no switch"
+    assert warning == "The lid has no switch."
 
 
 def test_a_latency_that_was_never_measured_is_told() -> None:
@@ -112,3 +96,51 @@ def test_measures_that_were_not_taken_are_named_with_their_reasons() -> None:
 def test_a_side_that_may_be_wrong() -> None:
     [line] = told(measures_of("left") | {"side_note": "its form is that of a right foot"}, quality_of())
     assert line == "Its form is that of a right foot: was the right side chosen? Scan again if not."
+
+
+def test_all_that_steps_found_is_in_the_list() -> None:
+    """A sentence that a step has written is shown once, whole, and ends with what to do."""
+    glass = GlassPlane(below_foot_mm=3.5, largest_mm=3.6, corrected=True)
+    doubts = [doubt for doubt in (glass_doubt(glass), "90 % of the sole was filled, not measured") if doubt]
+    quality = quality_of() | {
+        "warnings": [*moved_warning(glass, 0.5)],
+        "heads": {
+            "doubt": HEADS,
+            "warnings": ["heads were corrected; film the body"],
+        },
+    }
+    quality["fusion"]["warnings"] = ["camera 2 deviates by 2.00 mm; check it"]
+    lines = told(measures_of("right") | {"doubts": [*doubts, HEADS]}, quality)
+    assert lines == [
+        "A head lies 3.10 mm off: film the body. All measures are uncertain. Then scan again.",
+        "The glass is up to 3.6 mm from where it was calibrated, more than can be corrected safely: calibrate anew. "
+        "All measures are uncertain.",
+        "90 % of the sole was filled, not measured. All measures are uncertain. See that nothing covers the cameras "
+        "below the glass, then scan again.",
+        "The sole stands 3.50 mm above the calibrated glass: the plate was moved since the calibration; calibrate "
+        "anew.",
+        "Heads were corrected; film the body.",
+        "Camera 2 deviates by 2.00 mm; check it.",
+    ]
+
+
+def test_uncertain_measures_are_named_unless_all_are_for_one_reason() -> None:
+    measures = measures_of("right")
+    for name in ("ball_girth", "foot_breadth"):
+        measures["measures"][name] |= {"status": "uncertain", "note": "ball by a fallback"}
+    [line] = told(measures, quality_of())
+    assert line == (
+        "Uncertain: Foot breadth, Ball girth: ball by a fallback. Do not rely on them alone, or set the landmarks by "
+        "hand."
+    )
+    for measure in measures["measures"].values():
+        measure |= {"status": "uncertain", "note": "a hand at the heel"}
+    [line] = told(measures | {"things": ["a hand at the heel"]}, quality_of())
+    assert line.startswith("A hand at the heel. All measures are uncertain. Take everything away")
+
+
+def test_the_stored_list_is_shown_and_an_older_file_gets_one() -> None:
+    measures = Measures.model_validate(measures_of("right"))
+    older = Quality.model_validate(quality_of(blind=5))
+    assert warnings_of(measures, older) == scan_warnings(measures, older) != []
+    assert warnings_of(measures, older.model_copy(update={"scan_warnings": ["as stored"]})) == ["as stored"]

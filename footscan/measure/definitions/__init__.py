@@ -1,0 +1,1 @@
+"""Which published definitions the measures follow."""
