@@ -201,6 +201,7 @@ def measure_foot(
     calibration: Mapping[str, tuple[float, float]] | None = None,
     glass: GlassPlane | None = None,
     doubts: Sequence[str] = (),
+    is_whole: bool = True,
 ) -> Measures:
     """Measure a foot in any pose. A left foot is mirrored and measured as a right one.
 
@@ -220,6 +221,7 @@ def measure_foot(
     calibration : name of a measure to (a, b): the reported value is a + b times the measured one
     glass : the scanner's glass in the frame of the mesh; default: at Z = 0
     doubts : reasons, a sentence each, not to rely on the scan: all measures are uncertain
+    is_whole : as of `foot_frame`
 
     Raises
     ------
@@ -227,7 +229,7 @@ def measure_foot(
         The surface is no foot, or not in mm.
     """
     glass = glass or GlassPlane()
-    foot = foot_frame(vertices, faces, side, axis, manual, glass.plane)
+    foot = foot_frame(vertices, faces, side, axis, manual, glass.plane, is_whole=is_whole)
     landmarks = find_landmarks(foot, manual or {})
     if errors_mm is not None or filled is not None:  # the foot's vertices are those of the mesh without its strays
         back = apply(np.linalg.inv(foot.transform), foot.vertices)

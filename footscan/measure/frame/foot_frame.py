@@ -92,6 +92,8 @@ def foot_frame(
     axis: Axis = "toe2",
     marked: Mapping[str, Floats] | None = None,
     glass: Plane = CALIBRATED,
+    *,
+    is_whole: bool = True,
 ) -> FootFrame:
     """Compute the frame of a foot in any pose; on the scanner's glass that is the floor.
 
@@ -107,6 +109,7 @@ def foot_frame(
     axis : the requested axis
     marked : (3,) mm, points set by a person, in the frame of the mesh; pternion and toe_2_tip are used here
     glass : the plane of the scanner's glass in the frame of the mesh
+    is_whole : False accepts the proportions of a foot without its toes or its heel
 
     Raises
     ------
@@ -119,7 +122,8 @@ def foot_frame(
     transform, floor = _on_floor(places, pose, to_glass(glass))
     samples = dense_points(places, faces, SPACING_MM)
     moved = apply(transform, samples)
-    _check_form(moved, pose)
+    if is_whole:
+        _check_form(moved, pose)
 
     lead = _medial_lead(moved, pose.length)
     form: Side = "right" if lead >= 0 else "left"
