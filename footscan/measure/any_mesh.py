@@ -33,7 +33,7 @@ def measure(
     RefusedInput
         The file is missing or broken.
     Finding
-        The mesh is no foot.
+        The mesh is no foot, or holds two.
 
     Examples
     --------
@@ -51,5 +51,5 @@ def measure(
         vertices, faces = read_mesh(Path(mesh))
     feet = prepare_feet(vertices, faces, None)
     if len(feet) > 1:
-        raise Finding("the surface holds two feet, expected a single foot; `measure_pair` measures both")
+        raise Finding("the surface has 2 separate bodies, expected a single foot")
     return measure_raw(feet[0], side, axis)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, KDTree, QhullError
 
 from footscan.measure.bodies.floor import floor_faces
 from footscan.measure.bodies.sole import close_sole
@@ -38,6 +38,8 @@ BODY_SHARE = 0.5
 HULL_SAMPLES, APART = 200, 0.2
 """A part is a second body if less than the share APART of about so many of its points lies within the hull of the
 first; layers of one surface lie within the same hull. Chosen by hand."""
+LID_REACH = 1e-6
+"""Vertices nearer than this share of the length to a point of the leg's end are that point."""
 OPEN_EDGES = 0.001
 """A surface with a greater share of open edges is reported as open; with a smaller one, as having small holes.
 Chosen by hand."""
@@ -70,8 +72,12 @@ class RawMesh(NamedTuple):
     """Ends of the foot that are cut off, open or not there"""
     closing: NDArray[np.bool_] | None = None
     """(V,) vertices on the floor that close a sole which was not seen; None if the sole was seen"""
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    """Unit vector from the floor to the leg"""
+    lid: NDArray[np.bool_] | None = None
+    """(V,) vertices of the flat end of the leg; None without one"""
+    tilt_deg: float = 0.0
+    """Standard deviation of the tilt of a floor that follows from the rim of an open sole"""
+    to_floor: Floats = np.eye(4)
+    """(4, 4) from the frame of the mesh to one with the floor at Z = 0"""
 
 
 def prepare_feet(
@@ -159,9 +165,28 @@ def _prepared(
         origin = "as stated" if unit is not None else f"inferred from the length of {pose.length:.3g}"
         notes.append(f"coordinates in {mesh_unit}, {origin}, were multiplied by {factor:g} to obtain mm")
     _report_rounding(vertices, factor, notes)
-    x, y, z = pose.transform[2, :3].tolist()
-    closing = None if sole is None else sole.closing
-    return RawMesh(vertices * factor, faces, mesh_unit, factor, is_closed, tuple(notes), missing, closing, (x, y, z))
+    to_floor = pose.transform.copy()
+    if sole is not None:
+        to_floor[2, 3] -= sole.level
+    to_floor[:3, 3] *= factor
+    return RawMesh(
+        vertices * factor,
+        faces,
+        mesh_unit,
+        factor,
+        is_closed,
+        tuple(notes),
+        missing,
+        None if sole is None else sole.closing,
+        _at(vertices, pose.leg_end, LID_REACH * pose.length),
+        0.0 if sole is None else float(np.degrees(np.arctan(sole.uneven / (pose.length / 2)))),
+        to_floor,
+    )
+
+
+def _at(vertices: Floats, points: Floats | None, reach: float) -> NDArray[np.bool_] | None:
+    """Returns (V,) which vertices lie at one of the points; None without points."""
+    return None if points is None else np.asarray(KDTree(points).query(vertices)[0] < reach)
 
 
 def _clean(vertices: Floats, faces: Faces) -> tuple[Floats, Faces]:

@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from footscan.measure.foot_landmarks import find_landmarks
-from footscan.measure.frame.foot_frame import FootFrame, foot_frame
+from footscan.measure.frame.foot_frame import Body, FootFrame, foot_frame
 from footscan.measure.measures import measure_foot, take_measures
 from footscan.measure.raw_mesh import RawMesh
 from footscan.mesh.rigid_transform import apply, turn_about_z
@@ -25,19 +26,30 @@ Floats = NDArray[np.float64]
 DEEPER_MM = 5.0
 """The floor may lie this much lower than the rim of a sole that was not seen: depth cameras drop what is nearer than
 about this to the floor. Chosen by hand."""
+HIGHER_MM = 5.0
+"""By this much the cut through the leg is raised, to see what rests on it; chosen by hand."""
+LEAST_TILT_DEG = 0.05
+"""A floor that is known better is not tilted; chosen by hand."""
 LONGER = (1.2, 1.45, 1.7)
 """Lengths of the whole foot, as multiples of what is there. An amputation through the metatarsals leaves 0.6 of it."""
-TURNS_DEG = (-4.0, 4.0)
-"""The axis of a foot whose toes or heel are missing may be turned by this much; chosen by hand."""
+TURNS_DEG = (-8.0, 8.0)
+"""The axis of a foot whose toes or heel are missing may be turned by this much: the footprint of a foot that is cut off
+at 0.62 of its length is turned by 7 degrees. Chosen by hand."""
 STEADY = {"mm": 0.3, "deg": 0.3, "1": 0.003, "mm2": 300.0, "mm3": 3000.0}
 """A measure that changes by less holds; by unit of the measure. Chosen by hand."""
-SAYS_NOTHING = 0.15
-"""A measure that changes by more than this share of its value is incomplete; chosen by hand."""
+SAYS_NOTHING, SAYS_LITTLE = 0.15, {"mm": 6.0, "deg": 6.0}
+"""A measure that changes by more than this share of its value, and by more than this many units, is incomplete; chosen
+by hand."""
+LEG_CUT = "it rests on the cut through the leg"
 OF_SOLE = ("arch_height", "arch_index", "chippaux_smirak_index", "staheli_index", "clarke_angle")
 """Measures of the sole itself."""
 OF_TOES = ("foot_length", "toe_length", "toe_height", "toe_1_angle", "toe_5_angle")
 """Measures of the toes themselves."""
-SOLE_MISSING = "the sole was not seen"
+OF_HEEL = (
+    *("foot_length", "ball_length", "lateral_ball_length", "instep_length", "arch_height_index"),
+    *("heel_breadth", "heel_angle", "heel_girth", "long_heel_girth"),
+)
+"""Measures of the heel itself."""
 
 
 class _Variants(NamedTuple):
@@ -59,35 +71,72 @@ def measure_raw(
     Finding
         The surface is no foot.
     """
-    is_whole = not mesh.missing
-    base = measure_foot(mesh.vertices, mesh.faces, side, axis=axis, manual=manual, is_whole=is_whole)
+    base = measure_foot(mesh.vertices, mesh.faces, side, axis=axis, manual=manual, body=_body(mesh))
     measures = dict(base.measures)
     for variants in _variants(mesh, base.side, axis, manual):
         for name, measure in measures.items():
+            if name == "scan_height" and variants.reason == LEG_CUT:  # it is the height of the cut, by definition
+                continue
             others = [other[name] for other in variants.measures]
             measures[name] = _judged(measure, others, variants.reason, name in variants.missing)
-    if "toes" in mesh.missing and base.measures["foot_length"].value is not None:
+    if mesh.missing == ("toes",) and base.measures["foot_length"].value is not None:
+        measured = base.measures["foot_length"]
         note = "up to where the surface ends: the toes are missing"
-        measures["foot_length"] = base.measures["foot_length"].model_copy(update={"status": "uncertain", "note": note})
+        measures["foot_length"] = measured.model_copy(update={"status": "uncertain", "note": note, "uncertainty": None})
     return base.model_copy(update={"measures": measures})
 
 
 def _variants(mesh: RawMesh, side: Side, axis: Axis, manual: Mapping[str, Floats] | None) -> Iterator[_Variants]:
+    up = mesh.to_floor[2, :3]
     if mesh.closing is not None:
-        deeper = mesh.vertices - DEEPER_MM * np.outer(mesh.closing, mesh.up)
-        try:
-            taken = measure_foot(deeper, mesh.faces, side, axis=axis, manual=manual, is_whole=not mesh.missing)
-            lower = [taken.measures]
-        except Finding:
-            lower = [{}]
-        yield _Variants("the sole was not seen and was closed by the floor", _filled_up(lower), OF_SOLE)
+        deeper = mesh._replace(vertices=mesh.vertices - DEEPER_MM * np.outer(mesh.closing, up))
+        others = [_measured(deeper, _shifted(DEEPER_MM), side, axis, manual)]
+        if mesh.tilt_deg > LEAST_TILT_DEG:
+            turns = [_tilted(about, sign * mesh.tilt_deg) for about in ("x", "y") for sign in (-1, 1)]
+            others += [_measured(mesh, turn, side, axis, manual) for turn in turns]
+        yield _Variants("the sole was not seen and was closed by the floor", _filled_up(others), OF_SOLE)
+    if mesh.lid is not None:
+        longer = _measured(
+            mesh._replace(vertices=mesh.vertices + HIGHER_MM * np.outer(mesh.lid, up)), np.eye(4), side, axis, manual
+        )
+        yield _Variants(LEG_CUT, _filled_up([longer]), ())
     if mesh.missing:
-        foot = foot_frame(mesh.vertices, mesh.faces, side, axis, manual, is_whole=False)
+        foot = foot_frame(mesh.vertices, mesh.faces, side, axis, manual, body=_body(mesh))
         completed = [_taken(one, manual) for one in _completed(foot, "heel" in mesh.missing)]
         part = " and ".join(mesh.missing)
         verb = "are" if part == "toes" else "is"
-        missing = OF_TOES if "toes" in mesh.missing else ()
+        missing = OF_TOES if "toes" in mesh.missing else OF_HEEL
         yield _Variants(f"the {part} {verb} missing", _filled_up(completed), missing)
+
+
+def _body(mesh: RawMesh, motion: Floats | None = None) -> Body:
+    """What is known of the mesh; `motion` is a (4, 4) error of its floor, which matters if the sole was not seen."""
+    if mesh.closing is None:
+        return Body(not mesh.missing)
+    return Body(not mesh.missing, mesh.to_floor if motion is None else motion @ mesh.to_floor)
+
+
+def _shifted(upwards_mm: float) -> Floats:
+    motion = np.eye(4)
+    motion[2, 3] = upwards_mm
+    return motion
+
+
+def _tilted(about: str, degrees: float) -> Floats:
+    motion = np.eye(4)
+    motion[:3, :3] = Rotation.from_euler(about, degrees, degrees=True).as_matrix()
+    return motion
+
+
+def _measured(
+    mesh: RawMesh, motion: Floats, side: Side, axis: Axis, manual: Mapping[str, Floats] | None
+) -> dict[str, Measure]:
+    """Measures of a variant; none if that is no foot."""
+    try:
+        body = _body(mesh, motion)
+        return measure_foot(mesh.vertices, mesh.faces, side, axis=axis, manual=manual, body=body).measures
+    except Finding:
+        return {}
 
 
 class _None(dict[str, Measure]):
@@ -135,12 +184,11 @@ def _judged(measure: Measure, others: list[Measure], reason: str, is_missing: bo
     without_value = {"value": None, "uncertainty": None, "status": "incomplete", "surface_length": None, "plane": None}
     values = [measure.value, *(other.value for other in others if other.value is not None)]
     change = float(np.ptp(values))
-    if is_missing or len(values) == 1 or change > SAYS_NOTHING * abs(measure.value):
+    most = max(SAYS_NOTHING * abs(measure.value), SAYS_LITTLE.get(measure.unit, 0.0))
+    if is_missing or 2 * len(values) <= len(others) + 1 or change > most:
         return measure.model_copy(update={**without_value, "note": reason})
-    note = reason if measure.note is None else f"{measure.note}; {reason}"
-    if len(values) <= len(others):
-        return measure.model_copy(update={"status": "uncertain", "note": note})
-    if change <= STEADY[measure.unit]:
+    if len(values) > len(others) and change <= STEADY[measure.unit]:
         return measure
-    sd = float(np.hypot(measure.uncertainty or 0.0, change / 2))
-    return measure.model_copy(update={"status": "uncertain", "note": note, "uncertainty": round(sd, 3)})
+    note = reason if measure.note is None else f"{measure.note}; {reason}"
+    sd = round(float(np.hypot(measure.uncertainty or 0.0, change / 2)), 3)
+    return measure.model_copy(update={"status": "uncertain", "note": note, "uncertainty": sd})

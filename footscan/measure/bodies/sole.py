@@ -26,7 +26,7 @@ LID_FACING, EDGE = 0.9999, 0.94
 """Cosines: a lid faces the floor by more than the first, and the skin at its edge turns by more than 20 degrees. A sole
 that is pressed flat on a glass leaves it smoothly. Chosen by hand."""
 SKIRT = 1e-4
-"""Least height of the skin between the rim and the closing, as a share of the length, so that no triangle lacks area."""
+"""Least height of the skin between rim and closing, as a share of the length: no triangle lacks area."""
 
 
 class Sole(NamedTuple):
@@ -37,6 +37,10 @@ class Sole(NamedTuple):
     faces: Faces
     closing: NDArray[np.bool_]
     """(V,) true for vertices on the floor that close the sole"""
+    level: float
+    """Z of the floor"""
+    uneven: float
+    """Standard deviation of the height of the rim"""
 
 
 def close_sole(vertices: Floats, faces: Faces, length: float, floor: float | None = None) -> Sole | None:
@@ -57,6 +61,7 @@ def close_sole(vertices: Floats, faces: Faces, length: float, floor: float | Non
     if area < OPEN_SHARE * length**2:
         return None
     level = min(float(vertices[:, 2].min()), np.inf if floor is None else floor) - SKIRT * length
+    uneven = float(np.std(vertices[np.concatenate(holes).ravel(), 2]))
     parts, added = [faces], [vertices]
     count = len(vertices)
     for rim in holes:
@@ -69,7 +74,7 @@ def close_sole(vertices: Floats, faces: Faces, length: float, floor: float | Non
         added += [on_floor, on_floor.mean(axis=0, keepdims=True)]
         count += len(ends) + 1
     closing = np.arange(count) >= len(vertices)
-    return Sole(np.concatenate(added), np.concatenate(parts).astype(np.int32), closing)
+    return Sole(np.concatenate(added), np.concatenate(parts).astype(np.int32), closing, level, uneven)
 
 
 def _flat_lid(vertices: Floats, faces: Faces, length: float) -> NDArray[np.bool_]:
