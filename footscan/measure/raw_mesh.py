@@ -94,7 +94,7 @@ def prepare_feet(
     vertices, faces = _clean(np.asarray(vertices, np.float64), np.asarray(faces, np.int32))
     notes: list[str] = []
     plane = None
-    found = floor_faces(vertices, faces)
+    found = floor_faces(vertices, np.where(_against(faces, _meetings(faces))[:, None], faces[:, ::-1], faces))
     if found is not None and np.count_nonzero(~found[0]) >= LEAST_FACES:
         floor, plane = found
         vertices, faces = used_vertices(vertices, faces[~floor])

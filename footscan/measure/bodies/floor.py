@@ -19,7 +19,7 @@ TRIALS = 12
 
 
 def floor_faces(vertices: Floats, faces: Faces) -> tuple[NDArray[np.bool_], tuple[Floats, Floats]] | None:
-    """Find a floor that the rest of the surface stands on; None without one.
+    """Find a floor that the rest of the surface stands on; None without one. Faces of a part look to the same side.
 
     A floor looks at the body on it; a sole and a cut through the leg look away from it. A flat part of its own may look
     either way.
@@ -61,8 +61,12 @@ def floor_faces(vertices: Floats, faces: Faces) -> tuple[NDArray[np.bool_], tupl
             height = (vertices - middle) @ up
             if np.mean(height > -reach) < ON_ONE_SIDE or height.max() < 4 * reach:
                 continue
+            # About a point of the floor, neither the floor nor an opening on it adds to the volume.
+            from_floor = corners - middle
+            volume = np.einsum("ni,ni->", from_floor[:, 0], np.cross(from_floor[:, 1], from_floor[:, 2]))
+            outward = normals if volume > 0 else -normals
             own = np.isin(component, [part for part in np.unique(component[near]) if near[component == part].all()])
-            floor = near & ((normals @ up > FACING) | own)
+            floor = near & ((outward @ up > FACING) | own)
             if areas[floor].sum() > LEAST_SHARE * areas.sum():
                 return floor, (middle, up)
     return None
