@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 
 from footscan.measure.bodies.partial import measure_raw
-from footscan.measure.raw_mesh import RawMesh
+from footscan.measure.bodies.raw_mesh import RawMesh
 from footscan.mesh.rigid_transform import apply
 from schemas.base.errors import Finding
 from schemas.measures import Axis, Measures

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from footscan.measure.bodies.raw_mesh import RawMesh
 from footscan.measure.foot_landmarks import find_landmarks
 from footscan.measure.frame.foot_frame import Body, FootFrame, foot_frame
 from footscan.measure.measures import measure_foot, take_measures
-from footscan.measure.raw_mesh import RawMesh
 from footscan.mesh.rigid_transform import apply, turn_about_z
 from schemas.base.errors import Finding
 from schemas.base.model import Side

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from footscan.measure.raw_mesh import MeshUnit, RawMesh
+    from footscan.measure.bodies.raw_mesh import MeshUnit, RawMesh
     from schemas.base.model import Side
     from schemas.measures import Axis, Measures
 
@@ -75,8 +75,8 @@ def _measured(
     """Measure the one or two feet of a mesh; of two, the left one comes first."""
     from footscan.measure.bodies.pair import measure_pair
     from footscan.measure.bodies.partial import measure_raw
+    from footscan.measure.bodies.raw_mesh import prepare_feet
     from footscan.measure.foot_landmarks import check_manual
-    from footscan.measure.raw_mesh import prepare_feet
     from footscan.mesh.formats.files import read_mesh
 
     manual = {} if landmarks is None else _manual_landmarks(landmarks)

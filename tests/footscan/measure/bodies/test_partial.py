@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from footscan.measure.bodies.pair import measure_pair
 from footscan.measure.bodies.partial import measure_raw
-from footscan.measure.raw_mesh import RawMesh, prepare_feet
+from footscan.measure.bodies.raw_mesh import RawMesh, prepare_feet
 from footscan.virtual.foot.foot import Foot, make_foot
 from schemas.base.errors import Finding
 from schemas.measures import Measures
