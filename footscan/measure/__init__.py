@@ -1,4 +1,4 @@
-"""Landmarks, lengths, girths, footprint, volume. `footscan.measure(mesh)` calls `bodies.any_mesh.measure`."""
+"""Landmarks, lengths, girths, footprint, volume. `footscan.measure(mesh)` calls `any_mesh.measure`."""
 
 import sys
 from importlib import import_module
@@ -8,7 +8,7 @@ from typing import Any
 
 class _Package(ModuleType):
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        return import_module("footscan.measure.bodies.any_mesh").measure(*arguments, **options)
+        return import_module("footscan.measure.any_mesh").measure(*arguments, **options)
 
 
 sys.modules[__name__].__class__ = _Package

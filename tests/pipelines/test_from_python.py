@@ -90,7 +90,7 @@ def test_the_page(done: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
 
 
 def test_docstrings_examples_run() -> None:
-    assert doctest.testmod(import_module("footscan.measure.bodies.any_mesh")).failed == 0
+    assert doctest.testmod(import_module("footscan.measure.any_mesh")).failed == 0
 
 
 def test_a_mesh_in_several_forms() -> None:

@@ -1,1 +1,1 @@
-"""Bodies of which a part was not seen or is not there, and meshes that hold more than one foot."""
+"""Meshes of other scanners, prepared: unit, orientation, the floor, soles that were not seen, ends that are missing."""

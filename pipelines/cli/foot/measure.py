@@ -73,10 +73,9 @@ def _measured(
     file: Path, side: "Side", axis: "Axis", unit: "MeshUnit | None", landmarks: Path | None
 ) -> "list[tuple[RawMesh, Measures]]":
     """Measure the one or two feet of a mesh; of two, the left one comes first."""
-    from footscan.measure.bodies.pair import measure_pair
-    from footscan.measure.bodies.partial import measure_raw
     from footscan.measure.bodies.raw_mesh import prepare_feet
     from footscan.measure.foot_landmarks import check_manual
+    from footscan.measure.partial import measure_pair, measure_raw
     from footscan.mesh.formats.files import read_mesh
 
     manual = {} if landmarks is None else _manual_landmarks(landmarks)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.bodies.partial import measure_raw
 from footscan.measure.bodies.raw_mesh import prepare_feet
+from footscan.measure.partial import measure_raw
 from footscan.mesh.formats.files import read_mesh
 from footscan.mesh.mesh import Mesh
 from schemas.base.errors import Finding

@@ -1,4 +1,4 @@
-"""Measures of a foot of which a part was not seen or is not there.
+"""Measures of prepared meshes: of a foot of which a part was not seen or is not there, and of a pair.
 
 What is unknown is varied: the height of the floor below a sole that was not seen, the length and the axis of a foot
 whose toes or heel are missing. A measure that stays the same holds all the same. One that changes is uncertain, or
@@ -6,7 +6,7 @@ incomplete if it changes by so much that a value says nothing.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,8 @@ OF_HEEL = (
     *("heel_breadth", "heel_angle", "heel_girth", "long_heel_girth"),
 )
 """Measures of the heel itself."""
+ALIKE = 0.7
+"""Feet stand side by side if they point the same way by more than this cosine; chosen by hand."""
 
 
 class _Variants(NamedTuple):
@@ -84,6 +86,44 @@ def measure_raw(
         note = "up to where the surface ends: the toes are missing"
         measures["foot_length"] = measured.model_copy(update={"status": "uncertain", "note": note, "uncertainty": None})
     return base.model_copy(update={"measures": measures})
+
+
+def measure_pair(
+    feet: tuple[RawMesh, RawMesh], axis: Axis = "toe2"
+) -> dict[Literal["left", "right"], tuple[RawMesh, Measures]]:
+    """Measure both feet. Their sides follow from their form; if both look alike, from their places side by side.
+
+    Raises
+    ------
+    Finding
+        One is no foot, or they are not a left and a right one.
+    """
+    first, second = (measure_raw(foot, "unknown", axis) for foot in feet)
+    if first.side == second.side:
+        is_first_right = _lies_right(feet[0], first, feet[1], second)
+        if is_first_right is None:
+            raise Finding(f"the surface has 2 separate bodies, both like a {first.side} foot, expected a pair")
+        if is_first_right == (first.side == "right"):
+            second = measure_raw(feet[1], "left" if is_first_right else "right", axis)
+        else:
+            first = measure_raw(feet[0], "right" if is_first_right else "left", axis)
+        for foot in (first, second):
+            if foot.side_note is not None:
+                raise Finding(f"the surface has 2 separate bodies, and of the {foot.side} one {foot.side_note}")
+    of_first, of_second = (feet[0], first), (feet[1], second)
+    return {"left": of_first, "right": of_second} if first.side == "left" else {"left": of_second, "right": of_first}
+
+
+def _lies_right(mesh: RawMesh, measures: Measures, other: RawMesh, of_other: Measures) -> bool | None:
+    """True if a foot stands on the right of the other, False if on its left; None if not side by side."""
+    transform, second = np.array(measures.transform), np.array(of_other.transform)
+    if transform[0, :3] @ second[0, :3] < ALIKE:
+        return None
+    away = np.mean(apply(transform, other.vertices), axis=0) - np.mean(apply(transform, mesh.vertices), axis=0)
+    if abs(away[1]) < abs(away[0]):
+        return None
+    is_mirrored = np.linalg.det(transform[:3, :3]) < 0
+    return bool((away[1] > 0) != is_mirrored)
 
 
 def _variants(mesh: RawMesh, side: Side, axis: Axis, manual: Mapping[str, Floats] | None) -> Iterator[_Variants]:

@@ -8,9 +8,8 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from footscan.measure.bodies.pair import measure_pair
-from footscan.measure.bodies.partial import measure_raw
 from footscan.measure.bodies.raw_mesh import RawMesh, prepare_feet
+from footscan.measure.partial import measure_pair, measure_raw
 from footscan.virtual.foot.foot import Foot, make_foot
 from schemas.base.errors import Finding
 from schemas.measures import Measures
