@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.measure.measures import measure_foot
-from footscan.measure.raw_mesh import prepare_mesh
+from footscan.measure.bodies.raw_mesh import prepare_feet
+from footscan.measure.partial import measure_raw
 from footscan.mesh.formats.files import read_mesh
 from footscan.mesh.mesh import Mesh
+from schemas.base.errors import Finding
 from schemas.base.model import Side
 from schemas.measures import Axis, Measures
 
@@ -32,7 +33,7 @@ def measure(
     RefusedInput
         The file is missing or broken.
     Finding
-        The mesh is no foot.
+        The mesh is no foot, or holds two.
 
     Examples
     --------
@@ -48,5 +49,7 @@ def measure(
         vertices, faces = np.asarray(mesh[0], np.float64), np.asarray(mesh[1], np.int32)
     else:
         vertices, faces = read_mesh(Path(mesh))
-    whole = prepare_mesh(vertices, faces, None)
-    return measure_foot(whole.vertices, whole.faces, side, axis=axis)
+    feet = prepare_feet(vertices, faces, None)
+    if len(feet) > 1:
+        raise Finding("the surface has 2 separate bodies, expected a single foot")
+    return measure_raw(feet[0], side, axis)

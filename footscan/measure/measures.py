@@ -15,7 +15,7 @@ from footscan.measure.attached import things_at_foot
 from footscan.measure.definitions.conventions import CONVENTIONS, OWN
 from footscan.measure.foot_landmarks import Landmark, find_landmarks
 from footscan.measure.foot_surface import FootSurface
-from footscan.measure.frame.foot_frame import FootFrame, foot_frame
+from footscan.measure.frame.foot_frame import Body, FootFrame, foot_frame
 from footscan.measure.frame.glass import glass_doubt
 from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.measure.replicates import replicates
@@ -204,6 +204,7 @@ def measure_foot(
     calibration: Mapping[str, tuple[float, float]] | None = None,
     glass: GlassPlane | None = None,
     doubts: Sequence[str] = (),
+    body: Body | None = None,
 ) -> Measures:
     """Measure a foot in any pose. A left foot is mirrored and measured as a right one.
 
@@ -221,6 +222,7 @@ def measure_foot(
     calibration : name of a measure to (a, b): the reported value is a + b times the measured one
     glass : the scanner's glass in the frame of the mesh; default: at Z = 0
     doubts : reasons, a sentence each, not to rely on the scan: all measures are uncertain
+    body : as of `foot_frame`
 
     Raises
     ------
@@ -228,14 +230,15 @@ def measure_foot(
         The surface is no foot, or not in mm.
     """
     glass = glass or GlassPlane()
-    foot = foot_frame(vertices, faces, side, axis, manual, glass.plane)
+    foot = foot_frame(vertices, faces, side, axis, manual, glass.plane, body)
     landmarks = find_landmarks(foot, manual or {})
     if errors is not None or filled is not None:  # the foot's vertices are those of the mesh without its strays
         back = apply(np.linalg.inv(foot.transform), foot.vertices)
         source = np.asarray(KDTree(vertices).query(back)[1])
         errors = None if errors is None else [field.of(source) for field in errors]
         filled = None if filled is None else filled[source]
-    things = things_at_foot(foot)
+    # A cut end is a step of its own.
+    things = things_at_foot(foot) if body is None or body.is_whole else []
     reasons = [*doubts, *filter(None, [glass_doubt(glass)])]
     return Measures(
         side=foot.side,

@@ -49,6 +49,15 @@ CLEAR_SIDE = 0.03
 hand."""
 
 
+class Body(NamedTuple):
+    """What is known of a body before it is measured."""
+
+    is_whole: bool = True
+    """False accepts the proportions of a foot without its toes or its heel"""
+    to_floor: Floats | None = None
+    """(4, 4) from the frame of the mesh to one with the floor at Z = 0; None: the floor is the glass or the sole"""
+
+
 class FootFrame(NamedTuple):
     """A foot in its own frame, in mm.
 
@@ -92,12 +101,14 @@ def foot_frame(
     axis: Axis = "toe2",
     marked: Mapping[str, Floats] | None = None,
     glass: Plane = CALIBRATED,
+    body: Body | None = None,
 ) -> FootFrame:
     """Compute the frame of a foot in any pose; on the scanner's glass that is the floor.
 
     The axis runs from the rearmost heel point to the tip of the second toe ("toe2"), to the middle of the ball
     ("ball_center"), or along the medial tangent of heel and ball ("brannock"). Where the second toe cannot be
-    identified, "toe2" becomes "ball_center".
+    identified, "toe2" becomes "ball_center". Without toes or heel, the axis is the long axis of the footprint, which
+    counts as "ball_center".
 
     Parameters
     ----------
@@ -107,6 +118,7 @@ def foot_frame(
     axis : the requested axis
     marked : (3,) mm, points set by a person, in the frame of the mesh; pternion and toe_2_tip are used here
     glass : the plane of the scanner's glass in the frame of the mesh
+    body : what is known of a foot that is not whole; default: it is whole
 
     Raises
     ------
@@ -116,10 +128,12 @@ def foot_frame(
     places, faces = used_vertices(np.asarray(vertices, np.float64), keep_large_components(faces, STRAY_SHARE))
     _check_size(places)
     pose = find_pose(places, faces)
-    transform, floor = _on_floor(places, pose, to_glass(glass))
+    body = body or Body()
+    transform, floor = _on_floor(places, pose, to_glass(glass), body.to_floor)
     samples = dense_points(places, faces, SPACING_MM)
     moved = apply(transform, samples)
-    _check_form(moved, pose)
+    if body.is_whole:
+        _check_form(moved, pose)
 
     lead = _medial_lead(moved, pose.length)
     form: Side = "right" if lead >= 0 else "left"
@@ -130,7 +144,10 @@ def foot_frame(
     low = samples[moved[:, 2] <= low_height(pose.length)]
     forefoot = forefoot_points(apply(transform, places), faces, pose.length, low_height(pose.length))
     forefoot = apply(np.linalg.inv(transform), forefoot)
-    transform, actual_axis, length = along_axis(transform, low, forefoot, pose.length, axis, marked or {})
+    if body.is_whole:
+        transform, actual_axis, length = along_axis(transform, low, forefoot, pose.length, axis, marked or {})
+    else:
+        transform, actual_axis, length = _along_footprint(transform, low)
     _check_length(length)
     note = f"toes and ball look like those of a {form} foot"
     return FootFrame(
@@ -146,6 +163,14 @@ def foot_frame(
         floor_residual=pose.residual,
         cut_height=None if pose.leg_end is None else float(apply(transform, pose.leg_end)[:, 2].min()),
     )
+
+
+def _along_footprint(transform: Floats, low: Floats) -> tuple[Floats, Axis, float]:
+    """The frame and the length of a foot without its toes or its heel, along its footprint; as `along_axis`."""
+    moved = apply(transform, low)
+    shift = np.eye(4)
+    shift[:2, 3] = -moved[np.argmin(moved[:, 0]), :2]
+    return shift @ transform, "ball_center", float(np.ptp(moved[:, 0]))
 
 
 def forefoot_points(vertices: Floats, faces: NDArray[np.integer], length: float, low: float) -> Floats:
@@ -167,22 +192,25 @@ def _check_size(vertices: Floats) -> None:
         raise Finding(f"the surface is {diagonal:.3g} across, expected a foot in mm: {_range(DIAGONAL_MM)}")
 
 
-def _on_floor(vertices: Floats, pose: Pose, to_glass: Floats) -> tuple[Floats, Floor]:
-    """Returns (4, 4) the transform to the glass if the foot stands on it, or else to the floor of its pose.
+def _on_floor(vertices: Floats, pose: Pose, to_glass: Floats, to_floor: Floats | None) -> tuple[Floats, Floor]:
+    """Returns (4, 4) the transform to the floor if that is known, to the glass if the foot stands on it, or else to the
+    floor of its pose.
 
     The heel comes to lie near X = 0.
     """
     transform = pose.transform.copy()
     floor: Floor = "sole" if pose.stands else "resting"
-    turn = transform[:3, :3] @ to_glass[:3, :3].T
+    to_plane = to_glass if to_floor is None else to_floor
+    turn = transform[:3, :3] @ to_plane[:3, :3].T
     tilt = float(np.degrees(np.arccos(np.clip(turn[2, 2], -1.0, 1.0))))
     lowest = apply(to_glass, vertices)[:, 2].min()
-    if abs(lowest) < GLASS_MM and tilt < (GLASS_DEG if pose.stands else ABOUT_LEVEL_DEG):
-        floor = "glass"
+    on_glass = abs(lowest) < GLASS_MM and tilt < (GLASS_DEG if pose.stands else ABOUT_LEVEL_DEG)
+    if to_floor is not None or on_glass:
+        floor = "glass" if to_floor is None else "sole"
         along = turn[0, :2] / np.linalg.norm(turn[0, :2])
         about_z = np.eye(4)
         about_z[:2, :2] = along, [-along[1], along[0]]
-        transform = about_z @ to_glass
+        transform = about_z @ to_plane
     low = apply(transform, vertices)
     transform[0, 3] -= low[low[:, 2] <= low_height(pose.length), 0].min()
     return transform, floor

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from schemas.measures import Measures
+    from footscan.measure.bodies.raw_mesh import MeshUnit, RawMesh
+    from schemas.base.model import Side
+    from schemas.measures import Axis, Measures
 
 
 DECIMALS = {"mm": 2, "mm2": 0, "mm3": 0, "deg": 1, "1": 3}
@@ -47,31 +49,65 @@ def measure(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure the mesh of a foot, from this scanner or another."""
-    from footscan.measure.foot_landmarks import check_manual
-    from footscan.measure.measures import measure_foot
-    from footscan.measure.raw_mesh import prepare_mesh
-    from footscan.mesh.formats.files import read_mesh
-    from pipelines.engine.files.atomic import write_atomically
+    """Measure the mesh of a foot, or of both feet, from this scanner or another.
 
+    Of both feet, --out and --picture write a file each, with -left and -right in its name.
+    """
     keep_inputs((out, csv, picture), file)
     if picture is not None and picture.suffix.lower() != ".png":
         raise RefusedInput("--picture", f"expected a name that ends with .png, found {picture.name!r}")
+    feet = _measured(file, side, axis, unit, landmarks)
+    measured = [(mesh, measures.model_copy(update={"posture": posture})) for mesh, measures in feet]
+    for note in dict.fromkeys(note for mesh, _ in measured for note in mesh.notes):
+        message(f"{file}: {note}")
+    for mesh, measures in measured:
+        suffix = f"-{measures.side}" if len(measured) > 1 else ""
+        for note in measures.warnings:
+            message(f"{file}: {note}")
+        files = [None if path is None else path.with_stem(path.stem + suffix) for path in (out, picture)]
+        _write(file, mesh, measures, files[0], csv, files[1])
+    if as_json:
+        documents = [measures.model_dump(mode="json") for _, measures in measured]
+        print_json(documents[0] if len(documents) == 1 else dict(zip(("left", "right"), documents, strict=True)))
+    else:
+        for _, measures in measured:
+            print_measures(measures, {})
+
+
+def _measured(
+    file: Path, side: "Side", axis: "Axis", unit: "MeshUnit | None", landmarks: Path | None
+) -> "list[tuple[RawMesh, Measures]]":
+    """Measure the one or two feet of a mesh; of two, the left one comes first."""
+    from footscan.measure.bodies.raw_mesh import prepare_feet
+    from footscan.measure.foot_landmarks import check_manual
+    from footscan.measure.partial import measure_pair, measure_raw
+    from footscan.mesh.formats.files import read_mesh
+
     manual = {} if landmarks is None else _manual_landmarks(landmarks)
     vertices, faces = read_mesh(file)
     try:
-        mesh = prepare_mesh(vertices, faces, unit)
+        feet = prepare_feet(vertices, faces, unit)
+        if len(feet) == 2:
+            pair = measure_pair((feet[0], feet[1]), axis)
+            if side != "unknown" or landmarks is not None:
+                raise RefusedInput(file, "the surface holds two feet, expected one with --side or --landmarks")
+            return [pair["left"], pair["right"]]
         if landmarks is not None:
             try:
-                check_manual(manual, mesh.vertices)
+                check_manual(manual, feet[0].vertices)
             except ValueError as error:
                 raise RefusedInput(landmarks, str(error)) from None
-        measured = measure_foot(mesh.vertices, mesh.faces, side, axis=axis, manual=manual)
-        measures = measured.model_copy(update={"posture": posture})
+        return [(feet[0], measure_raw(feet[0], side, axis, manual))]
     except Finding as error:
         raise RefusedInput(file, str(error)) from None
-    for note in (*mesh.notes, *measures.warnings):
-        message(f"{file}: {note}")
+
+
+def _write(
+    file: Path, mesh: "RawMesh", measures: "Measures", out: Path | None, csv: Path | None, picture: Path | None
+) -> None:
+    """Write the files of one foot."""
+    from pipelines.engine.files.atomic import write_atomically
+
     if out is not None:
         write_atomically(out, (measures.model_dump_json(indent=2) + "\n").encode())
     if csv is not None:
@@ -80,10 +116,6 @@ def measure(
         from footscan.report.scan.measure_figure import measure_figure
 
         write_atomically(picture, measure_figure(mesh.vertices, mesh.faces, measures))
-    if as_json:
-        print_json(measures.model_dump(mode="json"))
-    else:
-        print_measures(measures, {})
 
 
 def _manual_landmarks(file: Path) -> "dict[str, NDArray[np.float64]]":

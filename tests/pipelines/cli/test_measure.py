@@ -88,21 +88,10 @@ NO_FEET: dict[str, tuple[Callable[[], Shape], str]] = {
     "hand-sized blob": (lambda: ball(95, 45, 20), "round or a block"),
     "hand": (lambda: hand((-60, 0, 0)), "gaps from side to side where a foot has its ball"),
     "two feet side by side": (lambda: together(whole(), moved(whole(), 0, 130, 0)), "2 separate bodies"),
-    "a pair": (lambda: together(whole(), moved(mirrored(whole()), 0, 130, 0)), "2 separate bodies"),
     "heel to toe": (lambda: together(whole(), moved(whole(), 270, 0, 0)), "2 separate bodies"),
     "two feet through each other": (lambda: together(whole(), moved(whole(), 0, 60, 0)), "expected a foot"),
     "foot and plate": (lambda: together(whole(), moved(box(400, 200, 5), 130, 0, -3)), "2 separate bodies"),
-    "foot and sheet": (lambda: together(whole(), moved(box(400, 200, 0), 130, 0, 0)), "separate bodies"),
-    "without toes": (lambda: part(lambda middle: middle[:, 0] < 200), "cut off or open at the toes"),
-    "tips of toes cut": (lambda: part(lambda middle: middle[:, 0] < 240), "cut off or open at the toes"),
-    "without a heel": (lambda: part(lambda middle: middle[:, 0] > 40), "cut off or open at the heel"),
-    "front half": (lambda: part(lambda middle: middle[:, 0] > 120), "cut off or open at the heel"),
-    "rear half": (lambda: part(lambda middle: middle[:, 0] < 140), "cut off or open at the toes"),
     "medial half": (lambda: part(lambda middle: middle[:, 1] > 5), "expected a foot"),
-    "toes cut and closed": (
-        lambda: (np.column_stack([np.minimum(whole()[0][:, 0], 225), whole()[0][:, 1:]]), whole()[1]),
-        "cut off or open at the toes",
-    ),
     "100 times a foot": (lambda: (whole()[0] * 100, whole()[1]), "2.62e\\+04 long, expected a foot of 100 to 380 mm"),
     "12 triangles": (
         lambda: (np.asarray(trimesh.creation.box().vertices) * 200, np.asarray(trimesh.creation.box().faces, np.int32)),
@@ -136,6 +125,47 @@ def test_no_foot_is_refused_in_one_line(run: Run, tmp_path: Path, shape: Callabl
     assert (status, out, len(lines)) == (2, "", 1), (lines, out[:500])
     assert lines[0].startswith(f"footscan: {file}: the surface ")
     assert re.search(problem, lines[0])
+
+
+CUT: dict[str, tuple[Callable[[], Shape], str]] = {
+    "without toes": (lambda: part(lambda middle: middle[:, 0] < 200), "toes"),
+    "tips of toes cut": (lambda: part(lambda middle: middle[:, 0] < 240), "toes"),
+    "rear half": (lambda: part(lambda middle: middle[:, 0] < 140), "toes"),
+    "toes cut and closed": (
+        lambda: (np.column_stack([np.minimum(whole()[0][:, 0], 225), whole()[0][:, 1:]]), whole()[1]),
+        "toes",
+    ),
+    "without a heel": (lambda: part(lambda middle: middle[:, 0] > 40), "heel"),
+}
+
+
+@pytest.mark.parametrize(("shape", "missing"), CUT.values(), ids=CUT.keys())
+def test_a_cut_foot_is_measured_as_far_as_it_goes(
+    run: Run, tmp_path: Path, shape: Callable[[], Shape], missing: str
+) -> None:
+    file = written(shape(), tmp_path / "mesh.ply")
+    status, printed, lines = run(file, "--json", "--side", "right")
+    assert status == 0
+    assert f"{file}: the foot is cut off or open at the {missing}" in lines
+    measures = Measures.model_validate_json(printed).measures
+    assert measures["foot_length"].status == ("uncertain" if missing == "toes" else "incomplete")
+    assert measures["foot_length"].note is not None
+    assert missing in measures["foot_length"].note
+    assert any(measure.value is not None for measure in measures.values())
+
+
+def test_both_feet_of_a_mesh_are_measured_as_a_pair(run: Run, tmp_path: Path) -> None:
+    file = written(together(whole(), moved(mirrored(whole()), 0, 130, 0)), tmp_path / "pair.ply")
+    status, printed, lines = run(file, "--json", "--out", tmp_path / "m.json", "--csv", tmp_path / "m.csv")
+    assert (status, lines) == (0, [f"{file}: the surface holds two feet, which are measured as a pair"])
+    for side, content in json.loads(printed).items():
+        measures = Measures.model_validate(content)
+        assert measures == Measures.model_validate_json((tmp_path / f"m-{side}.json").read_bytes())
+        assert measures.side == side
+        for name in LENGTHS:
+            assert measures.measures[name].value == pytest.approx(known_foot().measures[name], abs=0.5)
+    assert [row[1] for row in csv.reader((tmp_path / "m.csv").read_text().splitlines())] == ["side", "left", "right"]
+    assert run(file, "--side", "left")[0] == 2
 
 
 def test_broken_files_are_refused_in_one_line(run: Run, tmp_path: Path) -> None:
@@ -177,7 +207,7 @@ def test_a_foot_in_a_bad_state_is_measured_all_the_same(run: Run, tmp_path: Path
     status, printed, lines = run(file, "--json", "--side", "left", "--out", out)
     assert status == 0
     assert lines == [
-        f"{file}: 1 small part apart from the foot left out",
+        f"{file}: a flat part under the foot, the floor, was left out",
         f"{file}: {np.count_nonzero(turned)} triangles faced against their neighbours and were turned over",
         f"{file}: coordinates in cm, inferred from the length of 26.2, were multiplied by 10 to obtain mm",
         f"{file}: toes and ball look like those of a right foot",

@@ -6,8 +6,8 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from footscan.measure.bodies.raw_mesh import MeshUnit, RawMesh, prepare_mesh
 from footscan.measure.frame.foot_frame import foot_frame
-from footscan.measure.raw_mesh import MeshUnit, RawMesh, prepare_mesh
 from footscan.virtual.foot.foot import Foot, make_foot
 from schemas.base.errors import Finding
 

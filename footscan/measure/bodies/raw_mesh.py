@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, KDTree, QhullError
 
+from footscan.measure.bodies.floor import floor_faces
+from footscan.measure.bodies.sole import close_sole
 from footscan.measure.frame.foot_frame import CONVEX
 from footscan.measure.frame.pose import find_pose, volume
 from footscan.mesh.rigid_transform import apply
@@ -19,6 +21,8 @@ Floats = NDArray[np.float64]
 Faces = NDArray[np.int32]
 MeshUnit = Literal["mm", "cm", "m", "in"]
 
+Part = Literal["heel", "toes"]
+
 MILLIMETRES: dict[MeshUnit, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 FOOT_MM = (115.0, 335.0), (100.0, 380.0)
 """Ranges of foot length from which the unit is inferred: first from a child of one year to the largest size in common
@@ -27,11 +31,15 @@ LEAST_FACES = 40
 """A mesh with fewer triangles is refused; chosen by hand."""
 STRAY_SHARE = 0.02
 """Parts with less than this share of the triangles are strays; chosen by hand."""
+FOOT_SHARE = 0.3
+"""Each of two feet has at least this share of the triangles of the other; chosen by hand."""
 BODY_SHARE = 0.5
 """Parts of more than this share of the largest part's extent may be a second body; chosen by hand."""
 HULL_SAMPLES, APART = 200, 0.2
 """A part is a second body if less than the share APART of about so many of its points lies within the hull of the
 first; layers of one surface lie within the same hull. Chosen by hand."""
+LID_REACH = 1e-6
+"""Vertices nearer than this share of the length to a point of the leg's end are that point."""
 OPEN_EDGES = 0.001
 """A surface with a greater share of open edges is reported as open; with a smaller one, as having small holes.
 Chosen by hand."""
@@ -60,10 +68,52 @@ class RawMesh(NamedTuple):
     is_closed: bool
     notes: tuple[str, ...]
     """Remarks for the user, each a sentence without a full stop"""
+    missing: tuple[Part, ...] = ()
+    """Ends of the foot that are cut off, open or not there"""
+    closing: NDArray[np.bool_] | None = None
+    """(V,) vertices on the floor that close a sole which was not seen; None if the sole was seen"""
+    lid: NDArray[np.bool_] | None = None
+    """(V,) vertices of the flat end of the leg; None without one"""
+    tilt_deg: float = 0.0
+    """Standard deviation of the tilt of a floor that follows from the rim of an open sole"""
+    to_floor: Floats = np.eye(4)
+    """(4, 4) from the frame of the mesh to one with the floor at Z = 0"""
+
+
+def prepare_feet(
+    vertices: NDArray[np.floating], faces: NDArray[np.integer], unit: MeshUnit | None = None
+) -> list[RawMesh]:
+    """Prepare a mesh that holds one foot or two, and maybe the floor; as `prepare_mesh`, whose foot is a single one.
+
+    Raises
+    ------
+    Finding
+        As of `prepare_mesh`; or the surface holds more than two bodies.
+    """
+    _check_finite(vertices)
+    vertices, faces = _clean(np.asarray(vertices, np.float64), np.asarray(faces, np.int32))
+    notes: list[str] = []
+    plane = None
+    found = floor_faces(vertices, np.where(_against(faces, _meetings(faces))[:, None], faces[:, ::-1], faces))
+    if found is not None and np.count_nonzero(~found[0]) >= LEAST_FACES:
+        floor, plane = found
+        vertices, faces = used_vertices(vertices, faces[~floor])
+        notes.append("a flat part under the foot, the floor, was left out")
+    component = face_components(faces)
+    counts = np.bincount(component)
+    large = np.flatnonzero(counts >= FOOT_SHARE * counts.max())
+    bodies = [used_vertices(vertices, faces[component == part]) for part in large]
+    extents = [_extent(body) for body, _ in bodies]
+    if len(bodies) == 2 and min(extents) > BODY_SHARE * max(extents) and _inside(bodies[1][0], bodies[0][0]) < APART:
+        strays = len(counts) - 2
+        notes += ["the surface holds two feet, which are measured as a pair"]
+        notes += [f"{strays} small part{'s' if strays > 1 else ''} apart from the feet left out"] if strays else []
+        return [_prepared(*body, unit, plane, notes) for body in bodies]
+    return [_prepared(vertices, faces, unit, plane, notes)]
 
 
 def prepare_mesh(vertices: NDArray[np.floating], faces: NDArray[np.integer], unit: MeshUnit | None = None) -> RawMesh:
-    """Prepare a mesh from elsewhere for `foot_frame`.
+    """Prepare the mesh of a single foot from elsewhere for `foot_frame`.
 
     Repeated vertices are merged, triangles without area and small stray parts are left out, triangles are turned to
     look outward, and the unit is inferred from the size of the foot unless it is stated. The pose is not changed.
@@ -78,26 +128,65 @@ def prepare_mesh(vertices: NDArray[np.floating], faces: NDArray[np.integer], uni
     ------
     Finding
         The mesh has hardly any triangles, coordinates that are no numbers, or several bodies; its size is that of a
-        foot in no unit or in two; or it has no heel, no toes, or gaps at the ball.
+        foot in no unit or in two; or it has neither heel nor toes, or gaps at the ball.
     """
+    _check_finite(vertices)
+    vertices, faces = _clean(np.asarray(vertices, np.float64), np.asarray(faces, np.int32))
+    return _prepared(vertices, faces, unit, None, [])
+
+
+def _check_finite(vertices: NDArray[np.floating]) -> None:
     if not np.all(np.isfinite(vertices)):
         raise Finding("the surface has coordinates that are no numbers, expected a foot")
-    notes: list[str] = []
-    vertices, faces = _clean(np.asarray(vertices, np.float64), np.asarray(faces, np.int32))
+
+
+def _prepared(
+    vertices: Floats, faces: Faces, unit: MeshUnit | None, floor: tuple[Floats, Floats] | None, before: list[str]
+) -> RawMesh:
+    """Prepare a foot; `floor` is a point and the upward normal of the floor, if that was seen."""
+    notes = list(before)
     vertices, faces = _one_body(vertices, faces, notes)
     meetings = _meetings(faces)
     is_closed = _is_closed(meetings, notes)
     faces = _outward(vertices, faces, meetings, notes)
     pose = find_pose(vertices, faces)
     mesh_unit = _unit(pose.length, unit)
+    missing: tuple[Part, ...] = ()
     if pose.convexity < CONVEX:  # foot_frame refuses a more convex body
-        _check_whole(apply(pose.transform, vertices) / pose.length, faces)
+        missing = _missing_ends(apply(pose.transform, vertices) / pose.length, faces)
+    notes += [f"the foot is cut off or open at the {part}" for part in missing]
+    level = None if floor is None else float(apply(pose.transform, floor[0][None])[0, 2])
+    sole = close_sole(apply(pose.transform, vertices), faces, pose.length, level)
+    if sole is not None:
+        vertices, faces = apply(np.linalg.inv(pose.transform), sole.vertices), sole.faces
+        notes.append("the sole was not seen and was closed flat at the floor")
     factor = MILLIMETRES[mesh_unit]
     if mesh_unit != "mm":
         origin = "as stated" if unit is not None else f"inferred from the length of {pose.length:.3g}"
         notes.append(f"coordinates in {mesh_unit}, {origin}, were multiplied by {factor:g} to obtain mm")
     _report_rounding(vertices, factor, notes)
-    return RawMesh(vertices * factor, faces, mesh_unit, factor, is_closed, tuple(notes))
+    to_floor = pose.transform.copy()
+    if sole is not None:
+        to_floor[2, 3] -= sole.level
+    to_floor[:3, 3] *= factor
+    return RawMesh(
+        vertices * factor,
+        faces,
+        mesh_unit,
+        factor,
+        is_closed,
+        tuple(notes),
+        missing,
+        None if sole is None else sole.closing,
+        _at(vertices, pose.leg_end, LID_REACH * pose.length),
+        0.0 if sole is None else float(np.degrees(np.arctan(sole.uneven / (pose.length / 2)))),
+        to_floor,
+    )
+
+
+def _at(vertices: Floats, points: Floats | None, reach: float) -> NDArray[np.bool_] | None:
+    """Returns (V,) which vertices lie at one of the points; None without points."""
+    return None if points is None else np.asarray(KDTree(points).query(vertices)[0] < reach)
 
 
 def _clean(vertices: Floats, faces: Faces) -> tuple[Floats, Faces]:
@@ -237,8 +326,8 @@ def _unit(length: float, stated: MeshUnit | None) -> MeshUnit:
     raise Finding(f"the surface is {length:.3g} long, {expected}")
 
 
-def _check_whole(places: Floats, faces: Faces) -> None:
-    """Refuse a foot without heel or toes, and a hand.
+def _missing_ends(places: Floats, faces: Faces) -> tuple[Part, ...]:
+    """Returns the ends that a foot lacks. Refuse one that lacks both, and a hand.
 
     Parameters
     ----------
@@ -249,13 +338,20 @@ def _check_whole(places: Floats, faces: Faces) -> None:
     if not len(low):
         raise Finding("the surface has nothing near its floor, expected a foot")
     rear, front = float(low[:, :, 0].min()), float(low[:, :, 0].max())
-    for part, end, ahead in (("heel", rear, -1.0), ("toes", front, 1.0)):
+    ends: tuple[tuple[Part, float, float], ...] = (("heel", rear, -1.0), ("toes", front, 1.0))
+    missing: list[Part] = []
+    for part, end, ahead in ends:
         last = low[np.abs(low[:, :, 0].mean(axis=1) - end) < END]
         if _rounded(last, ahead) < ROUNDED:
-            raise Finding(f"the surface is cut off or open at the {part}, expected a foot from heel to toes")
+            missing.append(part)
+    if len(missing) == 2:
+        raise Finding("the surface is cut off or open at the heel and at the toes, expected a foot with one of them")
+    if missing:
+        return tuple(missing)
     low[:, :, 0] -= rear
     if _parted(low) > GAPS:
         raise Finding("the surface has gaps from side to side where a foot has its ball, expected a foot")
+    return ()
 
 
 def _rounded(triangles: Floats, ahead: float) -> float:
