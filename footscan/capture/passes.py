@@ -124,6 +124,9 @@ def film_pass(
             times[camera] = deck.times(camera)
         except Fault as fault:
             failed[camera] = str(fault)
+            continue
+        if (problem := times[camera][1].problem) is not None:
+            failed.setdefault(camera, problem)
     return FilmedPass(tuple(sorted(cameras)), before, travel, back, sorter.films(), times, failed)
 
 
