@@ -173,7 +173,10 @@ class LiveAdapter:
         latency = next(rig_camera.latency for rig_camera in self._scanner.rig.cameras if rig_camera.id == camera)
         if stream is None:
             problem = self._not_opened.get(camera)
-            return Device(name, "bad", problem, CABLE) if problem else Device(name, "unknown", "not open")
+            if problem is not None:
+                return Device(name, "bad", problem, CABLE)
+            later = [number for number, planned in enumerate(self._passes[1:], start=2) if camera in planned.cameras]
+            return Device(name, "unknown", f"opened for pass {later[0]}" if later else "not open")
         if stream.state in {"lost", "silent", "closed"} or (stream.problem and stream.state == "connecting"):
             return Device(name, "bad", stream.problem or f"is {stream.state}", CABLE)
         if stream.state == "connecting":
