@@ -172,11 +172,7 @@ class LiveAdapter:
         name = f"Camera {camera}"
         latency = next(rig_camera.latency for rig_camera in self._scanner.rig.cameras if rig_camera.id == camera)
         if stream is None:
-            problem = self._not_opened.get(camera)
-            if problem is not None:
-                return Device(name, "bad", problem, CABLE)
-            later = [number for number, planned in enumerate(self._passes[1:], start=2) if camera in planned.cameras]
-            return Device(name, "unknown", f"opened for pass {later[0]}" if later else "not open")
+            return self._closed_camera(camera)
         if stream.state in {"lost", "silent", "closed"} or (stream.problem and stream.state == "connecting"):
             return Device(name, "bad", stream.problem or f"is {stream.state}", CABLE)
         if stream.state == "connecting":
@@ -188,6 +184,12 @@ class LiveAdapter:
         if defects:
             return Device(name, "warning", f"{_frames(stream.received)}, of these {', '.join(defects)}", CABLE)
         return Device(name, "ok", _frames(stream.received))
+
+    def _closed_camera(self, camera: int) -> Device:
+        if (problem := self._not_opened.get(camera)) is not None:
+            return Device(f"Camera {camera}", "bad", problem, CABLE)
+        later = [number for number, planned in enumerate(self._passes[1:], start=2) if camera in planned.cameras]
+        return Device(f"Camera {camera}", "unknown", f"opened for pass {later[0]}" if later else "not open")
 
     def _plan(self) -> Iterator[Device]:
         if self._plan_problem is not None:

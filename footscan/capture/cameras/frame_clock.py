@@ -35,8 +35,8 @@ EARLY_PERIODS = (0.1, 0.5)
 RECENT = 16
 MOST_LATE = 0.2
 """Share of late frames beyond which nobody can tell which exposure a frame is: the line then lies among late frames,
-and a whole film may be numbered one period off. Tuned on films of 170 frames that a busy host delays at random, as in the
-tests of this module: of some six hundred films with a frame half a period off, four had fewer late frames."""
+and a whole film may be numbered one period off. Tuned on films of 170 frames that a busy host delays at random, as in
+the tests of this module: of some six hundred films with a frame half a period off, four had fewer late frames."""
 
 
 @dataclass(frozen=True)

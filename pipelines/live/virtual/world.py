@@ -19,6 +19,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field
 
+from footscan.calibration.travel.body import TURN_DEG
 from footscan.mesh.formats.files import read_mesh
 from footscan.virtual.board.board import Board
 from footscan.virtual.board.memory import SET_UP
@@ -56,8 +57,6 @@ ACCELERATIONS = (120, 121, 122)
 """Numbers of the board's settings of the accelerations, mm/s^2."""
 SLACK_MM = 2.0
 """Largest distance of a head from its target, and from the other heads."""
-BODY_TURN_DEG = 20.0
-"""Angle of the body to the travel: as a person is told to place it."""
 BODY_REACH_MM = 90.0
 """Half of the travel over the body that is rendered beforehand, from its middle: the standard body turned by any angle
 does not reach further."""
@@ -206,7 +205,7 @@ class VirtualWorld:
             if self._world.body is None:
                 raise RefusedInput("virtual world", "has no body", field="body")
             vertices, faces = read_mesh(Path(self._world.body))
-            return Subject(Mesh(stand_on_glass(vertices, middle_mm, BODY_TURN_DEG), faces.astype(np.int64)))
+            return Subject(Mesh(stand_on_glass(vertices, middle_mm, TURN_DEG), faces.astype(np.int64)))
         if subject.startswith("reference"):
             file = self._world.reference
             reference = standard_reference() if file is None else read_reference(Path(file))

@@ -9,7 +9,8 @@ import pytest
 from standing_scanner import StandingStandIn
 
 from pipelines.capture_job import check_calibration
-from pipelines.live.calibrating.guide import Guide, GuideSettings
+from pipelines.live.calibrating.guide import Guide
+from pipelines.live.calibrating.settings import GuideSettings
 from pipelines.live.calibrating.view import View
 from pipelines.live.rig_file import read_rig, write_rig
 from pipelines.recordings.captures import read_capture
@@ -53,6 +54,9 @@ def test_a_scanner_is_calibrated_checked_and_named(scanner: StandingStandIn, tmp
     assert guide.picture().count("<g ") == 3
     guide.finish()
     assert guide.view.step == "calibrated"
+    assert guide.placement_picture() is None
+    guide.body()
+    assert "150 x 64 x 84 mm, its middle at X = 200 mm" in str(guide.placement_picture())
     made = read_calibration(Path(str(guide.view.outcome and guide.view.outcome.file)))
     assert (made.scanner, [camera.camera for camera in made.cameras]) == ("S1", [1, 2, 5])
     assert max(camera.held_out_rms_mm or 9.0 for camera in made.cameras) < 0.2
