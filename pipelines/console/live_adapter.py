@@ -33,6 +33,8 @@ LEVELS: dict[str, Level] = {
     "lost": "bad", "closed": "bad", "alarm": "bad", "door": "warning", "held": "warning", "not homed": "warning"
 }  # fmt: skip
 """Level of the controller in a state of the board; in others it is well."""
+KNOWN_FILE = "known.json"
+"""Name of the known measures of a virtual foot, in the folder of its scan."""
 CABLE = "check its cable and hub, then connect again"
 
 
@@ -44,6 +46,10 @@ class Glass(Protocol):
 
     def put(self, subject: str, progress: Callable[[int, int], None] | None = None) -> None:
         """Put another subject onto it; `progress` hears of the pictures that are made."""
+        ...
+
+    def write_known(self, file: Path) -> None:
+        """Write what is known of the foot on it into a file."""
         ...
 
 
@@ -122,6 +128,10 @@ class LiveAdapter:
         name = ScanName(patient, next_scan_name(self._archive, patient, side, today), side, today)
         order = ScanOrder(name, self._archive, self._results, light=self._light, keep_partial=keep_partial)
         result = self._scanner.scan(order)
+        if self._glass is not None:
+            self._glass.write_known(
+                result.stored.place / KNOWN_FILE
+            )  # when all is measured: nothing can read it before
         problem = None if result.measured is None else result.measured.problem
         return Scanned(patient, name.scan, side, problem, dict(result.stored.left_out))
 

@@ -15,13 +15,14 @@ from pipelines.scan import DELIVERED
 from schemas.base.errors import FootscanError, RefusedInput
 from schemas.base.limits import limit, refuse_beyond
 from schemas.base.model import pseudonym
+from schemas.known_measures import KnownMeasures
 from schemas.measures import Measures
 from schemas.quality import Quality
 from schemas.recording import Recording
 
 log = logging.getLogger("footscan.console")
 
-Parsed = TypeVar("Parsed", Measures, Quality, Recording)
+Parsed = TypeVar("Parsed", Measures, Quality, Recording, KnownMeasures)
 _Made = TypeVar("_Made")
 
 LARGEST_BYTES = 512 * 2**20
@@ -109,6 +110,14 @@ def read_recording(archive: Path, patient: str, scan: str) -> Recording | None:
     """Read recording.json of a scan; None if it is missing or invalid, as for scans of another program."""
     try:
         return _parsed(Recording, archive, patient, scan, "recording.json")
+    except RefusedInput:
+        return None
+
+
+def read_known(archive: Path, patient: str, scan: str) -> KnownMeasures | None:
+    """Read known.json of a virtual foot's scan; None if it is missing or invalid, as for the scan of a person."""
+    try:
+        return _parsed(KnownMeasures, archive, patient, scan, "known.json")
     except RefusedInput:
         return None
 
