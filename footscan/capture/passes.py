@@ -125,7 +125,8 @@ def film_pass(
         except Fault as fault:
             failed[camera] = str(fault)
             continue
-        if (problem := times[camera][1].problem) is not None:
+        problem = times[camera][1].problem(before.begin_seconds, (back or travel).end_seconds + AFTER_SECONDS)
+        if problem is not None:
             failed.setdefault(camera, problem)
     return FilmedPass(tuple(sorted(cameras)), before, travel, back, sorter.films(), times, failed)
 

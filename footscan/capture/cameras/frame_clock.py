@@ -63,15 +63,16 @@ class FrameTimes:
     """Robust standard deviation of `delay_s`: of delivery if the camera exposes evenly, as a camera with fixed exposure
     does; for one that does not, `seconds + delay_s` is the better time, and this its standard deviation."""
 
-    @property
-    def problem(self) -> str | None:
-        """Why the numbers of all frames are doubtful; None if they are not."""
-        late, frames = int(self.is_late.sum()), len(self.is_late)
+    def problem(self, begin: float, end: float) -> str | None:
+        """Why the numbers of frames with stamps from `begin` to `end` are doubtful; None if they are not."""
+        stamps = self.seconds + self.delay_s
+        is_late = self.is_late[(stamps >= begin) & (stamps <= end)]
+        late, frames = int(is_late.sum()), len(is_late)
         if late <= MOST_LATE * frames:
             return None
         return (
-            f"{late} of {frames} frames came late, expected {100 * MOST_LATE:.0f} % at most: nobody can tell when each "
-            "was exposed. The computer or the line to the camera is too busy: film again when it is not"
+            f"{late} of {frames} frames came late, which leaves open when each was exposed: the computer or the line "
+            "to the camera is too busy. Film again when it is not"
         )
 
 

@@ -25,6 +25,7 @@ _MAIN = """\
 <div class="row"><button id="connect" type="button">Connect</button><button id="home" type="button">Home heads</button>
 <button id="shine" type="button">Show the stripe</button><a class="button" href="/">Scan feet</a></div></section>
 </div><div>
+<section id="placing" hidden><h2>Where to put it</h2><img id="placement" alt=""></section>
 <section id="outcome" hidden><h2 id="outcome-name">Result</h2><ul id="remarks"></ul>
 <div class="wide"><table class="plain"><thead><tr id="outcome-columns"></tr></thead>
 <tbody id="outcome-rows"></tbody></table></div>
@@ -34,7 +35,6 @@ _MAIN = """\
 <p class="note">From the film of the body, with standard deviations. X counts from the mean of the heads; travel is the
 error of its millimetres. What the films do not support is left at zero.</p></div><p id="outcome-file" class="note"></p>
 <img id="outcome-picture" alt="Residuals and coverage of each camera" hidden></section>
-<section id="placing" hidden><h2>Where it stands</h2><img id="placement" alt=""></section>
 <section id="covered" hidden><h2>Covered so far</h2>
 <p class="note">The stripe in each camera’s picture: the latest placement in orange, earlier ones in blue. The
 calibration will hold in the region between them.</p><img id="stripes" alt=""></section>
