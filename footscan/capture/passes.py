@@ -124,6 +124,10 @@ def film_pass(
             times[camera] = deck.times(camera)
         except Fault as fault:
             failed[camera] = str(fault)
+            continue
+        problem = times[camera][1].problem(before.begin_seconds, (back or travel).end_seconds + AFTER_SECONDS)
+        if problem is not None:
+            failed.setdefault(camera, problem)
     return FilmedPass(tuple(sorted(cameras)), before, travel, back, sorter.films(), times, failed)
 
 

@@ -57,12 +57,17 @@ def calibrating_routes(console: Console) -> list[Route]:
     async def stripes(_: Request) -> Response:
         return Response(await run_in_threadpool(_guide(console).picture), media_type="image/svg+xml")
 
+    async def placement(_: Request) -> Response:
+        picture = await run_in_threadpool(_guide(console).placement_picture)
+        return Response(status_code=204) if picture is None else Response(picture, media_type="image/svg+xml")
+
     async def result(_: Request) -> Response:
         picture = await run_in_threadpool(_guide(console).result_picture)
         return Response(status_code=204) if picture is None else Response(picture, media_type="image/png")
 
     return [
         Route("/calibrating", page),
+        Route("/calibrating/placement.svg", placement),
         Route("/calibrating/stripes.svg", stripes),
         Route("/calibrating/result.png", result),
     ]

@@ -33,9 +33,10 @@ WARNING_SECONDS = 60.0
 class Console:
     """The state behind the pages; usable from any thread. A context manager that closes the scanner, lasers off."""
 
-    def __init__(self, scanner: Scanner, results: Path, guide: Guide | None = None) -> None:
+    def __init__(self, scanner: Scanner, archive: Path, results: Path, guide: Guide | None = None) -> None:
         """`guide` leads through calibrations; None if the scanner has no reference object."""
-        self.scanner, self.results, self.guide = scanner, results, guide
+        self.scanner, self.guide = scanner, guide
+        self.archive, self.results = archive, results
         self._lock = threading.Lock()
         self._operator = OperatorLock()
         self._sitting = Sitting()

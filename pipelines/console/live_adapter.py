@@ -34,6 +34,8 @@ LEVELS: dict[str, Level] = {
     "lost": "bad", "closed": "bad", "alarm": "bad", "door": "warning", "held": "warning", "not homed": "warning"
 }  # fmt: skip
 """Level of the controller in a state of the board; in others it is well."""
+KNOWN_FILE = "known.json"
+"""Name of the known measures of a virtual foot, in the folder of its scan."""
 CABLE = "check its cable and hub, then connect again"
 
 
@@ -45,6 +47,10 @@ class Glass(Protocol):
 
     def put(self, subject: str, progress: Callable[[int, int], None] | None = None) -> None:
         """Put another subject onto it; `progress` hears of the pictures that are made."""
+        ...
+
+    def write_known(self, file: Path) -> None:
+        """Write what is known of the foot on it into a file."""
         ...
 
 
@@ -123,6 +129,10 @@ class LiveAdapter:
         name = ScanName(patient, next_scan_name(self._archive, patient, side, today), side, today, posture)
         order = ScanOrder(name, self._archive, self._results, light=self._light, keep_partial=keep_partial)
         result = self._scanner.scan(order)
+        if self._glass is not None:
+            self._glass.write_known(
+                result.stored.place / KNOWN_FILE
+            )  # when all is measured: nothing can read it before
         problem = None if result.measured is None else result.measured.problem
         return Scanned(patient, name.scan, side, problem, dict(result.stored.left_out))
 
@@ -173,8 +183,7 @@ class LiveAdapter:
         name = f"Camera {camera}"
         latency = next(rig_camera.latency for rig_camera in self._scanner.rig.cameras if rig_camera.id == camera)
         if stream is None:
-            problem = self._not_opened.get(camera)
-            return Device(name, "bad", problem, CABLE) if problem else Device(name, "unknown", "not open")
+            return self._closed_camera(camera)
         if stream.state in {"lost", "silent", "closed"} or (stream.problem and stream.state == "connecting"):
             return Device(name, "bad", stream.problem or f"is {stream.state}", CABLE)
         if stream.state == "connecting":
@@ -186,6 +195,12 @@ class LiveAdapter:
         if defects:
             return Device(name, "warning", f"{_frames(stream.received)}, of these {', '.join(defects)}", CABLE)
         return Device(name, "ok", _frames(stream.received))
+
+    def _closed_camera(self, camera: int) -> Device:
+        if (problem := self._not_opened.get(camera)) is not None:
+            return Device(f"Camera {camera}", "bad", problem, CABLE)
+        later = [number for number, planned in enumerate(self._passes[1:], start=2) if camera in planned.cameras]
+        return Device(f"Camera {camera}", "unknown", f"opened for pass {later[0]}" if later else "not open")
 
     def _plan(self) -> Iterator[Device]:
         if self._plan_problem is not None:

@@ -220,7 +220,7 @@ class _Pages:
         self._foot = lru_cache(PAGES_KEPT)(self._foot_page)
 
     def _foot_page(self, patient: str, scan: str, _version: tuple[int, ...]) -> str:
-        return foot_page(self._console.results, patient, scan)
+        return foot_page(self._console.archive, self._console.results, patient, scan)
 
     async def _in_worker(self, make: Callable[[], _Made]) -> _Made:
         """Run `make` in one of `WORKERS` threads and return its result."""

@@ -93,7 +93,7 @@ class LiveScanner:
         """
         with self._at_work("disconnected", "connecting"):
             self._connect_board()
-            problems = self._open_first() if cameras else {}
+            problems = self._deck.open_only(self._first_cameras()) if cameras else {}
             self._board.tell("idle")
             return problems
 
@@ -184,7 +184,7 @@ class LiveScanner:
 
         for camera in self.rig.cameras:
             timing_of(camera)
-        with self._stop_reported():
+        with self._stop_reported(), self._deck.open_after(self._first_cameras()):
             self._connect_board()
             self._home_if_needed()
             passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])
@@ -206,7 +206,7 @@ class LiveScanner:
     @contextmanager
     def ready(self, words: str = "") -> Iterator[None]:
         """Reserve the scanner, connected and homed, for the block."""
-        with self._at_work("filming", words), self._stop_reported():
+        with self._at_work("filming", words), self._stop_reported(), self._deck.open_after(self._first_cameras()):
             self._connect_board()
             self._home_if_needed()
             self._board.tell("filming", words)
@@ -355,9 +355,9 @@ class LiveScanner:
         self._refuse_stopped()
         return lost_mm
 
-    def _open_first(self) -> dict[int, str]:
-        passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])
-        return self._deck.open_only(passes[0].cameras)
+    def _first_cameras(self) -> tuple[int, ...]:
+        """The cameras of the first pass: they are open while nothing is filmed, for live pictures."""
+        return passes_of(self.rig, [camera.id for camera in self.rig.cameras])[0].cameras
 
     def _calibration(self, order: ScanOrder) -> Path | None:
         if order.calibration is not None:

@@ -46,7 +46,7 @@ def scanner(tmp_path: Path) -> Any:
 
 @pytest.fixture
 def console(scanner: Any, tmp_path: Path) -> Iterator[Console]:
-    with Console(scanner, tmp_path / "results") as one:
+    with Console(scanner, tmp_path / "archive", tmp_path / "results") as one:
         yield one
 
 

@@ -12,7 +12,8 @@ from served import console_stand_in, served
 from standing_scanner import StandingStandIn
 
 from pipelines.console.console import Console
-from pipelines.live.calibrating.guide import Guide, GuideSettings
+from pipelines.live.calibrating.guide import Guide
+from pipelines.live.calibrating.settings import GuideSettings
 from pipelines.live.rig_file import read_rig, write_rig
 
 pytestmark = [needs_chromium, pytest.mark.real_time]  # a browser waits for a server beside a stand-in that films
@@ -30,7 +31,7 @@ def address(glass: StandingStandIn, tmp_path: Path) -> Iterator[str]:
     guide = Guide(glass, settings, glass.put)
     scanner = console_stand_in(tmp_path / "results")
     scanner.connect()
-    with Console(scanner, tmp_path / "results", guide) as console, served(console) as at:
+    with Console(scanner, tmp_path / "archive", tmp_path / "results", guide) as console, served(console) as at:
         yield at
 
 
@@ -49,7 +50,8 @@ def test_a_scanner_is_calibrated_and_checked(
         expect(usual).not_to_have_attribute("aria-disabled", "true")
 
     press("Place the object")
-    expect(page.locator("#placement .where")).to_have_text("Y = 0 mm, on the glass")
+    expect(page.locator("#placement")).to_have_attribute("alt", re.compile("^The object at Y = 0 mm, 0 mm above"))
+    assert page.evaluate("placement.decode().then(() => placement.naturalWidth)") > 0
     usual.click()
     expect(words).to_contain_text(": a virtual object stands there now. Film it.")
     press("Placement 1: good")

@@ -72,7 +72,7 @@ def web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     (root / "secret").write_text(SECRET)
     (results / "P1" / "S1" / "link.ply").symlink_to(root / "secret")
     headers = {"origin": ADDRESS, "x-footscan-page": "a" * 16}
-    with Console(StandIn(results), results) as console:
+    with Console(StandIn(results), root / "archive", results) as console:
         app = application(console, "127.0.0.1", None)
         with TestClient(app, base_url=ADDRESS, headers=headers, follow_redirects=False) as client:
             yield client

@@ -2,8 +2,9 @@
 
 import threading
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from types import TracebackType
 from typing import Self
 
@@ -57,6 +58,15 @@ class CameraDeck:
                 self._streams[camera] = CameraStream(camera, self.sources[camera], self._deliver)
         return self._wait_for(cameras, FIRST_FRAMES, timeout_s)
 
+    @contextmanager
+    def open_after(self, cameras: Collection[int]) -> Iterator[None]:
+        """Open these cameras alone when the block ends, however it does, without waiting for their frames."""
+        try:
+            yield
+        finally:
+            with suppress(Fault):  # their health says what is wrong
+                self.open_only(cameras, 0.0)
+
     def health(self) -> dict[int, StreamHealth]:
         """Health of the streams of the open cameras."""
         return {camera: stream.health for camera, stream in self._opened()}
@@ -105,7 +115,7 @@ class CameraDeck:
             if camera not in cameras:
                 continue
             try:
-                stream.wait_for_frames(frames, max(end - time.monotonic(), 0.1))
+                stream.wait_for_frames(frames, max(end - time.monotonic(), 0.1 if timeout_s else 0.0))
             except Fault as fault:
                 problems[camera] = str(fault)
         return problems

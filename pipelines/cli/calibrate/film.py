@@ -216,6 +216,8 @@ def _print_outcome(view: "View", as_json: bool) -> None:
         return
     if view.outcome is not None:
         print_table("", view.outcome.columns, view.outcome.rows)
+        if view.outcome.planes:
+            print_table("Laser planes", view.outcome.plane_columns, view.outcome.planes)
         for remark in view.outcome.remarks:
             message(remark)
         message(f"{view.outcome.file}: stored")

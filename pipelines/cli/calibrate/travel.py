@@ -77,24 +77,14 @@ def travel(
 
 def print_planes(calibration: "Calibration") -> None:
     """Print where the laser plane of each camera lies."""
-    import math
+    from footscan.report.calibration.planes import CAMERA_COLUMNS, HEAD_COLUMNS, plane_cells
 
-    rows = []
-    for camera in calibration.cameras:
-        if (plane := camera.plane) is None:
-            continue
-        figures = [
-            (plane.offset_mm, 1.0, 3), (plane.yaw, math.degrees(1.0), 3), (plane.pitch, math.degrees(1.0), 3),
-            (plane.bend_mm, 1.0, 2), (plane.scale, 100.0, 3), (plane.delay_frames, 1.0, 3),
-            (plane.shutter_frames, 1.0, 3),
-        ]  # fmt: skip
-        cells = [
-            f"{factor * value:+.{digits}f} ± {factor * sd:.{digits}f}"
-            for (value, factor, digits), sd in zip(figures, plane.sd, strict=True)
-        ]
-        rows.append([camera.name, str(plane.head), *cells])
-    columns = ["camera", "head", "X mm", "yaw °", "pitch °", "bend mm", "travel %", "delay frames", "shutter frames"]
-    print_table("Laser planes", columns, rows)
+    rows = [
+        [camera.name, str(camera.plane.head), *plane_cells(camera.plane)]
+        for camera in calibration.cameras
+        if camera.plane is not None
+    ]
+    print_table("Laser planes", ["camera", "head", *HEAD_COLUMNS, *CAMERA_COLUMNS], rows)
 
 
 def body(

@@ -75,7 +75,7 @@ def console(
         listen(host, port) as socket,
         listen(host, 0) as aside,
         _opened(files, out, results, virtual_folder, grid_mm if virtual else None) as (scanner, guide),
-        Console(scanner, results, guide) as one,
+        Console(scanner, out, results, guide) as one,
     ):
         shown = f"[{host}]" if ":" in host else host
         if not is_loopback(host):

@@ -15,10 +15,11 @@ from footscan.report.scan.measure_drawings import landmark_place, measure_drawin
 from footscan.report.scan_warnings import warnings_of
 from footscan.report.surface_views import upright
 from footscan.report.viewer import Colouring, Drawing, viewer
-from pipelines.console.pages.results import read_measures, read_quality, read_result
+from pipelines.console.pages.results import read_known, read_measures, read_quality, read_result
 from pipelines.console.pages.shell import shell
 from schemas.base.errors import RefusedInput
 from schemas.base.limits import BeyondLimitError
+from schemas.known_measures import KnownMeasures
 from schemas.measures import Measures
 from schemas.quality import Quality
 
@@ -28,11 +29,12 @@ VERDICTS = {
     "poor": "A poor scan",
     "unknown": "A scan that cannot be fully judged",
 }
+KNOWN = "The virtual foot’s measures are known from how it was made; no step of the scan reads them."
 FIRST = ("foot_length", "foot_breadth", "ball_girth", "instep_girth", "instep_height", "heel_breadth", "arch_index")
 FILES = {"report.html": "Whole report", "foot.stl": "Surface (STL)", "measures.json": "Measures (JSON)"}
 
 
-def foot_page(results: Path, patient: str, scan: str) -> str:
+def foot_page(archive: Path, results: Path, patient: str, scan: str) -> str:
     """Return the page of the results of a scan.
 
     Raises
@@ -53,7 +55,7 @@ def foot_page(results: Path, patient: str, scan: str) -> str:
     lights = quality_lights(measures, quality)
     level = worst(lights)
     heading = {"right": "Right foot", "left": "Left foot"}.get(measures.side, "Foot")
-    listed = _measures(measures, drawings)
+    listed = _measures(measures, drawings, read_known(archive, patient, scan))
     parts = [
         f'<h1 tabindex="-1" id="result" data-patient="{text(patient)}" data-scan="{text(scan)}" '
         f'data-side="{measures.side}" data-posture="{measures.posture}" data-level="{level}">'
@@ -125,15 +127,21 @@ def _colourings(mesh: Mesh, quality: Quality) -> list[Colouring]:
     return colourings
 
 
-def _measures(measures: Measures, drawings: Mapping[str, Drawing]) -> str:
+def _measures(measures: Measures, drawings: Mapping[str, Drawing], known: KnownMeasures | None) -> str:
     if measures.finding is not None:
         return f'<p class="note">Not measured: {text(measures.finding)}</p>'
     names = [*(name for name in FIRST if name in measures.measures), *sorted(measures.measures.keys() - set(FIRST))]
-    rows = (_row(name, measures, name in drawings) for name in names)
-    return table(["Measure", "Value", "Unit", "Status"], rows, numeric=[1], kind="plain")
+    if known is None or known.side != measures.side:
+        rows = (_row(name, measures, name in drawings) for name in names)
+        return table(["Measure", "Value", "Unit", "Status"], rows, numeric=[1], kind="plain")
+    rows = (_row(name, measures, name in drawings, known) for name in names)
+    note = f'<p class="note">{KNOWN}</p>'
+    columns = ["Measure", "Value", "Known", "Value minus known", "Unit", "Status"]
+    return table(columns, rows, numeric=[1, 2, 3], kind="plain") + note
 
 
-def _row(name: str, measures: Measures, is_drawn: bool) -> list[str]:
+def _row(name: str, measures: Measures, is_drawn: bool, known: KnownMeasures | None = None) -> list[str]:
+    """The row of a measure; with `known`, what is known of it and how far the value is off follow the value."""
     measure, own = measures.measures[name], measures.own_note(name)
     unit, decimals = UNITS[measure.unit]
     value = "–" if measure.value is None else number(measure.value, decimals)
@@ -143,4 +151,11 @@ def _row(name: str, measures: Measures, is_drawn: bool) -> list[str]:
         attributes = f'data-shows="{text(name)}" data-told="{caption}" aria-pressed="false"'
         label = f'<button type="button" {attributes}>{label}</button>'
     note = f'<p class="note">{text(own)}</p>' if own and measure.status != "ok" else ""
-    return [label + note, value, unit, f'<span class="status {measure.status}">{measure.status}</span>']
+    compared = [] if known is None else _compared(measure.value, known.measures.get(name), decimals)
+    return [label + note, value, *compared, unit, f'<span class="status {measure.status}">{measure.status}</span>']
+
+
+def _compared(value: float | None, known: float | None, decimals: int) -> list[str]:
+    if known is None:
+        return ["–", "–"]
+    return [number(known, decimals), "–" if value is None else number(value - known, decimals)]

@@ -15,12 +15,13 @@ from pipelines.scan import DELIVERED
 from schemas.base.errors import FootscanError, RefusedInput
 from schemas.base.limits import limit, refuse_beyond
 from schemas.base.model import pseudonym
+from schemas.known_measures import KnownMeasures
 from schemas.measures import Measures
 from schemas.quality import Quality
 
 log = logging.getLogger("footscan.console")
 
-Parsed = TypeVar("Parsed", Measures, Quality)
+Parsed = TypeVar("Parsed", Measures, Quality, KnownMeasures)
 _Made = TypeVar("_Made")
 
 LARGEST_BYTES = 512 * 2**20
@@ -102,6 +103,14 @@ def read_measures(results: Path, patient: str, scan: str) -> Measures:
 def read_quality(results: Path, patient: str, scan: str) -> Quality:
     """Read quality.json of a scan; errors as in `read_result`."""
     return _parsed(Quality, results, patient, scan, "quality.json")
+
+
+def read_known(archive: Path, patient: str, scan: str) -> KnownMeasures | None:
+    """Read known.json of a virtual foot's scan; None if it is missing or invalid, as for the scan of a person."""
+    try:
+        return _parsed(KnownMeasures, archive, patient, scan, "known.json")
+    except RefusedInput:
+        return None
 
 
 def _read_inside(root: Path, patient: str, scan: str, name: str) -> bytes:

@@ -2,7 +2,6 @@
 "use strict";
 (() => {
   const {act, allow, element, hindrance, listen, made, press, say} = footscan;
-  const SVG = "http://www.w3.org/2000/svg";
   const NAMES = {put: "Put the virtual object there", take: "Film this placement", next: "Next placement",
     discard: "Discard this session", body: "Film the body, too", "film-body": "Film the body", use: "Use it for scans",
     calibrate: "Calibrate the scanner", check: "Check the calibration"};
@@ -10,7 +9,7 @@
     filmed: "All placements are filmed", calibrated: "The scanner is calibrated", body: "Place the body",
     planes: "The laser planes are found", used: "The calibration is in use", checked: "The calibration is checked"};
   const SURE_MS = 5000;
-  let usual = "", step = "", drawn = "", shown = "", told = "";
+  let usual = "", step = "", drawn = "", placed = "", shown = "", told = "";
 
   // The minus of a number, or of an axis, is longer than a hyphen.
   const minus = words => words.replace(/(?<!\w)-(?=[\dYZ])/g, "−");
@@ -59,38 +58,6 @@
     return null;
   }
 
-  function node(name, attributes, words) {
-    const part = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) part.setAttribute(key, value);
-    if (words) part.textContent = words;
-    return part;
-  }
-
-  // The object in its placement over the glass, seen from the front: Y to the right, Z upwards.
-  function drawPlacement(view) {
-    const at = view.placements[view.number];
-    const now = view.profile.map(([y, z]) => [y + at[0], z + at[1]]);
-    const all = view.placements.flatMap(([dy, dz]) => view.profile.map(([y, z]) => [y + dy, z + dz]));
-    const reach = Math.max(...all.map(([y]) => Math.abs(y))) + 15, top = Math.max(...all.map(([, z]) => z)) + 16;
-    const svg = node("svg", {viewBox: `${-reach} ${-top} ${2 * reach} ${top + 24}`, role: "img",
-      "aria-label": minus(`The object at Y = ${at[0]} mm, ${at[1]} mm above the glass, seen from the front`)});
-    const outline = corners => corners.map(([y, z]) => `${y},${-z}`).join(" ");
-    for (const number of view.taken) {
-      const [dy, dz] = view.placements[number];
-      if (number !== view.number)
-        svg.append(node("polygon", {points: outline(view.profile.map(([y, z]) => [y + dy, z + dz])), class: "earlier"}));
-    }
-    svg.append(node("line", {x1: -reach, x2: reach, y1: 0, y2: 0, class: "glass"}));
-    svg.append(node("line", {x1: 0, x2: 0, y1: -top, y2: 5, class: "middle"}));
-    svg.append(node("polygon", {points: outline(now), class: "now"}));
-    svg.append(node("text", {x: reach - 2, y: 9, "text-anchor": "end"}, "+Y"));
-    svg.append(node("text", {x: 2 - reach, y: 9}, "−Y"));
-    svg.append(node("text", {x: reach - 2, y: 8 - top, "text-anchor": "end"}, "seen from +X"));
-    svg.append(node("text", {x: 0, y: 20, "text-anchor": "middle", class: "where"},
-      minus(`Y = ${at[0]} mm${at[1] ? `, raised by ${at[1]} mm` : ", on the glass"}`)));
-    element("placement").replaceChildren(svg);
-  }
-
   function showSteps(view, why) {
     const now = JSON.stringify([view.step, view.actions, view.purpose]);
     if (now !== shown) {
@@ -109,6 +76,18 @@
     say(element("usual-told"), why);
   }
 
+  // What is to be filmed, drawn by the server from what the calibration takes it for.
+  function showPlacement(view) {
+    const isBody = view.step === "body", at = view.number === null ? null : view.placements[view.number];
+    element("placing").hidden = !isBody && !(at && ["place", "look"].includes(view.step));
+    const now = JSON.stringify([isBody, view.folder, view.number, view.taken]);
+    if (element("placing").hidden || now === placed) return;
+    placed = now;
+    const what = isBody ? "The body on the glass" : `The object at Y = ${at[0]} mm, ${at[1]} mm above the glass`;
+    element("placement").alt = minus(`${what}: seen from the front, from the side and from above`);
+    element("placement").src = `/calibrating/placement.svg?${Date.now()}`;
+  }
+
   function showNumbers(view, why) {
     element("all-placements").hidden = !view.actions.includes("go");
     const now = JSON.stringify([view.number, view.taken, view.placements]);
@@ -125,6 +104,15 @@
     }));
   }
 
+  function fill(table, columns, rows) {
+    element(`${table}-columns`).replaceChildren(...columns.map(words => made("th", words)));
+    element(`${table}-rows`).replaceChildren(...rows.map(row => {
+      const line = made("tr");
+      line.append(...row.map(cell => made("td", minus(cell))));
+      return line;
+    }));
+  }
+
   function showOutcome(view) {
     const outcome = view.outcome;
     element("outcome").hidden = !outcome;
@@ -132,12 +120,9 @@
     told = JSON.stringify(outcome);
     element("outcome").dataset.level = outcome.is_well ? "ok" : "bad";
     element("remarks").replaceChildren(...outcome.remarks.map(words => made("li", minus(words))));
-    element("outcome-columns").replaceChildren(...outcome.columns.map(words => made("th", words)));
-    element("outcome-rows").replaceChildren(...outcome.rows.map(row => {
-      const line = made("tr");
-      line.append(...row.map(cell => made("td", minus(cell))));
-      return line;
-    }));
+    fill("outcome", outcome.columns, outcome.rows);
+    fill("plane", outcome.plane_columns, outcome.planes);
+    element("planes").hidden = !outcome.planes.length;
     say(element("outcome-file"), outcome.file);
     element("outcome-picture").hidden = !outcome.has_picture;
     if (outcome.has_picture) element("outcome-picture").src = `/calibrating/result.png?${Date.now()}`;
@@ -165,13 +150,7 @@
     complaints.hidden = !words.length;
     if ([...complaints.children].map(one => one.textContent).join("\n") !== words.join("\n"))
       complaints.replaceChildren(...words.map(one => made("li", one)));
-    const placing = view.number !== null && ["place", "look"].includes(view.step);
-    element("placement").hidden = !placing;
-    const key = JSON.stringify([view.number, view.taken]);
-    if (placing && element("placement").dataset.key !== key) {
-      element("placement").dataset.key = key;
-      drawPlacement(view);
-    }
+    showPlacement(view);
     showNumbers(view, why);
     showSteps(view, why);
     say(element("price"), view.price);

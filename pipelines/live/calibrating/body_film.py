@@ -15,6 +15,7 @@ from pipelines.live.light import ScanLight
 from pipelines.live.recording_document import ScanStory
 from pipelines.live.scanner import LiveScanner
 from pipelines.live.storing import ScanName, store_scan
+from schemas.rig import Rig
 
 MARGIN_MM = 8.0
 """The travel begins and ends so far beside the body. Chosen by hand: as far as a person may place it off."""
@@ -30,9 +31,7 @@ def film_body(scanner: LiveScanner, place: Path, body: Body, light: ScanLight | 
     for camera in rig.cameras:
         timing_of(camera)
     shutil.rmtree(place, ignore_errors=True)
-    middle_mm, reach_mm = still_x_mm(rig), reach_of(body)
-    start_mm = max(middle_mm - reach_mm, rig.travel.start_mm)
-    end_mm = min(middle_mm + reach_mm, rig.travel.end_mm)
+    start_mm, end_mm = travel_over(rig, body)
     started = datetime.datetime.now().astimezone()
     name = ScanName(place.parent.name, place.name, "unknown", started.date())
     by_head = {
@@ -42,7 +41,7 @@ def film_body(scanner: LiveScanner, place: Path, body: Body, light: ScanLight | 
     with ScanRecording(place, scanner.expected_bytes(abs(end_mm - start_mm))) as recording:
         with scanner.ready_to_film():
             if light is None:
-                light = scanner.measured_light(passes_of(rig, [camera.id for camera in rig.cameras]), [middle_mm])
+                light = scanner.measured_light(passes_of(rig, [camera.id for camera in rig.cameras]), [still_x_mm(rig)])
             story = ScanStory(
                 started,
                 light,
@@ -59,6 +58,8 @@ def film_body(scanner: LiveScanner, place: Path, body: Body, light: ScanLight | 
         store_scan(rig, name, story, scanner.heads, recording, keep_partial=False)
 
 
-def reach_of(body: Body) -> float:
-    """Half of the travel over a body, whichever way it is turned, mm."""
-    return float(np.hypot(*np.ptp(body.vertices[:, :2], axis=0))) / 2.0 + MARGIN_MM
+def travel_over(rig: Rig, body: Body) -> tuple[float, float]:
+    """Begin and end of the travel over a body at `still_x_mm`, whichever way it is turned, X in mm."""
+    reach_mm = float(np.hypot(*np.ptp(body.vertices[:, :2], axis=0))) / 2.0 + MARGIN_MM
+    middle_mm = still_x_mm(rig)
+    return max(middle_mm - reach_mm, rig.travel.start_mm), min(middle_mm + reach_mm, rig.travel.end_mm)

@@ -6,12 +6,17 @@ It knows nothing of terminals and pages: they show its `view` and call its metho
 import datetime
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 from footscan.calibration.capture.standing import Complaint
-from footscan.calibration.travel.body import Body, standard_body
+from footscan.calibration.travel.body import TURN_DEG, Body, standard_body
+from footscan.report.calibration.planes import HEAD_COLUMNS, planes_of_heads
+from footscan.report.calibration.standing_picture import body_picture, placement_picture
+from pipelines.live.calibrating.body_film import travel_over
 from pipelines.live.calibrating.filmed import FilmedPlacements, Purpose, interrupted_session, new_session
 from pipelines.live.calibrating.judging import SeenPlacements
 from pipelines.live.calibrating.outcomes import (
@@ -22,12 +27,12 @@ from pipelines.live.calibrating.outcomes import (
     check_session,
     use_calibration,
 )
+from pipelines.live.calibrating.settings import GuideSettings
 from pipelines.live.calibrating.stills import Stills, still_x_mm
 from pipelines.live.calibrating.view import Action, Outcome, Step, View
 from pipelines.live.light import ScanLight
 from schemas.base.errors import RefusedInput
 from schemas.calibration import Calibration, read_calibration
-from schemas.reference import ReferenceObject
 from schemas.rig import Rig
 
 OnProgress = Callable[[int, int], None]
@@ -51,24 +56,6 @@ class StandingScanner(Protocol):
     def waiting_for(self, words: str) -> AbstractContextManager[OnProgress]:
         """Reserve the scanner for work that does not need its devices."""
         ...
-
-
-@dataclass(frozen=True)
-class GuideSettings:
-    """Files and limits of all sessions."""
-
-    captures: Path
-    """Folder of the sessions."""
-    rig_file: Path
-    reference: ReferenceObject
-    body: Body | None = None
-    """Default: the standard one."""
-    light: ScanLight | None = None
-    """Default: chosen at the first placement."""
-    placement_tolerance_mm: float = 1.0
-    """Departure of the object from its placement that is not reported; as for a recorded capture."""
-    drift_tolerance_mm: float = 0.2
-    """RMS deviation up to which a camera is steady; as for a recorded capture."""
 
 
 class Guide:
@@ -103,6 +90,19 @@ class Guide:
         """Draw the stripes of all placements, as SVG."""
         return self._seen.picture(self._view.number)
 
+    def placement_picture(self) -> str | None:
+        """Draw what is to be filmed and where it stands on the glass, as SVG; None if nothing is."""
+        view, rig = self._view, self._scanner.rig
+        if view.step == "body":
+            return body_picture(self._body, still_x_mm(rig), travel_over(rig, self._body))
+        if view.step not in {"place", "look"} or view.number is None:
+            return None
+        profile, placements = (
+            np.array(corners, np.float64) for corners in (self._settings.reference.profile_mm, view.placements)
+        )
+        travel = (rig.travel.start_mm, rig.travel.end_mm)
+        return placement_picture(profile, placements, view.number, view.taken, still_x_mm(rig), travel)
+
     def result_picture(self) -> bytes | None:
         """The figure of the calibration that was made, as PNG; None without one."""
         return None if self._stored is None else self._stored.picture.read_bytes()
@@ -125,7 +125,6 @@ class Guide:
             (),
             purpose,
             str(session.folder),
-            profile=settings.reference.profile_mm,
             placements=settings.reference.placements_mm,
             drawn=self._view.drawn,
         )
@@ -222,8 +221,8 @@ class Guide:
         self._need("body")
         x_mm = still_x_mm(self._scanner.rig)
         words = (
-            f"Put the body onto the glass, its middle at X = {x_mm:g} mm, its length at about 20 degrees to the "
-            "travel. Then film it: the heads travel over it one after the other."
+            f"Put the body onto the glass, its middle at X = {x_mm:g} mm, its length at about {TURN_DEG:g} degrees to "
+            "the travel. Then film it: the heads travel over it one after the other."
         )
         self._show(replace(self._view, step="body", words=words, actions=(*self._puts(), "film-body", "use", "end")))
 
@@ -312,7 +311,8 @@ class Guide:
     def _to_stored(self, step: Step, stored: StoredCalibration) -> None:
         self._stored = stored
         columns = ("camera", "points", "error, mm", "error on placements left out, mm")
-        outcome = Outcome(columns, stored.rows(), stored.remarks(), str(stored.file), has_picture=True)
+        planes = planes_of_heads(stored.calibration)
+        outcome = Outcome(columns, stored.rows(), stored.remarks(), str(stored.file), True, ("", *HEAD_COLUMNS), planes)
         more: tuple[Action, ...] = ("body",) if step == "calibrated" else ()
         advice = " A film of the body would show where the laser planes lie, too." if more else ""
         words = f"{stored.file.name} is stored.{advice} Use it for scans?"

@@ -1,12 +1,31 @@
 """The settings of sessions, from the files of a scanner."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
-from pipelines.live.calibrating.guide import GuideSettings
+from footscan.calibration.travel.body import Body
 from pipelines.live.light import ScanLight
 from pipelines.travel_job import read_body
 from schemas.base.yaml_files import read_yaml
 from schemas.reference import ReferenceObject
+
+
+@dataclass(frozen=True)
+class GuideSettings:
+    """Files and limits of all sessions."""
+
+    captures: Path
+    """Folder of the sessions."""
+    rig_file: Path
+    reference: ReferenceObject
+    body: Body | None = None
+    """Default: the standard one."""
+    light: ScanLight | None = None
+    """Default: chosen at the first placement."""
+    placement_tolerance_mm: float = 1.0
+    """Departure of the object from its placement that is not reported; as for a recorded capture."""
+    drift_tolerance_mm: float = 0.2
+    """RMS deviation up to which a camera is steady; as for a recorded capture."""
 
 
 def settings_of(

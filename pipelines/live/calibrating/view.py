@@ -26,6 +26,9 @@ class Outcome:
     """Sentences."""
     file: str
     has_picture: bool = False
+    plane_columns: Sequence[str] = ()
+    planes: Sequence[Sequence[str]] = ()
+    """Where the laser planes lie, a row for each laser; empty if they were not filmed."""
     is_well: bool = True
     """False if a camera has moved, or could not be checked."""
 
@@ -43,8 +46,6 @@ class View:
     folder: str = ""
     number: int | None = None
     """The placement that is to be filmed or was filmed last."""
-    profile: Sequence[Sequence[float]] = ()
-    """(Y, Z) of the object's corners, mm."""
     placements: Sequence[Sequence[float]] = ()
     """(dY, dZ) of each, mm."""
     taken: Sequence[int] = ()

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from queue import Empty, Queue
 from typing import Any, Self
 
@@ -55,6 +56,10 @@ class WorldProcess:
         """Put another subject onto the glass."""
         self.order({"put": subject}, progress)
         self.subject = subject
+
+    def write_known(self, file: Path) -> None:
+        """Write the known measures of the foot on the glass into a file."""
+        self.order({"known": str(file.resolve())})
 
     def order(self, order: dict[str, Any], progress: Callable[[int, int], None] | None = None) -> None:
         """Send an order of `pipelines.live.virtual.world.obey`, and wait until it is done."""

@@ -19,6 +19,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field
 
+from footscan.calibration.travel.body import TURN_DEG
 from footscan.mesh.formats.files import read_mesh
 from footscan.virtual.board.board import Board
 from footscan.virtual.board.memory import SET_UP
@@ -31,8 +32,10 @@ from footscan.virtual.stage.reference import read_reference, standard_reference
 from footscan.virtual.stage.reference_stage import NOTHING, block_subject, reference_subject
 from footscan.virtual.stage.stage import Positions, Stage, indices_of_travel
 from footscan.virtual.stage.standing import stand_on_glass
+from pipelines.engine.files.atomic import write_atomically
 from schemas.base.errors import RefusedInput
 from schemas.base.model import Document
+from schemas.known_measures import KnownMeasures
 from schemas.parameters.simulation import Scale, Seed, SimulationSettings
 
 CAMERAS = range(1, 9)
@@ -56,8 +59,6 @@ ACCELERATIONS = (120, 121, 122)
 """Numbers of the board's settings of the accelerations, mm/s^2."""
 SLACK_MM = 2.0
 """Largest distance of a head from its target, and from the other heads."""
-BODY_TURN_DEG = 20.0
-"""Angle of the body to the travel: as a person is told to place it."""
 BODY_REACH_MM = 90.0
 """Half of the travel over the body that is rendered beforehand, from its middle: the standard body turned by any angle
 does not reach further."""
@@ -114,6 +115,7 @@ class VirtualWorld:
         self._settings = SimulationSettings(
             ambient=world.light, scanner_seed=world.scanner_seed, laser_exposure=world.brightness
         )
+        self._foot: Foot | None = None
         self._ends, self._is_whole = threading.Event(), threading.Event()
         self._pictures = self._prepared(world.subject, progress)
         self.board = Board(gait=Gait(world.ripple)).start()
@@ -147,6 +149,13 @@ class VirtualWorld:
         before, self._pictures = self._pictures, self._prepared(subject, progress)
         self.stage.put(self._pictures)
         before.close()
+
+    def write_known(self, file: Path) -> None:
+        """Write the known measures of the foot on the glass; RefusedInput if there is none."""
+        if self._foot is None:
+            raise RefusedInput("virtual world", "has no foot on its glass, expected one", field="subject")
+        known = KnownMeasures(side=self._foot.side, measures=self._foot.measures)
+        write_atomically(file, (known.model_dump_json(indent=2) + "\n").encode())
 
     def close(self) -> None:
         """End board, cameras and stage."""
@@ -197,6 +206,7 @@ class VirtualWorld:
         return 1.0 if moves and power else power
 
     def _subject(self, subject: SubjectName) -> Subject:
+        self._foot = None
         if subject == "nothing":
             return NOTHING
         middle_mm = self._middle_mm
@@ -206,12 +216,12 @@ class VirtualWorld:
             if self._world.body is None:
                 raise RefusedInput("virtual world", "has no body", field="body")
             vertices, faces = read_mesh(Path(self._world.body))
-            return Subject(Mesh(stand_on_glass(vertices, middle_mm, BODY_TURN_DEG), faces.astype(np.int64)))
+            return Subject(Mesh(stand_on_glass(vertices, middle_mm, TURN_DEG), faces.astype(np.int64)))
         if subject.startswith("reference"):
             file = self._world.reference
             reference = standard_reference() if file is None else read_reference(Path(file))
             return reference_subject(middle_mm, int(subject.removeprefix("reference ")), reference)
-        foot = virtual_foot(self._world, "left" if subject == "left" else "right")
+        self._foot = foot = virtual_foot(self._world, "left" if subject == "left" else "right")
         return Subject(Mesh(stand_on_glass(foot.vertices, middle_mm), foot.faces.astype(np.int64)), SKIN)
 
     @property
@@ -252,11 +262,14 @@ def virtual_foot(world: World, side: Literal["right", "left"]) -> Foot:
 
 
 def obey(world: VirtualWorld, order: Mapping[str, Any]) -> None:
-    """Carry out an order: `put` a subject, `pause` (s), `door` open or closed, `cable` in or out, `stick` a head."""
+    """Carry out an order: `put` a subject, write what is `known` of it into a file, `pause` (s), `door` open or closed,
+    `cable` in or out, `stick` a head."""
     for name, value in order.items():
         match name:
             case "put":
                 world.put(value, _tell_progress)
+            case "known":
+                world.write_known(Path(str(value)))
             case "pause":
                 world.board.pause(float(value))
             case "door":

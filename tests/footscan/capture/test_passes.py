@@ -179,6 +179,13 @@ def test_a_camera_that_is_lost_on_the_way_is_told(tmp_path: Path) -> None:
         assert set(filmed.failed) == {3}
 
 
+def test_a_camera_most_of_whose_frames_come_late_is_told(tmp_path: Path) -> None:
+    late = [StreamFault("stall", first, 3) for first in range(0, 4000, 4)]  # one of four waits for two more
+    with bench(tmp_path, {1: late}) as one:
+        filmed = one.film()
+        assert re.search(r"^\d+ of \d+ frames came late", filmed.failed[1])
+
+
 def test_on_the_way_back_the_same_places_are_filmed_in_the_dark(tmp_path: Path) -> None:
     with bench(tmp_path) as one:
         filmed = one.film(PassPlan(50.0, 250.0, 100.0, 1.0, dark_return=True))

@@ -12,7 +12,8 @@ from standing_scanner import StandingStandIn
 
 from pipelines.cli.calibrate import film
 from pipelines.cli.main import run_command
-from pipelines.live.calibrating.guide import Guide, GuideSettings
+from pipelines.live.calibrating.guide import Guide
+from pipelines.live.calibrating.settings import GuideSettings
 from pipelines.live.rig_file import read_rig, write_rig
 from pipelines.recordings.captures import read_capture
 

@@ -35,7 +35,7 @@ def scanner(results: Path) -> StandIn:
 
 @pytest.fixture
 def console(scanner: StandIn, results: Path) -> Iterator[Console]:
-    with Console(scanner, results) as one:
+    with Console(scanner, results.parent / "archive", results) as one:
         yield one
 
 

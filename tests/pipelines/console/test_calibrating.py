@@ -11,7 +11,8 @@ from starlette.testclient import TestClient
 
 from pipelines.console.console import Console
 from pipelines.console.server import application
-from pipelines.live.calibrating.guide import Guide, GuideSettings
+from pipelines.live.calibrating.guide import Guide
+from pipelines.live.calibrating.settings import GuideSettings
 
 ADDRESS, PAGE = "http://127.0.0.1:8760", "a" * 16
 Until = Callable[[Callable[[dict[str, Any]], bool]], dict[str, Any]]
@@ -26,7 +27,7 @@ def glass(filmed_capture: Path) -> StandingStandIn:
 def console(scanner: StandIn, glass: StandingStandIn, results: Path) -> Iterator[Console]:
     home = results.parent
     guide = Guide(glass, GuideSettings(home / "captures", home / "rig.yaml", glass.capture.reference), glass.put)
-    with Console(scanner, results, guide) as one:
+    with Console(scanner, home / "archive", results, guide) as one:
         yield one
 
 
@@ -47,6 +48,7 @@ def give(web: TestClient, until: Until, action: str, step: str, number: int | No
 
 def test_a_session_from_the_page(web: TestClient, until: Until, results: Path) -> None:
     assert web.get("/calibrating").status_code == 200
+    assert web.get("/calibrating/placement.svg").status_code == 204
     give(web, until, "calibrate", "place")
     give(web, until, "go", "place", 1)
     assert give(web, until, "put", "place")["words"] == (
@@ -59,6 +61,9 @@ def test_a_session_from_the_page(web: TestClient, until: Until, results: Path) -
     assert picture.headers["content-type"].startswith("image/svg+xml")
     assert "Camera 5" in picture.text
     assert web.get("/calibrating/result.png").status_code == 204
+    placement = web.get("/calibrating/placement.svg")
+    assert placement.headers["content-type"].startswith("image/svg+xml")
+    assert "Y = +40 mm, raised by 14 mm" in placement.text
     give(web, until, "discard", "begin")
     assert list((results.parent / "captures").iterdir()) == []
 
@@ -84,7 +89,7 @@ def test_only_the_page_in_charge_calibrates(web: TestClient, until: Until) -> No
 def test_a_scanner_without_a_reference_object_says_so(scanner: StandIn, results: Path) -> None:
     headers = {"origin": ADDRESS, "x-footscan-page": PAGE}
     with (
-        Console(scanner, results) as console,
+        Console(scanner, results.parent / "archive", results) as console,
         TestClient(application(console, "127.0.0.1", None), base_url=ADDRESS, headers=headers) as web,
     ):
         assert console.seen_by(PAGE)["guide"] is None

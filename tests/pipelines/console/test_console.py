@@ -172,7 +172,7 @@ def test_the_end_of_the_console_stops_the_scan_and_lets_the_scanner_go(results: 
     scanner = StandIn(results)
     scanner.connect()
     scanner.pause = {"filming"}
-    with Console(scanner, results) as console:
+    with Console(scanner, results.parent / "archive", results) as console:
         console.scan(PAGE, "P1", "right", "half_weight", keep_partial=False)
         assert scanner.reached.wait(GENEROUS_SECONDS)
     assert scanner.calls == ["connect", "film P1 right half_weight False", "stop", "close"]

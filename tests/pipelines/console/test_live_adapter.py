@@ -9,15 +9,21 @@ import pytest
 from checked import made_check
 
 from footscan.capture.board.state import state_from
+from footscan.capture.cameras.usb_bus import Pass
 from footscan.capture.grbl.report import Report
+from footscan.virtual.foot.foot import make_foot
 from pipelines.calibration_check import store_check
+from pipelines.console import live_adapter
 from pipelines.console.guidance import guidance
-from pipelines.console.live_adapter import LiveAdapter
+from pipelines.console.live_adapter import KNOWN_FILE, LiveAdapter
 from pipelines.console.scanner import Device
 from pipelines.live.scanner import STOPPED, LiveScanner
 from pipelines.live.state import ScannerState
-from schemas.base.errors import FootscanError
+from pipelines.live.virtual.world import VirtualWorld, obey
+from schemas.base.errors import FootscanError, RefusedInput
+from schemas.base.json_files import read_json
 from schemas.calibration import Calibration
+from schemas.known_measures import KnownMeasures
 from schemas.rig import Rig
 
 RIG = {
@@ -140,6 +146,9 @@ def test_a_foot_that_is_put_onto_the_glass_is_told_and_can_be_stopped(tmp_path: 
             over.stop()
             assert subject == "left"
 
+        def write_known(self, file: Path) -> None:
+            raise AssertionError(f"{file}: nothing was filmed")
+
     over = LiveAdapter(scanner, tmp_path / "archive", tmp_path / "results", glass=OfTest())
     with pytest.raises(FootscanError, match="stopped"):
         over.film("P1", "left", keep_partial=False)
@@ -147,6 +156,46 @@ def test_a_foot_that_is_put_onto_the_glass_is_told_and_can_be_stopped(tmp_path: 
     assert told == [f"preparing: {words}", f"preparing 25 %: {words}", f"failed: {STOPPED}"]
     assert guidance(ScannerState("preparing", words), over.health(), "scan") == "The scan is being prepared."
     assert guidance(ScannerState("preparing", words), over.health(), "calibrate") == ""
+
+
+def test_known_measures_are_written_when_all_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place, scanner = tmp_path / "archive" / "P1" / "S1", LiveScanner(Rig.model_validate(RIG))
+    foot = make_foot(side="left", resolution_mm=4.0)
+    world = VirtualWorld.__new__(VirtualWorld)  # without its board and pictures
+    world._foot = foot
+
+    class OfTest:
+        subject = "left"
+
+        def put(self, subject: str, progress: object = None) -> None:
+            raise AssertionError(f"{subject} stands there: {progress}")
+
+        def write_known(self, file: Path) -> None:
+            obey(world, {"known": str(file)})
+
+    def scan(_: object) -> SimpleNamespace:
+        place.mkdir(parents=True)
+        assert not (place / KNOWN_FILE).exists()
+        return SimpleNamespace(stored=SimpleNamespace(place=place, left_out={}), measured=None)
+
+    monkeypatch.setattr(scanner, "scan", scan)
+    LiveAdapter(scanner, tmp_path / "archive", tmp_path / "results", glass=OfTest()).film(
+        "P1", "left", keep_partial=False
+    )
+    known = read_json(place / KNOWN_FILE, KnownMeasures)
+    assert (known.side, known.measures) == ("left", foot.measures)
+    world._foot = None
+    with pytest.raises(RefusedInput, match="no foot"):
+        world.write_known(place / "other.json")
+
+
+def test_cameras_of_later_passes_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = Rig.model_validate(RIG | {"cameras": [{"id": n, "device": f"http://127.0.0.1:9/{n}"} for n in (1, 5)]})
+    passes = [Pass((1,), "the bus is narrow"), Pass((5,), "the bus is narrow")]
+    monkeypatch.setattr(live_adapter, "passes_of", lambda *_: passes)
+    over = LiveAdapter(LiveScanner(rig), tmp_path / "archive", tmp_path / "results")
+    words = {device.name: device.words for device in over.health().devices}
+    assert (words["Camera 1"], words["Camera 5"]) == ("not open", "opened for pass 2")
 
 
 def test_a_scanner_that_was_not_connected_is_not_ready_after_a_preparation() -> None:

@@ -312,6 +312,7 @@ def test_heads_travel_over_a_body_one_after_the_other(bench: Bench) -> None:
     began = time.monotonic()
     place = bench.home / "captures" / "S1" / "body"
     film_body(bench.scanner, place, standard_body(), light_by_hand(bench.scanner.rig, 1.0, 10.0))
+    assert bench.scanner.deck.open_cameras == (1, 5)  # not only those of the last pass
     scan = read_scan(place)
     assert (scan.document.side, [camera.id for camera in scan.document.cameras]) == ("unknown", [1, 5])
     for camera in scan.document.cameras:

@@ -168,6 +168,46 @@ def test_bursts_never_give_a_wrong_number_for_certain(
     assert (np.abs(times.number - numbers + numbers[0])[~right] * PERIOD_S <= length * PERIOD_S).all()
 
 
+def delayed_by_a_busy_host(random: np.random.Generator, mean_s: float, goes_s: float) -> tuple[np.ndarray, float]:
+    """Stamps of 170 frames of which none is lost, of a host that is busy in spells, and their usual latency."""
+    latency = random.uniform(0.02, 0.06)
+    exposed = PERIOD_S * np.arange(170)
+    is_busy, waits = False, np.zeros(170)
+    for frame in range(170):
+        is_busy = random.random() >= goes_s if is_busy else random.random() < 0.02
+        waits[frame] = random.exponential(mean_s if is_busy else 0.001)
+    return np.maximum.accumulate(exposed + latency + random.uniform(-0.01, 0.01, 170) + waits), latency
+
+
+def test_a_busy_host_makes_no_film_that_is_a_frame_off_unnoticed() -> None:
+    refused, off_by_a_period = 0, 0
+    for seed in range(150):
+        random = np.random.default_rng([seed, 1])
+        stamps, latency = delayed_by_a_busy_host(random, random.choice([0.01, 0.03, 0.06]), 0.02)
+        times = number_frames(stamps, None, PERIOD_S)
+        off = np.abs(times.seconds - latency - PERIOD_S * np.arange(170)) / PERIOD_S
+        off_by_a_period += bool(np.median(off) > 0.5)
+        problem = times.problem(0.0, np.inf)
+        refused += problem is not None
+        assert problem is not None or np.median(off) < 0.5
+    assert off_by_a_period
+    assert refused < 150
+
+
+def test_a_few_late_frames_make_no_film_doubtful() -> None:
+    stamps = PERIOD_S * np.arange(100)
+    stamps[5:100:6] += 0.7 * PERIOD_S
+    assert number_frames(stamps).problem(0.0, np.inf) is None
+
+
+def test_frames_that_were_late_at_another_time_make_no_film_doubtful() -> None:
+    stamps = PERIOD_S * np.arange(1000)
+    stamps[4:100:4] += 0.7 * PERIOD_S
+    times = number_frames(stamps)
+    assert times.problem(stamps[100], np.inf) is None
+    assert str(times.problem(0.0, stamps[99])).startswith("24 of 100 frames came late, which leaves open when ")
+
+
 def test_a_running_number_leaves_gaps() -> None:
     running = RunningNumber()
     numbers = np.delete(np.arange(40), [10, 20, 21])

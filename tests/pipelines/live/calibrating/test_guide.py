@@ -9,13 +9,15 @@ import pytest
 from standing_scanner import StandingStandIn
 
 from pipelines.capture_job import check_calibration
-from pipelines.live.calibrating.guide import Guide, GuideSettings
+from pipelines.live.calibrating.guide import Guide
+from pipelines.live.calibrating.outcomes import StoredCalibration
+from pipelines.live.calibrating.settings import GuideSettings
 from pipelines.live.calibrating.view import View
 from pipelines.live.rig_file import read_rig, write_rig
 from pipelines.recordings.captures import read_capture
 from schemas.base.errors import Fault, RefusedInput
 from schemas.base.json_files import read_json
-from schemas.calibration import read_calibration
+from schemas.calibration import LaserPlane, read_calibration
 from schemas.calibration_check import CalibrationCheck
 from schemas.parameters.calibration import CaptureCalibrationParameters
 
@@ -53,6 +55,9 @@ def test_a_scanner_is_calibrated_checked_and_named(scanner: StandingStandIn, tmp
     assert guide.picture().count("<g ") == 3
     guide.finish()
     assert guide.view.step == "calibrated"
+    assert guide.placement_picture() is None
+    guide.body()
+    assert "150 x 64 x 84 mm, its middle at X = 200 mm" in str(guide.placement_picture())
     made = read_calibration(Path(str(guide.view.outcome and guide.view.outcome.file)))
     assert (made.scanner, [camera.camera for camera in made.cameras]) == ("S1", [1, 2, 5])
     assert max(camera.held_out_rms_mm or 9.0 for camera in made.cameras) < 0.2
@@ -78,6 +83,31 @@ def test_a_scanner_is_calibrated_checked_and_named(scanner: StandingStandIn, tmp
     assert guide.view.words.startswith("The calibration holds: every camera is within 0.")
     check = read_json(Path(named or "").with_suffix(".check.json"), CalibrationCheck)
     assert (check.verdict, check.scanner, len(check.cameras)) == ("steady", "S1", 3)
+
+
+def test_the_laser_planes_of_the_bodys_film_are_told(
+    scanner: StandingStandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plane = LaserPlane(head=2, offset_mm=-0.4, yaw=0.01, sd=[0.05, 0.001, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+    def planes(stored: StoredCalibration, *_: object) -> StoredCalibration:
+        cameras = [camera.model_copy(update={"plane": plane}) for camera in stored.calibration.cameras]
+        return StoredCalibration(stored.file, stored.calibration.model_copy(update={"cameras": cameras}))
+
+    monkeypatch.setattr(scanner, "film_body", lambda *_: None)
+    monkeypatch.setattr("pipelines.live.calibrating.guide.add_planes", planes)
+    guide = guide_of(scanner, tmp_path)
+    guide.begin("calibration")
+    film_all(guide)
+    guide.finish()
+    assert guide.view.outcome is not None
+    assert guide.view.outcome.planes == []
+    guide.body()
+    guide.film_body()
+    outcome = guide.view.as_json()["outcome"]
+    assert outcome["plane_columns"] == ("", "X, mm", "yaw, °", "pitch, °", "bend, mm", "travel, %")
+    unsupported = ["not supported by the films"] * 3
+    assert outcome["planes"] == [["head 2", "-0.400 ± 0.050", "+0.573 ± 0.057", *unsupported]]
 
 
 def test_a_camera_that_moved_is_told(scanner: StandingStandIn, tmp_path: Path) -> None:
