@@ -160,6 +160,7 @@ class OpenScan:
             self._fused.cloud,
             self._fused.report,
             self.movement,
+            self._cleaned[1].lasers_apart_mm,
         )
         return measures.model_copy(update={"posture": self.recorded.document.posture})
 

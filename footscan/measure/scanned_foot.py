@@ -78,6 +78,7 @@ def measure_scanned_foot(
     cloud: NDArray[np.void] | None = None,
     agreement: FusionReport | None = None,
     movement: MovementReport | None = None,
+    lasers_apart_mm: float = math.inf,
 ) -> Measures:
     """Measure a scanned surface; the uncertainties follow from the errors of the scanner.
 
@@ -90,6 +91,8 @@ def measure_scanned_foot(
     cloud : (N,) of `POINT_DTYPE`, fused; it shows how sure each place is, and where one camera alone saw the ends
     agreement : of the cameras; default: exact
     movement : of the foot; default: it stood still
+    lasers_apart_mm : largest distance between the laser planes of two heads: so much too far out may one camera alone
+        see an end
 
     Raises
     ------
@@ -99,7 +102,7 @@ def measure_scanned_foot(
     filled = np.zeros(len(mesh.vertices), bool) if mesh.filled is None else mesh.filled
     normals = vertex_normals(mesh.vertices, mesh.faces) if mesh.normals is None else mesh.normals
     beyond_mm = _beyond(mesh.vertices, filled, cloud)
-    alone_mm = _alone(mesh.vertices[:, 0], None if cloud is None else seen_ends(cloud))
+    alone_mm = np.minimum(_alone(mesh.vertices[:, 0], None if cloud is None else seen_ends(cloud)), lasers_apart_mm)
     gap_mm = np.where(beyond_mm > 0, beyond_mm, KDTree(mesh.vertices[~filled]).query(mesh.vertices)[0])
     apart_mm = 0.0 if agreement is None else math.sqrt(max(agreement.rms_mm**2 - AGREEMENT_MM**2, 0.0))
     ends = END_GROWS * np.maximum(beyond_mm, 0.0) + ALONE_GROWS * alone_mm

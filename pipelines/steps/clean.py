@@ -23,7 +23,7 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
 
     `inputs`: `points-N` of each camera, the `calibration` of all, and `heads`, where they were. The result holds the
     kept `points`, with the foot held still, the `codes` of all points, the counts of `removed` points by camera and
-    reason, `warnings`, the `glass` below the foot, and its `movement`.
+    reason, `warnings`, the `glass` below the foot, its `movement`, and how far `lasers_apart` lie, mm.
 
     Raises
     ------
@@ -52,6 +52,7 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
         warnings=_json([*removed.warnings, *movement.warnings]),
         glass=_json(removed.glass.model_dump(mode="json")),
         movement=_json(movement.model_dump(mode="json")),
+        lasers_apart=np.array(removed.lasers_apart_mm),
     )
 
 

@@ -36,7 +36,9 @@ def run(inputs: Mapping[str, bytes], parameters: MeasureParameters, places: Mapp
     agreement = FusionReport.model_validate_json(fused["report"].tobytes())
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface["filled"])
     try:
-        measures = measure_scanned_foot(mesh, parameters.side, glass, doubts, fused["cloud"], agreement, movement)
+        measures = measure_scanned_foot(
+            mesh, parameters.side, glass, doubts, fused["cloud"], agreement, movement, cleaned["lasers_apart"].item()
+        )
     except Finding as finding:  # the other results are still of use
         unmoved = np.eye(4).tolist()
         measures = Measures(

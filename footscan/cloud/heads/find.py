@@ -28,6 +28,7 @@ from footscan.cloud.heads.equations import (
 from footscan.cloud.heads.planes import calibrated_places, displaced, head_indices, heads_of, views_at
 from footscan.cloud.heads.start import first_places
 from footscan.cloud.heads.verdict import HALF_MM, report_of
+from footscan.cloud.outliers.moments import renumbered
 from footscan.cloud.outliers.other_laser import FARTHEST_MM, LasersSeen, lasers_seen
 from footscan.cloud.outliers.which_laser import choose_lasers
 from footscan.cloud.views import View
@@ -76,7 +77,7 @@ def find_heads(points: NDArray[np.void], views: Mapping[int, View], parameters: 
     if not parameters.correct_heads or count < 2:
         return nothing
     known = calibrated_places(views, heads, x_mm)
-    unmoved = displaced(usable, -known, head_of, x_mm)
+    unmoved = displaced(renumbered(usable, views), -known, head_of, x_mm)
     ordered = unmoved[np.lexsort([unmoved[name] for name in ("source", "camera", "frame")])]
     bare = {camera: replace(view, plane=None) for camera, view in views.items()}
     first = compare(ordered, head_of[ordered["camera"]], bare, head_of, x_mm)

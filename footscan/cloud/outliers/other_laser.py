@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from footscan.calibration.models.laser_plane import x_in_turned_plane
-from footscan.cloud.points import camera_numbers, coordinates, stripe_step
+from footscan.cloud.outliers.moments import (
+    ahead_of_frames,
+    late_rows,
+    motion,
+    plane_of_travel,
+    renumbered,
+    travel_of,
+)
+from footscan.cloud.points import camera_numbers, coordinates
 from footscan.cloud.views import View
 from footscan.compiled import compiled
 from schemas.calibration import LaserPlane, laser_of_view, view_number
@@ -57,8 +65,6 @@ SMOOTHED = 20
 serve nearly as well."""
 ROUNDS = 3
 """Rounds of assignment; from the second on, only points of a laser support others of it. Chosen by hand."""
-MOST_SLOPE = 10.0
-"""Bound of the way that a stripe moves across the skin, in mm per mm of travel. Chosen by hand."""
 SLOPE_ERROR = 0.5
 """Standard deviation of that way, as a share of it: the next stripe may be that of another head. Values from 0.25 to 1
 serve as well on the points that `LEAST_MM` was tuned on."""
@@ -81,8 +87,9 @@ def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Ma
     known = np.flatnonzero(np.isin(points["camera"], list(heads)))
     if len(set(heads.values())) < 2 or not len(known):
         return strange
-    known = known[np.lexsort([points[name][known] for name in ("source", "camera", "frame")])]
-    strange[known] = _assigned(points[known], views, heads)
+    of_moment = renumbered(points[known], views)
+    order = np.lexsort([of_moment[name] for name in ("source", "camera", "frame")])
+    strange[known[order]] = _assigned(of_moment[order], views, heads)
     return strange
 
 
@@ -120,12 +127,13 @@ def lasers_seen(points: NDArray[np.void], views: Mapping[int, View], heads: Mapp
 
     Parameters
     ----------
-    points : (N,) of `POINT_DTYPE`, by frame, camera and source
+    points : (N,) of `POINT_DTYPE`, by frame, camera and source; with the frames of `renumbered`
     heads : camera -> number of its head, of all cameras; indices are by ascending number
     """
     numbers = sorted(set(heads.values()))
     own: Ints = np.array([numbers.index(heads[number]) for number in points["camera"].tolist()], np.int64)
-    planes = _planes_by_frame(points, own, len(numbers))
+    ahead = ahead_of_frames(points, views)
+    planes = _planes_by_frame(points, own, len(numbers)) if ahead is None else _planes_at_once(points, views, heads)
     places = np.full((len(numbers), len(points), 2), np.nan)
     apart = np.full((len(numbers), len(points)), np.inf)
     for camera, view in views.items():
@@ -140,8 +148,8 @@ def lasers_seen(points: NDArray[np.void], views: Mapping[int, View], heads: Mapp
     laser = own.copy()
     seen_by = camera_numbers(points)
     support, at_own = np.zeros(apart.shape), np.zeros(len(points))
-    late = _late(points, views)
-    moved = late[:, None] * _motion(points, late)
+    late = late_rows(points, views) + (0.0 if ahead is None else ahead)
+    moved = late[:, None] * motion(points, late)
     spread = SLOPE_ERROR * np.linalg.norm(moved, axis=1)
     for turn in range(ROUNDS):
         for number in range(len(numbers)):
@@ -245,6 +253,14 @@ def _heights(skin: KDTree, places: Floats) -> Floats:
     return heights
 
 
+def _planes_at_once(points: NDArray[np.void], views: Mapping[int, View], heads: Mapping[int, int]) -> Floats:
+    """X of the laser plane of each head when each point was seen, (heads, N) mm, if all heads are at one place then."""
+    x = travel_of(points, views)
+    numbers = sorted(set(heads.values()))
+    views_of_heads = [views[next(one for one in heads if heads[one] == number)] for number in numbers]
+    return np.array([plane_of_travel(view, x) for view in views_of_heads])
+
+
 def _planes_by_frame(points: NDArray[np.void], own: Ints, heads: int) -> Floats:
     """X of the laser plane of each head in the frame of each point, (heads, N) mm; NaN if it is not known."""
     frame = points["frame"] - points["frame"][0]
@@ -273,43 +289,6 @@ def _in_plane(points: NDArray[np.void], view: View, other: View, plane_x: Floats
     apart = x_in_turned_plane(other.plane, plane_x, xyz[:, 1:]) - x_in_turned_plane(view.plane, x, xyz[:, 1:])
     sight = view.centre - np.column_stack([np.zeros(len(x)), xyz[:, 1:]])
     return xyz[:, 1:] + (apart / sight[:, 0])[:, None] * sight[:, 1:], np.abs(apart)
-
-
-def _late(points: NDArray[np.void], views: Mapping[int, View]) -> Floats:
-    """How far the head had travelled when the row of each point was exposed, (N,) mm, from when its frame counts."""
-    late = np.zeros(len(points))
-    for number, view in views.items():
-        rows = np.flatnonzero(points["camera"] == number)
-        if view.plane is not None:
-            xyz, x = coordinates(points[rows]), points["plane"][rows].astype(np.float64)
-            late[rows] = xyz[:, 0] - x_in_turned_plane(view.plane, x, xyz[:, 1:])
-    return late
-
-
-def _motion(points: NDArray[np.void], late: Floats) -> Floats:
-    """The way in Y and Z (N, 2) that the stripe at each point moves across the skin per mm of travel, if rows are late.
-
-    It leads to the nearest points of the same camera in the frames before and behind.
-    """
-    motion = np.zeros((len(points), 2))
-    step = stripe_step(points)
-    if np.ptp(late) < AGREE_MM / MOST_SLOPE or not step:
-        return motion
-    yz, frame = coordinates(points)[:, 1:], points["frame"].astype(np.float64)
-    reach = MOST_SLOPE * step
-    for number in np.unique(points["camera"]):
-        rows = np.flatnonzero(points["camera"] == number)
-        apart = 3.0 * reach + np.ptp(yz[rows])  # frames lie so far apart in the tree that they are not near each other
-        tree = KDTree(np.column_stack([apart * frame[rows], yz[rows]]))
-        found = np.zeros(len(rows))
-        for way in (-1.0, 1.0):
-            moved = np.column_stack([apart * (frame[rows] + way), yz[rows]])
-            near = np.asarray(tree.query(moved, distance_upper_bound=reach)[1])
-            known = near < len(rows)
-            motion[rows[known]] += way * (yz[rows][near[known]] - yz[rows[known]]) / step
-            found += known
-        motion[rows] /= np.maximum(found, 1.0)[:, None]
-    return motion
 
 
 def _linked(points: NDArray[np.void]) -> Mask:

@@ -13,6 +13,7 @@ from footscan.cloud.outliers.clutter import is_island, is_static
 from footscan.cloud.outliers.ghost import is_ghost
 from footscan.cloud.outliers.glass import is_below_sole, is_plate
 from footscan.cloud.outliers.levels import is_far, is_off_median
+from footscan.cloud.outliers.moments import planes_apart
 from footscan.cloud.outliers.off_surface import is_off_surface
 from footscan.cloud.outliers.other_laser import is_of_other_laser
 from footscan.cloud.outliers.support import END, ISOLATED, UNCONFIRMED, judge_segments
@@ -59,6 +60,8 @@ class Removed:
     one on a plate that was moved."""
     glass: GlassPlane
     """The glass on which the foot stands; points were judged by their height above it."""
+    lasers_apart_mm: float = math.inf
+    """As of `planes_apart`, over the points that are kept."""
 
 
 def remove_outliers(
@@ -148,7 +151,9 @@ def remove_outliers(
         *_cut_warnings(points, codes, parameters, views),
         *moved_warning(glass, parameters.glass_mm),
     ]
-    return points[codes == KEPT], Removed(codes, counts, warnings, glass)
+    kept = points[codes == KEPT]
+    ends = (float(kept["x"].min()), float(kept["x"].max())) if len(kept) else (0.0, 0.0)
+    return kept, Removed(codes, counts, warnings, glass, planes_apart(views, ends))
 
 
 def _drop_by_segment(

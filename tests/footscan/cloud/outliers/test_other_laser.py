@@ -75,6 +75,18 @@ def test_planes_that_coincide_hide_nothing() -> None:
     assert not is_of_other_laser(points[~strange], same).any()
 
 
+def test_cameras_that_are_not_synchronised_see_their_own_laser() -> None:
+    """On a steep slope the stripe of another moment lies as far off as that of another laser would."""
+    same = {camera: replace(view, plane=LaserPlane(head=camera, sd=[0.0] * 7)) for camera, view in VIEWS.items()}
+    parts = []
+    for camera, ahead in ((1, 0.0), (2, 0.9), (3, 1.7)):
+        for frame in range(20):
+            y = np.arange(-30.0, 30.0, 0.3)
+            x = np.full(len(y), 2.0 * frame + ahead)
+            parts.append(make_points(np.column_stack([x, y, 30.0 + 2.0 * x]), camera, frame, plane=x))
+    assert not is_of_other_laser(np.concatenate(parts), same).any()
+
+
 def test_two_lasers_of_one_head_are_two_planes() -> None:
     ahead = LaserPlane(head=2, offset_mm=8.5, sd=[0.0] * 7)
     second = {camera + 64: replace(view, plane=ahead) for camera, view in VIEWS.items() if view.plane is LOWER}
