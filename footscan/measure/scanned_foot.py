@@ -100,7 +100,7 @@ def measure_scanned_foot(
         The surface is no foot.
     """
     filled = np.zeros(len(mesh.vertices), bool) if mesh.filled is None else mesh.filled
-    normals = vertex_normals(mesh.vertices, mesh.faces) if mesh.normals is None else mesh.normals
+    normals = vertex_normals(mesh.vertices, mesh.faces)
     beyond_mm = _beyond(mesh.vertices, filled, cloud)
     alone_mm = np.minimum(_alone(mesh.vertices[:, 0], None if cloud is None else seen_ends(cloud)), lasers_apart_mm)
     gap_mm = np.where(beyond_mm > 0, beyond_mm, KDTree(mesh.vertices[~filled]).query(mesh.vertices)[0])
@@ -149,7 +149,12 @@ def _unseen_sole(vertices: NDArray[np.float64], normals: NDArray[np.float64], fi
     """Say that the sole was not seen, if it was not."""
     is_sole = (normals[:, 2] < DOWN) & (vertices[:, 2] < vertices[:, 2].min() + SOLE_MM)
     unseen = float(filled[is_sole].mean()) if is_sole.any() else 1.0
-    return f"{100 * unseen:.0f} % of the sole was filled, not measured" if unseen > MOST_UNSEEN else None
+    if unseen <= MOST_UNSEEN:
+        return None
+    return (
+        f"{100 * unseen:.0f} % of the sole was filled, not measured: see that nothing covers the cameras below the "
+        "glass, then scan again"
+    )
 
 
 def _beyond(

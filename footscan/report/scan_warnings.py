@@ -14,8 +14,6 @@ from schemas.recording import RecordedCamera, Recording
 
 MOST_MEASURES = 4
 """Most measures that are named one by one; chosen by hand."""
-_UNSEEN = "See that nothing covers the cameras below the glass, then scan again."
-"""What to do about a doubt that does not say so itself, which is that most of the sole was filled."""
 
 
 def scan_warnings(measures: Measures, quality: Quality, recording: Recording | None = None) -> list[str]:
@@ -71,8 +69,7 @@ def _doubts(measures: Measures, quality: Quality) -> Iterator[str]:
         again = "'footscan calibrate capture', then scan again" if check.drifted else "'footscan calibrate check' again"
         remedies[check.doubt] = f"Put the reference object onto the glass and run {again}."
     for doubt in dict.fromkeys([*remedies, *measures.doubts]):
-        remedy = remedies.get(doubt, "" if ":" in doubt else _UNSEEN)
-        yield f"{_sentence(doubt)} All measures are uncertain. {remedy}".rstrip()
+        yield f"{_sentence(doubt)} All measures are uncertain. {remedies.get(doubt, '')}".rstrip()
 
 
 def _cameras(quality: Quality, filmed: dict[int, RecordedCamera]) -> Iterator[str]:
@@ -146,7 +143,7 @@ def _uncertain(measures: Measures) -> Iterator[str]:
 
 def _named(notes: dict[str, str | None]) -> str:
     """The first names of measures, how many there are more, and the reasons."""
-    reasons = sorted({note for note in notes.values() if note})
+    reasons = sorted({reason for note in notes.values() if note for reason in note.split("; ")})
     named = ", ".join(words(name) for name in list(notes)[:MOST_MEASURES])
     more = f" and {len(notes) - MOST_MEASURES} more" if len(notes) > MOST_MEASURES else ""
     return f"{named}{more}" + (f": {'; '.join(reasons[:MOST_MEASURES])}" if reasons else "")

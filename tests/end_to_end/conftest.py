@@ -5,6 +5,7 @@ in Zarr once it has run) and `results/`.
 """
 
 import os
+import re
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
@@ -25,6 +26,9 @@ archive: archive
 calibration: calibration.json
 results: results
 """
+
+USUAL_LINE = re.compile(r" steps to run$|^P\d+/\w+: ")
+"""What `footscan run` writes of scans without a mistake: its plan and their warnings."""
 
 
 @pytest.fixture(scope="session")
@@ -127,10 +131,13 @@ def results() -> Callable[[Path], dict[str, bytes]]:
 
 @pytest.fixture(scope="session")
 def mistake() -> Callable[[subprocess.CompletedProcess[str]], str]:
-    """The one line in which a command says what is wrong, after a check that it says nothing else but its plan."""
+    """The one line in which a command says what is wrong.
+
+    Checks that it says nothing else but its plan and the warnings of scans.
+    """
 
     def line(done: subprocess.CompletedProcess[str]) -> str:
-        lines = [line for line in done.stderr.splitlines() if not line.endswith(" steps to run") and line.strip()]
+        lines = [line for line in done.stderr.splitlines() if line.strip() and not USUAL_LINE.search(line)]
         assert len(lines) == 1, done.stderr
         assert lines[0].startswith("footscan: "), done.stderr
         assert "Traceback" not in done.stderr + done.stdout

@@ -245,7 +245,7 @@ def test_a_table_that_cannot_be_written_hides_no_scan(footscan: Footscan, bench:
     (bench / "results/results.parquet").mkdir(parents=True)
     done = footscan("run", bench / "workflow.yaml")
     assert (done.returncode, done.stdout) == (3, f"P0001/S1: {bench / 'results/P0001/S1'}\n")
-    _, scan, table = done.stderr.splitlines()
+    scan, table = (line for line in done.stderr.splitlines() if line.startswith("footscan: "))
     assert scan == f"footscan: {archive / 'S2/cam5.avi'}: no such film"
     assert table == f"footscan: {bench / 'results/results.parquet'}: cannot be written (Is a directory)"
 

@@ -64,7 +64,9 @@ def test_measures_are_those_of_the_foot(folder: Path) -> None:
     length, breadth = (document["measures"][name] for name in ("foot_length", "foot_breadth"))
     print(f"length {length['value']} of {known['foot_length']}, breadth {breadth['value']} of {known['foot_breadth']}")
     assert length["unit"] == breadth["unit"] == "mm"
-    assert length["status"] == "ok"
+    for name, measure in (("foot_length", length), ("foot_breadth", breadth)):
+        assert measure["value"] == pytest.approx(known[name], abs=3.0 * measure["uncertainty"])
+    assert length["status"] == "uncertain"  # with so few frames, the ends lie between stripes
     assert length["value"] == pytest.approx(known["foot_length"], abs=3.0)
     assert breadth["value"] == pytest.approx(known["foot_breadth"], abs=2.0)
 
@@ -76,7 +78,7 @@ def test_the_surface_is_close_to_the_truth(measured: Path, folder: Path) -> None
     assert quality["truth"]["mean"] < 0.35
     assert quality["mesh"]["components"] == 1
     digest = hashlib.sha256((measured / "calibration.json").read_bytes()).hexdigest()
-    assert quality["calibration"] == {"name": "calibration.json", "sha256": digest}
+    assert (quality["calibration"]["name"], quality["calibration"]["sha256"]) == ("calibration.json", digest)
     assert [camera["camera"] for camera in quality["cameras"]] == list(range(1, 9))
 
 

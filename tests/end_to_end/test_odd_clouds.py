@@ -23,6 +23,7 @@ from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, S
 from schemas.frames import FrameManifest
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
+from schemas.movement import MovementReport
 from schemas.parameters.foot import MeasureParameters
 from schemas.parameters.fusion import FusionParameters
 from schemas.parameters.normals import NormalParameters
@@ -108,9 +109,13 @@ def truth(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def meshed(cloud: Cloud, calibration: bytes, parameters: SurfaceParameters) -> dict[str, bytes]:
     """The results of the steps up to the surface."""
-    nothing = {"removed": "{}", "warnings": "[]", "glass": GlassPlane().model_dump_json()}
+    nothing = {
+        "removed": "{}", "warnings": "[]",
+        "glass": GlassPlane().model_dump_json(), "movement": MovementReport().model_dump_json(),
+    }  # fmt: skip
     reports = {name: np.frombuffer(text.encode(), np.uint8) for name, text in nothing.items()}
-    clean = pack(points=cloud, codes=np.full(len(cloud), KEPT, np.uint8), **reports)
+    codes = np.full(len(cloud), KEPT, np.uint8)
+    clean = pack(points=cloud, codes=codes, lasers_apart=np.float64(0.0), **reports)
     fused = fuse.run({"clean": clean}, FusionParameters(), {})
     oriented = orient.run({"fused": fused, "calibration": calibration}, NormalParameters(), {})
     return {

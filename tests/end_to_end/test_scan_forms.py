@@ -34,7 +34,7 @@ def run(footscan: Footscan, bench: Path) -> dict[str, Any]:
 
 def test_seven_cameras_are_a_scan(footscan: Footscan, bench: Path) -> None:
     edit(bench / "archive/P0001/small", "- {id: 6, file: cam6.avi}\n", "")
-    assert run(footscan, bench)["steps"] == 33
+    assert run(footscan, bench)["steps"] == 34
     folder = bench / "results/P0001/small"
     quality = json.loads((folder / "quality.json").read_bytes())
     assert [camera["camera"] for camera in quality["cameras"]] == [1, 2, 3, 4, 5, 7, 8]
@@ -90,7 +90,7 @@ def test_the_scans_own_calibration_wins(footscan: Footscan, mistake: Mistake, be
     edit(bench / "archive/P0001/small", "side: right", "side: right\ncalibration: ../other.json")
     (bench / "archive/P0001/other.json").write_bytes((bench / "calibration.json").read_bytes())
     (bench / "calibration.json").unlink()
-    assert run(footscan, bench)["ran"] == 2  # quality and report, which name the calibration
+    assert run(footscan, bench)["ran"] == 3  # quality, quality.json and report, which name the calibration
     assert "other.json" in (bench / "results/P0001/small/report.html").read_text()
     (bench / "archive/P0001/other.json").unlink()
     done = footscan("run", bench / "workflow.yaml")

@@ -266,7 +266,7 @@ def test_plan_says_why_a_camera_is_extracted_again(done: Any, unfinished: pytest
     background = name_background(done, "off.png")
     write_background(background, [surroundings(40)])
     steps, reasons = done.plan()
-    assert steps == 20  # with its colours, and those of the surface
+    assert steps == 21  # with its colours, and those of the surface
     assert reasons["background-5"] == "never run"
     assert reasons["extract-5"] == "waits for background of camera 5"
     assert not reasons.keys() & {"ingest-1", "extract-1", "map-1", "ingest-5"}
@@ -275,7 +275,7 @@ def test_plan_says_why_a_camera_is_extracted_again(done: Any, unfinished: pytest
     assert reasons["extract-5"] == "input background changed"
     unfinished.undo()
     [end], ran = done.run()
-    assert (end.problem, "extract-5" in ran, done.plan()) == (None, True, (20, {}))
+    assert (end.problem, "extract-5" in ran, done.plan()) == (None, True, (21, {}))
 
     write_background(background, [surroundings(60)])
     _, reasons = done.plan()
@@ -296,7 +296,7 @@ def test_a_background_of_the_same_content_is_not_read_again(done: Any) -> None:
     shutil.copy(background, done.scan / "else.avi")
     document = done.scan / "scan.yaml"
     document.write_text(document.read_text().replace("off.avi", "else.avi"))
-    assert done.plan() == (20, {})
+    assert done.plan() == (21, {})
 
 
 def test_damaged_background_is_ingested_anew_within_the_run(done: Any) -> None:

@@ -85,9 +85,10 @@ def test_an_upgrade_that_changes_nothing_is_accepted_after_a_sample(
     assert all(f"numpy {version.removesuffix('.1')} -> {version}" in one["changes"] for one in found["steps"])
     steps, reasons = done.plan()
     assert len(reasons) == steps  # nothing was accepted yet
+    stale = steps - 1  # quality.json computes without numpy
 
     status, out, _ = upgrade(done.workflow, "--sample", 1, "--accept", "release notes name no change of arithmetic")
-    assert (status, out.splitlines()[-1]) == (0, f"{steps} results accepted under the new version")
+    assert (status, out.splitlines()[-1]) == (0, f"{stale} results accepted under the new version")
     assert done.plan()[1] == {}
     assert run_command(["trace", str(done.results / "foot.stl"), "--json"]) == 0
     actions = json.loads(capsys.readouterr().out)["actions"].values()

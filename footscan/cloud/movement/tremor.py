@@ -86,7 +86,10 @@ def steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArra
         update={
             "first_frame": max(every.first - CONTINUED, 0),
             "x_mm": np.round(way[max(CONTINUED - every.first, 0) :], 4).tolist(),
-            "warnings": [f"the foot trembled by {tremor:.2f} mm (root mean square), and was moved back"],
+            "warnings": [
+                f"the foot trembled by {tremor:.2f} mm (root mean square), and was moved back: scan again if it can be "
+                "held still"
+            ],
         }
     )
 

@@ -101,7 +101,7 @@ def test_a_side_that_may_be_wrong() -> None:
 def test_all_that_steps_found_is_in_the_list() -> None:
     """A sentence that a step has written is shown once, whole, and ends with what to do."""
     glass = GlassPlane(below_foot_mm=3.5, largest_mm=3.6, corrected=True)
-    doubts = [doubt for doubt in (glass_doubt(glass), "90 % of the sole was filled, not measured") if doubt]
+    doubts = [doubt for doubt in (glass_doubt(glass), "90 % of the sole was filled: uncover the cameras") if doubt]
     quality = quality_of() | {
         "warnings": [*moved_warning(glass, 0.5)],
         "heads": {
@@ -115,8 +115,7 @@ def test_all_that_steps_found_is_in_the_list() -> None:
         "A head lies 3.10 mm off: film the body. All measures are uncertain. Then scan again.",
         "The glass is up to 3.6 mm from where it was calibrated, more than can be corrected safely: calibrate anew. "
         "All measures are uncertain.",
-        "90 % of the sole was filled, not measured. All measures are uncertain. See that nothing covers the cameras "
-        "below the glass, then scan again.",
+        "90 % of the sole was filled: uncover the cameras. All measures are uncertain.",
         "The sole stands 3.50 mm above the calibrated glass: the plate was moved since the calibration; calibrate "
         "anew.",
         "Heads were corrected; film the body.",
