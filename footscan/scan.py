@@ -32,6 +32,7 @@ from footscan.recordings.scans import RecordedScan, read_scan
 from footscan.stripe.film import extract_film
 from footscan.stripe.laser import adapted
 from footscan.stripe.points import StripePoints
+from footscan.surface.errors import Evidence
 from footscan.surface.surface_of_cloud import surface_of_cloud
 from schemas.base.errors import Finding, RefusedInput
 from schemas.base.json_files import read_text
@@ -157,10 +158,7 @@ class OpenScan:
             self.recorded.document.side,
             self.glass,
             doubts,
-            self._fused.cloud,
-            self._fused.report,
-            self.movement,
-            self._cleaned[1].lasers_apart_mm,
+            Evidence(self._fused.cloud, self._fused.report, self.movement, self._cleaned[1].lasers_apart_mm),
         )
         return measures.model_copy(update={"posture": self.recorded.document.posture})
 

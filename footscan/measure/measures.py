@@ -20,8 +20,9 @@ from footscan.measure.frame.glass import glass_doubt
 from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.measure.replicates import replicates
 from footscan.measure.roughness import Roughness
-from footscan.measure.uncertainty import ErrorField, Scatter, SurfaceErrors, scatter_of, with_landmarks
+from footscan.measure.uncertainty import Scatter, SurfaceErrors, scatter_of, with_landmarks
 from footscan.mesh.rigid_transform import apply
+from footscan.surface.errors import ErrorField
 from schemas.base.errors import Finding
 from schemas.base.model import Side
 from schemas.glass import GlassPlane

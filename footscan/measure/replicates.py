@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from footscan.measure.frame.axis import along_axis
 from footscan.measure.frame.foot_frame import SPACING_MM, FootFrame, forefoot_points
 from footscan.measure.landmarks.dense_points import dense_points
-from footscan.measure.uncertainty import ErrorField
 from footscan.mesh.rigid_transform import apply, low_height
 from footscan.mesh.topology import vertex_normals
+from footscan.surface.errors import ErrorField
 from schemas.base.errors import Finding
 
 SEED = 101

@@ -1,54 +1,15 @@
 """Measures of a foot from this scanner, whose errors and filled parts are known."""
 
-import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial import KDTree
-
-from footscan.cloud.points import coordinates, stripe_step
 from footscan.measure.measures import measure_foot
-from footscan.measure.uncertainty import ErrorField
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
+from footscan.surface.errors import NO_EVIDENCE, Evidence, scan_errors
 from schemas.base.model import Side
-from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
 from schemas.measures import Measures
-from schemas.movement import MovementReport
 
-ERROR_MM, ERROR_GROWS, REACH_MM = 0.03, 0.04, 10.0
-"""Standard deviation of a measured vertex, its growth per mm into filled surface, and the edge of the cubes whose
-vertices share their error. Tuned on virtual feet: docs/surface.md."""
-USUAL_STEP_MM = 2.0
-"""Distance of stripes at which that holds. It grows with the square of a longer one, as the sagitta of the skin between
-two stripes does."""
-NEAREST, SHARED = 4, 0.5
-"""Points nearest to a vertex, and the part of their standard deviation that all points around it share. Chosen by
-hand."""
-END_GROWS = 0.15
-"""Growth of the standard deviation per mm along the travel beyond the outermost stripe, at heel and toes."""
-ALONE_GROWS, ALONE_MM = 0.5, 0.5
-"""Growth of the standard deviation per mm along the travel beyond the last place where two cameras agree: one camera
-alone may take the stripe of another head's laser for its own. An end that reaches farther beyond it than the second
-counts as filled. Chosen by hand, after a filmed scanner (`draw_assembled`, seed 501) whose heel began too early."""
-FEWEST_AT_END, LEAST_CONFIRMED, LEG_MM = 5, 0.2, 90.0
-"""Points that make an end; share of the points on which cameras must agree for that; and height above which a foot's
-length does not end. Chosen by hand."""
-AGREEMENT_MM, OF_DISAGREEMENT = 0.03, 2.0
-"""Cameras of an exact scanner disagree by the first, root mean square: noise. What they disagree by beyond it shows
-errors that their mean has too, this many times as large, and as broad as a camera's view: each camera errs, and what
-all of them have in common does not show. Tuned with `END_GROWS` on thirteen worlds without pictures: `draw_assembled`,
-seeds 405, 406, 412, 418, and `draw_world`, seeds 3001 to 3010."""
-SWAY_MM = 0.15
-"""Standard deviation of slow movement of the foot, along X and across, that no stripe shows: over a tenth of a metre it
-looks like the form of another foot. Chosen by hand."""
-LEFT_OF_TREMOR = 0.2
-"""Share of a tremor that is left when the foot was moved back: 0.1 to 0.15 on the feet that `movement` was tuned on."""
-WIDE_MM = 60.0
-"""Distance over which errors of whole cameras and heads vary on the foot. Chosen by hand."""
 REPLICATES = 16
 """Number of replicates of the foot: a bound of time, at which a standard deviation is known to 20 %."""
 DOWN, SOLE_MM = -0.7, 20.0
@@ -56,18 +17,6 @@ DOWN, SOLE_MM = -0.7, 20.0
 MOST_UNSEEN = 0.5
 """Share of the sole that may be filled. Of a virtual foot that four cameras see from below it is 0.02, of one that is
 seen from above alone 0.9: the foot then stands on a sole that was made up, and its frame follows that."""
-RELIABLE_MM = 5.0
-"""Filled surface nearer than this to measured surface counts as measured: a smooth surface hardly errs there. Chosen by
-hand."""
-
-
-class SeenEnds(NamedTuple):
-    """Where the skin ends along the travel."""
-
-    confirmed_mm: tuple[float, float]
-    """Least and greatest X at which two cameras or more agree on it"""
-    seen_mm: tuple[float, float]
-    """Least and greatest X at which any camera saw it"""
 
 
 def measure_scanned_foot(
@@ -75,10 +24,7 @@ def measure_scanned_foot(
     side: Side,
     glass: GlassPlane,
     doubts: Sequence[str] = (),
-    cloud: NDArray[np.void] | None = None,
-    agreement: FusionReport | None = None,
-    movement: MovementReport | None = None,
-    lasers_apart_mm: float = math.inf,
+    evidence: Evidence = NO_EVIDENCE,
 ) -> Measures:
     """Measure a scanned surface; the uncertainties follow from the errors of the scanner.
 
@@ -88,65 +34,31 @@ def measure_scanned_foot(
         cameras above alone, all measures are uncertain: each is taken in the foot's own frame, which rests on the sole.
     glass : on which the foot stands
     doubts : as of `measure_foot`
-    cloud : (N,) of `POINT_DTYPE`, fused; it shows how sure each place is, and where one camera alone saw the ends
-    agreement : of the cameras; default: exact
-    movement : of the foot; default: it stood still
-    lasers_apart_mm : largest distance between the laser planes of two heads: so much too far out may one camera alone
-        see an end
+    evidence : what the scan shows of its errors; default: nothing speaks against it
 
     Raises
     ------
     Finding
         The surface is no foot.
     """
-    filled = np.zeros(len(mesh.vertices), bool) if mesh.filled is None else mesh.filled
-    normals = vertex_normals(mesh.vertices, mesh.faces)
-    beyond_mm = _beyond(mesh.vertices, filled, cloud)
-    alone_mm = np.minimum(_alone(mesh.vertices[:, 0], None if cloud is None else seen_ends(cloud)), lasers_apart_mm)
-    gap_mm = np.where(beyond_mm > 0, beyond_mm, KDTree(mesh.vertices[~filled]).query(mesh.vertices)[0])
-    apart_mm = 0.0 if agreement is None else math.sqrt(max(agreement.rms_mm**2 - AGREEMENT_MM**2, 0.0))
-    ends = END_GROWS * np.maximum(beyond_mm, 0.0) + ALONE_GROWS * alone_mm
+    errors, movement = scan_errors(mesh, evidence), evidence.movement
     return measure_foot(
         mesh.vertices,
         mesh.faces,
         side,
-        errors=[
-            ErrorField("noise", _noise(mesh.vertices, cloud), REACH_MM),
-            ErrorField("filling", np.where(beyond_mm > 0, 0.0, ERROR_GROWS * gap_mm), REACH_MM),
-            ErrorField("ends", ends, REACH_MM),
-            ErrorField("cameras", np.full(len(gap_mm), OF_DISAGREEMENT * apart_mm), WIDE_MM),
-            ErrorField("tremor", _moved_mm(movement) * np.abs(normals[:, 0]), REACH_MM),
-            ErrorField("sway", SWAY_MM * np.hypot(normals[:, 0], normals[:, 1]), WIDE_MM),
-        ],
+        errors=errors.fields,
         count=REPLICATES,
-        filled=(gap_mm > RELIABLE_MM) | (alone_mm > ALONE_MM),
+        filled=errors.is_unseen,
         glass=glass,
-        doubts=[
-            *doubts,
-            *filter(None, [_unseen_sole(mesh.vertices, normals, filled), None if movement is None else movement.doubt]),
-        ],
+        doubts=[*doubts, *filter(None, [_unseen_sole(mesh), None if movement is None else movement.doubt])],
     )
 
 
-def _noise(vertices: NDArray[np.float64], cloud: NDArray[np.void] | None) -> NDArray[np.float64]:
-    """Return (V,) the standard deviations of vertices through the points of a cloud, mm."""
-    step_mm = USUAL_STEP_MM if cloud is None else stripe_step(cloud)
-    noise = np.full(len(vertices), ERROR_MM * max(1.0, (step_mm / USUAL_STEP_MM) ** 2))
-    if cloud is None or len(cloud) < NEAREST:
-        return noise
-    nearest = KDTree(coordinates(cloud)).query(vertices, NEAREST)[1]
-    return np.asarray(np.maximum(noise, SHARED * cloud["sigma"][nearest].mean(axis=1)))
-
-
-def _moved_mm(movement: MovementReport | None) -> float:
-    """Standard deviation of the X of a stripe after the foot was moved back, mm."""
-    if movement is None:
-        return 0.0
-    return LEFT_OF_TREMOR * movement.tremor_mm if movement.x_mm else movement.tremor_mm
-
-
-def _unseen_sole(vertices: NDArray[np.float64], normals: NDArray[np.float64], filled: NDArray[np.bool_]) -> str | None:
+def _unseen_sole(mesh: Mesh) -> str | None:
     """Say that the sole was not seen, if it was not."""
+    if mesh.filled is None:
+        return None
+    vertices, filled, normals = mesh.vertices, mesh.filled, vertex_normals(mesh.vertices, mesh.faces)
     is_sole = (normals[:, 2] < DOWN) & (vertices[:, 2] < vertices[:, 2].min() + SOLE_MM)
     unseen = float(filled[is_sole].mean()) if is_sole.any() else 1.0
     if unseen <= MOST_UNSEEN:
@@ -155,41 +67,3 @@ def _unseen_sole(vertices: NDArray[np.float64], normals: NDArray[np.float64], fi
         f"{100 * unseen:.0f} % of the sole was filled, not measured: see that nothing covers the cameras below the "
         "glass, then scan again"
     )
-
-
-def _beyond(
-    vertices: NDArray[np.float64], filled: NDArray[np.bool_], cloud: NDArray[np.void] | None
-) -> NDArray[np.float64]:
-    """Return (V,) how far each vertex lies beyond the outermost stripes along the travel, mm; 0 or less for most.
-
-    Without a cloud it is measured from the outermost vertices that are not filled. The caps of heel and toes beyond the
-    stripes are broad, but less than one step high.
-    """
-    x, seen = vertices[:, 0], vertices[~filled, 0]
-    if cloud is not None and len(cloud) > 2 * FEWEST_AT_END:
-        seen = np.sort(cloud["x"].astype(np.float64))[FEWEST_AT_END - 1 : 1 - FEWEST_AT_END]
-    return np.asarray(np.maximum(seen.min() - x, x - seen.max()))
-
-
-def _alone(x: NDArray[np.float64], ends: SeenEnds | None) -> NDArray[np.float64]:
-    """Return (V,) how far the surface up to each vertex rests on what one camera alone saw of its end, mm."""
-    if ends is None:
-        return np.zeros(len(x))
-    first = np.clip(ends.confirmed_mm[0] - x, 0.0, ends.confirmed_mm[0] - ends.seen_mm[0])
-    return np.asarray(first + np.clip(x - ends.confirmed_mm[1], 0.0, ends.seen_mm[1] - ends.confirmed_mm[1]))
-
-
-def seen_ends(cloud: NDArray[np.void]) -> SeenEnds | None:
-    """Find where a cloud ends; None if its cameras hardly agree anywhere.
-
-    Parameters
-    ----------
-    cloud : (N,) of `POINT_DTYPE`, fused
-    """
-    low = cloud[cloud["z"] < LEG_MM]
-    confirmed = np.sort(low["x"][low["cameras"] > 1].astype(np.float64))
-    if len(confirmed) < max(FEWEST_AT_END, LEAST_CONFIRMED * len(low)):
-        return None
-    every = np.sort(low["x"].astype(np.float64))
-    first, last = FEWEST_AT_END - 1, -FEWEST_AT_END
-    return SeenEnds((float(confirmed[first]), float(confirmed[last])), (float(every[first]), float(every[last])))

@@ -9,26 +9,13 @@ from numpy.typing import NDArray
 
 from footscan.measure.quantity import Quantity
 from footscan.rows import distinct_rows
+from footscan.surface.errors import ErrorField
 from schemas.measures import ErrorCause
 
 FEWEST_REPLICATES = 5
 """Replicates that must have a measure for a standard deviation."""
 
 Floats = NDArray[np.float64]
-
-
-class ErrorField(NamedTuple):
-    """Errors of the vertices that have one cause."""
-
-    cause: ErrorCause
-    deviations: Floats
-    """(V,) standard deviations of the displacement along the normal, mm"""
-    reach_mm: float = 0.0
-    """Distance over which vertices share their error; 0: each has its own."""
-
-    def of(self, source: NDArray[np.intp]) -> "ErrorField":
-        """The errors of W other vertices; source : (W,) index of the vertex that each of them was."""
-        return self._replace(deviations=self.deviations[source])
 
 
 class SurfaceErrors:

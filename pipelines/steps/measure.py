@@ -9,12 +9,11 @@ import numpy as np
 from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from pipelines.arrays import unpack
+from pipelines.scan_evidence import evidence_of
 from schemas.base.errors import Finding
-from schemas.fusion import FusionReport
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.measures import Measures
-from schemas.movement import MovementReport
 from schemas.parameters.foot import MeasureParameters
 
 
@@ -27,18 +26,12 @@ def run(inputs: Mapping[str, bytes], parameters: MeasureParameters, places: Mapp
     """
     del places
     surface = unpack(inputs["surface"])
-    cleaned = unpack(inputs["clean"])
-    glass = GlassPlane.model_validate_json(cleaned["glass"].tobytes())
-    movement = MovementReport.model_validate_json(cleaned["movement"].tobytes())
+    glass = GlassPlane.model_validate_json(unpack(inputs["clean"])["glass"].tobytes())
     checked = json.loads(inputs["calibration-doubt"]) if "calibration-doubt" in inputs else None
     doubts = [*filter(None, [checked, HeadsReport.model_validate_json(inputs["heads"]).doubt])]
-    fused = unpack(inputs["fused"])
-    agreement = FusionReport.model_validate_json(fused["report"].tobytes())
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface["filled"])
     try:
-        measures = measure_scanned_foot(
-            mesh, parameters.side, glass, doubts, fused["cloud"], agreement, movement, cleaned["lasers_apart"].item()
-        )
+        measures = measure_scanned_foot(mesh, parameters.side, glass, doubts, evidence_of(inputs))
     except Finding as finding:  # the other results are still of use
         unmoved = np.eye(4).tolist()
         measures = Measures(

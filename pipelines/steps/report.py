@@ -10,11 +10,14 @@ from footscan.cloud.outliers.remove import NO_POINT
 from footscan.cloud.points import of_cameras
 from footscan.frames.array import IngestedFrames
 from footscan.frames.reader import pixel_frames
+from footscan.mesh.mesh import Mesh
 from footscan.report.sample_frames import FrameSample
 from footscan.report.scan.foot_colours import FootSurface
 from footscan.report.scan.page import ScanPoints, ScanTitle, scan_page
 from footscan.stripe.points import StripePoints
+from footscan.surface.errors import scan_errors
 from pipelines.arrays import unpack
+from pipelines.scan_evidence import evidence_of
 from schemas.calibration import Calibration
 from schemas.frames import FrameManifest
 from schemas.measures import Measures
@@ -28,21 +31,23 @@ FRAMES_SHOWN = 12
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
     """Make the page of a scan, as HTML.
 
-    `inputs`: `calibration`, `clean`, `oriented`, `surface`, `measures`, `quality`, `about`, and `verified` if the scan
-    has a truth; for each camera `manifest-N`, `stripe-N` and `points-N`; `places`: each camera's array of frames,
-    `array-N`.
+    `inputs`: `calibration`, `clean`, `fused`, `oriented`, `surface`, `measures`, `quality`, `about`, and `verified` if
+    the scan has a truth; for each camera `manifest-N`, `stripe-N` and `points-N`; `places`: each camera's array of
+    frames, `array-N`.
     """
     surface = unpack(inputs["surface"])
     about = json.loads(inputs["about"])
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
     points = np.concatenate([unpack(inputs[f"points-{camera}"])["points"] for camera in ids])
     codes = unpack(inputs["clean"])["codes"]
+    mesh = Mesh(surface["vertices"], surface["faces"], filled=surface.get("filled"))
     page = scan_page(
         title=ScanTitle(about["patient"], about["scan"], parameters.side),
         surface=FootSurface(
             vertices=surface["vertices"],
             faces=surface["faces"],
             filled=surface.get("filled"),
+            deviations=scan_errors(mesh, evidence_of(inputs)).deviations,
             cut_mm=surface["cut_mm"].item() if "cut_mm" in surface else None,
             truth_distance=unpack(inputs["verified"])["vertex_distance"] if "verified" in inputs else None,
         ),

@@ -43,6 +43,8 @@ class FootSurface(NamedTuple):
     """(F, 3), counter-clockwise as seen from outside."""
     filled: NDArray[np.bool_] | None
     """(V,) True where the surface was not measured; None if unknown."""
+    deviations: Floats
+    """(V,) standard deviations along the normals, mm."""
     cut_mm: float | None
     """Z of the flat cut above the ankle; None without a cut."""
     truth_distance: NDArray[np.floating] | None
@@ -63,8 +65,8 @@ def foot_colourings(surface: FootSurface, mesh: MeshQuality, cloud: NDArray[np.v
         colourings.insert(0, Colouring("Distance to reference", colours, colour_bar(limit)))
     if len(cloud):
         nearest = cloud[KDTree(coordinates(cloud)).query(surface.vertices)[1]]
-        colourings += [_by_camera(nearest, filled), _by_uncertainty(nearest, filled)]
-    return colourings
+        colourings.append(_by_camera(nearest, filled))
+    return [*colourings, _by_uncertainty(surface.deviations)]
 
 
 def _by_camera(nearest: NDArray[np.void], filled: NDArray[np.bool_] | None) -> Colouring:
@@ -76,14 +78,15 @@ def _by_camera(nearest: NDArray[np.void], filled: NDArray[np.bool_] | None) -> C
     return Colouring("Camera", _with_filled(colours, filled), key([*meanings, *_filled_meaning(filled)]))
 
 
-def _by_uncertainty(nearest: NDArray[np.void], filled: NDArray[np.bool_] | None) -> Colouring:
-    """Colour each vertex by the expected standard deviation of the nearest measured point."""
-    sigma = nearest["sigma"].astype(np.float64)
-    limit = max(float(np.quantile(sigma, _SHARE)), _LEAST_SIGMA_MM)
-    meanings = [(f"{number(share * limit, 3)} mm", _rgb(share)) for share in (0.0, 0.5, 1.0)]
-    legend = key(meanings + _filled_meaning(filled))
-    note = '<p class="note">Standard deviation to be expected of a point’s place, along the normal of the skin.</p>'
-    return Colouring("Uncertainty", _with_filled(_ramp(sigma / limit), filled), legend + note)
+def _by_uncertainty(deviations: Floats) -> Colouring:
+    """Colour each vertex by its standard deviation."""
+    limit = max(float(np.quantile(deviations, _SHARE)), _LEAST_SIGMA_MM)
+    legend = key([(f"{number(share * limit, 2)} mm", _rgb(share)) for share in (0.0, 0.5, 1.0)])
+    note = (
+        '<p class="note">Standard deviation of the surface along its normal, from all causes: noise and calibration, '
+        "filled surface, ends beyond the stripes, disagreement of cameras, movement of the foot.</p>"
+    )
+    return Colouring("Uncertainty", _ramp(deviations / limit), legend + note)
 
 
 def _ramp(share: Floats) -> NDArray[np.uint8]:

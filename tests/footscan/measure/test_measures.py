@@ -10,9 +10,9 @@ from footscan.measure.definitions.conventions import CONVENTIONS, OWN
 from footscan.measure.foot_landmarks import Landmark
 from footscan.measure.frame.foot_frame import FootFrame
 from footscan.measure.measures import measure_foot, take_measures
-from footscan.measure.uncertainty import ErrorField
 from footscan.mesh.formats.files import read_mesh
 from footscan.mesh.topology import vertex_normals
+from footscan.surface.errors import ErrorField
 from footscan.virtual.foot.foot import Foot, make_foot
 from schemas.base.errors import Finding
 from schemas.glass import GlassPlane

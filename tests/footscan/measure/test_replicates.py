@@ -6,9 +6,10 @@ import pytest
 from footscan.measure.frame.foot_frame import foot_frame
 from footscan.measure.measures import measure_foot
 from footscan.measure.replicates import replicates, smooth_field
-from footscan.measure.uncertainty import ErrorField, scatter_of
+from footscan.measure.uncertainty import scatter_of
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
+from footscan.surface.errors import ErrorField
 from footscan.virtual.foot.foot import make_foot
 
 SD_MM, REACH_MM = 0.03, 10.0

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from footscan.cloud.points import make_points
-from footscan.measure.scanned_foot import SeenEnds, measure_scanned_foot, seen_ends
+from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
+from footscan.surface.errors import Evidence, SeenEnds, scan_errors, seen_ends
 from footscan.virtual.foot.foot import make_foot
 from schemas.fusion import Disagreement, FusionReport, PairDisagreement
 from schemas.glass import GlassPlane
@@ -25,10 +26,12 @@ def with_filled(foot: Mesh, share: float) -> Mesh:
     return Mesh(foot.vertices, foot.faces, filled=down & (x <= np.quantile(x[down], share)))
 
 
-def agreement(mm: float) -> FusionReport:
+def apart_by(mm: float) -> Evidence:
     """Two cameras that disagree by `mm`."""
     apart = Disagreement(median_mm=0.0, deviation_mm=mm, rms_mm=mm)
-    return FusionReport(pairs=[PairDisagreement(cameras=(1, 2), points=1000, before=apart, after=apart)])
+    return Evidence(
+        agreement=FusionReport(pairs=[PairDisagreement(cameras=(1, 2), points=1000, before=apart, after=apart)])
+    )
 
 
 def alone_up_to(foot: Mesh, mm: float) -> np.ndarray:
@@ -59,7 +62,7 @@ def test_a_reason_that_all_measures_share_is_no_note_of_one(foot: Mesh) -> None:
 
 def test_cameras_that_disagree_widen_every_measure(foot: Mesh) -> None:
     agreeing, apart = (
-        measure_scanned_foot(foot, "right", GlassPlane(), agreement=agreement(mm)).measures for mm in (0.03, 0.2)
+        measure_scanned_foot(foot, "right", GlassPlane(), evidence=apart_by(mm)).measures for mm in (0.03, 0.2)
     )
     for name in ("foot_length", "foot_breadth", "ball_girth", "instep_height"):
         assert (apart[name].uncertainty or 0.0) > 2 * (agreeing[name].uncertainty or np.inf)
@@ -68,7 +71,7 @@ def test_cameras_that_disagree_widen_every_measure(foot: Mesh) -> None:
 
 
 def test_the_causes_of_an_uncertainty_make_it_up(foot: Mesh) -> None:
-    measures = measure_scanned_foot(with_filled(foot, 0.1), "right", GlassPlane(), agreement=agreement(0.1)).measures
+    measures = measure_scanned_foot(with_filled(foot, 0.1), "right", GlassPlane(), evidence=apart_by(0.1)).measures
     for name, measure in measures.items():
         if measure.budget is not None and measure.unit == "mm":
             assert measure.uncertainty == pytest.approx(np.hypot.reduce([*measure.budget.values()]), abs=2e-3), name
@@ -76,13 +79,13 @@ def test_the_causes_of_an_uncertainty_make_it_up(foot: Mesh) -> None:
 
 
 def test_an_end_that_one_camera_alone_saw_makes_the_length_uncertain(foot: Mesh) -> None:
-    alone = measure_scanned_foot(foot, "right", GlassPlane(), cloud=alone_up_to(foot, 2.0)).measures
+    alone = measure_scanned_foot(foot, "right", GlassPlane(), evidence=Evidence(alone_up_to(foot, 2.0))).measures
     assert alone["foot_length"].status == "uncertain"
     assert "one camera alone" in (alone["foot_length"].note or "")
     assert alone["foot_breadth"].status == "ok"
     assert (alone["foot_length"].uncertainty or 0.0) > 0.5
     assert (alone["foot_length"].budget or {})["ends"] > 0.5
-    slightly = measure_scanned_foot(foot, "right", GlassPlane(), cloud=alone_up_to(foot, 0.2)).measures
+    slightly = measure_scanned_foot(foot, "right", GlassPlane(), evidence=Evidence(alone_up_to(foot, 0.2))).measures
     assert slightly["foot_length"].status == "ok"
 
 
@@ -93,3 +96,11 @@ def test_the_ends_that_cameras_confirm() -> None:
     assert seen_ends(cloud) == SeenEnds((24.0, 95.0), (4.0, 95.0))
     cloud["cameras"] = 1
     assert seen_ends(cloud) is None
+
+
+def test_a_vertex_is_less_sure_far_from_what_was_seen(foot: Mesh) -> None:
+    half = with_filled(foot, 0.5)
+    sure, apart = (scan_errors(half, apart_by(mm)).deviations for mm in (0.03, 0.2))
+    assert half.filled is not None
+    assert np.median(sure[half.filled]) > 2 * np.median(sure[~half.filled])
+    assert (apart > sure).all()

@@ -12,24 +12,28 @@ SURFACE = FootSurface(
     vertices=VERTICES,
     faces=np.array([[0, 1, 3], [1, 2, 3]]),
     filled=np.array([False, False, False, True]),
+    deviations=np.array([0.0, 0.05, 0.1, 0.2]),
     cut_mm=None,
     truth_distance=None,
 )
-CLOUD = make_points(VERTICES[:3] + 0.1, camera=np.array([1, 2, 13]), sigma=np.array([0.0, 0.05, 0.1]))
+CLOUD = make_points(VERTICES[:3] + 0.1, camera=np.array([1, 2, 13]))
 MESH = MeshQuality(vertices=4, triangles=2, open_edges=0, non_manifold_edges=0, components=1, holes=0)
 
 
-def test_cameras_and_uncertainty_are_those_of_the_nearest_point_and_filled_is_grey() -> None:
+def test_cameras_are_those_of_the_nearest_point_and_filled_is_grey() -> None:
     colourings = {colouring.name: colouring for colouring in foot_colourings(SURFACE, MESH, CLOUD)}
     assert list(colourings) == ["Measured and filled", "Camera", "Uncertainty"]
     # Camera 13 has the colour of the first.
     assert colourings["Camera"].colours.tolist() == [list(CAMERAS[0]), list(CAMERAS[1]), list(CAMERAS[0]), list(CUT)]
-    uncertain = colourings["Uncertainty"].colours
-    assert uncertain[0].tolist() == SURE.tolist()
-    assert uncertain[2].tolist() == UNSURE.tolist()
-    assert uncertain[3].tolist() == list(CUT)
     for camera in (1, 2, 13):
         assert f"Camera {camera}</span>" in colourings["Camera"].meaning
+
+
+def test_uncertainty_is_shown_of_filled_surface_too() -> None:
+    *_, uncertainty = foot_colourings(SURFACE, MESH, CLOUD)
+    assert uncertainty.colours[0].tolist() == SURE.tolist()
+    assert uncertainty.colours[3].tolist() == UNSURE.tolist()
+    assert "from all causes" in uncertainty.meaning
 
 
 def test_the_distance_to_a_reference_comes_first_where_there_is_one() -> None:
@@ -43,4 +47,7 @@ def test_the_distance_to_a_reference_comes_first_where_there_is_one() -> None:
 
 
 def test_without_a_cloud_the_surface_alone_is_shown() -> None:
-    assert [colouring.name for colouring in foot_colourings(SURFACE, MESH, CLOUD[:0])] == ["Measured and filled"]
+    assert [colouring.name for colouring in foot_colourings(SURFACE, MESH, CLOUD[:0])] == [
+        "Measured and filled",
+        "Uncertainty",
+    ]

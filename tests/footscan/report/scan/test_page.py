@@ -44,6 +44,7 @@ def scan():
             vertices=vertices,
             faces=np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
             filled=np.array([False, False, False, True]),
+            deviations=np.array([0.03, 0.03, 0.03, 0.5]),
             cut_mm=None,
             truth_distance=None,
         ),

@@ -1,0 +1,19 @@
+"""Evidence of the errors of a scan, from the results of its steps."""
+
+from collections.abc import Mapping
+
+from footscan.surface.errors import Evidence
+from pipelines.arrays import unpack
+from schemas.fusion import FusionReport
+from schemas.movement import MovementReport
+
+
+def evidence_of(inputs: Mapping[str, bytes]) -> Evidence:
+    """Collect the evidence; `inputs`: `clean` and `fused`."""
+    cleaned, fused = unpack(inputs["clean"]), unpack(inputs["fused"])
+    return Evidence(
+        cloud=fused["cloud"],
+        agreement=FusionReport.model_validate_json(fused["report"].tobytes()),
+        movement=MovementReport.model_validate_json(cleaned["movement"].tobytes()),
+        lasers_apart_mm=cleaned["lasers_apart"].item(),
+    )
