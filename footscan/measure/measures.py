@@ -18,7 +18,7 @@ from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame.foot_frame import Body, FootFrame, foot_frame
 from footscan.measure.frame.glass import glass_doubt
 from footscan.measure.quantity import NotMeasurable, Quantity
-from footscan.measure.replicates import replicates
+from footscan.measure.replicates import REPLICATES, replicates
 from footscan.measure.roughness import Roughness
 from footscan.measure.uncertainty import Scatter, SurfaceErrors, scatter_of, with_landmarks
 from footscan.mesh.rigid_transform import apply
@@ -35,6 +35,8 @@ FILLED_SHARE = 0.05
 LARGEST_SD_MM, LARGEST_GIRTH_SD_MM = 1.0, 2.0
 """Standard deviations from which a length and a girth are uncertain: half of what ISO 20685-1:2018 allows a scanner to
 be off, 2 mm for the foot and 4 mm for small circumferences."""
+ROUGH_MM = 0.05
+"""Median roughness of a mesh at which landmarks begin to move, and propagation is no longer linear. Chosen by hand."""
 MISSING_SHARE = 0.2
 """A measure that more than this share of the replicates does not have is uncertain. Chosen by hand."""
 DIGITS: dict[Unit, int] = {"mm": 3, "mm2": 0, "mm3": 0, "deg": 2, "1": 4}
@@ -200,7 +202,7 @@ def measure_foot(
     axis: Axis = "toe2",
     manual: Mapping[str, Floats] | None = None,
     errors: Sequence[ErrorField] | None = None,
-    count: int = 0,
+    count: int | None = None,
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
     glass: GlassPlane | None = None,
@@ -218,7 +220,7 @@ def measure_foot(
     manual : landmarks set by a person: name to (3,) mm in the frame of the mesh
     errors : errors of the V vertices by their cause; default: inferred from the roughness of the mesh
     count : number of replicates by which the errors of the vertices are propagated, see `replicates`; 0: propagation is
-        linear
+        linear; default: `REPLICATES` if the mesh is rough, 0 if not
     filled : (V,) true for vertices that were filled, not measured
     calibration : name of a measure to (a, b): the reported value is a + b times the measured one
     glass : the scanner's glass in the frame of the mesh; default: at Z = 0
@@ -266,7 +268,7 @@ def take_measures(
     landmarks: Mapping[str, Landmark],
     *,
     errors: Sequence[ErrorField] | None = None,
-    count: int = 0,
+    count: int | None = None,
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
     doubt: str | None = None,
@@ -278,6 +280,8 @@ def take_measures(
     """
     surface = FootSurface(foot, landmarks)
     known = SurfaceErrors(foot.vertices, [ErrorField("noise", surface.errors)] if errors is None else errors)
+    if count is None:
+        count = REPLICATES if errors is None and np.median(surface.errors) > ROUGH_MM else 0
     scatter = scatter_of([_values(one, surface.roughness) for one in replicates(foot, known.fields, count)], count)
     calibrations = calibration or {}
     to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
@@ -329,7 +333,7 @@ def _measure(
     surface_errors, scatter = errors
     if scatter is not None and scatter.missing > MISSING_SHARE:
         doubts.append(f"it cannot be measured in {100 * scatter.missing:.0f} % of the ways in which the scan may err")
-    budget = with_landmarks(surface_errors.budget(quantity), None if scatter is None else scatter.sd)
+    budget = with_landmarks(surface_errors.budget(quantity), None if scatter is None else scatter.about(quantity.value))
     sd = None if budget is None else abs(factor) * math.hypot(*budget.values())
     largest = LARGEST_SD_MM if quantity.plane is None else LARGEST_GIRTH_SD_MM
     if sd is not None and sd > largest and definition.unit == "mm":

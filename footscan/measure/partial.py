@@ -174,7 +174,7 @@ def _measured(
     """Measures of a variant; none if that is no foot."""
     try:
         body = _body(mesh, motion)
-        return measure_foot(mesh.vertices, mesh.faces, side, axis=axis, manual=manual, body=body).measures
+        return measure_foot(mesh.vertices, mesh.faces, side, axis=axis, manual=manual, count=0, body=body).measures
     except Finding:
         return {}
 
@@ -212,7 +212,7 @@ def _moved(foot: FootFrame, length: float, turn_deg: float, ahead: float) -> Foo
 
 def _taken(foot: FootFrame, manual: Mapping[str, Floats] | None) -> dict[str, Measure]:
     try:
-        return take_measures(foot, find_landmarks(foot, manual or {}))
+        return take_measures(foot, find_landmarks(foot, manual or {}), count=0)
     except (Finding, ValueError):  # a window in which a landmark is sought holds no surface
         return {}
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from footscan.measure.measures import measure_foot
+from footscan.measure.replicates import REPLICATES
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
 from footscan.surface.errors import NO_EVIDENCE, Evidence, scan_errors
@@ -10,8 +11,6 @@ from schemas.base.model import Side
 from schemas.glass import GlassPlane
 from schemas.measures import Measures
 
-REPLICATES = 16
-"""Number of replicates of the foot: a bound of time, at which a standard deviation is known to 20 %."""
 DOWN, SOLE_MM = -0.7, 20.0
 """The sole is what looks down, by the Z of its normal, up to this height above the lowest point. Chosen by hand."""
 MOST_UNSEEN = 0.5

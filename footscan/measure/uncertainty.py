@@ -67,9 +67,18 @@ def _cubes(vertices: Floats, edge: float) -> NDArray[np.int64] | None:
 class Scatter(NamedTuple):
     """How far a measure scatters over the replicates of a foot."""
 
+    mean: float
     sd: float
     missing: float
     """Share of the replicates that do not have it."""
+
+    def about(self, value: float) -> float:
+        """Root mean square distance from the value of the foot itself.
+
+        Errors make the outermost point lie farther out on average: the mean of the replicates then shows a bias, which
+        the foot itself has as well.
+        """
+        return math.hypot(self.sd, self.mean - value)
 
 
 def scatter_of(values: Sequence[Mapping[str, float]], count: int) -> dict[str, Scatter]:
@@ -87,7 +96,11 @@ def scatter_of(values: Sequence[Mapping[str, float]], count: int) -> dict[str, S
         for name, value in of_one.items():
             found.setdefault(name, []).append(value)
     return {
-        name: Scatter(float(np.std(each, ddof=1)) * math.sqrt((len(each) - 1) / (len(each) - 3)), 1 - len(each) / count)
+        name: Scatter(
+            mean=float(np.mean(each)),
+            sd=float(np.std(each, ddof=1)) * math.sqrt((len(each) - 1) / (len(each) - 3)),
+            missing=1 - len(each) / count,
+        )
         for name, each in found.items()
         if len(each) >= FEWEST_REPLICATES
     }

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from footscan.measure.bodies.raw_mesh import RawMesh, prepare_feet
 from footscan.measure.partial import measure_pair, measure_raw
+from footscan.mesh.topology import vertex_normals
 from footscan.virtual.foot.foot import Foot, make_foot
 from schemas.base.errors import Finding
 from schemas.measures import Measures
@@ -84,6 +85,13 @@ def with_strays(shape: Shape) -> Shape:
     return together(shape, (strays, np.arange(len(strays)).reshape(-1, 3)))
 
 
+def rough(shape: Shape, mm: float) -> Shape:
+    """The shape with vertices that scatter along their normals, as those of a depth camera."""
+    vertices, faces = np.asarray(shape[0]), np.asarray(shape[1])
+    scatter = np.random.default_rng(3).normal(0.0, mm, (len(vertices), 1))
+    return vertices + scatter * vertex_normals(vertices, faces), faces
+
+
 UP, DOWN, AHEAD, BACK = (0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0)
 SOLE_OPEN: dict[str, Callable[[], Shape]] = {
     "cut at 1 mm": lambda: cut(UP, 1.0),
@@ -102,6 +110,8 @@ OTHERS: dict[str, Callable[[], Shape]] = {
     "without forefoot, open": lambda: cut(BACK, 162.0),
     "without heel": lambda: cut(AHEAD, 50.0),
     "cut low": lambda: cut(DOWN, 60.0, cap=True),
+    "rough": lambda: rough((known_foot().vertices, known_foot().faces), 0.5),
+    "rough and cut at 3 mm": lambda: rough(cut(UP, 3.0), 0.2),
 }
 
 

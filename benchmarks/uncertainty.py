@@ -1,0 +1,65 @@
+"""Are the uncertainties true? |error| / sd of measures in worlds drawn at random, and how many stay `ok`.
+
+    .venv/bin/python -m benchmarks.uncertainty [FIRST COUNT [FOLDER [films]]]
+
+The baseline is the standard normal: 68 % within one standard deviation, 99.7 % within three. FOLDER keeps what came of
+each world. A world's data allow its main measures if stripes cover the foot and none of its doubts concerns all
+measures: the reconstruction decides the second, so the share of all worlds that are covered is printed beside it.
+"""
+
+import sys
+import tempfile
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from footscan.virtual.worlds.draw import draw_world
+from pipelines.engine.pool import cores, local_cluster
+from pipelines.worlds.campaign import run_worlds
+from pipelines.worlds.sums import silent_by_name, sum_up
+from schemas.campaign import WorldMeasure, WorldOutcome
+from schemas.parameters.scan import ScanParameters
+
+FIRST, COUNT = 5001, 60
+MAIN = ("foot_length", "foot_breadth", "ball_girth")
+"""The measures that a world should keep `ok`."""
+
+
+def main() -> None:
+    first, count = [int(text) for text in sys.argv[1:3]] or [FIRST, COUNT]
+    with tempfile.TemporaryDirectory() as temporary, local_cluster(cores()) as pool:
+        folder = Path(sys.argv[3] if len(sys.argv) > 3 else temporary)
+        worlds = [draw_world(seed) for seed in range(first, first + count)]
+        kind = "films" if "films" in sys.argv[4:] else "points"
+        outcomes = run_worlds(worlds, kind, ScanParameters(), folder, pool, lambda _: None)
+    print(f"{sum_up(outcomes)}\nsilent errors: {silent_by_name(outcomes)}")
+    _print_ratios(outcomes)
+    _print_kept(outcomes)
+
+
+def _print_ratios(outcomes: Sequence[WorldOutcome]) -> None:
+    names = sorted({name for outcome in outcomes for name in outcome.measures})
+    for name in [*names, "all"]:
+        chosen = [m for o in outcomes for n, m in o.measures.items() if name in (n, "all")]
+        print(f"{name:26} {_within(measure for measure in chosen if measure.status == 'ok')}")
+
+
+def _within(measures: Iterable[WorldMeasure]) -> str:
+    ratios = np.abs([m.error / m.sigma for m in measures if m.error is not None and m.sigma])
+    if not len(ratios):
+        return "none ok"
+    return f"{len(ratios):6} ok, within 1 sd {np.mean(ratios < 1):4.0%}, 3 sd {np.mean(ratios < 3):6.1%}"
+
+
+def _print_kept(outcomes: Sequence[WorldOutcome]) -> None:
+    covered = [outcome for outcome in outcomes if outcome.can_be_measured]
+    for name in MAIN:
+        ok = sum(name in o.measures and o.measures[name].status == "ok" for o in covered)
+        print(f"{name:26} ok in {ok} of {len(covered)} worlds whose stripes cover a foot")
+    kept = sum(all(n in o.measures and o.measures[n].status == "ok" for n in MAIN) for o in covered)
+    print(f"{'all three':26} ok in {kept} of {len(covered)}")
+
+
+if __name__ == "__main__":
+    main()
