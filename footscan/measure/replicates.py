@@ -47,7 +47,7 @@ def replicates(foot: FootFrame, errors: Sequence[ErrorField], count: int) -> Ite
 
 
 def smooth_field(places: Floats, reach_mm: float, random: np.random.Generator) -> Floats:
-    """Draw a field of unit variance at `places` (N, 3), mm: white noise on a grid, interpolated; at reach 0, white noise.
+    """Draw a field of unit variance at `places` (N, 3), mm: white noise on a grid, interpolated; on none at reach 0.
 
     Examples
     --------
