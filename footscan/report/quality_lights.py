@@ -22,6 +22,10 @@ FILLED_SHARES = (0.1, 0.25)
 """Largest filled share of the surface that is good, and fair; chosen by hand.
 
 In a whole scan, toes hide some 5 % of the surface from all cameras."""
+MISSING_SHARE = 0.1
+"""Largest share of measures not taken that is still fair; chosen by hand.
+
+Some feet lack a landmark, for instance the bulge of the navicular: another scan does not bring it."""
 
 
 class TrafficLight(NamedTuple):
@@ -92,8 +96,10 @@ def _measures(measures: Measures) -> TrafficLight:
         sum(measure.status == status for measure in measures.measures.values())
         for status in ("incomplete", "uncertain")
     )
-    why = f"{missing} of {len(measures.measures)} not taken, {doubted} uncertain"
-    return TrafficLight("Measures", "poor" if missing else "fair" if doubted else "good", why)
+    count = len(measures.measures)
+    why = f"{missing} of {count} not taken, {doubted} uncertain"
+    is_poor = missing + doubted == count or missing > MISSING_SHARE * count
+    return TrafficLight("Measures", "poor" if is_poor else "fair" if missing or doubted else "good", why)
 
 
 def _level(value: float, limits: tuple[float, float]) -> Level:

@@ -36,11 +36,11 @@ def measures(*statuses: str, **known: Any) -> Measures:
         axis="toe2",
         transform=IDENTITY,
         measures={
-            f"girth_{status}": Measure.model_validate(
+            f"girth_{number}": Measure.model_validate(
                 {"unit": "mm", "status": status, "definition": "d", "note": "n",
                  "value": None if status == "incomplete" else 1.0}
             )
-            for status in statuses
+            for number, status in enumerate(statuses)
         },
         **known,
     )  # fmt: skip
@@ -65,6 +65,9 @@ GOOD = ["good"] * 4
         ({"open_edges": 3}, ["ok"], ["good", "good", "poor", "good"]),
         ({}, ["ok", "uncertain"], ["good", "good", "good", "fair"]),
         ({}, ["uncertain", "incomplete"], ["good", "good", "good", "poor"]),
+        ({}, ["uncertain", "uncertain"], ["good", "good", "good", "poor"]),
+        ({}, [*["ok"] * 9, "incomplete"], ["good", "good", "good", "fair"]),
+        ({}, [*["ok"] * 8, "incomplete"], ["good", "good", "good", "poor"]),
     ],
 )
 def test_each_light_goes_by_its_own_figure(of_quality: dict[str, Any], statuses: list[str], levels: list[str]) -> None:
