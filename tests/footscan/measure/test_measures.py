@@ -117,7 +117,7 @@ def test_noise_changes_a_ball_girth_by_less_than_half_a_millimetre(seed: int, re
 
 
 def test_the_uncertainty_is_the_scatter() -> None:
-    repeated = [measure_foot(noisy(0.2, seed), foot().faces, "right").measures for seed in range(10)]
+    repeated = [measure_foot(noisy(0.2, seed), foot().faces, "right", count=0).measures for seed in range(10)]
     ratios = {}
     for name in (
         "foot_length",
