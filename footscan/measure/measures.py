@@ -282,7 +282,7 @@ def take_measures(
     known = SurfaceErrors(foot.vertices, [ErrorField("noise", surface.errors)] if errors is None else errors)
     if count is None:
         count = REPLICATES if errors is None and np.median(surface.errors) > ROUGH_MM else 0
-    scatter = scatter_of([_values(one, surface.roughness) for one in replicates(foot, known.fields, count)], count)
+    scatter = scatter_of([_values(one, surface.roughness) for one in replicates(foot, known, count)], count)
     calibrations = calibration or {}
     to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
     measures = {

@@ -4,6 +4,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 Floats = NDArray[np.float64]
 
@@ -31,13 +32,13 @@ class Quantity(NamedTuple):
     plane: tuple[Floats, Floats] | None = None
     """Plane of a girth: a point (3,) mm and its normal (3,), in the foot's frame."""
 
-    def sd(self, errors: Floats, patch: NDArray[np.int64] | None = None) -> float | None:
+    def sd(self, errors: Floats, shares: csr_array | None = None) -> float | None:
         """Standard deviation of the value; None where it is unknown.
 
         Parameters
         ----------
         errors : (V,) standard deviations of the vertices, mm
-        patch : (V,) vertices of one patch share their error; default: all errors are independent
+        shares : (V, N) of N independent errors in the error of each vertex; default: each has its own
 
         Examples
         --------
@@ -46,12 +47,12 @@ class Quantity(NamedTuple):
         >>> difference = Quantity(10.0, np.array([1.0, -1.0]))
         >>> difference.sd(np.array([0.3, 0.4]))
         0.5
-        >>> difference.sd(np.array([0.3, 0.3]), patch=np.array([0, 0]))
+        >>> difference.sd(np.array([0.3, 0.3]), csr_array([[1.0], [1.0]]))
         0.0
         """
         moves = self.gradient * errors
-        if patch is not None:
-            moves = np.bincount(patch, moves).astype(np.float64)
+        if shares is not None:
+            moves = shares.T @ moves
         deviation = float(np.sqrt(np.sum(moves**2)))
         return deviation if np.isfinite(deviation) else None
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.measure.quantity import Quantity
-from footscan.rows import distinct_rows
 from footscan.surface.errors import ErrorField
 from schemas.measures import ErrorCause
 
@@ -29,19 +28,28 @@ class SurfaceErrors:
 
     def __init__(self, vertices: Floats, fields: Sequence[ErrorField]) -> None:
         self.fields = [field for field in fields if field.deviations.any()]
-        self._patches = [_cubes(vertices, field.reach_mm) for field in self.fields]
+        different = {field.places: field.shares(vertices) for field in self.fields}
+        self._shares = [different[field.places] for field in self.fields]
 
     def budget(self, quantity: Quantity) -> dict[ErrorCause, float] | None:
         """Standard deviation of a quantity from each cause by linear propagation; None where its derivatives are not
-        known. Vertices in the same cube, as wide as a field reaches, share their error.
+        known.
         """
         parts: dict[ErrorCause, float] = {}
-        for field, patch in zip(self.fields, self._patches, strict=True):
-            sd = quantity.sd(field.deviations, patch)
+        for field, shares in zip(self.fields, self._shares, strict=True):
+            sd = quantity.sd(field.deviations, shares)
             if sd is None:
                 return None
-            parts[field.cause] = sd
+            parts[field.cause] = math.hypot(parts.get(field.cause, 0.0), sd)
         return parts
+
+    def draw(self, random: np.random.Generator) -> Floats:
+        """(V,) displacements along the normals, mm, drawn at random."""
+        drawn = [
+            field.deviations * (shares @ random.normal(size=shares.shape[1]))
+            for field, shares in zip(self.fields, self._shares, strict=True)
+        ]
+        return np.asarray(np.sum(drawn, axis=0))
 
 
 def with_landmarks(budget: Mapping[ErrorCause, float] | None, scatter: float | None) -> dict[ErrorCause, float] | None:
@@ -57,11 +65,6 @@ def with_landmarks(budget: Mapping[ErrorCause, float] | None, scatter: float | N
     linear = budget or {}
     left = scatter**2 - sum(sd**2 for sd in linear.values())
     return {**linear, **({"landmarks": round(math.sqrt(left), 9)} if left > 0.0 else {})}
-
-
-def _cubes(vertices: Floats, edge: float) -> NDArray[np.int64] | None:
-    """Return (V,) the number of the cube in which each vertex lies; None without cubes."""
-    return distinct_rows(np.floor(vertices / edge)).number if edge > 0 else None
 
 
 class Scatter(NamedTuple):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, eye_array
 from scipy.spatial import KDTree
 
 from footscan.cloud.points import coordinates, stripe_step
@@ -16,9 +17,9 @@ from schemas.movement import MovementReport
 
 Floats = NDArray[np.float64]
 
-ERROR_MM, ERROR_GROWS, REACH_MM = 0.03, 0.04, 10.0
-"""Standard deviation of a measured vertex, its growth per mm into filled surface, and the edge of the cubes whose
-vertices share their error. Tuned on virtual feet: docs/surface.md."""
+ERROR_MM, ERROR_GROWS, REACH_MM = 0.02, 0.04, 10.0
+"""Standard deviation of a measured vertex, its growth per mm into filled surface, and the distance over which vertices
+share their error. Tuned on virtual feet: docs/surface.md."""
 USUAL_STEP_MM = 2.0
 """Distance of stripes at which that holds. It grows with the square of a longer one, as the sagitta of the skin between
 two stripes does."""
@@ -39,7 +40,7 @@ AGREEMENT_MM, OF_DISAGREEMENT = 0.03, 2.0
 errors that their mean has too, this many times as large, and as broad as a camera's view: each camera errs, and what
 all of them have in common does not show. Tuned with `END_GROWS` on thirteen worlds without pictures: `draw_assembled`,
 seeds 405, 406, 412, 418, and `draw_world`, seeds 3001 to 3010."""
-SWAY_MM = 0.15
+SWAY_MM = 0.1
 """Standard deviation of slow movement of the foot, along X and across, that no stripe shows: over a tenth of a metre it
 looks like the form of another foot. Chosen by hand."""
 LEFT_OF_TREMOR = 0.2
@@ -57,13 +58,46 @@ class ErrorField(NamedTuple):
 
     cause: ErrorCause
     deviations: Floats
-    """(V,) standard deviations of the displacement along the normal, mm"""
+    """(V,) standard deviations of the displacement along the normal, mm; of vertices that share an error, with the sign
+    in which it displaces each"""
     reach_mm: float = 0.0
     """Distance over which vertices share their error; 0: each has its own."""
+    is_of_section: bool = False
+    """True if all vertices at about the same X share it, as where the whole foot moved while it was scanned"""
+
+    @property
+    def places(self) -> tuple[float, bool]:
+        """What `shares` depend on."""
+        return self.reach_mm, self.is_of_section
+
+    def shares(self, vertices: Floats) -> csr_array:
+        """(V, N) shares of N independent standard normal errors in that of each vertex, in its standard deviations.
+
+        `vertices` : (V, 3) mm
+        """
+        if not self.reach_mm:
+            return csr_array(eye_array(len(vertices)))
+        return _shares(vertices[:, :1] if self.is_of_section else vertices, self.reach_mm)
 
     def of(self, source: NDArray[np.intp]) -> "ErrorField":
         """The errors of W other vertices; source : (W,) index of the vertex that each of them was."""
         return self._replace(deviations=self.deviations[source])
+
+
+def _shares(places: Floats, reach_mm: float) -> csr_array:
+    """(V, N) linear interpolation at `places` (V, D) between errors at the N nodes of a grid, of unit variance."""
+    cells = places / reach_mm
+    low = np.floor(cells).astype(np.int64)
+    part = cells - low
+    low -= low.min(axis=0)
+    size = low.max(axis=0) + 2
+    corners = np.array(list(np.ndindex((2,) * places.shape[1])))
+    numbers = np.stack([np.ravel_multi_index((low + corner).T, size) for corner in corners], axis=1)
+    weights = np.stack([np.prod(np.where(corner, part, 1.0 - part), axis=1) for corner in corners], axis=1)
+    weights /= np.sqrt(np.sum(weights**2, axis=1, keepdims=True))
+    nodes, columns = np.unique(numbers, return_inverse=True)
+    starts = np.arange(len(places) + 1) * len(corners)
+    return csr_array((weights.ravel(), columns.ravel(), starts), shape=(len(places), len(nodes)))
 
 
 class Evidence(NamedTuple):
@@ -87,7 +121,7 @@ class ScanErrors(NamedTuple):
     """The errors of a scanned surface of V vertices."""
 
     fields: list[ErrorField]
-    """One a cause"""
+    """Independent of each other"""
     is_unseen: NDArray[np.bool_]
     """(V,) far from measured surface, or an end that one camera alone saw"""
 
@@ -114,7 +148,8 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     vertices, cloud, agreement = mesh.vertices, evidence.cloud, evidence.agreement
     normals = vertex_normals(vertices, mesh.faces)
     seen = np.ones(len(vertices), bool) if mesh.filled is None else ~mesh.filled
-    beyond_mm = _beyond(vertices, ~seen, cloud)
+    step_mm = USUAL_STEP_MM if cloud is None else stripe_step(cloud)
+    beyond_mm = _beyond(vertices, ~seen, cloud, step_mm)
     alone_mm = np.minimum(_alone(vertices[:, 0], None if cloud is None else seen_ends(cloud)), evidence.lasers_apart_mm)
     gap_mm = np.maximum(beyond_mm, 0.0)
     inside = ~seen & (beyond_mm <= 0)
@@ -122,19 +157,19 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     apart_mm = 0.0 if agreement is None else math.sqrt(max(agreement.rms_mm**2 - AGREEMENT_MM**2, 0.0))
     ends = END_GROWS * np.maximum(beyond_mm, 0.0) + ALONE_GROWS * alone_mm
     fields = [
-        ErrorField("noise", _noise(vertices, cloud), REACH_MM),
+        ErrorField("noise", _noise(vertices, cloud, step_mm), REACH_MM),
         ErrorField("filling", np.where(inside, ERROR_GROWS * gap_mm, 0.0), REACH_MM),
         ErrorField("ends", ends, REACH_MM),
         ErrorField("cameras", np.full(len(vertices), OF_DISAGREEMENT * apart_mm), WIDE_MM),
-        ErrorField("tremor", _moved_mm(evidence.movement) * np.abs(normals[:, 0]), REACH_MM),
-        ErrorField("sway", SWAY_MM * np.hypot(normals[:, 0], normals[:, 1]), WIDE_MM),
+        ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, is_of_section=True),
+        ErrorField("sway", SWAY_MM * normals[:, 0], WIDE_MM, is_of_section=True),
+        ErrorField("sway", SWAY_MM * normals[:, 1], WIDE_MM, is_of_section=True),
     ]
     return ScanErrors(fields, (gap_mm > RELIABLE_MM) | (alone_mm > ALONE_MM))
 
 
-def _noise(vertices: NDArray[np.float64], cloud: NDArray[np.void] | None) -> NDArray[np.float64]:
+def _noise(vertices: NDArray[np.float64], cloud: NDArray[np.void] | None, step_mm: float) -> NDArray[np.float64]:
     """Return (V,) the standard deviations of vertices through the points of a cloud, mm."""
-    step_mm = USUAL_STEP_MM if cloud is None else stripe_step(cloud)
     noise = np.full(len(vertices), ERROR_MM * max(1.0, (step_mm / USUAL_STEP_MM) ** 2))
     if cloud is None or len(cloud) < NEAREST:
         return noise
@@ -150,17 +185,23 @@ def _moved_mm(movement: MovementReport | None) -> float:
 
 
 def _beyond(
-    vertices: NDArray[np.float64], filled: NDArray[np.bool_], cloud: NDArray[np.void] | None
+    vertices: NDArray[np.float64], filled: NDArray[np.bool_], cloud: NDArray[np.void] | None, step_mm: float
 ) -> NDArray[np.float64]:
     """Return (V,) how far each vertex lies beyond the outermost stripes along the travel, mm; 0 or less for most.
 
     Without a cloud it is measured from the outermost vertices that are not filled. The caps of heel and toes beyond the
-    stripes are broad, but less than one step high.
+    stripes are broad, but less than one step high. The outermost stripe may touch the foot beside its cap: filled
+    surface less than one step from an end counts from the measured surface that is nearest.
     """
     x, seen = vertices[:, 0], vertices[~filled, 0]
     if cloud is not None and len(cloud) > 2 * FEWEST_AT_END:
         seen = np.sort(cloud["x"].astype(np.float64))[FEWEST_AT_END - 1 : 1 - FEWEST_AT_END]
-    return np.asarray(np.maximum(seen.min() - x, x - seen.max()))
+    beyond = np.maximum(seen.min() - x, x - seen.max())
+    cap = filled & (np.minimum(x - x.min(), x.max() - x) < step_mm)
+    if cap.any() and not filled.all():
+        nearest = KDTree(vertices[~filled]).query(vertices[cap])[1]
+        beyond[cap] = np.maximum(beyond[cap], np.abs(x[cap] - x[~filled][nearest]))
+    return np.asarray(beyond)
 
 
 def _alone(x: NDArray[np.float64], ends: SeenEnds | None) -> NDArray[np.float64]:

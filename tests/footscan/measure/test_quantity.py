@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from footscan.measure.quantity import Quantity, combined
 
@@ -12,10 +13,10 @@ def test_independent_errors_add_by_their_squares() -> None:
     assert BREADTH.sd(np.full(3, 0.1)) == pytest.approx(0.2)
 
 
-def test_errors_of_one_patch_are_the_same() -> None:
-    errors, patch = np.array([0.3, 0.4, 9.0]), np.array([1, 1, 0])
-    assert LENGTH.sd(errors, patch) == pytest.approx(0.5 * 0.3 + 0.5 * 0.4)
-    assert Quantity(0.0, np.array([1.0, -1.0, 0.0])).sd(np.ones(3), patch) == 0.0
+def test_vertices_share_errors() -> None:
+    errors, shares = np.array([0.3, 0.4, 9.0]), csr_array([[0.0, 1.0], [0.0, 1.0], [1.0, 0.0]])
+    assert LENGTH.sd(errors, shares) == pytest.approx(0.5 * 0.3 + 0.5 * 0.4)
+    assert Quantity(0.0, np.array([1.0, -1.0, 0.0])).sd(np.ones(3), shares) == 0.0
 
 
 def test_a_difference_has_the_errors_and_doubts_of_both() -> None:

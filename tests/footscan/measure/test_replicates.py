@@ -5,8 +5,8 @@ import pytest
 
 from footscan.measure.frame.foot_frame import foot_frame
 from footscan.measure.measures import measure_foot
-from footscan.measure.replicates import replicates, smooth_field
-from footscan.measure.uncertainty import scatter_of
+from footscan.measure.replicates import replicates
+from footscan.measure.uncertainty import SurfaceErrors, scatter_of
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
 from footscan.surface.errors import ErrorField
@@ -28,7 +28,7 @@ def sigmas(foot: Mesh, count: int) -> np.ndarray:
     errors = [ErrorField("noise", np.full(len(foot.vertices), SD_MM), REACH_MM)]
     found = []
     for seed in range(4):
-        away = SD_MM * smooth_field(foot.vertices, REACH_MM, np.random.default_rng(seed))
+        away = SurfaceErrors(foot.vertices, errors).draw(np.random.default_rng(seed))
         moved = foot.vertices + away[:, None] * normals
         measures = measure_foot(moved, foot.faces, "right", errors=errors, count=count).measures
         for name, measure in measures.items():
@@ -44,16 +44,33 @@ def test_the_standard_deviations_hold_the_errors(foot: Mesh) -> None:
     assert np.mean(linear < 3) < np.mean(by_replicates < 3)  # landmarks on plateaus
 
 
-def test_a_field_has_unit_variance_everywhere() -> None:
-    places = np.random.default_rng(0).uniform(0.0, 300.0, (20_000, 3))
-    field = smooth_field(places, 10.0, np.random.default_rng(1))
-    assert abs(field.std() - 1.0) < 0.02
-    assert abs(field.mean()) < 0.05
+def test_a_drawn_error_is_as_large_as_said_and_shared_by_neighbours() -> None:
+    random = np.random.default_rng(0)
+    places = random.uniform(0.0, 300.0, (20_000, 3))
+    places[1] = places[0] + [0.0, 0.0, 0.1]
+    drawn = np.array([of_places(places, False).draw(random) for _ in range(200)])
+    assert drawn.std() == pytest.approx(SD_MM, rel=0.02)
+    assert abs(drawn.mean()) < 0.05 * SD_MM
+    assert np.corrcoef(drawn[:, 0], drawn[:, 1])[0, 1] > 0.99
+
+
+def test_all_of_a_section_move_together() -> None:
+    random = np.random.default_rng(0)
+    places = np.array([[100.0, -40, 0], [100, 40, 60], [160, 0, 0]])
+    drawn = np.array([of_places(places, True).draw(random) for _ in range(500)])
+    left, right, ahead = np.corrcoef(drawn.T)[0]
+    assert left == pytest.approx(1.0)
+    assert right == pytest.approx(1.0)
+    assert abs(ahead) < 0.15
+
+
+def of_places(places: np.ndarray, is_of_section: bool) -> SurfaceErrors:
+    return SurfaceErrors(places, [ErrorField("sway", np.full(len(places), SD_MM), REACH_MM, is_of_section)])
 
 
 def test_replicates_are_the_same_in_every_run(foot: Mesh) -> None:
     frame = foot_frame(foot.vertices, foot.faces, "right")
-    errors = [ErrorField("noise", np.full(len(frame.vertices), SD_MM), REACH_MM)]
+    errors = SurfaceErrors(frame.vertices, [ErrorField("noise", np.full(len(frame.vertices), SD_MM), REACH_MM)])
     first, again = (list(replicates(frame, errors, 2)) for _ in range(2))
     for one, other in zip(first, again, strict=True):
         np.testing.assert_array_equal(one.vertices, other.vertices)
