@@ -148,7 +148,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     vertices, cloud, agreement = mesh.vertices, evidence.cloud, evidence.agreement
     normals = vertex_normals(vertices, mesh.faces)
     seen = np.ones(len(vertices), bool) if mesh.filled is None else ~mesh.filled
-    step_mm = USUAL_STEP_MM if cloud is None else stripe_step(cloud)
+    step_mm = USUAL_STEP_MM if cloud is None else stripe_step(cloud) or USUAL_STEP_MM
     beyond_mm = _beyond(vertices, ~seen, cloud, step_mm)
     alone_mm = np.minimum(_alone(vertices[:, 0], None if cloud is None else seen_ends(cloud)), evidence.lasers_apart_mm)
     gap_mm = np.maximum(beyond_mm, 0.0)

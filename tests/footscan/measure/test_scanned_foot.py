@@ -104,3 +104,19 @@ def test_a_vertex_is_less_sure_far_from_what_was_seen(foot: Mesh) -> None:
     assert half.filled is not None
     assert np.median(sure[half.filled]) > 2 * np.median(sure[~half.filled])
     assert (apart > sure).all()
+
+
+def test_the_cap_of_a_heel_is_less_than_a_step_high_even_if_the_first_stripe_touched_the_foot_beside_it(
+    foot: Mesh,
+) -> None:
+    heel = foot.vertices[np.argmin(foot.vertices[:, 0])]
+    is_cap = np.linalg.norm(foot.vertices - heel, axis=1) < 9.0
+    beside = np.tile(heel + np.array([0.05, 30.0, 0.0]), (9, 1))
+    cloud = make_points(np.concatenate([beside, foot.vertices[~is_cap]]), camera=1)
+    cloud["cameras"] = 2
+    cap = Mesh(foot.vertices, foot.faces, filled=is_cap)
+    length = measure_scanned_foot(cap, "right", GlassPlane(), evidence=Evidence(cloud)).measures["foot_length"]
+    assert length.status == "ok"
+    assert length.budget is not None
+    assert length.budget["ends"] > 0.05
+    assert length.budget.get("filling", 0.0) < 0.05
