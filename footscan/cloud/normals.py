@@ -1,5 +1,6 @@
 """Normals of a cloud, oriented outward."""
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.planes import SUMS, add_point, plane_normal
-from footscan.cloud.points import coordinates, stripe_step
+from footscan.cloud.points import PLANE_MM, coordinates, stripe_step
 from footscan.cloud.views import View
 from footscan.compiled import compiled
 from footscan.mesh.voxels import EMPTY, voxelise
@@ -24,6 +25,8 @@ FEWEST = 6
 LEAST_BREADTH = 0.15
 """Least standard deviation of the neighbours across their longest direction, relative to the radius; with less the
 radius is doubled, since points of one stripe lie on a line. Chosen by hand."""
+FAR = 6
+"""Radii within which the next stripe is sought where the neighbours of a point lie on one stripe. Chosen by hand."""
 PASSES = 50
 """How often the orientation spreads from normals to their neighbours at most: a bound of time."""
 CAMERAS = 256
@@ -111,11 +114,11 @@ def _fit(
     The points `xyz` (N, 3) are sorted by cell.
     """
     normals = np.empty(xyz.shape)
-    near, wide = np.empty(xyz.shape), np.empty(xyz.shape)
+    near, wide, far = np.empty(xyz.shape), np.empty(xyz.shape), np.empty(xyz.shape)
     sums = np.empty(SUMS)
     for v in range(len(place)):
         count = _gather(xyz, starts, number, place[v], window, near)
-        wide_count = 0
+        wide_count = far_count = 0
         for n in range(starts[v], starts[v + 1]):
             narrow = _sum_up(near[:count], xyz[n], radius, sums)
             nx, ny, nz, _, breadth = plane_normal(sums)
@@ -124,8 +127,41 @@ def _fit(
                     wide_count = _gather(xyz, starts, number, place[v], 2 * window, wide)
                 _sum_up(wide[:wide_count], xyz[n], 2.0 * radius, sums)
                 nx, ny, nz, _, _ = plane_normal(sums)
+                if sums[4] * sums[0] - sums[1] ** 2 < (PLANE_MM * sums[0]) ** 2:  # the points of one stripe alone
+                    if far_count == 0:
+                        far_count = _gather(xyz, starts, number, place[v], FAR * window, far)
+                    nx, ny, nz = _beside_stripe(xyz[n], sums, far[:far_count], nx, ny, nz)
             normals[n, 0], normals[n, 1], normals[n, 2] = nx, ny, nz
     return normals
+
+
+@compiled
+def _beside_stripe(
+    middle: Floats, sums: Floats, far: Floats, nx: float, ny: float, nz: float
+) -> tuple[float, float, float]:
+    """The normal of the surface between a stripe and the nearest point of another one; the given one without that.
+
+    The outermost stripe on a heel is farther from the next one than its neighbours are from each other. The plane
+    through them is that of the laser.
+
+    sums : over the points of the stripe near `middle`. far : points around
+    """
+    nearest, kx, ky, kz = np.inf, 0.0, 0.0, 0.0
+    for m in range(len(far)):
+        x, y, z = far[m, 0] - middle[0], far[m, 1] - middle[1], far[m, 2] - middle[2]
+        squared = x * x + y * y + z * z
+        if abs(x) > PLANE_MM and squared < nearest:
+            nearest, kx, ky, kz = squared, x, y, z
+    yy = sums[7] * sums[0] - sums[2] ** 2
+    yz = sums[8] * sums[0] - sums[2] * sums[3]
+    zz = sums[9] * sums[0] - sums[3] ** 2
+    angle = 0.5 * math.atan2(2.0 * yz, yy - zz)
+    ty, tz = math.cos(angle), math.sin(angle)  # along the stripe
+    x, y, z = ty * kz - tz * ky, tz * kx, -ty * kx
+    length = math.sqrt(x * x + y * y + z * z)
+    if not math.isfinite(nearest) or length == 0.0:
+        return nx, ny, nz
+    return x / length, y / length, z / length
 
 
 @compiled

@@ -11,7 +11,7 @@ from footscan.surface.ankle import cut_flat, opening_height
 from footscan.surface.patch import fair
 from footscan.surface.poisson import indicator, level_surface
 from footscan.surface.projection import Projection, project
-from footscan.surface.travel_ends import drawn_to_tips, travel_ends
+from footscan.surface.travel_ends import TravelEnd, drawn_to_tips, travel_ends
 from schemas.base.errors import Finding
 from schemas.parameters.surface import SurfaceParameters
 
@@ -22,6 +22,9 @@ EVENING_ROUNDS = 2
 Chosen by hand."""
 LEAST_SECTORS = 7
 """A measured vertex has points in at least this many of eight directions; chosen by hand."""
+CAP_STEPS, AWAY_STEPS = 0.25, 0.5
+"""Surface is within the outermost stripe if it lies no farther than the first before the plane of that stripe, and
+farther than the second from its points, in steps. Chosen by hand."""
 LEAST_POINTS = 50
 """Fewer points are refused; chosen by hand."""
 LEAST_MEASURED = 0.5
@@ -77,6 +80,7 @@ def close_surface(
         on_cloud = _project(_evened(on_cloud, faces), faces, cloud, parameters, 1)
     vertices = on_cloud.points
     is_measured = (on_cloud.gap_steps <= parameters.gap_steps) & (on_cloud.sectors >= LEAST_SECTORS)
+    is_measured &= ~_in_cap(on_cloud, cloud, ends)
     if is_measured.mean() < LEAST_MEASURED:
         raise Finding(
             f"{len(xyz)} points do not surround a solid: {100 * is_measured.mean():.0f} % of a closed surface would "
@@ -102,6 +106,16 @@ def close_surface(
 def _project(points: Floats, faces: Faces, cloud: _Cloud, parameters: SurfaceParameters, rounds: int) -> Projection:
     normals = vertex_normals(points, faces)
     return project(points, normals, cloud.points, cloud.normals, cloud.step_mm, parameters.reach_steps, rounds)
+
+
+def _in_cap(placed: Projection, cloud: _Cloud, ends: tuple[TravelEnd, TravelEnd]) -> NDArray[np.bool_]:
+    """True for the points (N,) within the outermost stripe of an end, as on a heel.
+
+    All their neighbours are of that stripe, which does not say how the surface bends within it.
+    """
+    away = np.linalg.norm(placed.points - cloud.points[placed.nearest], axis=1)
+    outermost = np.maximum(*(end.outward * (placed.points[:, 0] - end.last_mm) for end in ends))
+    return np.asarray((outermost > -CAP_STEPS * cloud.step_mm) & (away > AWAY_STEPS * cloud.step_mm))
 
 
 def _evened(placed: Projection, faces: Faces) -> Floats:

@@ -34,8 +34,8 @@ STRAY = 10
 
 BROAD_MM = 12.0
 """Radius of curvature, upright, from which an end is broad: a heel, whose curvature the surface continues to a tenth of
-a millimetre. It overshoots narrow tips, as of toes. Tuned on 34 scans of 28 virtual feet (`draw_assembled`), steps of 2
-and 4 mm: radii of 14 to 30 mm against 3 to 11 mm."""
+a millimetre, and a quadric does not. It overshoots narrow tips, as of toes. Tuned on 34 scans of 28 virtual feet
+(`draw_assembled`), steps of 2 and 4 mm: radii of 14 to 30 mm against 3 to 11 mm."""
 DEPTH_STEPS, EXTENT = 1.5, (0.02, 0.98)
 """Depth of the end at which that radius is taken, and the quantiles of Z there. Chosen by hand."""
 
@@ -59,7 +59,7 @@ class TravelEnd:
     tip_mm: float | None
     """Distance of the tip beyond that stripe as the sections predict it; None where there are too few of them."""
     is_broad: bool = False
-    """True of a heel."""
+    """True of a heel whose points are scattered: `tip_mm` says less of it than its surface."""
 
     @property
     def limit(self) -> float:
@@ -124,7 +124,6 @@ def travel_ends(points: Floats, step_mm: float) -> tuple[Mask, tuple[TravelEnd, 
                 least_mm=first * (step_mm - BEFORE_MM),
                 most_mm=step_mm + first * BEHIND_MM,
                 tip_mm=max(predictions) * step_mm if predictions else None,
-                is_broad=_is_broad(points, outward, step_mm),
             )
         )
     return grazing, (ends[0], ends[1])
@@ -156,8 +155,8 @@ def drawn_to_tips(vertices: Floats, ends: tuple[TravelEnd, TravelEnd]) -> Floats
     """Move the vertices beyond the last stripes along X so that the surface ends at the tips.
 
     The surface continues smoothly beyond a stripe, and its curvature there predicts the tip too. The sections predict
-    it by how they shrink. The errors of the two predictions are independent, and their mean is taken; at a broad end,
-    whose sections shrink fast, the surface is left as it is.
+    it by how they shrink. The errors of the two predictions are independent, and their mean is taken; at a broad end
+    without sections, the surface is left as it is.
 
     Parameters
     ----------

@@ -12,6 +12,7 @@ from footscan.cloud.outliers.body import body_range, is_apart
 from footscan.cloud.outliers.clutter import is_island, is_static
 from footscan.cloud.outliers.ghost import is_ghost
 from footscan.cloud.outliers.glass import is_below_sole, is_plate
+from footscan.cloud.outliers.inside import is_inside
 from footscan.cloud.outliers.levels import is_far, is_off_median
 from footscan.cloud.outliers.moments import planes_apart
 from footscan.cloud.outliers.off_surface import is_off_surface
@@ -81,8 +82,8 @@ def remove_outliers(
       other;
     - the last points of a stripe where other cameras see the same place within their stripes ("end"), segments of
       stripe without any before and behind them ("isolated"), and segments that other cameras should see, but do not,
-      or that lie behind a surface on which more cameras agree, and points off the surface that the stripes around them
-      make ("unconfirmed");
+      or that lie behind a surface on which more cameras agree, points off the surface that the stripes around them
+      make, and points inside the skin of an end ("unconfirmed");
     - parts apart from the rest that are small, or on which cameras do not agree ("clutter" again).
 
     With the method `levels` they are dropped without the evidence of other cameras, as in the thesis: points far from
@@ -141,6 +142,7 @@ def remove_outliers(
     _drop_by_segment(points, codes, views, parameters, filmed)
     drop_glass(is_plate)  # without what seemed to be its sides
     drop("unconfirmed", is_off_surface)
+    drop("unconfirmed", is_inside)
     if body is not None:
         drop("clutter", is_apart)
     drop("clutter", lambda left: is_island(left, parameters.island_gap_steps, parameters.island_share))

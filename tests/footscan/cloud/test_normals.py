@@ -75,6 +75,18 @@ def test_a_stripe_far_from_others_takes_a_wider_look(ellipsoid: Film, views: Vie
     assert np.median(degrees(normals, outward[there])[alone]) < 3.0
 
 
+def test_the_outermost_stripe_of_a_heel_is_not_the_plane_of_the_laser() -> None:
+    """The next stripe is farther away than the neighbours along the stripe."""
+    x, angle = (part.ravel() for part in np.meshgrid(1.1 + 2.0 * np.arange(8), np.linspace(0, 2 * np.pi, 180)))
+    radius = np.sqrt(90.0 * x - x**2)  # a sphere of radius 45 mm
+    skin = np.column_stack([x, radius * np.cos(angle), radius * np.sin(angle)])
+    cloud = make_points(skin, camera=1, frame=np.round(x / 2).astype(int))
+    normals = estimate_normals(cloud, {}, NormalParameters())
+    first = x < 2.0
+    outward = (skin - [45.0, 0.0, 0.0]) / 45.0
+    assert degrees(normals[first], outward[first]).max() < 5.0
+
+
 def test_the_same_at_every_call(ellipsoid: Film, views: Views) -> None:
     cloud, _ = ellipsoid()
     first = estimate_normals(cloud, views, NormalParameters())

@@ -58,6 +58,21 @@ def test_sphere_is_met_between_the_stripes_and_not_shortened_beyond_the_last() -
     assert mesh.vertices[:, 0].max() == pytest.approx(RADIUS, abs=0.06)
 
 
+def test_the_cap_within_the_outermost_stripe_bulges() -> None:
+    """A heel: the ring of the first stripe is not round, and the quadric of its points does not say how it bends."""
+    axes = np.array([100.0, 45.0, 30.0])
+    places = np.random.default_rng(2).normal(size=(4_000_000, 3))
+    places *= axes / np.linalg.norm(places, axis=1, keepdims=True)
+    outward = places / axes**2
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    points, normals = stripes(places, outward, offset=0.9)  # the first stripe lies 0.9 mm before the end
+    mesh = closed(points, normals)
+    cap = mesh.vertices[mesh.vertices[:, 0] < points[:, 0].min()]
+    assert cap[:, 0].min() == pytest.approx(-axes[0], abs=0.1)
+    off = np.sqrt(np.sum((cap / axes) ** 2, axis=1)) - 1.0
+    assert np.abs(off * axes[0]).max() < 0.15
+
+
 def test_steps_are_not_to_be_seen_as_ribs() -> None:
     """The distance to the sphere does not follow the distance to the nearest stripe."""
     mesh = closed(*sphere())

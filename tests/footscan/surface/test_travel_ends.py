@@ -144,11 +144,11 @@ def test_planes_between_each_other_tell_the_tip_too(beyond: float) -> None:
     assert end.limit == pytest.approx(beyond + 0.9 + 8 * STEP)
 
 
-def test_a_broad_end_is_left_as_the_surface_continues_it() -> None:
+def test_a_broad_end_of_scattered_stripes_is_left_as_the_surface_continues_it() -> None:
     for radius, is_broad in ((25.0, True), (6.0, False)):
         angles = np.linspace(0.0, 2 * np.pi, 200)
         ring = np.column_stack([np.zeros(200), np.cos(angles), np.sin(angles)])
-        x = np.arange(-radius + 0.7, radius, 2.0)
+        x = np.concatenate([np.arange(-radius + away, radius, 2.0) for away in (0.7, 1.4, 2.2)])  # three heads
         points = np.concatenate([[place, 0.0, 0.0] + np.sqrt(radius**2 - place**2) * ring for place in x])
         _, ends = travel_ends(points, step_mm=2.0)
         assert ends[0].is_broad == is_broad
