@@ -102,7 +102,9 @@ def _run_window(
     body: Body | None,
 ) -> Iterator[tuple[int, WorldOutcome]]:
     out.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(prefix="worlds-", dir=out) as folder, Workspace(Path(folder) / "cache") as workspace:
+    # A worker may still be writing when the last outcome is there.
+    temporary = TemporaryDirectory(prefix="worlds-", dir=out, ignore_cleanup_errors=True)
+    with temporary as folder, Workspace(Path(folder) / "cache") as workspace:
         graphs: dict[int, list[Step]] = {}
         if kind == "points":
             graphs = {world.seed: point_steps(world, parameters, body) for world in worlds}

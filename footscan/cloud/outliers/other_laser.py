@@ -57,7 +57,7 @@ LINKED_MM = 1.0
 FEWEST_AT_END = 20
 """Confirmed points that make an end of the skin along the travel. Chosen by hand."""
 EXTRAPOLATED = 0.15
-"""Error of an end of the foot that is extrapolated, in mm per mm: `END_GROWS` of the uncertainty of measures."""
+"""Largest usual error of an end of the foot that is extrapolated, in mm per mm. Chosen by hand."""
 FEW = 0.1
 """Share of the points of another head below which a head has not met the skin yet, or no longer. Chosen by hand."""
 SMOOTHED = 20
