@@ -25,7 +25,14 @@ from footscan.cloud.heads.equations import (
     spread_unmoved,
     unmoved_heads,
 )
-from footscan.cloud.heads.planes import calibrated_places, displaced, head_indices, heads_of, views_at
+from footscan.cloud.heads.planes import (
+    calibrated_places,
+    displaced,
+    head_indices,
+    heads_of,
+    planes_filmed,
+    views_at,
+)
 from footscan.cloud.heads.start import first_places
 from footscan.cloud.heads.verdict import HALF_MM, report_of
 from footscan.cloud.outliers.moments import renumbered
@@ -93,7 +100,7 @@ def find_heads(points: NDArray[np.void], views: Mapping[int, View], parameters: 
     moved = fit.places - known
     fit = fit._replace(places=moved - moved.mean(axis=0))
     found = nothing.model_copy(update={"comparisons": across})
-    return report_of(found, heads, fit, unmoved_mm, parameters)
+    return report_of(found, heads, fit, unmoved_mm, parameters, filmed=planes_filmed(views, heads))
 
 
 def _refined(

@@ -62,6 +62,16 @@ def calibrated_places(views: Mapping[int, View], heads: Mapping[int, int], x_mm:
     return places
 
 
+def planes_filmed(views: Mapping[int, View], heads: Mapping[int, int]) -> bool:
+    """True if a film has shown where the laser planes of all cameras on `heads` lie.
+
+    >>> planes_filmed({}, {1: 1})
+    False
+    """
+    planes = [views[camera].plane if camera in views else None for camera in heads]
+    return all(plane is not None and any(plane.sd) for plane in planes)
+
+
 def displaced(points: NDArray[np.void], places: Floats, head_of: NDArray[np.intp], x_mm: float) -> NDArray[np.void]:
     """Move points along X to where places (H, 4) of their heads put them; `head_of` as of `head_indices`."""
     head = head_of[points["camera"]]

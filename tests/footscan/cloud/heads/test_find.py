@@ -1,13 +1,16 @@
 """Where the heads are, from the skin that cameras of two heads see."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from footscan.cloud.heads.find import find_heads
 from footscan.cloud.heads.planes import corrected, places_of
+from schemas.calibration import LaserPlane
 from schemas.heads import HeadsReport
 from schemas.parameters.heads import HeadParameters
-from tests.footscan.cloud.heads.ellipsoid import points_of, views
+from tests.footscan.cloud.heads.ellipsoid import HEADS, points_of, views
 
 SMALL = (0.0, 0.0, -0.3)
 
@@ -60,6 +63,25 @@ def test_a_turned_plane_is_found() -> None:
     yaw = places_of(report)[:, 1]
     assert yaw[0] - yaw[2] == pytest.approx(0.008, abs=0.003)
     assert report.is_corrected
+
+
+def test_heads_whose_planes_were_filmed_are_corrected_if_that_explains_what_cameras_disagree_by() -> None:
+    filmed = {
+        camera: replace(view, plane=LaserPlane(head=HEADS[camera] + 1, sd=[0.01] * 7))
+        for camera, view in views().items()
+    }
+    assert find_heads(points_of((0.0, 0.0, -0.15)), filmed, HeadParameters()).is_corrected
+    warped = points_of((0.0, 0.0, 0.0))  # maps that err by a tenth of a millimetre
+    random = np.random.default_rng(1)
+    for camera in filmed:
+        rows = warped["camera"] == camera
+        tilt, lift, wave = random.normal(0.0, 0.1, 3)
+        warped["y"][rows] += tilt * (warped["z"][rows] - 57.0) / 40.0
+        warped["z"][rows] += lift * warped["y"][rows] / 40.0
+        warped["y"][rows] += wave * np.sin(warped["y"][rows] / 20.0)
+    assert find_heads(warped, views(), HeadParameters()).is_corrected
+    report = find_heads(warped, filmed, HeadParameters())
+    assert (report.is_corrected, report.doubt) == (False, None)
 
 
 def test_heads_that_travel_one_after_the_other_are_not_trusted_if_they_are_off() -> None:
