@@ -170,10 +170,13 @@ def _gather(
 ) -> int:
     """Copy the points of the cells around a place into `near`; returns their number."""
     count = 0
-    a, b, c = place
-    for i in range(a - window[0], a + window[0] + 1):
-        for j in range(b - window[1], b + window[1] + 1):
-            for k in range(c - window[2], c + window[2] + 1):
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+    for axis in range(3):  # a wide window reaches beyond the cells
+        low[axis] = max(place[axis] - window[axis], 0)
+        high[axis] = min(place[axis] + window[axis] + 1, number.shape[axis])
+    for i in range(low[0], high[0]):
+        for j in range(low[1], high[1]):
+            for k in range(low[2], high[2]):
                 if number[i, j, k] != EMPTY:
                     for m in range(starts[number[i, j, k]], starts[number[i, j, k] + 1]):
                         near[count, 0], near[count, 1], near[count, 2] = xyz[m, 0], xyz[m, 1], xyz[m, 2]
