@@ -12,6 +12,9 @@ Count = Annotated[int, Field(ge=0)]
 Length = Annotated[float, Field(ge=0)]
 Kind = Literal["none", "rigid", "affine", "quadratic"]
 
+MANY_DISTRUSTED = 2
+"""Cameras that deviate from which on the others are in doubt, too: those of one head, for instance. Chosen by hand."""
+
 
 class Disagreement(Document):
     """Distances in mm between what two cameras see of the same skin, along its normal in the laser's plane."""
@@ -73,6 +76,21 @@ class FusionReport(Document):
     contradicted: dict[Camera, Count] = Field(default_factory=dict)
     """Number of points by camera that were dropped in favour of other cameras."""
     warnings: list[str] = Field(default_factory=list)
+
+    @property
+    def doubt(self) -> str | None:
+        """Reason for which measures are uncertain: if several cameras deviate, it is not known which are right.
+
+        >>> FusionReport(distrusted=[3, 4]).doubt
+        "cameras 3 and 4 deviate from the others: check them with 'footscan calibrate check', then scan again"
+        >>> FusionReport(distrusted=[3]).doubt is None
+        True
+        """
+        if len(self.distrusted) < MANY_DISTRUSTED:
+            return None
+        *first, last = map(str, self.distrusted)
+        which = f"cameras {', '.join(first)} and {last}"
+        return f"{which} deviate from the others: check them with 'footscan calibrate check', then scan again"
 
     @property
     def rms_mm(self) -> float:

@@ -40,7 +40,7 @@ def measure_scanned_foot(
     Finding
         The surface is no foot.
     """
-    errors, movement = scan_errors(mesh, evidence), evidence.movement
+    errors, reports = scan_errors(mesh, evidence), (evidence.movement, evidence.agreement)
     return measure_foot(
         mesh.vertices,
         mesh.faces,
@@ -49,7 +49,10 @@ def measure_scanned_foot(
         count=REPLICATES,
         filled=errors.is_unseen,
         glass=glass,
-        doubts=[*doubts, *filter(None, [_unseen_sole(mesh), None if movement is None else movement.doubt])],
+        doubts=[
+            *doubts,
+            *filter(None, [_unseen_sole(mesh), *(report.doubt for report in reports if report is not None)]),
+        ],
     )
 
 

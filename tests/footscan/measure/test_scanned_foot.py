@@ -120,3 +120,12 @@ def test_the_cap_of_a_heel_is_less_than_a_step_high_even_if_the_first_stripe_tou
     assert length.budget is not None
     assert length.budget["ends"] > 0.05
     assert length.budget.get("filling", 0.0) < 0.05
+
+
+def test_several_cameras_that_deviate_put_all_measures_in_doubt(foot: Mesh) -> None:
+    statuses = []
+    for distrusted in ([3], [3, 4]):
+        evidence = Evidence(agreement=FusionReport(distrusted=distrusted))
+        measures = measure_scanned_foot(foot, "right", GlassPlane(), evidence=evidence).measures
+        statuses.append({measures[name].status for name in ("foot_length", "foot_breadth", "ball_girth")})
+    assert statuses == [{"ok"}, {"uncertain"}]
