@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from footscan.cloud.fusion.stripes import Floats
 from footscan.cloud.heads.comparisons import HEAD_TERMS, RIGID, Comparisons, Ints
@@ -101,9 +102,11 @@ def likeliest(comparisons: Comparisons, origins: list[Floats], distance: Floats,
 
 def groups_of(comparisons: Comparisons) -> Ints:
     """(M,) numbers of what one pair of cameras sees on one stretch of the travel."""
-    low, high = comparisons.cameras.min(axis=1), comparisons.cameras.max(axis=1)
-    _, group = np.unique(np.column_stack([low, high, comparisons.stretch]), axis=0, return_inverse=True)
-    return np.asarray(group.ravel(), np.intp)
+    first, second = comparisons.cameras.T
+    one_row = np.stack([np.minimum(first, second), np.maximum(first, second), comparisons.stretch])
+    one_row -= one_row.min(axis=1, keepdims=True, initial=0)
+    numbers = np.ravel_multi_index(tuple(one_row), tuple(one_row.max(axis=1, initial=0) + 1))
+    return np.asarray(np.unique(numbers, return_inverse=True)[1], np.intp)
 
 
 def displacements(change: Floats, comparisons: Comparisons, places: Floats) -> Floats:
@@ -136,8 +139,10 @@ def solve(comparisons: Comparisons, change: Floats, distance: Floats, near: Head
         scale = max(1.0, MAD_TO_SD * float(np.median(left)) if len(left) else 1.0)
         weights = INDEPENDENT * weigh(left / scale) / (scale * noise) ** 2
         known = _priors(heads, unknowns[of_heads:of_cameras].reshape(cameras, RIGID))
-        normal = (rows.T * weights) @ rows + known
-        unknowns = np.linalg.solve(normal, rows.T @ (weights * distance))
+        root = np.sqrt(weights)
+        weighted = rows * root[:, None]
+        normal = weighted.T @ weighted + known
+        unknowns = np.linalg.solve(normal, weighted.T @ (root * distance))
     left = distance - rows @ unknowns
     sd = _deviations(comparisons, rows * (weights * left)[:, None], normal, known)
     return HeadFit(
@@ -198,8 +203,7 @@ def _deviations(comparisons: Comparisons, errors: Floats, normal: Floats, known:
     """
     group = groups_of(comparisons)
     groups = int(group.max()) + 1 if len(group) else 0
-    sums = np.zeros((groups, errors.shape[1]))
-    np.add.at(sums, group, errors)
+    sums = csr_array((np.ones(len(group)), (group, np.arange(len(group)))), (groups, len(group))) @ errors
     scatter = (sums.T @ sums) * groups / max(groups - errors.shape[1], 1) + known
     inverse = np.linalg.inv(normal)
     return np.sqrt(np.diag(inverse @ scatter @ inverse))

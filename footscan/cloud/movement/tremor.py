@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
 
 from footscan.cloud.fusion.agreement import GAP_STEPS
 from footscan.cloud.fusion.stripes import Floats, Stripes, sort_stripes, traces_of, ways_to_neighbours
@@ -36,6 +37,8 @@ NOISE_MM, PRIOR_MM = 0.1, 0.15
 with and without tremor (`draw_assembled`, seed 601): 0.03 to 0.06 mm remain of 0.3 mm."""
 RIDGE = 1e-2
 """Added to the normal equations of a frame: directions that its stripes do not show stay at zero."""
+FOURTH = np.array([0.25, -1.0, 1.5, -1.0, 0.25])
+"""Second differences from the middle of both neighbours, taken twice."""
 FORM = 0.3
 """Share of the standard deviation of a frame that does not follow from the form of the skin. Chosen by hand."""
 POOR, CONTINUED = 2, 4
@@ -73,9 +76,12 @@ def steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArra
         return points, MovementReport()
     x, known = _integrated(every), np.isfinite(every.way[:, 0])
     tremor = float(np.sqrt(np.mean(x[known] ** 2)))
+    report = MovementReport(tremor_mm=round(tremor, 4))
+    if tremor < LEAST_TREMOR_MM:
+        return points, report
     agreement = _agreement(comparisons, heads)
-    report = MovementReport(tremor_mm=round(tremor, 4), agreement=agreement)
-    if tremor < LEAST_TREMOR_MM or (agreement is not None and agreement < LEAST_AGREEMENT):
+    report = report.model_copy(update={"agreement": agreement})
+    if agreement is not None and agreement < LEAST_AGREEMENT:
         return points, report
     moved, way = points.copy(), _continued(x, known)
     frame = points["frame"].astype(np.intp) - (every.first - CONTINUED)
@@ -141,9 +147,9 @@ def _moves(comparisons: _Comparisons, use: NDArray[np.bool_]) -> FrameMoves | No
     weights, spread = np.ones(len(frame)), np.full(count, LEAST_MM)
     way, normal = np.zeros((count, 3)), np.zeros((count, 3, 3))
     for _ in range(ROUNDS):
-        normal, right = np.zeros((count, 3, 3)), np.zeros((count, 3))
-        np.add.at(normal, frame, weights[:, None, None] * change[:, :, None] * change[:, None, :])
-        np.add.at(right, frame, (weights * away)[:, None] * change)
+        for i, j in zip(*np.triu_indices(3), strict=True):
+            normal[:, i, j] = normal[:, j, i] = np.bincount(frame, weights * change[:, i] * change[:, j], count)
+        right = np.column_stack([np.bincount(frame, weights * away * change[:, k], count) for k in range(3)])
         way = np.asarray(np.linalg.solve(normal + RIDGE * np.eye(3), right[:, :, None])[:, :, 0])
         left = np.abs(away - np.einsum("mk,mk->m", change, way[frame]))
         spread = np.maximum(MAD_TO_SD * _medians(left, frame, count), LEAST_MM)
@@ -178,19 +184,24 @@ def _integrated(moves: FrameMoves) -> Floats:
     """
     way, sd = moves.way[:, 0], moves.sd[:, 0]
     count = len(way)
-    second = np.eye(count) - 0.5 * (np.eye(count, k=1) + np.eye(count, k=-1))
     inner = np.arange(2, count - 2)
     known = inner[np.isfinite(way[inner - 1] + way[inner] + way[inner + 1])]
     if not known.size:
         return np.zeros(count)
-    rows = (second @ second)[known]
     right = way[known] - 0.5 * (way[known - 1] + way[known + 1])
     noise = np.hypot(NOISE_MM, FORM * np.sqrt(sd[known] ** 2 + 0.25 * (sd[known - 1] ** 2 + sd[known + 1] ** 2)))
-    weights, x, prior = noise**-2.0, np.zeros(count), np.eye(count) / PRIOR_MM**2
+    weights, x = noise**-2.0, np.zeros(count)
+    around = known[:, None] + np.arange(len(FOURTH)) - len(FOURTH) // 2
     for _ in range(ROUNDS):
-        x = np.asarray(np.linalg.solve((rows.T * weights) @ rows + prior, rows.T @ (weights * right)))
-        weights = noise**-2.0 / (1.0 + ((right - rows @ x) / (2.0 * noise)) ** 2)
-    return np.asarray(x)
+        bands = np.zeros((len(FOURTH), count))
+        for k in range(len(FOURTH)):
+            products = FOURTH[: len(FOURTH) - k] * FOURTH[k:]
+            bands[-1 - k] = np.bincount(around[:, k:].ravel(), np.outer(weights, products).ravel(), count)
+        bands[-1] += PRIOR_MM**-2.0
+        sums = np.bincount(around.ravel(), np.outer(weights * right, FOURTH).ravel(), count)
+        x = np.asarray(solveh_banded(bands, sums, check_finite=False))
+        weights = noise**-2.0 / (1.0 + ((right - x[around] @ FOURTH) / (2.0 * noise)) ** 2)
+    return x
 
 
 def _continued(x: Floats, known: NDArray[np.bool_]) -> Floats:

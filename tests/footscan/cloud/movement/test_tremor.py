@@ -72,13 +72,13 @@ def test_a_still_foot_is_left_where_it_is() -> None:
 
 
 def test_heads_that_run_unevenly_are_no_tremor() -> None:
-    jitter = np.random.default_rng(1).normal(0.0, 0.2, (2, FRAMES))
+    jitter = np.random.default_rng(1).normal(0.0, 0.4, (2, FRAMES))
     points = scan(jitter)
     moved, report = steadied(points, HEADS)
     np.testing.assert_array_equal(moved, points)
     assert report.agreement is not None
     assert report.agreement < 0.5
-    assert report.tremor_mm > 0.03  # it counts as an error of the measures
+    assert report.tremor_mm > 0.1  # it counts as an error of the measures
 
 
 def test_points_that_show_nothing_are_left() -> None:
