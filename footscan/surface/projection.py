@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from footscan.compiled import compiled
 from footscan.mesh.buckets import Buckets, sort_into_cubes
+from footscan.side_by_side import Arrays, in_pieces
 
 STEEPEST = 0.35
 """Sine of the least angle between surface and stripe planes by which neighbourhoods grow: a toe is no quadric, and
@@ -77,8 +78,11 @@ def project(
     ([[5.2, 5.0, 0.0]], [60], [8])
     """
     buckets = sort_into_cubes(cloud, reach_steps * step_mm)
-    moved = _project(points, normals, cloud, cloud_normals, step_mm, reach_steps, rounds, buckets)
-    return Projection(*moved)
+
+    def projected(rows: slice) -> Arrays:
+        return _project(points[rows], normals[rows], cloud, cloud_normals, step_mm, reach_steps, rounds, buckets)
+
+    return Projection(*in_pieces(len(points), projected))
 
 
 @compiled

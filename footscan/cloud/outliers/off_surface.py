@@ -15,6 +15,7 @@ from footscan.cloud.points import PLANE_MM, coordinates
 from footscan.compiled import compiled
 from footscan.mesh.buckets import Buckets, sort_into_cubes
 from footscan.robust import MAD_TO_SD
+from footscan.side_by_side import Arrays, in_pieces
 
 JUDGED = 3
 """Every third point of a stripe is judged, for all three: neighbours along a stripe are closer than its width."""
@@ -67,7 +68,7 @@ def is_off_surface(points: NDArray[np.void]) -> NDArray[np.bool_]:
     places = coordinates(ordered[judged])
     own = stripe[judged].astype(np.int64)
     around = Surroundings(RADIUS_MM, OFF, LEAST_OFF_MM, SURROUNDING)
-    off = _off(places, own, places, own, sort_into_cubes(places, RADIUS_MM), around)
+    off = _off_side_by_side(places, own, places, own, around)
     selected = np.empty(len(points), np.bool_)
     selected[order] = np.repeat(off, np.diff(judged, append=len(points)))
     return selected
@@ -91,7 +92,7 @@ def is_off_shared_surface(cloud: NDArray[np.void]) -> NDArray[np.bool_]:
         # Numbers below 0: what several cameras saw is never of the same stripe.
         own, other = np.arange(len(alone)), np.full(len(shared), -1)
         around = Surroundings(SHARED_RADIUS_MM, SHARED_OFF, LEAST_SHARED_OFF_MM, 0)
-        off[alone] = _off(places, own, known, other, sort_into_cubes(known, SHARED_RADIUS_MM), around)
+        off[alone] = _off_side_by_side(places, own, known, other, around)
     return off
 
 
@@ -104,6 +105,22 @@ class Surroundings(NamedTuple):
     least_off_mm: float
     surrounding: int
     """Neighbours before the point, and behind it, at least."""
+
+
+def _off_side_by_side(
+    places: NDArray[np.float64],
+    stripe: NDArray[np.int64],
+    known: NDArray[np.float64],
+    known_stripe: NDArray[np.int64],
+    around: Surroundings,
+) -> NDArray[np.bool_]:
+    """As of `_off`."""
+    buckets = sort_into_cubes(known, around.radius_mm)
+
+    def off(rows: slice) -> Arrays:
+        return (_off(places[rows], stripe[rows], known, known_stripe, buckets, around),)
+
+    return in_pieces(len(places), off)[0]
 
 
 @compiled

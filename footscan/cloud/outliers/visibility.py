@@ -16,6 +16,7 @@ from footscan.cloud.planes import SUMS, add_point, plane_normal
 from footscan.cloud.views import View
 from footscan.compiled import compiled
 from footscan.mesh.voxels import EMPTY, Voxels
+from footscan.side_by_side import Arrays, in_pieces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -115,7 +116,14 @@ def ask_others(
     sides = [_sides(view) for view in views]
     bounds = np.concatenate([[0], np.cumsum([len(side) for side in sides])])
     heads = np.array([0 if view is None or view.plane is None else view.plane.head for view in views])
-    return _ask(xyz, camera, voxel, Eyes(centres, np.concatenate(sides), bounds, heads), voxels, sight)
+    eyes = Eyes(centres, np.concatenate(sides), bounds, heads)
+    is_witness = _witnesses(xyz, camera, voxel, eyes, voxels, sight)
+    near = cameras_around(voxels.number, sight.seen, voxels.place)
+
+    def answered(rows: slice) -> Arrays:
+        return (_ask(xyz[rows], camera[rows], voxel[rows], eyes, voxels, sight, is_witness, near),)
+
+    return in_pieces(len(xyz), answered)[0]
 
 
 def _sides(view: View | None) -> Floats:
@@ -170,13 +178,19 @@ class Line(NamedTuple):
 
 @compiled
 def _ask(
-    xyz: Floats, camera: NDArray[np.uint8], voxel: Ints, eyes: Eyes, voxels: Voxels, sight: Sight
+    xyz: Floats,
+    camera: NDArray[np.uint8],
+    voxel: Ints,
+    eyes: Eyes,
+    voxels: Voxels,
+    sight: Sight,
+    is_witness: NDArray[np.bool_],
+    near: NDArray[np.uint64],
 ) -> NDArray[np.uint8]:
-    """The answers of `ask_others`."""
+    """The answers of `ask_others`; is_witness (C,) as of `_witnesses`, near (V,) as of `cameras_around`."""
     centres, sides, bounds, heads = eyes
     origin, size, number, _, place = voxels
     seen, normals, films, solid = sight
-    is_witness, near = _witnesses(xyz, camera, voxel, eyes, voxels, sight), cameras_around(number, seen, place)
     answers = np.zeros(len(xyz), np.uint8)
     for n in range(len(xyz)):
         x, y, z = xyz[n]
