@@ -62,7 +62,8 @@ class FootSurface:
 
     Parameters
     ----------
-    rough : of the same mesh, or one that was displaced a little; default: it is estimated
+    rough : of the mesh of which this is a replicate, displaced a little: values are asked for, and all derivatives are
+        NaN; default: it is estimated
     """
 
     def __init__(self, foot: FootFrame, landmarks: Mapping[str, Landmark], rough: Roughness | None = None) -> None:
@@ -71,6 +72,7 @@ class FootSurface:
         self.normals: Floats = vertex_normals(foot.vertices, foot.faces)
         self.roughness = rough or roughness(foot.vertices, self.normals, foot.faces)
         self.errors, self.noise = self.roughness
+        self._no_derivatives = None if rough is None else np.full(len(self.normals), np.nan)
         self.landmarks = landmarks
         self._places: dict[str, LandmarkQuantities] = {}
         self._outlines: dict[tuple[float, ...], Outline] = {}
@@ -124,6 +126,8 @@ class FootSurface:
 
     def _landmark_gradient(self, name: str, landmark: Landmark) -> Floats:
         """Returns (3, V) derivatives of the coordinates by the displacements of the vertices."""
+        if self._no_derivatives is not None:
+            return np.broadcast_to(self._no_derivatives, (3, len(self.normals)))
         vertices, normals, point, cap = self.mesh.vertices, self.normals, landmark.point, landmark.cap
         if cap is not None and name in FACING:
             return summit_gradient(vertices, normals, point, np.array(FACING[name]), cap)
@@ -180,6 +184,8 @@ class FootSurface:
 
     def gradient(self, outline: Outline, by_points: Floats) -> Floats:
         """Returns (V,) derivatives by the displacements of the vertices, from (N, 2) ones by the outline's points."""
+        if self._no_derivatives is not None:
+            return self._no_derivatives
         by_points = outline.raw_gradient(by_points)
         shares = (1.0 - outline.loop.shares, outline.loop.shares)
         total = np.zeros(len(self.normals))

@@ -12,6 +12,11 @@ from footscan.compiled import compiled
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+SLABS = 128
+"""Slabs of a mesh across X, about 2 mm thick in a foot."""
+MARGIN_MM = 1e-6
+"""Rounding of coordinates."""
+
 
 class Cuttable(NamedTuple):
     """A mesh with the neighbours of its faces."""
@@ -22,6 +27,22 @@ class Cuttable(NamedTuple):
     """(F, 3)"""
     neighbours: Ints
     """(F, 3) face beyond the edge from corner k to the next; -1 where the mesh ends"""
+    slabs: "Slabs"
+
+
+class Slabs(NamedTuple):
+    """The faces of a mesh by the least X of their corners: a plane across X need not be held against all."""
+
+    low: Floats
+    """(3,) least coordinates of the mesh, mm"""
+    high: Floats
+    """(3,) greatest coordinates, mm"""
+    start: Ints
+    """(S + 1,) where the faces of each slab begin in `order`"""
+    order: Ints
+    """(F,)"""
+    widest: float
+    """Largest extent of a face in X, mm"""
 
 
 class Loop(NamedTuple):
@@ -39,8 +60,36 @@ class Loop(NamedTuple):
 
 def cuttable(vertices: Floats, faces: NDArray[np.integer]) -> Cuttable:
     """Prepare a mesh, (V, 3) mm and (F, 3), for `cut`."""
-    corners = np.ascontiguousarray(faces, np.int64)
-    return Cuttable(np.ascontiguousarray(vertices, np.float64), corners, face_neighbours(corners, len(vertices)))
+    corners, places = np.ascontiguousarray(faces, np.int64), np.ascontiguousarray(vertices, np.float64)
+    return Cuttable(places, corners, face_neighbours(corners, len(places)), Slabs(*_slabs(places, corners)))
+
+
+@compiled
+def _slabs(vertices: Floats, faces: Ints) -> tuple[Floats, Floats, Ints, Ints, float]:
+    """The fields of `Slabs`."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for axis in range(3):
+        for vertex in range(len(vertices)):
+            low[axis], high[axis] = min(low[axis], vertices[vertex, axis]), max(high[axis], vertices[vertex, axis])
+    widest, slab = 0.0, np.empty(len(faces), np.int64)
+    for face in range(len(faces)):
+        a, b, c = vertices[faces[face, 0], 0], vertices[faces[face, 1], 0], vertices[faces[face, 2], 0]
+        slab[face] = _slab_of(min(a, b, c), low[0], high[0])
+        widest = max(widest, max(a, b, c) - min(a, b, c))
+    start = np.zeros(SLABS + 1, np.int64)
+    for face in range(len(faces)):
+        start[slab[face] + 1] += 1
+    start = np.cumsum(start)
+    order, free = np.empty(len(faces), np.int64), start.copy()
+    for face in range(len(faces)):
+        order[free[slab[face]]] = face
+        free[slab[face]] += 1
+    return low, high, start, order, widest
+
+
+@compiled
+def _slab_of(x: float, low: float, high: float) -> int:
+    return min(max(int((x - low) / max(high - low, 1e-9) * SLABS), 0), SLABS - 1)
 
 
 @compiled
@@ -96,7 +145,7 @@ def cut(mesh: Cuttable, point: Floats, normal: Floats) -> list[Loop]:
     ([[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 0.0, 1.0]], 0.0)
     """
     height = mesh.vertices @ normal - point @ normal
-    edges, ends, closed = _traced(mesh.faces, mesh.neighbours, height >= 0)
+    edges, ends, closed = _traced(mesh.faces, mesh.neighbours, mesh.slabs, point, normal, height)
     curves = [edges[start:end] for start, end in pairwise((0, *ends.tolist()))]
     loops = [_loop(mesh.vertices, height, curve, 0.0) for curve, whole in zip(curves, closed, strict=True) if whole]
     open_curves = [curve for curve, whole in zip(curves, closed, strict=True) if not whole]
@@ -153,24 +202,31 @@ def _nearest_pairs(points: Floats) -> tuple[Ints, Floats]:
 
 
 @compiled
-def _traced(faces: Ints, neighbours: Ints, above: NDArray[np.bool_]) -> tuple[Ints, Ints, NDArray[np.bool_]]:
-    """Trace the curves between the vertices `above`, (V,), and the others from face to face, open curves first.
+def _traced(
+    faces: Ints, neighbours: Ints, slabs: Slabs, point: Floats, normal: Floats, height: Floats
+) -> tuple[Ints, Ints, NDArray[np.bool_]]:
+    """Trace the curves between the vertices at a `height` (V,) of 0 and more, and the others from face to face, open
+    curves first.
 
     Returns (N, 2) the vertices of the edges crossed, (C,) the end of each curve among these, (C,) whether it is closed.
     """
-    crossing, crossed = np.zeros(len(faces), np.bool_), np.empty(len(faces), np.int64)
+    above = height >= 0
+    first_slab, last_slab = _crossed_slabs(slabs, point, normal)
+    candidates = slabs.order[slabs.start[first_slab] : slabs.start[last_slab + 1]]
+    crossing, crossed = np.zeros(len(faces), np.bool_), np.empty(len(candidates), np.int64)
     count = 0
-    for face in range(len(faces)):
+    for face in candidates:
         first = above[faces[face, 0]]
         if first != above[faces[face, 1]] or first != above[faces[face, 2]]:
             crossing[face] = True
             crossed[count] = face
             count += 1
+    crossed = np.sort(crossed[:count])
     edges = np.empty((2 * count + 1, 2), np.int64)
     ends, closed = np.empty(count, np.int64), np.empty(count, np.bool_)
     length = curves = 0
     for seek_open in (True, False):
-        for start in crossed[:count]:
+        for start in crossed:
             if not crossing[start]:
                 continue
             slot = _crossed(faces, above, start, -1)
@@ -197,6 +253,23 @@ def _traced(faces: Ints, neighbours: Ints, above: NDArray[np.bool_]) -> tuple[In
             ends[curves], closed[curves] = length, whole
             curves += 1
     return edges[:length], ends[:curves], closed[:curves]
+
+
+@compiled
+def _crossed_slabs(slabs: Slabs, point: Floats, normal: Floats) -> tuple[int, int]:
+    """The first and the last slab with faces that a plane may cross."""
+    if normal[0] == 0.0:
+        return 0, SLABS - 1
+    least, most = np.inf, -np.inf
+    for y in (slabs.low[1], slabs.high[1]):
+        for z in (slabs.low[2], slabs.high[2]):
+            x = point[0] - ((y - point[1]) * normal[1] + (z - point[2]) * normal[2]) / normal[0]
+            least, most = min(least, x), max(most, x)
+    margin = slabs.widest + MARGIN_MM
+    low, high = slabs.low[0], slabs.high[0]
+    # Bounds first: a plane nearly along X has corners far away.
+    first, last = max(least - margin, low), min(most + margin, high)
+    return _slab_of(first, low, high), _slab_of(last, low, high)
 
 
 @compiled

@@ -1,7 +1,9 @@
 """The report of a scan: an HTML page."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ from footscan.mesh.mesh import Mesh
 from footscan.report.sample_frames import FrameSample
 from footscan.report.scan.foot_colours import FootSurface
 from footscan.report.scan.page import ScanPoints, ScanTitle, scan_page
+from footscan.side_by_side import together
 from footscan.stripe.points import StripePoints
 from footscan.surface.errors import scan_errors
 from pipelines.arrays import unpack
@@ -73,18 +76,21 @@ def _samples(ids: Sequence[int], inputs: Mapping[str, bytes], places: Mapping[st
         return []
     spaced = np.linspace(stripe_frames.min(), stripe_frames.max(), FRAMES_SHOWN)
     numbers = np.unique(np.rint(spaced).astype(int)).tolist()
-    return [
-        sample for camera, stripe in stripes.items() for sample in _of_camera(camera, stripe, numbers, inputs, places)
-    ]
+    of_cameras = together(
+        partial(_of_camera, camera, stripe, numbers, inputs, places) for camera, stripe in stripes.items()
+    )
+    return list(chain.from_iterable(of_cameras))
 
 
 def _of_camera(
     camera: int, stripe: StripePoints, numbers: Sequence[int], inputs: Mapping[str, bytes], places: Mapping[str, Path]
-) -> Iterator[FrameSample]:
+) -> list[FrameSample]:
     manifest = FrameManifest.model_validate_json(inputs[f"manifest-{camera}"])
     frames = IngestedFrames(places[f"array-{camera}"], manifest)
     filmed = [number for number in numbers if number < frames.count]
+    samples = []
     for number, image in zip(filmed, pixel_frames(frames, filmed), strict=True):
         if image is not None:
             points = stripe[stripe["frame"] == number]
-            yield FrameSample(camera, number, image.copy(), points["i"], points["j"])
+            samples.append(FrameSample(camera, number, image.copy(), points["i"], points["j"]))
+    return samples

@@ -24,6 +24,7 @@ from footscan.report.scan_warnings import warnings_of
 from footscan.report.surface_views import surface_views, upright
 from footscan.report.viewer import Drawing, viewer
 from footscan.report.viewer_script import SCRIPT
+from footscan.side_by_side import together
 from schemas.calibration import Calibration
 from schemas.measures import Measure, Measures
 from schemas.quality import Comparison, Quality
@@ -88,23 +89,25 @@ def scan_page(
     seen = upright(surface.vertices, measures.transform)
     plain = filled_colours(surface.vertices, surface.filled, surface.cut_mm)
     drawings = measure_drawings(surface.vertices, faces, measures)
-    turned = viewer(
-        seen,
-        faces,
-        foot_colourings(surface, quality.mesh, cloud),
-        drawings,
-        {words(name): landmark_place(measures, name) for name in measures.landmarks},
+    landmarks = {words(name): landmark_place(measures, name) for name in measures.landmarks}
+    turned, views, distances, removed, frames = together(
+        [
+            lambda: viewer(seen, faces, foot_colourings(surface, quality.mesh, cloud), drawings, landmarks),
+            lambda: surface_views(seen, faces, plain, measures.side),
+            lambda: "" if distance is None else _distances(seen, faces, measures, quality.truth, distance),
+            lambda: removed_pictures(points.points, points.codes),
+            lambda: sample_frames(samples) if samples else "",
+        ]
     )
-    removed = removed_table(quality.cameras), removed_pictures(points.points, points.codes)
     parts = [
         section("Warnings", _warnings(warnings_of(measures, quality))),
         section("Measures", _tiles(measures), _measures(measures, drawings, turned)),
-        section("Surface", _GRID_NOTE, filled_key(quality.mesh), surface_views(seen, faces, plain, measures.side)),
-        "" if distance is None else _distances(seen, faces, measures, quality.truth, distance),
-        section("Stripe over the frames", _FRAMES_NOTE, sample_frames(samples)) if samples else "",
+        section("Surface", _GRID_NOTE, filled_key(quality.mesh), views),
+        distances,
+        section("Stripe over the frames", _FRAMES_NOTE, frames) if samples else "",
         section("Mesh", mesh_facts(quality.mesh, quality.cloud_points)),
         section("Cameras", _cameras_table(quality, cloud)),
-        section("Removed points", _REMOVED_NOTE, *removed),
+        section("Removed points", _REMOVED_NOTE, removed_table(quality.cameras), removed),
         section(
             "Agreement of the cameras",
             _AGREEMENT_NOTE,
