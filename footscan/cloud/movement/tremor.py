@@ -17,6 +17,7 @@ from scipy.linalg import solveh_banded
 from footscan.cloud.fusion.agreement import GAP_STEPS
 from footscan.cloud.fusion.stripes import Floats, Stripes, sort_stripes, traces_of, ways_to_neighbours
 from footscan.cloud.points import stripe_step
+from footscan.compiled import compiled
 from footscan.robust import MAD_TO_SD, huber_weights
 from schemas.movement import MovementReport
 
@@ -144,6 +145,7 @@ def _moves(comparisons: _Comparisons, use: NDArray[np.bool_]) -> FrameMoves | No
     count = int(comparisons.frame.max()) + 1 - first
     frame, away, change = comparisons.frame[use] - first, comparisons.away[use], comparisons.change[use]
     numbers = np.bincount(frame, minlength=count)
+    order = np.argsort(frame, kind="stable")
     weights, spread = np.ones(len(frame)), np.full(count, LEAST_MM)
     way, normal = np.zeros((count, 3)), np.zeros((count, 3, 3))
     for _ in range(ROUNDS):
@@ -152,7 +154,7 @@ def _moves(comparisons: _Comparisons, use: NDArray[np.bool_]) -> FrameMoves | No
         right = np.column_stack([np.bincount(frame, weights * away * change[:, k], count) for k in range(3)])
         way = np.asarray(np.linalg.solve(normal + RIDGE * np.eye(3), right[:, :, None])[:, :, 0])
         left = np.abs(away - np.einsum("mk,mk->m", change, way[frame]))
-        spread = np.maximum(MAD_TO_SD * _medians(left, frame, count), LEAST_MM)
+        spread = np.maximum(MAD_TO_SD * _medians(left[order], numbers), LEAST_MM)
         weights = huber_weights(left / spread[frame])
     # Errors of neighbouring points are correlated: of 20 of them, one counts.
     variance = FEWEST * np.diagonal(np.linalg.inv(normal + RIDGE * np.eye(3)), axis1=1, axis2=2)
@@ -163,16 +165,19 @@ def _moves(comparisons: _Comparisons, use: NDArray[np.bool_]) -> FrameMoves | No
     return FrameMoves(first, np.where(shown, way, np.nan), np.where(shown, sd, np.nan))
 
 
-def _medians(values: Floats, group: Ints, count: int) -> Floats:
-    """(count,) medians of the values (M,) of each group; 0 of groups without any.
+@compiled
+def _medians(values: Floats, counts: Ints) -> Floats:
+    """(G,) medians of groups of values (M,), of which each has so many (G,), one after the other; 0 of an empty one.
 
-    >>> _medians(np.array([3.0, 1.0, 2.0, 7.0]), np.array([0, 0, 0, 2]), 3).tolist()
+    >>> _medians(np.array([3.0, 1.0, 2.0, 7.0]), np.array([3, 0, 1])).tolist()
     [2.0, 0.0, 7.0]
     """
-    order = np.lexsort((values, group))
-    starts = np.searchsorted(group[order], np.arange(count + 1))
-    middle = np.minimum((starts[:-1] + starts[1:]) // 2, max(len(values) - 1, 0))
-    return np.where(starts[1:] > starts[:-1], values[order][middle], 0.0) if len(values) else np.zeros(count)
+    medians, start = np.zeros(len(counts)), 0
+    for group in range(len(counts)):
+        if counts[group]:
+            medians[group] = np.median(values[start : start + counts[group]])
+        start += counts[group]
+    return medians
 
 
 def _integrated(moves: FrameMoves) -> Floats:

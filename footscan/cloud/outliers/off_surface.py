@@ -36,6 +36,9 @@ PASSES, INLIER = 3, 3.0
 """Fits of the plane, each to the points within so many standard deviations of the plane before."""
 LEAST_SPREAD_MM = 0.05
 """Standard deviation of points on a plane at least: noise of the centres."""
+NEAR = 0.25
+"""A point is on the surface if it is nearer to the first plane than this share of `LEAST_OFF_MM`, and its neighbours
+scatter by less: no further plane is fitted. Chosen by hand."""
 OFF, LEAST_OFF_MM = 4.0, 1.0
 """A point is off the surface from this distance on, in standard deviations of its neighbours and in mm. A camera that
 is displaced by less stays, so that the fusion finds its contradiction."""
@@ -155,6 +158,8 @@ def _off(
             limit = INLIER * spread
             broad = breadth >= (LEAST_BREADTH * around.radius_mm) ** 2
             distance = abs(level) if sums[0] >= FEWEST and broad else 0.0
+            if max(abs(level), spread) < NEAR * around.least_off_mm:
+                break
         off[n] = distance > max(around.least_off_mm, around.off * spread)
     return off
 
