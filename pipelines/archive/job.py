@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from footscan.recordings.calibration_checks import check_of_scan
 from footscan.recordings.scans import RecordedScan, read_scan, scan_folders
+from pipelines.archive.early_delivery import EarlyDelivery, older_results
 from pipelines.archive.workflow_file import check_archives, read_workflow
 from pipelines.calibrate import CaptureInputs, CaptureOfScan, recorded_inputs
 from pipelines.engine.actions.key import parameters_text
@@ -18,7 +19,7 @@ from pipelines.engine.files.access import group_number, share
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.places import open_files
 from pipelines.engine.plan import Plan
-from pipelines.engine.pool import OnStepEnd, Pool, cores
+from pipelines.engine.pool import OnStepEnd, Pool, StepEnd, cores
 from pipelines.engine.store.erasure_notes import interrupted_erasures
 from pipelines.engine.store.permissions import warn_if_others_can_write
 from pipelines.engine.workspace import Workspace
@@ -317,7 +318,13 @@ def _run_window(
     for scan in window:
         if scan.to_run:
             steps += draw_steps(scan.scan, planned)
-    outcomes = planned.workspace.run(steps, pool, on_step_end)
+    early = EarlyDelivery(planned.workspace, {scan.scan.name: _target(scan.scan, planned) for scan in window})
+
+    def on_end(end: StepEnd) -> None:
+        early.on_step_end(end)
+        on_step_end(end)
+
+    outcomes = planned.workspace.run(steps, pool, on_end)
     for scan in window:
         end = _end_scan(scan, outcomes, planned)
         if end.kind == "damaged":
@@ -327,10 +334,15 @@ def _run_window(
         yield end
 
 
+def _target(scan: RecordedScan, planned: PlannedJob) -> Path:
+    """Folder of the results of a scan."""
+    return planned.job.results / scan.document.patient / scan.document.scan
+
+
 def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planned: PlannedJob) -> ScanEnd:
     """Deliver the results of a scan, if it has them."""
     scan = planned_scan.scan
-    target = planned.job.results / scan.document.patient / scan.document.scan
+    target = _target(scan, planned)
     ended = ScanEnd(
         scan.name, scan.folder, None, None, None, document=scan.document, parameters_sha256=planned.parameters_sha256
     )
@@ -339,7 +351,7 @@ def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planne
         planned_outcome = planned_scan.failure or Success(planned_scan.delivered.get(file, ""))
         outcome = outcomes.get(f"{scan.name}/{kind}", planned_outcome)
         if isinstance(outcome, Failure):
-            return replace(ended, problem=outcome.problem + _older_results(target), kind=outcome.kind)
+            return replace(ended, problem=outcome.problem + older_results(target), kind=outcome.kind)
         digests[file] = outcome.digest
     problem = planned.workspace.deliver(digests, target)
     if problem is not None:
@@ -357,11 +369,6 @@ def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planne
         was_cached=not planned_scan.to_run,
         warnings=quality.scan_warnings or (),
     )
-
-
-def _older_results(target: Path) -> str:
-    """Warning if a failed scan still has results of an earlier run; empty without."""
-    return f" ({target} still holds the results of an earlier run)" if target.exists() else ""
 
 
 def _calibration(scan: RecordedScan, planned: PlannedJob) -> CalibrationFile | CaptureOfScan:

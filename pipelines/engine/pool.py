@@ -43,6 +43,10 @@ class StepEnd:
     seconds: float
     earlier_outcome: str | None = None
     """Digest or failure of an earlier run of the same action, if it differs."""
+    started: float = 0.0
+    """Unix time of its start, by the clock of its machine; 0 if it is not known."""
+    worker: str = ""
+    """Machine, process and thread that ran it."""
 
 
 OnStepEnd = Callable[[StepEnd], None]

@@ -4,11 +4,13 @@ import contextlib
 import importlib
 import json
 import logging
+import os
 import platform
 import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from weakref import WeakValueDictionary
 
@@ -57,6 +59,11 @@ def run_plan(plan: Plan, store: Store, *, pool: Pool, on_step_end: OnStepEnd) ->
 
 def run_step(store: Store, task: Task, ended: Mapping[str, StepEnd]) -> StepEnd:
     """Run one step, unless the cache has a result for its inputs, or one of them has failed."""
+    started, worker = time.time(), f"{platform.node()} {os.getpid()} {threading.get_native_id()}"
+    return replace(_run_task(store, task, ended), started=started, worker=worker)
+
+
+def _run_task(store: Store, task: Task, ended: Mapping[str, StepEnd]) -> StepEnd:
     start = time.perf_counter()
     step = task.step
     if code_identity(step.module).digest != task.code:

@@ -25,7 +25,8 @@ from schemas.base.errors import Fault, FootscanError, RefusedInput
 
 if TYPE_CHECKING:
     from pipelines.archive.job import Job, PlannedJob, ScanEnd
-    from pipelines.engine.pool import Pool
+    from pipelines.archive.profile import Profile
+    from pipelines.engine.pool import Pool, StepEnd
 
 WORKFLOW = Path("workflow.yaml")
 
@@ -38,6 +39,9 @@ CalibrationFile = Annotated[
 ]
 ResultsFolder = Annotated[Path | None, typer.Option("--out", help="Folder for the results of --scan.")]
 JsonLog = Annotated[Path | None, typer.Option("--log-json", help="Log file to write, one JSON object per line.")]
+ProfilePage = Annotated[
+    Path | None, typer.Option("--profile", help="Page to write: which step ran when and where.", metavar="FILE.html")
+]
 WatchArchive = Annotated[
     bool, typer.Option("--watch", help="Keep running and process scans as they arrive in the archive, until Ctrl-C.")
 ]
@@ -65,6 +69,7 @@ def run(
     tls_key: TlsKey = None,
     watch: WatchArchive = False,
     log_json: JsonLog = None,
+    profile: ProfilePage = None,
     as_json: AsJson = False,
 ) -> int:
     """Reconstruct and measure: all scans of a workflow, or one scan folder.
@@ -75,13 +80,16 @@ def run(
     placement.check()
     if watch and (scan is not None or as_json):
         raise RefusedInput("--watch", "goes with a workflow alone, not with --scan or --json")
+    profiled = _profile(profile, watch=watch)
     with ExitStack() as stack:
         log = None if log_json is None else stack.enter_context(_log(log_json))
         job = job_of(workflow, scan, calibration, out, threads, settings, may_be_empty=watch)
         pool = stack.enter_context(chosen_pool(job.threads, placement))
         if watch:
             return _watch(job, pool, log)
-        ends = _run(job, pool, log, as_json=as_json)
+        ends = _run(job, pool, log, as_json=as_json, profile=profiled)
+    if profile is not None and profiled is not None:
+        profiled.write(profile)
     if scan is not None:
         return _status(ends, single=True)
     return max(_status(ends, single=False), _write_table(ends, job.results))
@@ -94,6 +102,7 @@ def _run(
     *,
     as_json: bool = False,
     folders: dict[str, Path] | None = None,
+    profile: "Profile | None" = None,
 ) -> "list[ScanEnd]":
     """Run a job and print the result of each scan; `folders` as in `plan_job`."""
     from pipelines.archive.job import plan_job, run_job
@@ -104,7 +113,13 @@ def _run(
         message(_summary(planned))
     ends = []
     with StepProgress(planned.to_run, len(job.folders), log) as progress:
-        for end in run_job(planned, pool, progress.on_step_end):
+
+        def on_step_end(ended: "StepEnd") -> None:
+            progress.on_step_end(ended)
+            if profile is not None:
+                profile.on_step_end(ended)
+
+        for end in run_job(planned, pool, on_step_end):
             progress.on_scan_end(end)
             ends.append(end)
     if as_json:
@@ -117,6 +132,18 @@ def _run(
             for warning in end.warnings:
                 message(f"{end.scan}: {warning}")
     return ends
+
+
+def _profile(path: Path | None, *, watch: bool) -> "Profile | None":
+    """The profile that `--profile` asks for."""
+    if path is None:
+        return None
+    from pipelines.archive.profile import Profile, check_place
+
+    if watch:
+        raise RefusedInput("--profile", "goes with a run that ends, not with --watch")
+    check_place(path)
+    return Profile()
 
 
 def _write_table(ends: "list[ScanEnd]", results: Path) -> int:
