@@ -41,7 +41,7 @@ OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 def compiled(function: _Function) -> _Function:
     """The function compiled at its first call, without Python's global lock."""
     made: Any = numba.njit(nogil=True)(function)
-    if _folder(function.__module__, Path(function.__code__.co_filename)) is not None:
+    if code_folder(function.__module__, Path(function.__code__.co_filename)) is not None:
         # As `cache=True` does, but for the folder: numba's own setting for that holds for all threads and libraries.
         made._cache = _ModuleCache(function)
     kept: _Function = made
@@ -54,7 +54,7 @@ class _ModuleLocator:
     def __init__(self, function: Callable[..., object], file: str) -> None:
         self._py_file = file  # numba's warnings name it
         self._line = function.__code__.co_firstlineno
-        folder = _folder(function.__module__, Path(file))
+        folder = code_folder(function.__module__, Path(file))
         if folder is None:
             raise RuntimeError(f"{file}: its machine code is kept nowhere")
         self._folder = folder
@@ -86,9 +86,9 @@ class _ModuleCache(FunctionCache):  # type: ignore[misc]  # as above
 
 
 @lru_cache
-def _folder(module: str, file: Path) -> Path | None:
+def code_folder(module: str, file: Path) -> Path | None:
     """Where the machine code of a module's functions is kept; None where no place is safe."""
-    place = _place()
+    place = code_place()
     if place is None:
         return None
     folder = place / f"{module}-{_digest_of_closure(module, file)[:16]}"
@@ -143,7 +143,7 @@ def _source(root: Path, module: str) -> tuple[str, tuple[str, ...]]:
 
 
 @lru_cache
-def _place() -> Path | None:
+def code_place() -> Path | None:
     """The folder that `NUMBA_CACHE_DIR` names, otherwise one in the user's cache; settled at its first use."""
     if given := numba.config.CACHE_DIR:
         return Path(given).absolute()

@@ -42,6 +42,8 @@ def in_pieces(count: int, work: Callable[[slice], Arrays]) -> Arrays:
     (2000, 3996001)
     """
     pieces = max(min(cores(), count // FEWEST), 1)
+    if pieces == 1:
+        return work(slice(0, count))
     bounds = np.linspace(0, count, pieces + 1).astype(int).tolist()
     made = together(partial(work, slice(start, end)) for start, end in pairwise(bounds))
-    return made[0] if pieces == 1 else tuple(np.concatenate(parts) for parts in zip(*made, strict=True))
+    return tuple(np.concatenate(parts) for parts in zip(*made, strict=True))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from footscan.cloud.points import PLANE_MM, camera_numbers, coordinates
+from footscan.compiled import compiled
 
 END_MM = 8.0
 """Part of the foot at each end that is judged. Chosen by hand."""
@@ -52,7 +53,7 @@ def is_inside(points: NDArray[np.void]) -> NDArray[np.bool_]:
             beyond = near[depth[near] > depth[stripe].min() - PLANE_MM]
             others = xyz[beyond[camera[beyond] != camera[stripe[0]]]]
             if len(others) >= SIDES * FEWEST and np.diff(np.sort(others[:, 1])).max() < APART_MM:
-                selected[stripe] |= _is_amid(xyz[stripe, 1:], others[:, 1:]) & ~_is_near(xyz[stripe], others)
+                selected[stripe] |= _is_amid(xyz[stripe, 1:].copy(), others[:, 1:].copy()) & ~_is_near(xyz[stripe], others)
     return selected
 
 
@@ -68,11 +69,16 @@ def _is_near(places: NDArray[np.float64], others: NDArray[np.float64]) -> NDArra
     return np.isfinite(KDTree(others).query(places, distance_upper_bound=NEAR_MM)[0])
 
 
+@compiled
 def _is_amid(places: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Select the places (N, 2) that have others (M, 2) on all sides; Y and Z, mm."""
-    away = others - places[:, None]
-    distance = np.hypot(away[..., 0], away[..., 1])
-    counts = (distance > INSIDE_MM) & (distance < AROUND_MM)
-    side = np.floor((np.arctan2(away[..., 1], away[..., 0]) / (2 * np.pi) + 0.5) * SIDES).astype(np.int64) % SIDES
-    of_sides = [np.sum(counts & (side == number), axis=1) for number in range(SIDES)]
-    return np.asarray(np.min(of_sides, axis=0) >= FEWEST)
+    amid = np.zeros(len(places), np.bool_)
+    of_sides = np.zeros(SIDES, np.int64)
+    for n in range(len(places)):
+        of_sides[:] = 0
+        for m in range(len(others)):
+            y, z = others[m, 0] - places[n, 0], others[m, 1] - places[n, 1]
+            if INSIDE_MM < np.hypot(y, z) < AROUND_MM:
+                of_sides[int((np.arctan2(z, y) / (2 * np.pi) + 0.5) * SIDES) % SIDES] += 1
+        amid[n] = of_sides.min() >= FEWEST
+    return amid

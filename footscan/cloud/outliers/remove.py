@@ -114,32 +114,40 @@ def remove_outliers(
     codes = np.where(choice.other, NO_POINT, KEPT).astype(np.uint8)
     codes[choice.unassigned] = 1 + REASONS.index("laser")
 
+    kept = np.flatnonzero(codes == KEPT)
+    remaining = points[kept]
+
     def drop(reason: str, select: Callable[[NDArray[np.void]], Mask]) -> None:
         """Drop what `select` selects among the points that are left."""
-        if (left := np.flatnonzero(codes == KEPT)).size:
-            codes[left[select(points[left])]] = 1 + REASONS.index(reason)
+        nonlocal kept, remaining
+        if kept.size and (selected := select(remaining)).any():
+            codes[kept[selected]] = 1 + REASONS.index(reason)
+            left = np.flatnonzero(~selected)
+            kept, remaining = kept[left], remaining[left]
 
     volume = control_volume(views, parameters, filmed)
     if parameters.method == "levels":
         drop("isolated", lambda left: is_far(left, parameters.nearest_mm))
         drop("volume", lambda left: _outside(left, volume))
         drop("median", lambda left: is_off_median(left, parameters.median_mm))
-        return points[codes == KEPT], Removed(codes, _count(camera_numbers(points), codes), [], GlassPlane())
+        return remaining, Removed(codes, _count(camera_numbers(points), codes), [], GlassPlane())
     drop("volume", lambda left: _outside(left, volume))
     if parameters.drop_unsupported:
         drop("extrapolated", lambda left: ~left["supported"])
-    glass = estimate_glass(points[codes == KEPT], views)
+    glass = estimate_glass(remaining, views)
 
     def drop_glass(select: Callable[[NDArray[np.void], Mapping[int, View], float], Mask]) -> None:
         drop("glass", lambda left: select(above_glass(left, glass.plane), views, parameters.glass_mm))
 
     drop_glass(is_plate)
     drop("laser", lambda left: is_of_other_laser(left, views))
-    body = _body(points[codes == KEPT], views, parameters)
+    body = _body(remaining, views, parameters)
     drop("clutter", lambda left: is_static(left, parameters.static_share, body, filmed) | _is_beside(left, body))
     drop("glass", lambda left: is_ghost(left, views, parameters.gap_mm, parameters.segment_mm))
     drop_glass(is_below_sole)
     _drop_by_segment(points, codes, views, parameters, filmed)
+    kept = np.flatnonzero(codes == KEPT)
+    remaining = points[kept]
     drop_glass(is_plate)  # without what seemed to be its sides
     drop("unconfirmed", is_off_surface)
     drop("unconfirmed", is_inside)
@@ -153,9 +161,8 @@ def remove_outliers(
         *_cut_warnings(points, codes, parameters, views),
         *moved_warning(glass, parameters.glass_mm),
     ]
-    kept = points[codes == KEPT]
-    ends = (float(kept["x"].min()), float(kept["x"].max())) if len(kept) else (0.0, 0.0)
-    return kept, Removed(codes, counts, warnings, glass, planes_apart(views, ends))
+    ends = (float(remaining["x"].min()), float(remaining["x"].max())) if len(remaining) else (0.0, 0.0)
+    return remaining, Removed(codes, counts, warnings, glass, planes_apart(views, ends))
 
 
 def _drop_by_segment(

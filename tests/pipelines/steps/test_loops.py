@@ -1,0 +1,62 @@
+"""`footscan/loops.json` lists the argument types with which a scan calls its compiled loops.
+
+After an intended change, `FOOTSCAN_WRITE_LOOPS=1 pytest tests/pipelines/steps/test_loops.py` writes the list anew.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+RUN = """
+import json, sys, time
+from pathlib import Path
+from numba.core import event
+from numba.core.registry import CPUDispatcher
+from footscan.ahead_of_time import spec_of
+from pipelines.archive.job import job_of_workflow, plan_job, run_job
+from pipelines.engine.pool import Threads
+
+class Timer(event.Listener):
+    def on_start(self, started):
+        started.data["dispatcher"].footscan_started = time.process_time()
+    def on_end(self, ended):
+        loop = ended.data["dispatcher"]
+        loop.footscan_seconds = time.process_time() - loop.footscan_started
+
+event.register("numba:compile", Timer())
+for workflow in sys.argv[1:]:
+    for end in run_job(plan_job(job_of_workflow(Path(workflow))), Threads(1), lambda _: None):
+        assert end.problem is None, end.problem
+loops = []
+for name, module in sorted(sys.modules.items()):
+    for value in list(vars(module).values()) if name.startswith("footscan.") else []:
+        if isinstance(value, CPUDispatcher) and value.py_func.__module__ == name:
+            seconds = getattr(value, "footscan_seconds", 0.0)
+            loops += [(seconds, [name, value.__name__, [spec_of(part) for part in types]]) for types in value.signatures]
+print(json.dumps([loop for _, loop in sorted(loops, key=lambda each: -each[0])]))
+"""
+
+
+def called(archive: Any, cache: Path | None) -> list[Any]:
+    """The loops that a run loads or compiles; with an empty `cache` those that take longest to compile come first."""
+    environment = os.environ | ({} if cache is None else {"NUMBA_CACHE_DIR": str(cache)})
+    command = [sys.executable, "-c", RUN, str(archive.workflow)]
+    loops: list[Any] = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, env=environment).stdout)
+    return loops
+
+
+def test_all_loops_of_a_scan_are_listed(archive: Any, tmp_path: Path) -> None:
+    place = Path(str(files("footscan").joinpath("loops.json")))
+    if os.environ.get("FOOTSCAN_WRITE_LOOPS"):
+        slowest_first = called(archive, tmp_path / "cache")  # and the loops that others call
+        shutil.rmtree(archive.root / "results")
+        from_python = called(archive, tmp_path / "cache")
+        lines = ",\n".join(json.dumps(loop) for loop in slowest_first if loop in from_python)
+        place.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+    listed = json.loads(place.read_text("utf-8"))
+    assert [loop for loop in called(archive, None) if loop not in listed] == [], __doc__
