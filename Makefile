@@ -2,7 +2,7 @@
 export PYTHON
 BIN := .venv/bin
 
-.PHONY: help setup demo test test-slow lint format clean
+.PHONY: help setup compiled demo test test-slow lint format clean
 
 help:     ## this list
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1	\2/p' $(MAKEFILE_LIST)
@@ -10,15 +10,18 @@ help:     ## this list
 setup:    ## system libraries, .venv, pinned packages; starts at once when they are there
 	@scripts/setup.sh
 
-demo: setup   ## films, calibrates, scans and measures a foot; the result is in demo/
+compiled: setup
+	@$(BIN)/python -m footscan.ahead_of_time
+
+demo: compiled ## films, calibrates, scans and measures a foot; the result is in demo/
 	@$(BIN)/footscan demo
 
-test: lint    ## lint, then the tests, in the end those that keep time; pages in Debian's Chromium; films are kept in .pytest_cache
+test: lint compiled ## lint, then the tests, in the end those that keep time; pages in Debian's Chromium; films are kept in .pytest_cache
 	@scripts/browser.sh
 	$(BIN)/pytest -n 2 --dist worksteal -m "not real_time and not slow"
 	$(BIN)/pytest -n 2 --dist worksteal -m "real_time and not slow" --reruns 2 -r fER
 
-test-slow: lint  ## the tests that repeat whole runs or draw many samples
+test-slow: lint compiled ## the tests that repeat whole runs or draw many samples
 	@scripts/browser.sh
 	$(BIN)/pytest -n 2 --dist worksteal -m "slow and not real_time"
 	$(BIN)/pytest -n 2 --dist worksteal -m "slow and real_time" --reruns 2 -r fER

@@ -49,7 +49,7 @@ def _decode(films: list[Packets]) -> None:
 
 
 def _run(scan: Path, calibration: Path, results: Path) -> float:
-    """Reconstruct a scan from its films alone; returns the seconds until the files that a person waits for are there."""
+    """Reconstruct a scan from its films alone; returns the seconds until the files `EARLY` are there."""
     shutil.rmtree(results, ignore_errors=True)
     shutil.rmtree(scan / "frames.zarr", ignore_errors=True)
     start, early = time.perf_counter(), None

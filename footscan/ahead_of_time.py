@@ -18,12 +18,13 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from llvmlite import binding
+from llvmlite import binding  # type: ignore[import-untyped]
 from numba import types
 
 from footscan.compiled import code_folder, code_place
 from footscan.side_by_side import cores
 
+MODULE = "footscan.ahead_of_time"
 LIST = "loops.json"
 """Module, name and argument types of each loop of a scan that Python calls, the slowest to compile first."""
 
@@ -36,10 +37,9 @@ def compile_ahead() -> None:
     if mark is None or mark.exists():
         return
     shares = cores()
-    started = [
-        subprocess.Popen([sys.executable, "-m", __spec__.name, str(share), str(shares)]) for share in range(shares)
-    ]
-    if all([process.wait() == 0 for process in started]):
+    started = [subprocess.Popen([sys.executable, "-m", MODULE, str(share), str(shares)]) for share in range(shares)]
+    ended = [process.wait() for process in started]
+    if not any(ended):
         with suppress(OSError):
             mark.touch()
 
@@ -97,7 +97,7 @@ def _listed() -> list[tuple[str, str, list[Spec]]]:
 
 
 def _mark() -> Path | None:
-    """The file that says that all is compiled: for these sources, this numba and this processor; None without a place."""
+    """The file that says that all is compiled for these sources, numba and processor; None without a place for it."""
     place = code_place()
     if place is None:
         return None

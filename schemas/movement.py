@@ -16,7 +16,8 @@ class MovementReport(Document):
     tremor_mm: Length = 0.0
     """Root mean square of the fast movement along X, of 2 to about 8 frames to and fro."""
     agreement: Annotated[float, Field(ge=-1, le=1)] | None = None
-    """Correlation between the movements that the cameras of two heads show; None with one head, or where the foot hardly trembled."""
+    """Correlation between the movements that the cameras of two heads show; None with one head, or of a foot that
+    hardly trembled."""
     first_frame: Annotated[int, Field(ge=0)] = 0
     x_mm: list[Way] = Field(default_factory=list)
     """Way along X by which the foot was moved back, from `first_frame` on; empty if it was not."""

@@ -226,7 +226,8 @@ def _traced(
     ends, closed = np.empty(count, np.int64), np.empty(count, np.bool_)
     length = curves = 0
     for seek_open in (True, False):
-        for start in crossed:
+        for k in range(count):
+            start = int(crossed[k])
             if not crossing[start]:
                 continue
             slot = _crossed(faces, above, start, -1)

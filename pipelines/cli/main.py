@@ -18,6 +18,10 @@ from pipelines.engine.files.access import keep_private
 from schemas.base.errors import Fault, FootscanError, RefusedInput, one_line
 from schemas.base.limits import check_limits
 
+# Steps run side by side, and their matrices are small: threads of OpenBLAS would wait for each other, and on a busy
+# machine a step takes 25 times as long. It reads this when NumPy is imported, later; processes inherit it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 INTERRUPTED = 130
 MOST_OTHERS = 19
 """Mistakes printed after the first one. Bound: what a terminal shows at once."""

@@ -53,7 +53,8 @@ def is_inside(points: NDArray[np.void]) -> NDArray[np.bool_]:
             beyond = near[depth[near] > depth[stripe].min() - PLANE_MM]
             others = xyz[beyond[camera[beyond] != camera[stripe[0]]]]
             if len(others) >= SIDES * FEWEST and np.diff(np.sort(others[:, 1])).max() < APART_MM:
-                selected[stripe] |= _is_amid(xyz[stripe, 1:].copy(), others[:, 1:].copy()) & ~_is_near(xyz[stripe], others)
+                amid = _is_amid(xyz[stripe, 1:].copy(), others[:, 1:].copy())
+                selected[stripe] |= amid & ~_is_near(xyz[stripe], others)
     return selected
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cloud.outliers.cell_cameras import cameras_around, cameras_near
 from footscan.cloud.planes import SUMS, add_point, plane_normal
 from footscan.cloud.views import View
 from footscan.compiled import compiled
@@ -280,27 +281,6 @@ def _witnesses(
                 should[b] += 1
                 does[b] += others != near
     return does >= WITNESS_SHARE * should
-
-
-@compiled
-def cameras_near(number: Ints, seen: NDArray[np.uint64], place: Ints) -> np.uint64:
-    """The bits of the cameras that `seen` (V,) has in a cell or in its 26 neighbours."""
-    cameras = np.uint64(0)
-    for i in range(place[0] - 1, place[0] + 2):
-        for j in range(place[1] - 1, place[1] + 2):
-            for k in range(place[2] - 1, place[2] + 2):
-                if number[i, j, k] != EMPTY:
-                    cameras |= seen[number[i, j, k]]
-    return cameras
-
-
-@compiled
-def cameras_around(number: Ints, seen: NDArray[np.uint64], place: Ints) -> NDArray[np.uint64]:
-    """(V,) `cameras_near` of each numbered cell."""
-    near = np.empty(len(place), np.uint64)
-    for v in range(len(place)):
-        near[v] = cameras_near(number, seen, place[v])
-    return near
 
 
 @compiled

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cloud.outliers.cell_cameras import cameras_around
 from footscan.cloud.outliers.other_laser import smoothed
-from footscan.cloud.outliers.visibility import cameras_around
 from footscan.cloud.points import camera_numbers, coordinates, stripe_step
 from footscan.mesh.voxels import voxelise
 

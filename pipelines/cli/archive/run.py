@@ -52,6 +52,8 @@ Settings = Annotated[
     ),
 ]
 POLL_S = 2.0
+MANY_STEPS = 20
+"""Steps to run from which all loops of a scan are compiled beforehand: fewer may call but a few."""
 
 
 def run(
@@ -111,6 +113,8 @@ def _run(
     planned = plan_job(job, folders=folders)
     if planned.steps:
         message(_summary(planned))
+    if planned.to_run >= MANY_STEPS:
+        _compile()
     ends = []
     with StepProgress(planned.to_run, len(job.folders), log) as progress:
 
@@ -132,6 +136,15 @@ def _run(
             for warning in end.warnings:
                 message(f"{end.scan}: {warning}")
     return ends
+
+
+def _compile() -> None:
+    """Compile the loops of a scan on all cores, where that was not done yet."""
+    from footscan.ahead_of_time import compile_ahead, is_compiled
+
+    if not is_compiled():
+        message("compiling for this machine, once; on two cores that takes about half a minute")
+        compile_ahead()
 
 
 def _profile(path: Path | None, *, watch: bool) -> "Profile | None":

@@ -36,8 +36,9 @@ loops = []
 for name, module in sorted(sys.modules.items()):
     for value in list(vars(module).values()) if name.startswith("footscan.") else []:
         if isinstance(value, CPUDispatcher) and value.py_func.__module__ == name:
-            seconds = getattr(value, "footscan_seconds", 0.0)
-            loops += [(seconds, [name, value.__name__, [spec_of(part) for part in types]]) for types in value.signatures]
+            for types in value.signatures:
+                loop = [name, value.__name__, [spec_of(part) for part in types]]
+                loops.append((getattr(value, "footscan_seconds", 0.0), loop))
 print(json.dumps([loop for _, loop in sorted(loops, key=lambda each: -each[0])]))
 """
 
