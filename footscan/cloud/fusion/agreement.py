@@ -50,7 +50,7 @@ def find_overlaps(stripes: Stripes, yz: Floats, reach_mm: float) -> Overlaps:
     """
     usable = stripes.points["supported"] & ~stripes.bent & np.any(stripes.normals != 0, axis=1)
     candidates = np.flatnonzero(usable)
-    sample = candidates[:: max(1, len(candidates) // COMPARED)]
+    sample = candidates[:: max(1, len(candidates) // COMPARED)].copy()
     count = len(stripes.cameras)
     if count < 2:
         sample = sample[:0]

@@ -58,7 +58,7 @@ def is_off_alone(cloud: NDArray[np.void]) -> NDArray[np.bool_]:
         return off
     xyz = coordinates(cloud)
     buckets = sort_into_cubes(xyz, max(REACH_MM, 1.5 * step))
-    away, joined = _compare(xyz, alone, cloud["cameras"], buckets, step)
+    away, joined = _compare(xyz, alone, cloud["cameras"].copy(), buckets, step)
     farthest = OFF_MM * max(step / AT_STEP_MM, 1.0) ** 2
     off[alone] = (away > farthest) | _is_apart(xyz[alone], joined, step, LARGEST_SHARE * len(cloud))
     return off

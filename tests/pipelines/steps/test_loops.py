@@ -1,6 +1,7 @@
 """`footscan/loops.json` lists the argument types with which a scan calls its compiled loops.
 
-After an intended change, `FOOTSCAN_WRITE_LOOPS=1 pytest tests/pipelines/steps/test_loops.py` writes the list anew.
+After an intended change, `FOOTSCAN_WRITE_LOOPS=WORKFLOW pytest tests/pipelines/steps/test_loops.py` writes the list
+anew: of a small scan, and of what the workflow runs, such as the demo's scan. Its results must be gone before.
 """
 
 import json
@@ -43,21 +44,23 @@ print(json.dumps([loop for _, loop in sorted(loops, key=lambda each: -each[0])])
 """
 
 
-def called(archive: Any, cache: Path | None) -> list[Any]:
-    """The loops that a run loads or compiles; with an empty `cache` those that take longest to compile come first."""
+def called(workflows: list[Path], cache: Path | None) -> list[Any]:
+    """The loops that runs load or compile; with an empty `cache` those that take longest to compile come first."""
     environment = os.environ | ({} if cache is None else {"NUMBA_CACHE_DIR": str(cache)})
-    command = [sys.executable, "-c", RUN, str(archive.workflow)]
+    command = [sys.executable, "-c", RUN, *map(str, workflows)]
     loops: list[Any] = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, env=environment).stdout)
     return loops
 
 
 def test_all_loops_of_a_scan_are_listed(archive: Any, tmp_path: Path) -> None:
     place = Path(str(files("footscan").joinpath("loops.json")))
-    if os.environ.get("FOOTSCAN_WRITE_LOOPS"):
-        slowest_first = called(archive, tmp_path / "cache")  # and the loops that others call
-        shutil.rmtree(archive.root / "results")
-        from_python = called(archive, tmp_path / "cache")
+    if further := os.environ.get("FOOTSCAN_WRITE_LOOPS"):
+        workflows = [Path(further).resolve(), archive.workflow]
+        slowest_first = called(workflows, tmp_path / "cache")  # and the loops that others call
+        for workflow in workflows:
+            shutil.rmtree(workflow.parent / "results")
+        from_python = called(workflows, tmp_path / "cache")
         lines = ",\n".join(json.dumps(loop) for loop in slowest_first if loop in from_python)
         place.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
     listed = json.loads(place.read_text("utf-8"))
-    assert [loop for loop in called(archive, None) if loop not in listed] == [], __doc__
+    assert [loop for loop in called([archive.workflow], None) if loop not in listed] == [], __doc__
