@@ -1,4 +1,4 @@
-"""The surface beside Poisson's and a ball-pivoted one of other libraries; a whole cold scan beside decoding its frames.
+"""The surface beside Poisson's and a ball-pivoted one of other libraries.
 
     .venv/bin/python -m benchmarks.surface [SCAN [CALIBRATION]]
 
@@ -9,22 +9,18 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.compare import interleave, print_ratios, python, spread
+from benchmarks.compare import interleave, print_ratios
 from footscan.cloud.points import coordinates, stripe_step
-from footscan.frames.array import StoredFrames
-from footscan.frames.reader import pixel_frames
 from footscan.mesh.formats.files import Shape, read_mesh
 from footscan.mesh.sampling import sample_surface
-from footscan.recordings.scans import RecordedScan, read_scan
+from footscan.recordings.scans import read_scan
 from footscan.surface.ball_pivoting import mesh_cloud
 from footscan.surface.closed_surface import close_surface
 from footscan.surface.quality import mesh_quality
@@ -37,7 +33,6 @@ from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.run import run_plan
 from pipelines.engine.store.store import Store
-from schemas.frames import FrameManifest
 from schemas.parameters.surface import SurfaceParameters
 
 DEFAULT = Path("demo/archive/P0001/demo-R")
@@ -45,7 +40,6 @@ THREADS = 2
 ROUNDS = 3
 TRIMMED = 0.01
 """Share of the vertices, the least dense, that Open3D's manual takes away from Poisson's surface."""
-COMMAND = "from pipelines.cli.main import main; main()"
 Floats = NDArray[np.float64]
 
 
@@ -66,7 +60,6 @@ def main() -> None:
         shutil.copytree(given, scan, ignore=shutil.ignore_patterns("*.zarr"))
         cloud, cut_mm = _fused_cloud(scan, calibration, Path(place) / "first")
         _compare_surfaces(cloud, cut_mm, read_mesh(read_scan(scan).truth or scan / "truth.stl"))
-        _compare_with_decoding(read_scan(scan), calibration, Path(place))
 
 
 def _fused_cloud(scan: Path, calibration: Path, results: Path) -> tuple[Cloud, float]:
@@ -144,48 +137,6 @@ def _distances(a: Shape, b: Shape, below_mm: float) -> NDArray[np.floating]:
 
 def _p99(values: NDArray[np.floating]) -> float:
     return float(np.percentile(values, 99))
-
-
-def _compare_with_decoding(scan: RecordedScan, calibration: Path, place: Path) -> None:
-    """A scan whose films lie in Zarr, and nothing else of it is known; on two threads."""
-    steps, store = _steps_to("foot.stl", scan.folder, calibration, place / "ingested")
-    ingest = [step for step in steps if step.kind == "ingest"]
-    found = _run(ingest, store)
-    stored = {step.places["array"]: FrameManifest.model_validate_json(found[step.name]) for step in ingest}
-    frames, numbers = sum(len(manifest.frames) for manifest in stored.values()), count()
-    taken: dict[str, list[float]] = {}
-
-    def decode() -> None:
-        with ThreadPoolExecutor(THREADS) as pool:
-            list(pool.map(_decode, stored, stored.values()))
-
-    def afresh() -> Path:
-        return Path(shutil.copytree(place / "ingested", place / f"cold{next(numbers)}"))
-
-    def to_stl() -> None:
-        ends: list[StepEnd] = []
-        _run(*_steps_to("foot.stl", scan.folder, calibration, afresh()), ends.append)
-        for kind in {end.step.kind for end in ends}:
-            taken.setdefault(kind, []).append(sum(end.seconds for end in ends if end.step.kind == kind))
-
-    def command() -> None:
-        places = ("--scan", scan.folder, "--calibration", calibration, "--out", afresh())
-        python("-c", COMMAND, "run", *map(str, places), "--threads", str(THREADS))
-
-    runs: dict[str, Callable[[], None]] = {
-        "reading and decoding the frames": decode,
-        "from Zarr to STL": to_stl,
-        "`footscan run`, with measures and report": command,
-    }
-    print_ratios(f"A cold scan of {frames} frames, two threads", interleave(runs, ROUNDS), 1, "scan")
-    print("  of this, to the STL, seconds of a thread, median (range)")
-    for kind, seconds in sorted(taken.items(), key=lambda item: -float(np.median(item[1]))):
-        print(f"    {kind:<42}{spread(seconds, 3)}")
-
-
-def _decode(array: Path, manifest: FrameManifest) -> None:
-    for _ in pixel_frames(StoredFrames(array, manifest)):
-        pass
 
 
 def _steps_to(kind: str, scan: Path, calibration: Path, results: Path) -> tuple[list[Step], Store]:
