@@ -2,22 +2,27 @@
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numcodecs import Blosc
 from pydantic import ValidationError
 
 from footscan.frames.image import Rgb, frame_digest
+from footscan.frames.shard import SHARD, ShardReader
 from schemas.base.errors import DamagedError, Fault, RefusedInput
 from schemas.base.image_size import ImageSize
 from schemas.base.limits import BeyondLimitError, read_bounded, refuse_beyond
 from schemas.frames import Encoding, FrameManifest
 
 METADATA = "zarr.json"
+PACKER = Blosc(cname="zstd", clevel=5, shuffle=Blosc.BITSHUFFLE, typesize=1)
+"""Packs raw frames."""
+BLOSC_HEADER = 16
+_BROKEN = (ValueError, KeyError, TypeError, RecursionError)
 
 
 @dataclass(frozen=True)
@@ -44,10 +49,13 @@ class StoredFrames:
         return self.manifest.encoding
 
     def stored(self, numbers: Iterable[int] | None = None) -> Iterator[bytes | Rgb | None]:
-        read = partial(_stored_bytes, self.path) if self.encoding == "image" else _pixel_reader(self.path, self.size)
-        for number in range(self.count) if numbers is None else numbers:
+        wanted = list(range(self.count) if numbers is None else numbers)
+        present = [number for number in wanted if self.manifest.frames[number] is not None]
+        chunks = iter(chunks_of(self.path, self.count, present))
+        for number in wanted:
             digest = self.manifest.frames[number]
-            frame = None if digest is None else read(number)
+            chunk = None if digest is None else next(chunks)
+            frame = chunk if chunk is None or self.encoding == "image" else unpacked(chunk, self.size)
             if digest is not None and (frame is None or frame_digest(frame) != digest):
                 problem = f"{self.path}: frame {number} is damaged, expected the frame that was"
                 if is_recorded(self.path):
@@ -69,8 +77,23 @@ class IngestedFrames(StoredFrames):
 
 
 def chunk_name(frame: int) -> str:
-    """File of one frame within its array."""
+    """File of one frame within an array without shards, as earlier versions wrote them."""
     return f"{frame}.0.0.0"
+
+
+def chunks_of(array: Path, frames: int, numbers: Iterable[int]) -> Iterable[bytes | None]:
+    """The chunks of these frames of an array of so many, None for each that cannot be read.
+
+    Those of encoded images are the images: Zarr's own way takes as long as the decoding.
+    """
+    if is_sharded(array):
+        return ShardReader(array, frames).chunks(numbers)
+    return (_file_bytes(array / chunk_name(number)) for number in numbers)
+
+
+def is_sharded(array: Path) -> bool:
+    """Whether all frames of an array lie in one file."""
+    return (array / SHARD).is_file()
 
 
 def is_complete(array: Path) -> bool:
@@ -107,57 +130,35 @@ def discard(array: Path) -> None:
     (array / METADATA).unlink(missing_ok=True)
 
 
-_BROKEN = (ValueError, KeyError, TypeError, RecursionError)
-
-
 def _attributes(array: Path) -> dict[str, Any]:
     attributes: dict[str, Any] = json.loads(read_bounded(array / METADATA, "json_bytes"))["attributes"]
     return attributes
 
 
-def _stored_bytes(array: Path, frame: int) -> bytes | None:
-    """A frame's file itself; None where it cannot be read.
-
-    What is in it is the image, and Zarr's own way takes as long as the decoding.
-    """
+def _file_bytes(chunk: Path) -> bytes | None:
     try:
-        return read_bounded(array / chunk_name(frame), "image_bytes")
+        return read_bounded(chunk, "image_bytes")
     except BeyondLimitError:
         raise
     except (OSError, RefusedInput):
         return None
 
 
-def _pixel_reader(array: Path, size: ImageSize) -> Callable[[int], Rgb | None]:
-    import zarr  # 0.3 s that other commands need not wait for
-
-    shape = (*size, 3)
-    try:
-        read_bounded(array / METADATA, "json_bytes")  # before Zarr reads them
-        frames = zarr.open_array(str(array), mode="r")
-    except Exception as error:  # damaged metadata can make Zarr raise anything
-        raise DamagedError(f"{array}: expected a Zarr array ({error})") from None
-    if frames.shape[1:] != shape or frames.chunks != (1, *shape):
-        raise DamagedError(f"{array}: expected frames of {shape}, found {frames.shape[1:]}")
-
-    def read(number: int) -> Rgb | None:
-        try:
-            if not _is_chunk_of(array / chunk_name(number), math.prod(shape)):
-                return None
-            return np.asarray(frames[number], np.uint8)
-        except Exception:  # a damaged chunk can make its decompressor raise anything
-            return None
-
-    return read
+def packed(pixels: Rgb) -> bytes:
+    """The chunk of a raw frame: what Zarr's Blosc codec makes of it."""
+    chunk: bytes = PACKER.encode(np.ascontiguousarray(pixels))
+    return chunk
 
 
-def _is_chunk_of(chunk: Path, size: int) -> bool:
-    """Whether a chunk says that it holds so many bytes: one that was forged could unpack to anything.
+def unpacked(chunk: bytes, size: ImageSize) -> Rgb | None:
+    """The raw frame in a chunk; None where it is none: one that was forged could unpack to anything.
 
-    Blosc's header has the bytes before compression at its fifth byte; what does not compress is as long and a little
-    longer.
+    Blosc's header has the bytes before compression at its fifth byte.
     """
-    if not chunk.is_file() or chunk.stat().st_size > size + 4096:
-        return False
-    with chunk.open("rb") as file:
-        return int.from_bytes(file.read(8)[4:], "little") == size
+    shape = (*size, 3)
+    if len(chunk) < BLOSC_HEADER or int.from_bytes(chunk[4:8], "little") != math.prod(shape):
+        return None
+    try:
+        return np.frombuffer(PACKER.decode(chunk), np.uint8).reshape(shape)
+    except (RuntimeError, ValueError):
+        return None

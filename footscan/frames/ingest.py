@@ -1,4 +1,4 @@
-"""A film into a Zarr array `(frame, row, column, rgb)`, one frame a chunk.
+"""A film into a Zarr array `(frame, row, column, rgb)`, one frame a chunk, all chunks in one shard.
 
 An array is written beside its place and renamed when it is whole: what has its name is complete.
 """
@@ -16,12 +16,19 @@ import zarr
 from zarr.codecs import BloscCodec
 from zarr.errors import ContainsGroupError
 
-from footscan.frames.array import METADATA, chunk_name, is_recorded, read_manifest
+from footscan.frames.array import (
+    METADATA,
+    chunk_name,
+    is_recorded,
+    packed,
+    read_manifest,
+)
 from footscan.frames.codec import ImageCodec
 from footscan.frames.film import open_background, open_camera_film, open_film
 from footscan.frames.image import frame_digest
 from footscan.frames.partial import make_partial, move_into_place, partial_folder, sweep
 from footscan.frames.reader import FrameReader
+from footscan.frames.shard import ShardWriter
 from schemas.base.errors import Fault, RefusedInput
 from schemas.base.image_size import ImageSize
 from schemas.base.limits import read_bounded
@@ -79,7 +86,7 @@ def ingest_film(film: Path, array: Path, size: ImageSize | None = None) -> Frame
 
 
 class FrameWriter:
-    """Writes encoded frames into a folder, one a file, which `finish` makes a Zarr array.
+    """Writes encoded frames into a folder, one a file as they come, of which `finish` makes a Zarr array.
 
     OSError where the disk refuses.
     """
@@ -111,7 +118,12 @@ class FrameWriter:
     def finish(self, frames: int, size: ImageSize) -> FrameManifest:
         """Makes the folder an array of so many frames, which no film holds; those that were never added are lost."""
         digests = [self._digests.get(number) for number in range(frames)]
-        return _describe(_create_array(self._folder, "image", frames, size), "image", digests, None)
+        with ShardWriter(self._folder, frames) as shard:
+            for number in sorted(self._digests):
+                shard.add(number, (self._folder / chunk_name(number)).read_bytes())
+        for number in self._digests:
+            (self._folder / chunk_name(number)).unlink()
+        return _describe(create_array(self._folder, "image", frames, size), "image", digests, None)
 
 
 def ingest_background(background: Path, array: Path, frames: int, size: ImageSize) -> FrameManifest:
@@ -153,34 +165,37 @@ def _expect_own(array: Path) -> None:
         raise Fault(f"{array}: holds {min(foreign)}, which footscan did not write; {expected}")
 
 
-_IS_OURS = re.compile(r"zarr\.json|\d+\.0\.0\.0|\d+\.renumbered|[\w.]+\.[0-9a-f]{32}\.partial").fullmatch
-"""Names of a frame, of Zarr's document, and of what is left of either by a process that was killed."""
+_IS_OURS = re.compile(
+    r"zarr\.json(\.partial)?|(c|\d+)\.0\.0\.0(\.0)?(\.partial)?|\d+\.renumbered|[\w.]+\.[0-9a-f]{32}\.partial"
+).fullmatch
+"""Names of a shard, of a frame, of Zarr's document, and of what is left of them by a process that was killed."""
 
 
 def _write_frames(film: FrameReader, folder: Path) -> FrameManifest:
-    array = _create_array(folder, film.encoding, film.count, film.size)
+    array = create_array(folder, film.encoding, film.count, film.size)
     digests: list[str | None] = []
-    for number, frame in enumerate(film.stored()):
-        digests.append(None if frame is None else frame_digest(frame))
-        if isinstance(frame, bytes):
-            (folder / chunk_name(number)).write_bytes(frame)
-        elif frame is not None:
-            array[number] = frame
+    with ShardWriter(folder, film.count) as shard:
+        for number, frame in enumerate(film.stored()):
+            digests.append(None if frame is None else frame_digest(frame))
+            if frame is not None:
+                shard.add(number, frame if isinstance(frame, bytes) else packed(frame))
     return _describe(array, film.encoding, digests, film.path.name)
 
 
-def _create_array(folder: Path, encoding: Encoding, frames: int, size: ImageSize) -> "zarr.Array[Any]":
+def create_array(folder: Path, encoding: Encoding, frames: int, size: ImageSize) -> "zarr.Array[Any]":
+    """A new Zarr array of so many frames, all lost: the shard is written by `ShardWriter`."""
     return zarr.create_array(
         store=str(folder),
         shape=(frames, *size, 3),
         chunks=(1, *size, 3),
+        shards=(max(frames, 1), *size, 3),
         dtype="uint8",
         fill_value=0,
         # A background of one frame lies beside films of many, and xarray wants dimensions of one name to be as long.
         dimension_names=("single_frame" if frames == 1 else "frame", "row", "column", "rgb"),
-        chunk_key_encoding={"name": "v2", "separator": "."},  # one flat folder of images
+        chunk_key_encoding={"name": "default", "separator": "."},  # `SHARD`, in the folder itself
         **(
-            {"compressors": BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")}
+            {"compressors": BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle", typesize=1)}
             if encoding == "pixels"
             else {"serializer": ImageCodec(), "compressors": None}
         ),

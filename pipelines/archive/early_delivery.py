@@ -18,7 +18,7 @@ LAST = "report.html"
 
 
 class EarlyDelivery:
-    """Delivers the files `EARLY` as soon as their steps end, of scans that have no results yet.
+    """Delivers the files `EARLY` as soon as all of their steps have ended, of scans that have no results yet.
 
     A scan with earlier results gets new ones all at once: a report must not stand beside measures of another run.
 
@@ -30,14 +30,18 @@ class EarlyDelivery:
     def __init__(self, workspace: Workspace, folders: Mapping[str, Path]) -> None:
         self._workspace = workspace
         self._folders = {scan: folder for scan, folder in folders.items() if not folder.exists()}
-        self._files = {DELIVERED[file]: file for file in EARLY}
+        self._made: dict[str, dict[str, str]] = {scan: {} for scan in self._folders}
 
     def on_step_end(self, end: StepEnd) -> None:
-        """Deliver the result of the step, if it is one of them."""
-        folder, file = self._folders.get(end.step.scan), self._files.get(end.step.kind)
-        if folder is None or file is None or not isinstance(end.outcome, Success):
+        """Deliver the files, if the step was the last of them."""
+        made = self._made.get(end.step.scan)
+        files = [file for file in EARLY if DELIVERED[file] == end.step.kind]
+        if made is None or not files or not isinstance(end.outcome, Success):
             return
-        problem = self._workspace.deliver({file: end.outcome.digest}, folder)
+        made |= dict.fromkeys(files, end.outcome.digest)
+        if len(made) < len(EARLY):
+            return
+        problem = self._workspace.deliver(made, self._folders[end.step.scan])
         if problem is not None:  # reported at the end of the scan, if it still is one
             log.debug("%s", problem)
 

@@ -175,14 +175,20 @@ def simulate_world(
 
 def ingest(
     folders: Annotated[list[Path], typer.Argument(help="Scan folders, or an archive of them.")],
+    repack: Annotated[
+        bool, typer.Option("--repack", help="Read no films: gather arrays of one file a frame in one file a camera.")
+    ] = False,
     as_json: AsJson = False,
 ) -> int:
     """Convert films to Zarr: one array per camera in frames.zarr beside the films, with the JPEG bytes unchanged."""
-    from pipelines.archive.ingest import ingest_scans
+    from pipelines.archive.ingest import ingest_scans, repack_scans
 
-    ends = ingest_scans(folders)
+    ends = repack_scans(folders) if repack else ingest_scans(folders)
     if as_json:
         print_json([end.to_json() for end in ends])
+    elif repack:
+        rows = [[e.scan, str(e.camera or ""), str(e.files_fewer), str(e.store_bytes), e.problem or "ok"] for e in ends]
+        print_table("", ["scan", "camera", "files fewer", "store bytes", ""], rows)
     else:
         rows = [
             [

@@ -14,6 +14,7 @@ import pytest
 import trimesh
 
 from footscan.virtual.foot.foot import make_foot
+from tests.helpers.stored_frames import frame_bytes, put_frame
 
 Footscan = Callable[..., CompletedProcess[str]]
 Results = Callable[[Path], dict[str, bytes]]
@@ -211,14 +212,14 @@ def test_frames_that_are_gone_are_ingested_again(footscan: Footscan, bench: Path
 
 def test_a_damaged_frame_is_ingested_again(footscan: Footscan, bench: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Another parameter of the extraction has it read the frames again."""
-    chunk = bench / "archive/P0001/small/frames.zarr/cam2/40.0.0.0"
-    sound = chunk.read_bytes()
-    replace(chunk, sound[:-1000] + bytes(1000))
+    array = bench / "archive/P0001/small/frames.zarr/cam2"
+    sound = frame_bytes(array, 40)
+    put_frame(array, 40, sound[:-1000] + bytes(1000))
     set_parameters(bench, "{extraction: {red_threshold: 19}}")
     done = footscan("run", bench / "workflow.yaml")
     assert done.returncode == 0, done.stderr
-    assert f"{chunk.parent}: frame 40 is damaged" in caplog.text
-    assert chunk.read_bytes() == sound
+    assert f"{array}: frame 40 is damaged" in caplog.text
+    assert frame_bytes(array, 40) == sound
     mesh = trimesh.load_mesh(bench / "results/P0001/small/foot.stl")
     foot = make_foot(side="right")
     assert mesh.extents[1] == pytest.approx(np.ptp(foot.vertices[:, 1]), abs=1.5)

@@ -9,6 +9,8 @@ from subprocess import CompletedProcess
 
 import pytest
 
+from tests.helpers.stored_frames import frame_bytes
+
 Footscan = Callable[..., CompletedProcess[str]]
 COMMANDS = [
     ["demo"],
@@ -81,7 +83,7 @@ def test_json_stands_alone_on_standard_output(
     monkeypatch.chdir(bench)
     Path("pixels.csv").write_text("i,j\n320,240\n")
     scan = Path("archive/P0001/small")
-    (scan / "frame.jpg").write_bytes((scan / "frames.zarr/cam1/40.0.0.0").read_bytes())
+    (scan / "frame.jpg").write_bytes(frame_bytes(scan / "frames.zarr/cam1", 40))
     done = footscan(*arguments, "--json")
     assert done.returncode == 0, done.stderr
     json.loads(done.stdout, parse_constant=pytest.fail)  # no NaN

@@ -8,6 +8,8 @@ from subprocess import CompletedProcess
 
 import pytest
 
+from tests.helpers.stored_frames import frame_bytes
+
 Footscan = Callable[..., CompletedProcess[str]]
 Mistake = Callable[[CompletedProcess[str]], str]
 Results = Callable[[Path], dict[str, bytes]]
@@ -78,7 +80,7 @@ def test_full_disk_while_steps_run(
 
 
 def test_full_disk_while_films_become_frames(footscan: Footscan, fresh: Path, fill_disk: Callable[[str], None]) -> None:
-    fill_disk("30.0.0.0")  # the chunk of a frame
+    fill_disk("c.0.0.0.0.partial")  # the frames of a camera
     done = footscan("ingest", fresh / "archive/P0001/small")
     scan = fresh / "archive/P0001/small"
     assert done.returncode == 3
@@ -93,7 +95,7 @@ def test_full_disk_while_films_become_frames(footscan: Footscan, fresh: Path, fi
     [
         ("calibrate", "chart", "capture/chart.csv", "--out"),
         ("measure", "results/P0001/small/foot.stl", "--out"),
-        ("extract", "archive/P0001/small/frames.zarr/cam1/40.0.0.0.jpg", "--out"),
+        ("extract", "frame.jpg", "--out"),
     ],
     ids=["calibrate", "measure", "extract"],
 )
@@ -104,8 +106,7 @@ def test_full_disk_at_a_written_file(
     monkeypatch: pytest.MonkeyPatch,
     arguments: tuple[str, ...],
 ) -> None:
-    picture = bench / "archive/P0001/small/frames.zarr/cam1/40.0.0.0"
-    picture.with_name("40.0.0.0.jpg").write_bytes(picture.read_bytes())
+    (bench / "frame.jpg").write_bytes(frame_bytes(bench / "archive/P0001/small/frames.zarr/cam1", 40))
     monkeypatch.chdir(bench)
     Path("out").write_text("what was there before")
     fill_disk(".out.")

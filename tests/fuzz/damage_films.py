@@ -6,6 +6,8 @@ import struct
 from pathlib import Path
 from random import Random
 
+from footscan.frames.shard import SHARD
+
 SIZES = (0, 1, 7, 2**15, 2**31 - 1, 2**31, 2**32 - 1)
 TAGS = (b"RIFF", b"LIST", b"avih", b"strh", b"strf", b"idx1", b"movi", b"JUNK", b"00dc", b"01wb", b"\0\0\0\0")
 SHAPES = (0, -1, 1, 2**31, 2**62, 2**63, 1e308, "640", None, [1])
@@ -27,8 +29,8 @@ def damage_store(random: Random, group: Path) -> str:
     if random.random() < 0.3:
         return random.choice((_other_metadata, _other_manifest))(random, group / "cam1" / "zarr.json")
     array = group / "cam1"
-    chunk = array / f"{random.randrange(20)}.0.0.0"
-    place = random.choice((chunk, chunk, array / "zarr.json", group / "zarr.json"))
+    shard = array / SHARD
+    place = random.choice((shard, shard, array / "zarr.json", group / "zarr.json"))
     return f"{place.name} {random.choice(DAMAGES)(random, place)}"
 
 
@@ -73,10 +75,9 @@ def _a_link(random: Random, place: Path) -> str:
     return "is a link"
 
 
-def _another_frame(_: Random, place: Path) -> str:
-    frame = next(place.parent.glob("**/1.0.0.0")).read_bytes()
-    place.write_bytes(frame)
-    return "is another frame"
+def _a_part(_: Random, place: Path) -> str:
+    place.write_bytes(next(place.parent.glob(f"**/{SHARD}")).read_bytes()[:1000])
+    return "is a part of the frames"
 
 
 def _random(random: Random, place: Path) -> str:
@@ -84,7 +85,7 @@ def _random(random: Random, place: Path) -> str:
     return "is random"
 
 
-DAMAGES = (_a_folder, _a_pipe, _another_length, _a_link, _another_frame, _random)
+DAMAGES = (_a_folder, _a_pipe, _another_length, _a_link, _a_part, _random)
 
 
 def _truncated(random: Random, film: bytes) -> tuple[bytes, str]:

@@ -36,7 +36,7 @@ READERS: dict[str, tuple[str, ...]] = {
     f"{SCAN}/cam1.avi": (f"extract {SCAN}/cam1.avi --out new.csv", f"ingest {SCAN}", RUN),
     "sizes.yaml": ("sizes left.json --table sizes.yaml", "pair left.json right.json --table sizes.yaml"),
     f"{SCAN}/frames.zarr/cam1/zarr.json": (f"extract {SCAN}/frames.zarr/cam1 --out new.csv", f"ingest {SCAN}", RUN),
-    f"{SCAN}/frames.zarr/cam1/3.0.0.0": (f"extract {SCAN}/frames.zarr/cam1 --out new.csv", f"ingest {SCAN}"),
+    f"{SCAN}/frames.zarr/cam1/c.0.0.0.0": (f"extract {SCAN}/frames.zarr/cam1 --out new.csv", f"ingest {SCAN}"),
     f"{SCAN}/frames.zarr/zarr.json": (f"ingest {SCAN}",),
 }  # fmt: skip
 """File -> argument lines."""

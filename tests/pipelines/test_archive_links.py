@@ -7,9 +7,11 @@ from typing import Any
 
 import pytest
 
+from footscan.frames.shard import SHARD
 from footscan.recordings.scans import read_scan
 from pipelines.cli.main import run_command
 from schemas.base.errors import RefusedInput
+from tests.helpers.stored_frames import frame_bytes
 
 LEAVES = "leaves the archive, expected a path inside it"
 
@@ -44,7 +46,7 @@ def manifest(archive: Any, elsewhere: Path) -> None:
 
 def chunk(archive: Any, elsewhere: Path) -> None:
     (archive.scan / "frames.zarr/cam1").mkdir(parents=True)
-    (archive.scan / "frames.zarr/cam1/3.0.0.0").symlink_to(elsewhere / "cam1")
+    (archive.scan / "frames.zarr/cam1" / SHARD).symlink_to(elsewhere / "cam1")
 
 
 def group(archive: Any, elsewhere: Path) -> None:
@@ -127,7 +129,9 @@ def film_of_images(archive: Any, jpeg: Path) -> Path:
 @pytest.fixture
 def jpeg(done: Any, archive: Any) -> Path:
     """A frame, outside the archive."""
-    return Path(shutil.copy(done.scan / "frames.zarr/cam1/3.0.0.0", archive.root / "frame.jpg"))
+    place = archive.root / "frame.jpg"
+    place.write_bytes(frame_bytes(done.scan / "frames.zarr/cam1", 3))
+    return Path(place)
 
 
 def test_an_image_that_is_a_link_out_of_the_archive_is_refused(archive: Any, jpeg: Path) -> None:

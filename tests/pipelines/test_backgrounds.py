@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from footscan.frames.film import open_film
 from footscan.frames.image import encode_png
-from footscan.frames.ingest import chunk_name, ingest_film
+from footscan.frames.ingest import ingest_film
 from footscan.frames.reader import pixel_frames
 from footscan.mesh.formats.files import read_file
 from footscan.recordings.scans import read_scan
@@ -29,6 +29,7 @@ from schemas.calibration import Calibration
 from schemas.frames import FrameManifest
 from schemas.parameters.extraction import ExtractionParameters
 from schemas.parameters.scan import ScanParameters
+from tests.helpers.stored_frames import frame_bytes, put_frame
 
 Image = NDArray[np.uint8]
 FRAMES = 20
@@ -302,15 +303,15 @@ def test_a_background_of_the_same_content_is_not_read_again(done: Any) -> None:
 def test_damaged_background_is_ingested_anew_within_the_run(done: Any) -> None:
     write_background(name_background(done, "off.avi"), [surroundings(40)] * FRAMES)
     done.run()
-    chunk = done.scan / "frames.zarr/cam5-background" / chunk_name(6)
-    whole = chunk.read_bytes()
-    chunk.write_bytes(whole[:-9])
+    array = done.scan / "frames.zarr/cam5-background"
+    whole = frame_bytes(array, 6)
+    put_frame(array, 6, whole[:-9])
     done.set_parameters("{extraction: {red_threshold: 20}}")
     [end], ran = done.run()
     assert end.problem is None
     assert "background-5" in ran
     assert not ran & {"ingest-1", "ingest-5"}
-    assert chunk.read_bytes() == whole
+    assert frame_bytes(array, 6) == whole
 
 
 def test_skin_is_coloured_where_laser_off_frames_show_it(done: Any) -> None:

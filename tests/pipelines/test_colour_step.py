@@ -7,13 +7,14 @@ import pytest
 import simplejpeg
 
 from footscan.cloud.colour import linear_light
-from footscan.frames.ingest import chunk_name, ingest_film
+from footscan.frames.ingest import ingest_film
 from footscan.stripe.points import STRIPE_DTYPE
 from footscan.virtual.filming.film import write_film
 from pipelines.arrays import pack, unpack
 from pipelines.steps import colour
 from schemas.base.errors import DamagedError
 from schemas.frames import FrameManifest
+from tests.helpers.stored_frames import frame_bytes, put_frame
 
 LEVELS = (60, 120, 180)
 
@@ -49,8 +50,7 @@ def test_a_single_background_shows_no_skin(tmp_path: Path) -> None:
 
 def test_a_damaged_array_is_ingested_anew_by_the_next_run(tmp_path: Path) -> None:
     array, manifest = ingested(tmp_path, LEVELS)
-    chunk = array / chunk_name(2)
-    chunk.write_bytes(chunk.read_bytes()[:-9])
+    put_frame(array, 2, frame_bytes(array, 2)[:-9])
     with pytest.raises(DamagedError, match="frame 2"):
         coloured(array, manifest)
     assert not (array / "zarr.json").exists()

@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 from made_up_scan import recorded
 
-from footscan.frames.ingest import chunk_name
 from footscan.recordings.scans import read_scan
 from pipelines.engine.actions.step import Output
 from pipelines.engine.files.file_digests import FileDigests
@@ -19,6 +18,7 @@ from pipelines.scan import DELIVERED, CalibrationFile, scan_steps, source_files
 from schemas.base.errors import RefusedInput
 from schemas.calibration import Calibration
 from schemas.parameters.scan import ScanParameters
+from tests.helpers.stored_frames import frame_bytes, put_frame
 
 FROM_CLEAN = {
     "clean", "fuse", "orient", "surface", "measure", "quality", "quality.json", "cloud.ply", "foot.stl", "foot.ply",
@@ -142,15 +142,15 @@ def test_results_come_back_without_a_step(done: Any, damage: str) -> None:
 
 
 def test_damaged_frame_is_ingested_anew_within_the_run(done: Any) -> None:
-    chunk = done.scan / "frames.zarr/cam1" / chunk_name(6)
-    whole = chunk.read_bytes()
-    chunk.write_bytes(whole[:-9])
+    array = done.scan / "frames.zarr/cam1"
+    whole = frame_bytes(array, 6)
+    put_frame(array, 6, whole[:-9])
     done.set_parameters("{extraction: {red_threshold: 20}}")
     [scan], ran = done.run()
     assert scan.problem is None
     assert "ingest-1" in ran
     assert "ingest-5" not in ran
-    assert chunk.read_bytes() == whole
+    assert frame_bytes(array, 6) == whole
 
 
 def test_removed_frames_are_ingested_and_the_rest_is_a_hit(done: Any) -> None:

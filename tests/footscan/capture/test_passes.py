@@ -27,6 +27,7 @@ from footscan.virtual.filming.stream_faults import StreamFault
 from footscan.virtual.filming.streams import SentFrame, VirtualStreams, free_running
 from schemas.base.errors import Fault
 from schemas.rig import RigBoard
+from tests.helpers.stored_frames import frame_bytes
 
 pytestmark = pytest.mark.real_time  # cameras stream while heads move
 
@@ -88,7 +89,7 @@ class Bench:
         self.recording.close_film(name, film.arrivals, len(film.x_mm))
         sent = {frame.number: frame for frame in self.streams.sent(camera)}
         folder = self.recording.file("frames.zarr") / name
-        return {k: sent[exposure_of((folder / f"{k}.0.0.0").read_bytes())] for k in film.arrivals}
+        return {k: sent[exposure_of(frame_bytes(folder, k))] for k in film.arrivals}
 
 
 def timing(camera: int) -> CameraTiming:

@@ -24,8 +24,10 @@ from footscan.capture.recording import LEAST_FREE_BYTES, ScanRecording
 from footscan.frames.array import StoredFrames, is_recorded, read_manifest
 from footscan.frames.ingest import FrameWriter, ingest_film
 from footscan.frames.reader import pixel_frames
+from footscan.frames.shard import SHARD
 from schemas.base.errors import Fault, RefusedInput
 from schemas.scan import Scan
+from tests.helpers.stored_frames import frame_bytes, frames_of, put_frame
 
 FILM = "frames.zarr/cam1"
 DOCUMENT = Scan.model_validate(
@@ -73,8 +75,8 @@ def test_frames_have_their_numbers_and_their_bytes(place: Path) -> None:
     manifest = read_manifest(array)
     assert [number for number, digest in enumerate(manifest.frames) if digest is None] == [3, 7]
     for number, arrival in frames.items():
-        assert (array / f"{number}.0.0.0").read_bytes() == jpeg(arrival)
-    assert names(array) == {"zarr.json"} | {f"{number}.0.0.0" for number in frames}
+        assert frame_bytes(array, number) == jpeg(arrival)
+    assert names(array) == {"zarr.json", SHARD}
     assert names(place) == {"scan.yaml", "cam1.csv", "frames.zarr"}
     assert names(place.parent) == {"R1"}
     assert is_recorded(array)
@@ -82,8 +84,7 @@ def test_frames_have_their_numbers_and_their_bytes(place: Path) -> None:
 
 def test_one_picture_may_stand_for_several_frames(place: Path) -> None:
     record(place, {0: 1, 1: 1, 2: 0, 3: 1}, 4)
-    assert [(place / FILM / f"{k}.0.0.0").read_bytes() for k in range(4)] == [jpeg(k) for k in (1, 1, 0, 1)]
-    assert names(place / FILM) == {"zarr.json", "0.0.0.0", "1.0.0.0", "2.0.0.0", "3.0.0.0"}
+    assert frames_of(place / FILM) == [jpeg(k) for k in (1, 1, 0, 1)]
 
 
 def test_plain_zarr_reads_a_recording(place: Path) -> None:
@@ -108,7 +109,7 @@ def test_a_recording_named_elsewhere_is_copied(place: Path, tmp_path: Path) -> N
     record(place, {0: 4, 2: 7}, 3)
     copy = tmp_path / "other/frames.zarr/cam5"
     assert ingest_film(place / FILM, copy) == read_manifest(place / FILM)
-    assert (copy / "2.0.0.0").read_bytes() == jpeg(7)
+    assert frame_bytes(copy, 2) == jpeg(7)
     assert not is_recorded(copy)
 
 
@@ -117,7 +118,7 @@ def test_another_film_never_overwrites_a_recording(place: Path, tmp_path: Path) 
     other = record(tmp_path / "archive/P0001/R2", {0: 5}, 1)
     with pytest.raises(RefusedInput, match="cam1: holds frames that were recorded into it"):
         ingest_film(other / FILM, place / FILM)
-    assert (place / FILM / "0.0.0.0").read_bytes() == jpeg(4)
+    assert frame_bytes(place / FILM, 0) == jpeg(4)
 
 
 @pytest.mark.parametrize("harm", ["flipped", "missing"])
@@ -125,13 +126,12 @@ def test_a_damaged_recording_is_refused_with_the_frame_and_stays(place: Path, ha
     record(place, {0: 4, 1: 7}, 2)
     array = place / FILM
     manifest = read_manifest(array)
-    chunk = array / "1.0.0.0"
-    chunk.unlink() if harm == "missing" else chunk.write_bytes(jpeg(8))
+    put_frame(array, 1, None if harm == "missing" else jpeg(8))
     with pytest.raises(Fault, match="cam1: frame 1 is damaged, expected the frame that was recorded"):
         ingest_film(array, array)
     with pytest.raises(Fault, match="frame 1 is damaged, expected the frame that was recorded"):
         list(pixel_frames(StoredFrames(array, manifest)))
-    chunk.write_bytes(jpeg(7))
+    put_frame(array, 1, jpeg(7))
     assert ingest_film(array, array) == manifest
 
 
@@ -172,7 +172,7 @@ def test_a_scan_is_never_overwritten(place: Path) -> None:
         with pytest.raises(Fault, match="R2: cannot be written"):
             recording.finish(DOCUMENT)
     assert names(place.parent) == {"R1", "R2"}
-    assert (place.with_name("R2") / FILM / "0.0.0.0").read_bytes() == jpeg(4)
+    assert frame_bytes(place.with_name("R2") / FILM, 0) == jpeg(4)
 
 
 def test_without_space_nothing_begins(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -259,7 +259,7 @@ def test_a_scan_is_on_the_disk_before_it_has_its_name(place: Path, monkeypatch: 
     monkeypatch.setattr(os, "fsync", noted)
     record(place, {0: 4}, 1)
     hidden = [path for path in synced if path.startswith(".R1.partial")]
-    assert {Path(path).name for path in hidden} >= {"0.0.0.0", "zarr.json", "cam1", "frames.zarr", "cam1.csv"}
+    assert {Path(path).name for path in hidden} >= {SHARD, "zarr.json", "cam1", "frames.zarr", "cam1.csv"}
     assert Path(hidden[-1]).name == "scan.yaml"
     assert synced[len(hidden)] == "R1"
     assert synced[-1].endswith("/P0001")

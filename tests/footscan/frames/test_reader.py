@@ -5,17 +5,21 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import google_crc32c
 import numpy as np
 import pytest
 
-from footscan.frames.array import IngestedFrames, StoredFrames, chunk_name, is_complete
+from footscan.frames.array import IngestedFrames, StoredFrames, is_complete
 from footscan.frames.film import open_film
 from footscan.frames.image import encode_png
 from footscan.frames.ingest import ingest_film
 from footscan.frames.reader import FrameReader, backgrounds_of, pixel_frames
+from footscan.frames.shard import SHARD
 from schemas.base.errors import DamagedError
 from schemas.base.image_size import ImageSize
+from schemas.base.limits import BeyondLimitError
 from schemas.frames import FrameManifest
+from tests.helpers.stored_frames import frame_bytes, put_frame
 
 SIZE = ImageSize(rows=48, columns=64)
 Ingested = tuple[Path, FrameManifest]
@@ -41,10 +45,10 @@ def ingested(
     return array, manifest
 
 
-def flip(path: Path, at: int) -> None:
-    data = bytearray(path.read_bytes())
+def flipped(frame: bytes, at: int) -> bytes:
+    data = bytearray(frame)
     data[at] ^= 1
-    path.write_bytes(data)
+    return bytes(data)
 
 
 def test_one_frame_is_as_all_give_it(ingested: Ingested) -> None:
@@ -56,20 +60,20 @@ def test_one_frame_is_as_all_give_it(ingested: Ingested) -> None:
 @pytest.mark.parametrize("damage", ["first byte", "middle byte", "cut", "emptied", "removed", "exchanged"])
 def test_damaged_frame_is_noticed(ingested: Ingested, damage: str) -> None:
     array, manifest = ingested
-    chunk = array / chunk_name(2)
+    frame = frame_bytes(array, 2)
     match damage:
         case "first byte":
-            flip(chunk, 0)
+            put_frame(array, 2, flipped(frame, 0))
         case "middle byte":
-            flip(chunk, chunk.stat().st_size // 2)
+            put_frame(array, 2, flipped(frame, len(frame) // 2))
         case "cut":
-            chunk.write_bytes(chunk.read_bytes()[:-1])
+            put_frame(array, 2, frame[:-1])
         case "emptied":
-            chunk.write_bytes(b"")
+            put_frame(array, 2, b"")
         case "removed":
-            chunk.unlink()
+            put_frame(array, 2, None)
         case "exchanged":
-            shutil.copy(array / chunk_name(3), chunk)
+            put_frame(array, 2, frame_bytes(array, 3))
     frames = pixel_frames(StoredFrames(array, manifest))
     assert next(frames) is not None
     assert next(frames) is not None
@@ -79,16 +83,41 @@ def test_damaged_frame_is_noticed(ingested: Ingested, damage: str) -> None:
 
 
 @pytest.mark.parametrize("metadata", [None, b"", b"{}", b'{"zarr_format": 3, "node_type": "group"}', b"\xff", b"[1]"])
-def test_damaged_metadata_are_noticed_where_they_are_needed(ingested: Ingested, metadata: bytes | None) -> None:
+def test_frames_are_read_without_the_metadata_of_zarr(ingested: Ingested, metadata: bytes | None) -> None:
     array, manifest = ingested
     (array / "zarr.json").unlink()
     if metadata is not None:
         (array / "zarr.json").write_bytes(metadata)
-    if manifest.encoding == "image":
-        assert len(list(pixel_frames(StoredFrames(array, manifest)))) == 4
-    else:
-        with pytest.raises(DamagedError, match=r"cam1: expected a Zarr array"):
-            list(pixel_frames(StoredFrames(array, manifest)))
+    assert len(list(pixel_frames(StoredFrames(array, manifest)))) == 4
+
+
+@pytest.mark.parametrize("damage", ["cut", "index", "checksum", "emptied", "removed"])
+def test_a_shard_without_its_index_is_damaged(ingested: Ingested, damage: str) -> None:
+    array, manifest = ingested
+    shard = array / SHARD
+    content = shard.read_bytes()
+    match damage:
+        case "cut":
+            shard.write_bytes(content[:-1])
+        case "index":
+            shard.write_bytes(content[:-20] + flipped(content[-20:], 3))
+        case "checksum":
+            shard.write_bytes(content[:-1] + flipped(content[-1:], 0))
+        case "emptied":
+            shard.write_bytes(b"")
+        case "removed":
+            shard.unlink()
+    with pytest.raises(DamagedError, match="frame 0 is damaged"):
+        list(pixel_frames(StoredFrames(array, manifest)))
+
+
+def test_a_forged_index_reads_nothing_large(ingested: Ingested) -> None:
+    array, manifest = ingested
+    index = np.array([[0, 2**62]] * 4, "<u8").tobytes()
+    content = (array / SHARD).read_bytes()[:-68] + index + google_crc32c.value(index).to_bytes(4, "little")
+    (array / SHARD).write_bytes(content)
+    with pytest.raises(BeyondLimitError, match="image_bytes"):
+        list(pixel_frames(StoredFrames(array, manifest)))
 
 
 def test_array_that_is_gone_is_noticed(ingested: Ingested) -> None:
@@ -136,20 +165,22 @@ def test_every_source_gives_its_frames_alike(
 
 def test_a_damaged_array_is_discarded_where_a_step_has_ingested_it(ingested: Ingested) -> None:
     array, manifest = ingested
-    flip(array / chunk_name(2), 9)
+    put_frame(array, 2, flipped(frame_bytes(array, 2), 9))
     for reader, stays in ((StoredFrames(array, manifest), True), (IngestedFrames(array, manifest), False)):
         with pytest.raises(DamagedError):
             list(pixel_frames(reader))
         assert is_complete(array) == stays
 
 
-def test_one_background_serves_every_frame(ingested: Ingested) -> None:
+def test_one_background_serves_every_frame(
+    ingested: Ingested, tmp_path: Path, pixels: Callable[..., Any], write_raw: Callable[..., Path]
+) -> None:
     reader = StoredFrames(*ingested)
-    first, *_ = (frame.copy() for frame in pixel_frames(reader) if frame is not None)
     for found, expected in zip(backgrounds_of(reader, 4), pixel_frames(reader), strict=True):
         np.testing.assert_array_equal(found, expected)
-    alone = StoredFrames(reader.path, reader.manifest.model_copy(update={"frames": reader.manifest.frames[:1]}))
+    film = write_raw(tmp_path / "alone.avi", [pixels(7)])
+    alone = StoredFrames(tmp_path / "alone", ingest_film(film, tmp_path / "alone", SIZE))
     served = list(backgrounds_of(alone, 3))
     assert len(served) == 3
     for found in served:
-        np.testing.assert_array_equal(found, first)
+        np.testing.assert_array_equal(found, pixels(7))
