@@ -8,6 +8,7 @@ from subprocess import CompletedProcess
 
 import pytest
 
+from footscan.frames.shard import ShardWriter
 from tests.helpers.stored_frames import frame_bytes
 
 Footscan = Callable[..., CompletedProcess[str]]
@@ -79,8 +80,15 @@ def test_full_disk_while_steps_run(
     assert footscan("run", bench / "workflow.yaml").returncode == 0
 
 
-def test_full_disk_while_films_become_frames(footscan: Footscan, fresh: Path, fill_disk: Callable[[str], None]) -> None:
-    fill_disk("c.0.0.0.0.partial")  # the frames of a camera
+def test_full_disk_while_films_become_frames(footscan: Footscan, fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    add = ShardWriter.add
+
+    def fill(shard: ShardWriter, number: int, data: bytes) -> None:
+        add(shard, number, data[: len(data) // 2] if number == 30 else data)
+        if number == 30:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(ShardWriter, "add", fill)
     done = footscan("ingest", fresh / "archive/P0001/small")
     scan = fresh / "archive/P0001/small"
     assert done.returncode == 3
