@@ -18,7 +18,9 @@ from footscan.frames.ingest import ingest_background, ingest_film
 from schemas.base.image_size import ImageSize
 
 PAGE = Path(__file__).parents[3] / "docs/frames.md"
-BESIDE_FOOTSCAN, WITHOUT_FOOTSCAN = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+BESIDE_FOOTSCAN, WITHOUT_FOOTSCAN, PIECE = re.findall(
+    r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL
+)
 NO_FOOTSCAN = """
 import importlib.metadata, sys
 sys.modules["footscan"] = sys.modules["schemas"] = None
@@ -101,6 +103,13 @@ def group(tmp_path: Path, jpeg: Callable[..., bytes], write_mjpeg: Callable[...,
 def test_the_examples_of_the_page(group: Path, code: str, jpeg: Callable[..., bytes]) -> None:
     shown = subprocess.run([sys.executable, "-c", code], cwd=group.parent, check=True, capture_output=True, text=True)
     assert shown.stdout.startswith(str(decode_image(jpeg(10)).mean(axis=(0, 1))))
+
+
+def test_a_frame_is_a_piece_of_the_file(group: Path, jpeg: Callable[..., bytes]) -> None:
+    code = PIECE.replace("frames, wanted = 200, 12", "frames, wanted = 12, 10")
+    assert code != PIECE
+    subprocess.run([sys.executable, "-c", code], cwd=group.parent, check=True)
+    assert (group.parent / "12.jpg").read_bytes() == jpeg(10)
 
 
 def test_dimensions_of_one_name_have_one_length(group: Path) -> None:
