@@ -208,6 +208,8 @@ def local_cluster(workers: int, *, dashboard: bool = False) -> Iterator[Cluster]
         "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical",
         "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": TRIM_BYTES,
         "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": MMAP_BYTES,
+        # Loops that run side by side (footscan.side_by_side) share the cores with the other workers.
+        "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": max(cores() // workers, 1),
     }
     if not dashboard:  # Dask opens the ports of its pages in any case; without routes they serve nothing
         settings |= {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
