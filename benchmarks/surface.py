@@ -8,10 +8,10 @@ SCAN is a virtual scan that knows its truth. Each library gets the same fused cl
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from pipelines.archive.job import draw_steps, job_of_scan, plan_job
 from pipelines.arrays import unpack
 from pipelines.engine.actions.step import Output, Step, Success
 from pipelines.engine.plan import make_plan
-from pipelines.engine.pool import StepEnd, Threads
+from pipelines.engine.pool import Threads
 from pipelines.engine.run import run_plan
 from pipelines.engine.store.store import Store
 from schemas.parameters.surface import SurfaceParameters
@@ -150,14 +150,10 @@ def _steps_to(kind: str, scan: Path, calibration: Path, results: Path) -> tuple[
     return [step for step in steps if step.name in wanted], planned.workspace.store
 
 
-def _run(
-    steps: Iterable[Step], store: Store, on_step_end: Callable[[StepEnd], Any] = lambda _: None
-) -> dict[str, bytes]:
+def _run(steps: Iterable[Step], store: Store) -> dict[str, bytes]:
     """What the steps come to, by their names."""
     found: dict[str, bytes] = {}
-    for name, outcome in run_plan(
-        make_plan(list(steps), store), store, pool=Threads(THREADS), on_step_end=on_step_end
-    ).items():
+    for name, outcome in run_plan(make_plan(list(steps), store), store, pool=Threads(THREADS)).items():
         data = store.get(outcome.digest) if isinstance(outcome, Success) else None
         if data is None:
             raise RuntimeError(f"{name}: {outcome}")

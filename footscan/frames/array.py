@@ -2,13 +2,14 @@
 
 import json
 import math
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numcodecs import Blosc
 from pydantic import ValidationError
 
 from footscan.frames.image import Rgb, frame_digest
@@ -18,9 +19,10 @@ from schemas.base.image_size import ImageSize
 from schemas.base.limits import BeyondLimitError, read_bounded, refuse_beyond
 from schemas.frames import Encoding, FrameManifest
 
+if TYPE_CHECKING:
+    from numcodecs import Blosc
+
 METADATA = "zarr.json"
-PACKER = Blosc(cname="zstd", clevel=5, shuffle=Blosc.BITSHUFFLE, typesize=1)
-"""Packs raw frames."""
 BLOSC_HEADER = 16
 _BROKEN = (ValueError, KeyError, TypeError, RecursionError)
 
@@ -77,8 +79,12 @@ class IngestedFrames(StoredFrames):
 
 
 def chunk_name(frame: int) -> str:
-    """File of one frame within an array without shards, as earlier versions wrote them."""
+    """File of one frame in its array while it is filmed, and in arrays of earlier versions, which have no shards."""
     return f"{frame}.0.0.0"
+
+
+is_chunk_name = re.compile(r"\d+\.0\.0\.0").fullmatch
+"""Whether a file's name is one that `chunk_name` gives."""
 
 
 def chunks_of(array: Path, frames: int, numbers: Iterable[int]) -> Iterable[bytes | None]:
@@ -146,7 +152,7 @@ def _file_bytes(chunk: Path) -> bytes | None:
 
 def packed(pixels: Rgb) -> bytes:
     """The chunk of a raw frame: what Zarr's Blosc codec makes of it."""
-    chunk: bytes = PACKER.encode(np.ascontiguousarray(pixels))
+    chunk: bytes = _packer().encode(np.ascontiguousarray(pixels))
     return chunk
 
 
@@ -159,6 +165,13 @@ def unpacked(chunk: bytes, size: ImageSize) -> Rgb | None:
     if len(chunk) < BLOSC_HEADER or int.from_bytes(chunk[4:8], "little") != math.prod(shape):
         return None
     try:
-        return np.frombuffer(PACKER.decode(chunk), np.uint8).reshape(shape)
+        return np.frombuffer(_packer().decode(chunk), np.uint8).reshape(shape)
     except (RuntimeError, ValueError):
         return None
+
+
+@cache
+def _packer() -> "Blosc":
+    from numcodecs import Blosc  # slow to import, and needed for raw frames alone
+
+    return Blosc(cname="zstd", clevel=5, shuffle=Blosc.BITSHUFFLE, typesize=1)

@@ -166,7 +166,7 @@ def _expect_own(array: Path) -> None:
 
 
 _IS_OURS = re.compile(
-    r"zarr\.json(\.partial)?|(c|\d+)\.0\.0\.0(\.0)?(\.partial)?|\d+\.renumbered|[\w.]+\.[0-9a-f]{32}\.partial"
+    r"zarr\.json(\.partial)?|c\.0\.0\.0\.0(\.partial)?|\d+\.0\.0\.0|\d+\.renumbered|[\w.]+\.[0-9a-f]{32}\.partial"
 ).fullmatch
 """Names of a shard, of a frame, of Zarr's document, and of what is left of them by a process that was killed."""
 

@@ -2,17 +2,14 @@
 
 import json
 import os
-import re
 import tempfile
 from pathlib import Path
 
-from footscan.frames.array import METADATA, StoredFrames, chunks_of, is_complete, read_manifest
+from footscan.frames.array import METADATA, StoredFrames, chunks_of, is_chunk_name, is_complete, read_manifest
 from footscan.frames.ingest import create_array
 from footscan.frames.shard import ShardWriter
 from schemas.base.errors import Fault
 from schemas.frames import FrameManifest
-
-OLD_CHUNK = re.compile(r"\d+\.0\.0\.0").fullmatch
 
 
 def repack(array: Path) -> int:
@@ -48,7 +45,7 @@ def repack(array: Path) -> int:
                         raise Fault(f"{array}: frame {number} cannot be read any more")
                     shard.add(number, chunk)
             _replace_document(array, document["attributes"], manifest)
-        old = [file for file in array.iterdir() if OLD_CHUNK(file.name)]
+        old = [file for file in array.iterdir() if is_chunk_name(file.name)]
         for file in old:
             file.unlink()
     except OSError as error:

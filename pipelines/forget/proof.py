@@ -4,9 +4,10 @@ import os
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
+from footscan.frames.array import is_chunk_name
 from footscan.recordings.scans import SCAN_FILE
 from pipelines.engine.store.store import Store
-from pipelines.forget.subject import CHUNK, Subject, digest_of, files_below
+from pipelines.forget.subject import Subject, digest_of, files_below
 
 OF_A_SCAN = (SCAN_FILE, "measures.json")
 """A folder with one of these files is that of a scan or of its results."""
@@ -48,7 +49,7 @@ def _remains(subject: Subject, digests: Collection[str], folder: Path, sizes: Co
         places = [Path(here, name) for name in (*below, *names)]
         yield from (place for place in places if subject.pattern.search(str(place.relative_to(folder)).encode()))
     for file in files_below(folder):
-        if file.is_symlink() or not file.is_file() or CHUNK(file.name):
+        if file.is_symlink() or not file.is_file() or is_chunk_name(file.name):
             continue
         size = file.stat().st_size
         # A blob in one of the folders is judged as a file of the store.

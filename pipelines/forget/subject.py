@@ -7,13 +7,11 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from footscan.frames.array import is_chunk_name
 from footscan.recordings.scans import read_scan, scan_folders
 from schemas.base.errors import FootscanError, RefusedInput
 from schemas.base.model import pseudonym
 from schemas.frames import GROUP
-
-CHUNK = re.compile(r"\d+\.0\.0\.0").fullmatch
-"""Matches the file name of a chunk of a Zarr array of frames."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +139,10 @@ def _add_contents(folder: Path, belongings: Belongings) -> None:
     for file in files_below(folder):
         if file.is_symlink():
             belongings.out_of_reach.append(f"{file} is a link to {os.readlink(file)}: only the link is erased")  # noqa: PTH115
-        elif not (GROUP in file.parts and CHUNK(file.name)) and (digest := digest_of(file)) and file.stat().st_size:
+        elif (
+            not (GROUP in file.parts and is_chunk_name(file.name))
+            and (digest := digest_of(file))
+            and file.stat().st_size
+        ):
             belongings.digests.add(digest)
             belongings.sizes.add(file.stat().st_size)

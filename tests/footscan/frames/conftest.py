@@ -1,6 +1,6 @@
 """Films made by a second hand: PyAV writes them, simplejpeg encodes their pictures."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 Pixels = NDArray[np.uint8]
 WriteMjpeg = Callable[..., Path]
+WriteFilm = Callable[..., Path]
 WriteRaw = Callable[[Path, Sequence[Pixels]], Path]
 
 
@@ -58,6 +59,14 @@ def _write_encoded(path: Path, frames: Sequence[Pixels], codec: str, pixel_forma
     return path
 
 
+def _write_film(path: Path, encoding: str, lost: Collection[int] = ()) -> Path:
+    """A film of four frames, of which one of encoded images may have lost some."""
+    if encoding == "pixels":
+        return _write_encoded(path, [_pixels(number) for number in range(4)], "rawvideo", "bgr24")
+    numbers = [number for number in range(4) if number not in lost]
+    return _write_mjpeg(path, [_jpeg(number) for number in numbers], numbers)
+
+
 @pytest.fixture(scope="session")
 def pixels() -> Callable[..., Pixels]:
     return _pixels
@@ -81,3 +90,13 @@ def write_encoded() -> Callable[..., Path]:
 @pytest.fixture(scope="session")
 def write_raw() -> WriteRaw:
     return lambda path, frames: _write_encoded(path, frames, "rawvideo", "bgr24")
+
+
+@pytest.fixture(scope="session")
+def write_film() -> WriteFilm:
+    return _write_film
+
+
+@pytest.fixture(params=["image", "pixels"])
+def encoding(request: pytest.FixtureRequest) -> str:
+    return str(request.param)

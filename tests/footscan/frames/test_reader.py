@@ -25,23 +25,11 @@ SIZE = ImageSize(rows=48, columns=64)
 Ingested = tuple[Path, FrameManifest]
 
 
-@pytest.fixture(params=["image", "pixels"])
-def ingested(
-    request: pytest.FixtureRequest,
-    tmp_path: Path,
-    pixels: Callable[..., Any],
-    jpeg: Callable[..., bytes],
-    write_mjpeg: Callable[..., Path],
-    write_raw: Callable[..., Path],
-) -> Ingested:
-    path = tmp_path / "cam1.avi"
-    if request.param == "image":
-        write_mjpeg(path, [jpeg(number) for number in range(4)])
-    else:
-        write_raw(path, [pixels(number) for number in range(4)])
+@pytest.fixture
+def ingested(encoding: str, tmp_path: Path, write_film: Callable[..., Path]) -> Ingested:
     array = tmp_path / "frames.zarr/cam1"
-    manifest = ingest_film(path, array, SIZE)
-    assert manifest.encoding == request.param
+    manifest = ingest_film(write_film(tmp_path / "cam1.avi", encoding), array, SIZE)
+    assert manifest.encoding == encoding
     return array, manifest
 
 

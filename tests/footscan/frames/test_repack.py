@@ -23,23 +23,11 @@ from tests.helpers.stored_frames import frames_of
 SIZE = ImageSize(rows=48, columns=64)
 
 
-@pytest.fixture(params=["image", "pixels"])
-def old(
-    request: pytest.FixtureRequest,
-    tmp_path: Path,
-    pixels: Callable[..., Any],
-    jpeg: Callable[..., bytes],
-    write_mjpeg: Callable[..., Path],
-    write_raw: Callable[..., Path],
-) -> Path:
+@pytest.fixture
+def old(encoding: str, tmp_path: Path, write_film: Callable[..., Path]) -> Path:
     """An array of four frames as earlier versions wrote it; the third of images is lost."""
-    path = tmp_path / "cam1.avi"
-    if request.param == "image":
-        write_mjpeg(path, [jpeg(number) for number in (0, 1, 3)], [0, 1, 3])
-    else:
-        write_raw(path, [pixels(number) for number in range(4)])
     array = tmp_path / "frames.zarr/cam1"
-    ingest_film(path, array, SIZE)
+    ingest_film(write_film(tmp_path / "cam1.avi", encoding, lost=[2]), array, SIZE)
     for number, chunk in enumerate(list(chunks_of(array, 4, range(4)))):
         if chunk is not None:
             (array / chunk_name(number)).write_bytes(chunk)
