@@ -105,7 +105,7 @@ class OpenScan:
     @cached_property
     def _fused(self) -> Fusion:
         """`cloud` with the numbers of views, and how the cameras agree."""
-        return fuse(self._steadied[0], self.parameters.fusion)
+        return fuse(self._steadied[0], self.parameters.fusion, heads_of(views_of(self._used.cameras)))
 
     @property
     def movement(self) -> MovementReport:
@@ -158,7 +158,13 @@ class OpenScan:
             self.recorded.document.side,
             self.glass,
             doubts,
-            Evidence(self._fused.cloud, self._fused.report, self.movement, self._cleaned[1].lasers_apart_mm),
+            Evidence(
+                self._fused.cloud,
+                self._fused.report,
+                self.movement,
+                self._cleaned[1].lasers_apart_mm,
+                self._cleaned[1].contested_mm,
+            ),
         )
         return measures.model_copy(update={"posture": self.recorded.document.posture})
 

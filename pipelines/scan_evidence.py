@@ -16,4 +16,5 @@ def evidence_of(inputs: Mapping[str, bytes]) -> Evidence:
         agreement=FusionReport.model_validate_json(fused["report"].tobytes()),
         movement=MovementReport.model_validate_json(cleaned["movement"].tobytes()),
         lasers_apart_mm=cleaned["lasers_apart"].item(),
+        contested_mm=tuple(cleaned["contested"].tolist()),
     )

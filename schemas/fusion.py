@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from schemas.base.model import Document
+from schemas.heads import FILM_BODY
 
 Camera = Annotated[int, Field(ge=1)]
 Count = Annotated[int, Field(ge=0)]
@@ -14,6 +15,11 @@ Kind = Literal["none", "rigid", "affine", "quadratic"]
 
 MANY_DISTRUSTED = 2
 """Cameras that deviate from which on the others are in doubt, too: those of one head, for instance. Chosen by hand."""
+HEADS_APART_MM = 0.3
+"""Systematic disagreement of two heads from which all measures are in doubt: ten times that of scanners whose planes a
+film has shown. Chosen by hand."""
+FEWEST_COMPARED = 10
+"""Comparisons from which two cameras of different heads count. Chosen by hand."""
 
 
 class Disagreement(Document):
@@ -24,6 +30,9 @@ class Disagreement(Document):
     deviation_mm: Length
     """Standard deviation by the median of absolute deviations from the median."""
     rms_mm: Length
+    systematic_mm: Length | None = None
+    """Root mean square of the mean distances over patches of skin: noise averages out, errors of the cameras stay. None
+    where no patch was compared often enough, and in reports of earlier versions."""
 
 
 class PairDisagreement(Document):
@@ -77,33 +86,79 @@ class FusionReport(Document):
     """Number of points by camera that were dropped in favour of other cameras."""
     warnings: list[str] = Field(default_factory=list)
 
+    heads: dict[Camera, int] = Field(default_factory=dict)
+    """Head of each camera, where it is known."""
+
     @property
     def doubt(self) -> str | None:
-        """Reason for which measures are uncertain: if several cameras deviate, it is not known which are right.
+        """Reason for which measures are uncertain: heads or cameras deviate, and it is not known which are right.
 
         >>> FusionReport(distrusted=[3, 4]).doubt
         "cameras 3 and 4 deviate from the others: check them with 'footscan calibrate check', then scan again"
         >>> FusionReport(distrusted=[3]).doubt is None
         True
         """
-        if len(self.distrusted) < MANY_DISTRUSTED:
+        if len(self.distrusted) >= MANY_DISTRUSTED:
+            *first, last = map(str, self.distrusted)
+            which = f"cameras {', '.join(first)} and {last}"
+            return f"{which} deviate from the others: check them with 'footscan calibrate check', then scan again"
+        apart = self.heads_apart
+        if not apart or max(apart.values()) <= HEADS_APART_MM:
             return None
-        *first, last = map(str, self.distrusted)
-        which = f"cameras {', '.join(first)} and {last}"
-        return f"{which} deviate from the others: check them with 'footscan calibrate check', then scan again"
+        one, other = max(apart, key=lambda pair: apart[pair])
+        return (
+            f"heads {one} and {other} place the same skin {apart[one, other]:.2f} mm apart, and it is not known which "
+            f"is right: film the body that shows the laser planes ({FILM_BODY}), then scan again"
+        )
 
     @property
-    def rms_mm(self) -> float:
-        """Root mean square of the distances of all pairs of trusted cameras, after the corrections; 0 without pairs.
+    def heads_apart(self) -> dict[tuple[int, int], float]:
+        """Pairs of heads -> systematic disagreement of their cameras as calibrated, mm.
 
-        >>> one = Disagreement(median_mm=0.0, deviation_mm=0.1, rms_mm=0.3)
-        >>> other = one.model_copy(update={"rms_mm": 0.1})
-        >>> pairs = [PairDisagreement(cameras=(1, 2), points=1, before=one, after=one)]
-        >>> pairs.append(PairDisagreement(cameras=(1, 3), points=7, before=other, after=other))
-        >>> print(f"{FusionReport(pairs=pairs).rms_mm:.3f}")
-        0.141
+        It is the median over their pairs of cameras, so that one knocked camera of several does not count. Corrections
+        do not count either: they make heads agree, on what may be wrong.
         """
-        trusted = [pair for pair in self.pairs if not set(pair.cameras) & set(self.distrusted)]
-        points = sum(pair.points for pair in trusted)
-        squares = sum(pair.points * pair.after.rms_mm**2 for pair in trusted)
-        return math.sqrt(squares / points) if points else 0.0
+        of_heads: dict[tuple[int, int], list[tuple[float, int]]] = {}
+        for pair in self.pairs:
+            one, other = sorted(self.heads.get(camera, 0) for camera in pair.cameras)
+            if 0 < one < other and pair.points >= FEWEST_COMPARED:
+                of_heads.setdefault((one, other), []).append((_systematic(pair.before), pair.points))
+        return {pair: _weighted_median(found) for pair, found in of_heads.items()}
+
+    @property
+    def systematic_mm(self) -> float:
+        """Systematic disagreement of trusted cameras of one head after the corrections, and of the heads before them.
+
+        Root of the sum of their mean squares, mm; 0 without comparisons.
+
+        >>> apart = Disagreement(median_mm=0.0, deviation_mm=0.1, rms_mm=0.5, systematic_mm=0.4)
+        >>> corrected = apart.model_copy(update={"systematic_mm": 0.03})
+        >>> cameras = [(1, 2), (1, 3), (2, 3)]
+        >>> pairs = [PairDisagreement(cameras=both, points=99, before=apart, after=corrected) for both in cameras]
+        >>> print(f"{FusionReport(pairs=pairs, heads={1: 1, 2: 1, 3: 2}).systematic_mm:.3f}")
+        0.401
+        """
+        within = [
+            pair
+            for pair in self.pairs
+            if not set(pair.cameras) & set(self.distrusted)
+            and len({self.heads.get(camera) for camera in pair.cameras}) == 1
+        ]
+        points = sum(pair.points for pair in within)
+        square = sum(pair.points * _systematic(pair.after) ** 2 for pair in within) / points if points else 0.0
+        apart = self.heads_apart.values()
+        return math.sqrt(square + (sum(mm**2 for mm in apart) / len(apart) if apart else 0.0))
+
+
+def _systematic(disagreement: Disagreement) -> float:
+    return disagreement.rms_mm if disagreement.systematic_mm is None else disagreement.systematic_mm
+
+
+def _weighted_median(found: list[tuple[float, int]]) -> float:
+    """Of values and their weights."""
+    half, below = sum(weight for _, weight in found) / 2, 0
+    for value, weight in sorted(found):
+        below += weight
+        if below >= half:
+            return value
+    raise ValueError("expected at least one value")

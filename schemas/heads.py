@@ -10,6 +10,10 @@ Number = Annotated[float, Field(ge=-1e3, le=1e3)]
 Length = Annotated[float, Field(ge=0)]
 
 
+FILM_BODY = "`footscan calibrate film`, or “Calibrate or check” in the console"
+"""What to do about heads that are not where the calibration says."""
+
+
 class HeadPlace(Document):
     """The laser plane of one head, relative to the calibration and to the mean of all heads. X of a point of it is
 

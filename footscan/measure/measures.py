@@ -16,7 +16,7 @@ from footscan.measure.definitions.conventions import CONVENTIONS, OWN
 from footscan.measure.foot_landmarks import Landmark, find_landmarks
 from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame.foot_frame import Body, FootFrame, foot_frame
-from footscan.measure.frame.glass import glass_doubt
+from footscan.measure.frame.glass import glass_doubt, glass_sd
 from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.measure.replicates import REPLICATES, replicates
 from footscan.measure.roughness import Roughness
@@ -35,6 +35,8 @@ FILLED_SHARE = 0.05
 LARGEST_SD_MM, LARGEST_GIRTH_SD_MM = 1.0, 2.0
 """Standard deviations from which a length and a girth are uncertain: half of what ISO 20685-1:2018 allows a scanner to
 be off, 2 mm for the foot and 4 mm for small circumferences."""
+HEIGHT = "_height"
+"""Ending of the names of measures that count from the glass."""
 ROUGH_MM = 0.05
 """Median roughness of a mesh at which landmarks begin to move, and propagation is no longer linear. Chosen by hand."""
 MISSING_SHARE = 0.2
@@ -232,7 +234,7 @@ def measure_foot(
     Finding
         The surface is no foot, or not in mm.
     """
-    glass = glass or GlassPlane()
+    glass_sd_mm, glass = (0.0, GlassPlane()) if glass is None else (glass_sd(glass), glass)
     foot = foot_frame(vertices, faces, side, axis, manual, glass.plane, body)
     landmarks = find_landmarks(foot, manual or {})
     if errors is not None or filled is not None:  # the foot's vertices are those of the mesh without its strays
@@ -258,6 +260,7 @@ def measure_foot(
             filled=filled,
             calibration=calibration,
             doubt="; ".join([*reasons, *things]) or None,
+            glass_sd_mm=glass_sd_mm,
         ),
         landmarks=_in_mesh(landmarks, foot.transform),
     )
@@ -272,11 +275,12 @@ def take_measures(
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
     doubt: str | None = None,
+    glass_sd_mm: float = 0.0,
 ) -> dict[str, Measure]:
     """Compute all measures of a foot in its own frame.
 
     Parameters are those of `measure_foot`; arrays (V,) are by the vertices of `foot`. `doubt` is a reason for which all
-    measures are uncertain.
+    measures are uncertain, `glass_sd_mm` the standard deviation of the floor from which heights count.
     """
     surface = FootSurface(foot, landmarks)
     known = SurfaceErrors(foot.vertices, [ErrorField("noise", surface.errors)] if errors is None else errors)
@@ -286,7 +290,15 @@ def take_measures(
     calibrations = calibration or {}
     to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
     measures = {
-        name: _measure(definition, surface, (known, scatter.get(name)), filled, calibrations.get(name), to_mesh, doubt)
+        name: _measure(
+            definition,
+            surface,
+            (known, scatter.get(name), glass_sd_mm if name.endswith(HEIGHT) else 0.0),
+            filled,
+            calibrations.get(name),
+            to_mesh,
+            doubt,
+        )
         for name, definition in _definitions().items()
     }
     return {
@@ -312,7 +324,7 @@ def _values(replicate: FootFrame, rough: Roughness) -> dict[str, float]:
 def _measure(
     definition: Definition,
     surface: FootSurface,
-    errors: tuple[SurfaceErrors, Scatter | None],
+    errors: tuple[SurfaceErrors, Scatter | None, float],
     filled: NDArray[np.bool_] | None,
     calibration: tuple[float, float] | None,
     to_mesh: Floats,
@@ -330,10 +342,12 @@ def _measure(
     doubts = [reason for reason in (quantity.doubt, doubt) if reason is not None]
     if share is not None and share > FILLED_SHARE:
         doubts.append(f"{100 * share:.0f} % of it rests on surface that was filled, or that one camera alone saw")
-    surface_errors, scatter = errors
+    surface_errors, scatter, glass_sd_mm = errors
     if scatter is not None and scatter.missing > MISSING_SHARE:
         doubts.append(f"it cannot be measured in {100 * scatter.missing:.0f} % of the ways in which the scan may err")
     budget = with_landmarks(surface_errors.budget(quantity), None if scatter is None else scatter.about(quantity.value))
+    if budget is not None and glass_sd_mm:
+        budget["glass"] = glass_sd_mm
     sd = None if budget is None else abs(factor) * math.hypot(*budget.values())
     largest = LARGEST_SD_MM if quantity.plane is None else LARGEST_GIRTH_SD_MM
     if sd is not None and sd > largest and definition.unit == "mm":

@@ -23,7 +23,8 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
 
     `inputs`: `points-N` of each camera, the `calibration` of all, and `heads`, where they were. The result holds the
     kept `points`, with the foot held still, the `codes` of all points, the counts of `removed` points by camera and
-    reason, `warnings`, the `glass` below the foot, its `movement`, and how far `lasers_apart` lie, mm.
+    reason, `warnings`, the `glass` below the foot, its `movement`, how far `lasers_apart` lie, mm, how
+    far the ends are `contested`, X in mm, and the `heads` of the cameras.
 
     Raises
     ------
@@ -43,7 +44,8 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
     kept, removed = remove_outliers(points, views, parameters, filmed)
     if not len(kept):
         raise Finding("every point is an outlier, expected a foot in the control volume")
-    kept, movement = steadied(kept, heads_of(views))
+    heads = heads_of(views)
+    kept, movement = steadied(kept, heads)
     counts = {str(camera): reasons for camera, reasons in removed.counts.items()}
     return pack(
         points=kept,
@@ -53,6 +55,8 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
         glass=_json(removed.glass.model_dump(mode="json")),
         movement=_json(movement.model_dump(mode="json")),
         lasers_apart=np.array(removed.lasers_apart_mm),
+        contested=np.array(removed.contested_mm),
+        heads=_json(heads),
     )
 
 

@@ -1,5 +1,6 @@
 """The points of all cameras to one cloud, with the agreement of the cameras."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -16,5 +17,7 @@ def run(inputs: Mapping[str, bytes], parameters: FusionParameters, places: Mappi
     `inputs`: `clean`. The result holds the `cloud` and the fusion `report`.
     """
     del places
-    fusion = fuse(unpack(inputs["clean"])["points"], parameters)
+    cleaned = unpack(inputs["clean"])
+    heads = {int(camera): head for camera, head in json.loads(cleaned["heads"].tobytes()).items()}
+    fusion = fuse(cleaned["points"], parameters, heads)
     return pack(cloud=fusion.cloud, report=np.frombuffer(fusion.report.model_dump_json().encode(), np.uint8))

@@ -17,6 +17,9 @@ Pairs = dict[tuple[int, int], tuple[int, Disagreement]]
 
 COMPARED = 12_000
 """Points that are compared with all other cameras, about: a bound of time."""
+PATCH_MM, PATCH_SECTORS, FEWEST_IN_PATCH = 20.0, 8, 10
+"""A patch of skin: its length along the travel, the sectors of its normal, and the comparisons from which their mean
+shows more of the cameras than of the noise. Chosen by hand."""
 GAP_STEPS = 1.5
 """Steps of the travel between two planes up to which the skin between their stripes counts as straight. Chosen by
 hand."""
@@ -84,24 +87,39 @@ def disagreements(stripes: Stripes, overlaps: Overlaps) -> Pairs:
     >>> print(round(disagreement.median_mm, 3))
     -0.1
     """
-    outward = np.sign(np.sum(stripes.normals * (stripes.yz - _middles(stripes)), axis=1))[overlaps.point]
+    normals = stripes.normals[overlaps.point]
+    outward = np.sign(np.sum(normals * (stripes.yz - _middles(stripes))[overlaps.point], axis=1))
     camera = stripes.camera[overlaps.point]
     farther_out = -overlaps.distance * outward * np.where(camera < overlaps.other, 1.0, -1.0)
     first, second = np.minimum(camera, overlaps.other), np.maximum(camera, overlaps.other)
+    patch = _patches(stripes.x[overlaps.point], normals * outward[:, np.newaxis])
     pairs = {}
     for a, b in combinations(range(len(stripes.cameras)), 2):
-        apart = farther_out[(first == a) & (second == b)]
-        if len(apart):
-            pairs[int(stripes.cameras[a]), int(stripes.cameras[b])] = len(apart), _disagreement(apart)
+        of_pair = (first == a) & (second == b)
+        if of_pair.any():
+            found = int(of_pair.sum()), _disagreement(farther_out[of_pair], patch[of_pair])
+            pairs[int(stripes.cameras[a]), int(stripes.cameras[b])] = found
     return pairs
 
 
-def _disagreement(apart: Floats) -> Disagreement:
+def _patches(x: Floats, outward: Floats) -> NDArray[np.intp]:
+    """(M,) the number of the patch of skin at each `x`, mm, with the `outward` normal (M, 2)."""
+    turn = np.arctan2(outward[:, 1], outward[:, 0]) / (2.0 * np.pi)
+    sector = np.floor(PATCH_SECTORS * turn).astype(np.intp) % PATCH_SECTORS
+    length = np.floor((x - x.min(initial=np.inf)) / PATCH_MM).astype(np.intp)
+    return np.asarray(length * PATCH_SECTORS + sector)
+
+
+def _disagreement(apart: Floats, patch: NDArray[np.intp]) -> Disagreement:
     median = float(np.median(apart))
+    counts, sums = np.bincount(patch), np.bincount(patch, apart)
+    often = counts >= FEWEST_IN_PATCH
+    squares = sums[often] ** 2 / counts[often]
     return Disagreement(
         median_mm=median,
         deviation_mm=MAD_TO_SD * float(np.median(np.abs(apart - median))),
         rms_mm=float(np.sqrt(np.mean(apart**2))),
+        systematic_mm=float(np.sqrt(squares.sum() / counts[often].sum())) if often.any() else None,
     )
 
 

@@ -1,7 +1,8 @@
 """Fusion of the points of all cameras to one cloud."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,11 @@ class Fusion(NamedTuple):
     report: FusionReport
 
 
-def fuse(points: NDArray[np.void] | Iterable[NDArray[np.void]], parameters: FusionParameters) -> Fusion:
+def fuse(
+    points: NDArray[np.void] | Iterable[NDArray[np.void]],
+    parameters: FusionParameters,
+    heads: Mapping[int, int] = MappingProxyType({}),
+) -> Fusion:
     """Fuse the points of several cameras to one cloud in which skin that several cameras saw appears once.
 
     The distance at which two cameras place the same skin is measured for each pair. Cameras that deviate from the
@@ -42,6 +47,7 @@ def fuse(points: NDArray[np.void] | Iterable[NDArray[np.void]], parameters: Fusi
     ----------
     points : one array of `POINT_DTYPE`, or one for each camera, mm, scanner frame. Points are ordered along the stripe
         by `source`, or, if it is equal, as they are given. Points that are not finite are left out.
+    heads : camera -> number of its head, for the report
 
     Returns
     -------
@@ -90,6 +96,7 @@ def fuse(points: NDArray[np.void] | Iterable[NDArray[np.void]], parameters: Fusi
             for camera, away in sorted(corrected.too_far.items())
         ]
         + [*_worse(before, after)],
+        heads={camera: head for camera, head in heads.items() if camera in stripes.cameras},
     )
     return Fusion(merged.points[~off], report)
 

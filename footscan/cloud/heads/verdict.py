@@ -6,7 +6,7 @@ import numpy as np
 
 from footscan.cloud.fusion.stripes import Floats
 from footscan.cloud.heads.equations import HeadFit
-from schemas.heads import HeadPlace, HeadsReport
+from schemas.heads import FILM_BODY, HeadPlace, HeadsReport
 from schemas.parameters.heads import HeadParameters
 
 HALF_MM = np.array([1.0, 50.0, 50.0, 130.0])
@@ -18,9 +18,6 @@ LEAST_GAIN, LEAST_GAIN_FILMED = 0.9, 0.6
 """Cameras of two heads must agree better by this factor, or the heads stay where they are; by the second where a film
 has shown all laser planes. Maps that err by a tenth of a millimetre look a little like turned heads: a filmed scanner
 (`draw_assembled`, seed 503) whose heads were right gave 0.8. A head that is off gives 0.2. Chosen by hand."""
-
-FILM_BODY = "`footscan calibrate film`, or “Calibrate or check” in the console"
-"""What to do about heads that are not where the calibration says."""
 
 
 def report_of(

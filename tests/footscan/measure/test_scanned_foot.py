@@ -28,7 +28,7 @@ def with_filled(foot: Mesh, share: float) -> Mesh:
 
 def apart_by(mm: float) -> Evidence:
     """Two cameras that disagree by `mm`."""
-    apart = Disagreement(median_mm=0.0, deviation_mm=mm, rms_mm=mm)
+    apart = Disagreement(median_mm=0.0, deviation_mm=mm, rms_mm=mm + 0.03, systematic_mm=mm)
     return Evidence(
         agreement=FusionReport(pairs=[PairDisagreement(cameras=(1, 2), points=1000, before=apart, after=apart)])
     )
@@ -62,9 +62,9 @@ def test_a_reason_that_all_measures_share_is_no_note_of_one(foot: Mesh) -> None:
 
 def test_cameras_that_disagree_widen_every_measure(foot: Mesh) -> None:
     agreeing, apart = (
-        measure_scanned_foot(foot, "right", GlassPlane(), evidence=apart_by(mm)).measures for mm in (0.03, 0.2)
+        measure_scanned_foot(foot, "right", GlassPlane(), evidence=apart_by(mm)).measures for mm in (0.0, 0.2)
     )
-    for name in ("foot_length", "foot_breadth", "ball_girth", "instep_height"):
+    for name in ("foot_length", "foot_breadth", "ball_girth", "heel_breadth"):
         assert (apart[name].uncertainty or 0.0) > 2 * (agreeing[name].uncertainty or np.inf)
         assert (apart[name].budget or {})["cameras"] > 0.05
         assert "cameras" not in (agreeing[name].budget or {"cameras": 0.0})
@@ -87,6 +87,25 @@ def test_an_end_that_one_camera_alone_saw_makes_the_length_uncertain(foot: Mesh)
     assert (alone["foot_length"].budget or {})["ends"] > 0.5
     slightly = measure_scanned_foot(foot, "right", GlassPlane(), evidence=Evidence(alone_up_to(foot, 0.2))).measures
     assert slightly["foot_length"].status == "ok"
+
+
+def test_an_end_beyond_which_stripes_were_dropped_makes_the_length_uncertain(foot: Mesh) -> None:
+    x = foot.vertices[:, 0]
+    cloud = make_points(foot.vertices, camera=1)
+    cloud["cameras"] = 2
+    for beyond_mm, status in ((0.0, "ok"), (4.0, "uncertain")):
+        evidence = Evidence(cloud, contested_mm=(float(x.min()) - beyond_mm, float(x.max())))
+        length = measure_scanned_foot(foot, "right", GlassPlane(), evidence=evidence).measures["foot_length"]
+        assert length.status == status
+        assert ((length.uncertainty or 0.0) > 1.5) == (beyond_mm > 0.0)
+
+
+def test_heights_are_worth_less_where_the_glass_was_not_seen(foot: Mesh) -> None:
+    seen = GlassPlane(below_foot_sd_mm=0.02, tilt_x_sd_deg=0.01, tilt_y_sd_deg=0.01)
+    for glass, least, most in ((seen, 0.02, 0.03), (GlassPlane(), 0.5, 1.0)):
+        measures = measure_scanned_foot(foot, "right", glass).measures
+        assert least < (measures["instep_height"].budget or {})["glass"] < most
+        assert "glass" not in (measures["foot_length"].budget or {"glass": 0.0})
 
 
 def test_the_ends_that_cameras_confirm() -> None:

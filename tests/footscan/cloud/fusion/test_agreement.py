@@ -26,6 +26,17 @@ def test_a_camera_that_sees_the_skin_farther_out() -> None:
     assert apart.deviation_mm < 1e-3
 
 
+def test_noise_is_no_systematic_disagreement() -> None:
+    first, second = tube(3, 30.0, 0, 120, frames=60), tube(5, 30.1, 0, 120, frames=60)
+    noise = np.random.default_rng(3).normal(0.0, 0.05 / 30.0, len(second))
+    second["y"] *= 1.0 + noise
+    second["z"] *= 1.0 + noise
+    stripes = sort_stripes([first, second])
+    _, apart = disagreements(stripes, find_overlaps(stripes, stripes.yz, 3.0))[3, 5]
+    assert apart.rms_mm > 0.107
+    assert apart.systematic_mm == pytest.approx(0.1, abs=0.004)
+
+
 def test_what_only_one_camera_sees_is_not_compared() -> None:
     for clouds in ([tube(1, 30.0, 0, 80), tube(2, 30.0, 90, 170)], [tube(1, 30.0, 0, 80)], []):
         stripes = sort_stripes(clouds)
