@@ -20,12 +20,16 @@ Floats = NDArray[np.float64]
 ERROR_MM, ERROR_GROWS, REACH_MM = 0.015, 0.04, 10.0
 """Standard deviation of a measured vertex, its growth per mm into filled surface, and the distance over which vertices
 share their error. Tuned on virtual feet: docs/surface.md."""
+NARROW_MM = 3.0
+"""The smaller distance over which vertices share noise, and the errors of ends: the tip of a toe moves to its side if
+one half of its cap errs. Chosen by hand, after two scanners (`draw_assembled`, seeds 805 and 806) whose axes through the
+second toe were off by 0.4 degrees."""
 USUAL_STEP_MM = 2.0
 """Distance of stripes at which that holds. It grows with the square of a longer one, as the sagitta of the skin between
 two stripes does."""
-NEAREST, SHARED = 4, 0.5
-"""Points nearest to a vertex, and the part of their standard deviation that all points around it share. Chosen by
-hand."""
+NEAREST, SHARED = 4, 0.25
+"""Points nearest to a vertex, and the part of their standard deviation that all points around it share. Tuned on
+scanners without pictures whose planes a body has shown: `draw_assembled`, seeds 801 to 810."""
 END_GROWS = 0.08
 """Growth of the standard deviation per mm along the travel beyond the outermost stripe, at heel and toes: some 0.06 of
 heels and 0.1 of toes on 50 scans of virtual feet (`draw_assembled`)."""
@@ -161,15 +165,20 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     contested_mm = _contested(vertices, cloud, evidence.contested_mm)
     ends = END_GROWS * np.maximum(beyond_mm, 0.0) + ALONE_GROWS * (alone_mm + contested_mm)
     fields = [
-        ErrorField("noise", _noise(vertices, cloud, step_mm), REACH_MM),
+        *_broad_and_narrow("noise", _noise(vertices, cloud, step_mm)),
         ErrorField("filling", np.where(inside, ERROR_GROWS * gap_mm, 0.0), REACH_MM),
-        ErrorField("ends", ends, REACH_MM),
+        *_broad_and_narrow("ends", ends),
         ErrorField("cameras", np.full(len(vertices), OF_DISAGREEMENT * apart_mm), WIDE_MM),
         ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, is_of_section=True),
         ErrorField("sway", SWAY_MM * normals[:, 0], WIDE_MM, is_of_section=True),
         ErrorField("sway", SWAY_MM * normals[:, 1], WIDE_MM, is_of_section=True),
     ]
     return ScanErrors(fields, (gap_mm > RELIABLE_MM) | (alone_mm + contested_mm > ALONE_MM))
+
+
+def _broad_and_narrow(cause: ErrorCause, deviations: Floats) -> list[ErrorField]:
+    """Errors (V,) of which half the variance is shared by vertices far from each other, and half by near ones only."""
+    return [ErrorField(cause, math.sqrt(0.5) * deviations, reach_mm) for reach_mm in (REACH_MM, NARROW_MM)]
 
 
 def _noise(vertices: NDArray[np.float64], cloud: NDArray[np.void] | None, step_mm: float) -> NDArray[np.float64]:
