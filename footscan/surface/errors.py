@@ -22,7 +22,7 @@ ERROR_MM, ERROR_GROWS, REACH_MM = 0.015, 0.04, 10.0
 share their error. Tuned on virtual feet: docs/surface.md."""
 NARROW_MM = 3.0
 """The smaller distance over which vertices share noise, and the errors of ends: the tip of a toe moves to its side if
-one half of its cap errs. Chosen by hand, after two scanners (`draw_assembled`, seeds 805 and 806) whose axes through the
+one half of its cap errs. Chosen by hand, after scanners (`draw_assembled`, seeds 805 and 806) whose axes through the
 second toe were off by 0.4 degrees."""
 USUAL_STEP_MM = 2.0
 """Distance of stripes at which that holds. It grows with the square of a longer one, as the sagitta of the skin between
