@@ -1,6 +1,7 @@
 """The report of the fusion: the disagreement of the cameras about the same skin, and their corrections."""
 
 import math
+from collections.abc import Iterable
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -15,9 +16,10 @@ Kind = Literal["none", "rigid", "affine", "quadratic"]
 
 MANY_DISTRUSTED = 2
 """Cameras that deviate from which on the others are in doubt, too: those of one head, for instance. Chosen by hand."""
-HEADS_APART_MM = 0.3
-"""Systematic disagreement of two heads from which all measures are in doubt: ten times that of scanners whose planes a
-film has shown. Chosen by hand."""
+HEADS_APART_MM = 0.5
+"""Systematic disagreement of two heads from which all measures are in doubt. Chosen by hand: of scanners whose planes a
+film has shown it is 0.02 mm without pictures, and up to 0.4 mm with maps from films of a chart (`draw_assembled`, seed
+512)."""
 FEWEST_COMPARED = 10
 """Comparisons from which two cameras of different heads count. Chosen by hand."""
 
@@ -31,8 +33,9 @@ class Disagreement(Document):
     """Standard deviation by the median of absolute deviations from the median."""
     rms_mm: Length
     systematic_mm: Length | None = None
-    """Root mean square of the mean distances over patches of skin: noise averages out, errors of the cameras stay. None
-    where no patch was compared often enough, and in reports of earlier versions."""
+    """Median size of the mean distances over patches of skin: noise averages out, errors of the cameras stay, and a few
+    patches at the borders of their maps do not count. None where no patch was compared often enough, and in reports of
+    earlier versions."""
 
 
 class PairDisagreement(Document):
@@ -118,18 +121,23 @@ class FusionReport(Document):
         It is the median over their pairs of cameras, so that one knocked camera of several does not count. Corrections
         do not count either: they make heads agree, on what may be wrong.
         """
-        of_heads: dict[tuple[int, int], list[tuple[float, int]]] = {}
+        return {pair: _weighted_median(found) for pair, found in self._between_heads.items()}
+
+    @property
+    def _between_heads(self) -> dict[tuple[int, int], list[tuple[float, int]]]:
+        """Pairs of heads -> disagreement, mm, and number of places, for each pair of their cameras."""
+        found: dict[tuple[int, int], list[tuple[float, int]]] = {}
         for pair in self.pairs:
             one, other = sorted(self.heads.get(camera, 0) for camera in pair.cameras)
             if 0 < one < other and pair.points >= FEWEST_COMPARED:
-                of_heads.setdefault((one, other), []).append((_systematic(pair.before), pair.points))
-        return {pair: _weighted_median(found) for pair, found in of_heads.items()}
+                found.setdefault((one, other), []).append((_systematic(pair.before), pair.points))
+        return found
 
     @property
     def systematic_mm(self) -> float:
         """Systematic disagreement of trusted cameras of one head after the corrections, and of the heads before them.
 
-        Root of the sum of their mean squares, mm; 0 without comparisons.
+        Root of the sum of their mean squares over all places, mm; 0 without comparisons.
 
         >>> apart = Disagreement(median_mm=0.0, deviation_mm=0.1, rms_mm=0.5, systematic_mm=0.4)
         >>> corrected = apart.model_copy(update={"systematic_mm": 0.03})
@@ -144,14 +152,23 @@ class FusionReport(Document):
             if not set(pair.cameras) & set(self.distrusted)
             and len({self.heads.get(camera) for camera in pair.cameras}) == 1
         ]
-        points = sum(pair.points for pair in within)
-        square = sum(pair.points * _systematic(pair.after) ** 2 for pair in within) / points if points else 0.0
-        apart = self.heads_apart.values()
-        return math.sqrt(square + (sum(mm**2 for mm in apart) / len(apart) if apart else 0.0))
+        places = {heads: sum(points for _, points in found) for heads, found in self._between_heads.items()}
+        return math.hypot(
+            _root_mean_square((_systematic(pair.after), pair.points) for pair in within),
+            _root_mean_square((mm, places[heads]) for heads, mm in self.heads_apart.items()),
+        )
 
 
 def _systematic(disagreement: Disagreement) -> float:
-    return disagreement.rms_mm if disagreement.systematic_mm is None else disagreement.systematic_mm
+    return abs(disagreement.median_mm) if disagreement.systematic_mm is None else disagreement.systematic_mm
+
+
+def _root_mean_square(found: Iterable[tuple[float, int]]) -> float:
+    """Of values and their weights; 0 without values."""
+    squares = weights = 0.0
+    for value, weight in found:
+        squares, weights = squares + weight * value**2, weights + weight
+    return math.sqrt(squares / weights) if weights else 0.0
 
 
 def _weighted_median(found: list[tuple[float, int]]) -> float:

@@ -114,14 +114,12 @@ def _disagreement(apart: Floats, patch: NDArray[np.intp]) -> Disagreement:
     median = float(np.median(apart))
     counts = np.bincount(patch)
     often = counts >= FEWEST_IN_PATCH
-    counts, sums, squares = (np.bincount(patch, of)[often] for of in (np.ones(len(apart)), apart, apart**2))
-    of_means = sums**2 / counts
-    of_noise = (squares - of_means) / (counts - 1)  # in the mean of a patch, a part of it is left
+    means = np.abs(np.bincount(patch, apart)[often] / counts[often])
     return Disagreement(
         median_mm=median,
         deviation_mm=MAD_TO_SD * float(np.median(np.abs(apart - median))),
         rms_mm=float(np.sqrt(np.mean(apart**2))),
-        systematic_mm=float(np.sqrt(max(np.sum(of_means - of_noise), 0.0) / counts.sum())) if often.any() else None,
+        systematic_mm=float(np.median(np.repeat(means, counts[often]))) if often.any() else None,
     )
 
 
