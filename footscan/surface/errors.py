@@ -43,8 +43,8 @@ FEWEST_AT_END, LEAST_CONFIRMED, LEG_MM = 5, 0.2, 90.0
 length does not end. Chosen by hand."""
 OF_DISAGREEMENT = 1.5
 """Errors of the mean of all cameras, relative to their systematic disagreement, and as broad as a camera's view: each
-camera errs, and what all of them have in common does not show. Tuned on worlds without pictures (`draw_assembled`, seeds
-801 to 810, and `draw_world`, seeds 6001 to 6024) and on films (`draw_assembled`, seeds 511 and 512)."""
+camera errs, and what all of them have in common does not show. Tuned on `draw_assembled`, seeds 801 to 810 without
+pictures, 511 and 512 with films, and `draw_world`, seeds 6001 to 6024."""
 SWAY_MM = 0.05
 """Standard deviation of slow movement of the foot, along X and across, that no stripe shows: over a tenth of a metre it
 looks like the form of another foot. Chosen by hand."""
