@@ -110,12 +110,13 @@ def truth(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def meshed(cloud: Cloud, calibration: bytes, parameters: SurfaceParameters) -> dict[str, bytes]:
     """The results of the steps up to the surface."""
     nothing = {
-        "removed": "{}", "warnings": "[]",
+        "removed": "{}", "warnings": "[]", "heads": "{}",
         "glass": GlassPlane().model_dump_json(), "movement": MovementReport().model_dump_json(),
     }  # fmt: skip
     reports = {name: np.frombuffer(text.encode(), np.uint8) for name, text in nothing.items()}
     codes = np.full(len(cloud), KEPT, np.uint8)
-    clean = pack(points=cloud, codes=codes, lasers_apart=np.float64(0.0), **reports)
+    contested = np.array([np.inf, -np.inf])
+    clean = pack(points=cloud, codes=codes, lasers_apart=np.float64(0.0), contested=contested, **reports)
     fused = fuse.run({"clean": clean}, FusionParameters(), {})
     oriented = orient.run({"fused": fused, "calibration": calibration}, NormalParameters(), {})
     return {

@@ -27,6 +27,7 @@ NOWHERE: dict[str, Path] = {}
 IN_PLACE = pack(
     glass=np.frombuffer(GlassPlane().model_dump_json().encode(), np.uint8),
     lasers_apart=np.array(np.inf),
+    contested=np.array([np.inf, -np.inf]),
     movement=np.frombuffer(MovementReport().model_dump_json().encode(), np.uint8),
 )
 """What cleaning says of a plate that was not moved."""
