@@ -20,7 +20,7 @@ from footscan.cloud.movement.tremor import steadied
 from footscan.cloud.normals import estimate_normals
 from footscan.cloud.outliers.remove import Removed, remove_outliers
 from footscan.cloud.points import POINT_DTYPE, of_cameras
-from footscan.cloud.views import views_of
+from footscan.cloud.views import View, views_of
 from footscan.frames.film import open_background, open_film
 from footscan.frames.image import Rgb
 from footscan.frames.reader import FrameReader, backgrounds_of, noting_lost, pixel_frames
@@ -92,10 +92,15 @@ class OpenScan:
         return {camera: self._points(camera) for camera in self.cameras}
 
     @cached_property
+    def _views(self) -> Mapping[int, View]:
+        """Of the calibrated cameras, by number, with their heads as calibrated."""
+        return views_of(self._used.cameras)
+
+    @cached_property
     def heads(self) -> HeadsReport:
         """Where the heads were, beside where the calibration says."""
         points = np.concatenate([np.empty(0, POINT_DTYPE), *self.points.values()])
-        return find_heads(points, views_of(self._used.cameras), self.parameters.heads)
+        return find_heads(points, self._views, self.parameters.heads)
 
     @property
     def cloud(self) -> NDArray[np.void]:
@@ -105,7 +110,7 @@ class OpenScan:
     @cached_property
     def _fused(self) -> Fusion:
         """`cloud` with the numbers of views, and how the cameras agree."""
-        return fuse(self._steadied[0], self.parameters.fusion, heads_of(views_of(self._used.cameras)))
+        return fuse(self._steadied[0], self.parameters.fusion, heads_of(self._views))
 
     @property
     def movement(self) -> MovementReport:
@@ -117,7 +122,7 @@ class OpenScan:
         kept, _ = self._cleaned
         if not len(kept):
             raise Finding("every point is an outlier, expected a foot in the control volume")
-        return steadied(kept, heads_of(views_of(self._used.cameras)))
+        return steadied(kept, heads_of(self._views))
 
     @property
     def glass(self) -> GlassPlane:
@@ -133,15 +138,13 @@ class OpenScan:
         for camera, lost in self._lost.items():
             placed[camera][lost] = np.nan
         filmed = {one.view: placed[one.camera] + one.ahead_mm for one in self._used.cameras}
-        together, views = corrected(together, views_of(self._used.cameras), self.heads)
+        together, views = corrected(together, self._views, self.heads)
         return remove_outliers(together, views, self.parameters.outliers, filmed)
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:
         """(N, 3) outward unit normals of the points of `cloud`."""
-        return np.asarray(
-            estimate_normals(self._fused.cloud, views_of(self._used.cameras), self.parameters.normals), np.float64
-        )
+        return np.asarray(estimate_normals(self._fused.cloud, self._views, self.parameters.normals), np.float64)
 
     @cached_property
     def mesh(self) -> Mesh:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from itertools import accumulate
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -88,7 +89,6 @@ class FusionReport(Document):
     contradicted: dict[Camera, Count] = Field(default_factory=dict)
     """Number of points by camera that were dropped in favour of other cameras."""
     warnings: list[str] = Field(default_factory=list)
-
     heads: dict[Camera, int] = Field(default_factory=dict)
     """Head of each camera, where it is known."""
 
@@ -173,9 +173,6 @@ def _root_mean_square(found: Iterable[tuple[float, int]]) -> float:
 
 def _weighted_median(found: list[tuple[float, int]]) -> float:
     """Of values and their weights."""
-    half, below = sum(weight for _, weight in found) / 2, 0
-    for value, weight in sorted(found):
-        below += weight
-        if below >= half:
-            return value
-    raise ValueError("expected at least one value")
+    ordered = sorted(found)
+    below = list(accumulate(weight for _, weight in ordered))
+    return next(value for (value, _), weight in zip(ordered, below, strict=True) if weight >= below[-1] / 2)

@@ -9,7 +9,6 @@ from schemas.base.model import Document
 Number = Annotated[float, Field(ge=-1e3, le=1e3)]
 Length = Annotated[float, Field(ge=0)]
 
-
 FILM_BODY = "`footscan calibrate film`, or “Calibrate or check” in the console"
 """What to do about heads that are not where the calibration says."""
 

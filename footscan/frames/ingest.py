@@ -19,6 +19,7 @@ from zarr.errors import ContainsGroupError
 from footscan.frames.array import (
     METADATA,
     chunk_name,
+    is_chunk_name,
     is_recorded,
     packed,
     read_manifest,
@@ -28,7 +29,7 @@ from footscan.frames.film import open_background, open_camera_film, open_film
 from footscan.frames.image import frame_digest
 from footscan.frames.partial import make_partial, move_into_place, partial_folder, sweep
 from footscan.frames.reader import FrameReader
-from footscan.frames.shard import ShardWriter
+from footscan.frames.shard import SHARD, ShardWriter
 from schemas.base.errors import Fault, RefusedInput
 from schemas.base.image_size import ImageSize
 from schemas.base.limits import read_bounded
@@ -158,7 +159,7 @@ def _expect_own(array: Path) -> None:
         if not stat.S_ISDIR(array.lstat().st_mode):
             raise Fault(f"{array}: was not written by footscan, {expected}")
         with os.scandir(array) as entries:
-            foreign = [one.name for one in entries if not _IS_OURS(one.name) or one.is_dir(follow_symlinks=False)]
+            foreign = [one.name for one in entries if not _is_own_file(one)]
     except (FileNotFoundError, NotADirectoryError):  # perhaps only now: another thread replaces the array
         return
     if foreign:
@@ -166,9 +167,14 @@ def _expect_own(array: Path) -> None:
 
 
 _IS_OURS = re.compile(
-    r"zarr\.json(\.partial)?|c\.0\.0\.0\.0(\.partial)?|\d+\.0\.0\.0|\d+\.renumbered|[\w.]+\.[0-9a-f]{32}\.partial"
+    rf"({re.escape(METADATA)}|{re.escape(SHARD)})(\.partial)?|\d+\.renumbered|[\w.]+\.[0-9a-f]{{32}}\.partial"
 ).fullmatch
-"""Names of a shard, of a frame, of Zarr's document, and of what is left of them by a process that was killed."""
+"""Names of a shard, of Zarr's document, and of what is left of them, or of frames, by a process that was killed."""
+
+
+def _is_own_file(entry: "os.DirEntry[str]") -> bool:
+    is_our_name = is_chunk_name(entry.name) or _IS_OURS(entry.name)
+    return is_our_name is not None and not entry.is_dir(follow_symlinks=False)
 
 
 def _write_frames(film: FrameReader, folder: Path) -> FrameManifest:

@@ -5,6 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.compiled import compiled
+
+Ints = NDArray[np.int64]
 MAX_CUBES = 20_000_000
 """Bound of memory: cubes are made larger where there would be more."""
 
@@ -39,5 +42,25 @@ def sort_into_cubes(points: NDArray[np.float64], edge: float) -> Buckets:
         edge *= 1.5
     dims = np.floor(extent / edge).astype(np.int64) + 1
     cube = np.floor((points - low) / edge).astype(np.int64) @ np.array([dims[1] * dims[2], dims[2], 1])
-    start = np.concatenate([[0], np.cumsum(np.bincount(cube, minlength=int(dims.prod())))])
-    return Buckets(edge, low, dims, start.astype(np.int64), np.argsort(cube, kind="stable").astype(np.int64))
+    return Buckets(edge, low, dims, *grouped(cube, int(dims.prod())))
+
+
+@compiled
+def grouped(numbers: Ints, groups: int) -> tuple[Ints, Ints]:
+    """Sort items by their group, a number from 0, by counting: it does not take the N log N of a sort.
+
+    Returns (G + 1,) where the items of each group begin, and (N,) the items, rising within a group.
+
+    >>> start, order = grouped(np.array([2, 0, 2]), groups=3)
+    >>> start.tolist(), order.tolist()
+    ([0, 1, 1, 3], [1, 0, 2])
+    """
+    start = np.zeros(groups + 1, np.int64)
+    for number in numbers:
+        start[number + 1] += 1
+    start = np.cumsum(start)
+    order, free = np.empty(len(numbers), np.int64), start.copy()
+    for item in range(len(numbers)):
+        order[free[numbers[item]]] = item
+        free[numbers[item]] += 1
+    return start, order

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from footscan.compiled import compiled
-from footscan.mesh.buckets import sort_into_cubes
+from footscan.mesh.buckets import grouped
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SLAB_MM = 2.0
-"""Thickness of the slabs of a mesh across X: 130 of a foot."""
+SLABS = 128
+"""Slabs of a mesh across X, about 2 mm thick in a foot."""
 MARGIN_MM = 1e-6
 """Rounding of coordinates."""
 
@@ -38,8 +38,6 @@ class Slabs(NamedTuple):
     """(3,) least coordinates of the mesh, mm"""
     high: Floats
     """(3,) greatest coordinates, mm"""
-    thickness: float
-    """mm"""
     start: Ints
     """(S + 1,) where the faces of each slab begin in `order`"""
     order: Ints
@@ -64,17 +62,28 @@ class Loop(NamedTuple):
 def cuttable(vertices: Floats, faces: NDArray[np.integer]) -> Cuttable:
     """Prepare a mesh, (V, 3) mm and (F, 3), for `cut`."""
     corners, places = np.ascontiguousarray(faces, np.int64), np.ascontiguousarray(vertices, np.float64)
-    return Cuttable(places, corners, face_neighbours(corners, len(places)), _slabs(places, corners))
+    return Cuttable(places, corners, face_neighbours(corners, len(places)), Slabs(*_slabs(places, corners)))
 
 
-def _slabs(vertices: Floats, faces: Ints) -> Slabs:
-    if not len(faces):
-        return Slabs(np.zeros(3), np.zeros(3), SLAB_MM, np.zeros(2, np.int64), np.zeros(0, np.int64), 0.0)
-    x = vertices[faces, 0]
-    least = x.min(axis=1)
-    buckets = sort_into_cubes(np.stack([least, np.zeros(len(x)), np.zeros(len(x))], axis=1), SLAB_MM)
-    widest = float((x.max(axis=1) - least).max())
-    return Slabs(vertices.min(axis=0), vertices.max(axis=0), buckets.edge, buckets.start, buckets.order, widest)
+@compiled
+def _slabs(vertices: Floats, faces: Ints) -> tuple[Floats, Floats, Ints, Ints, float]:
+    """The fields of `Slabs`."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for axis in range(3):
+        for vertex in range(len(vertices)):
+            low[axis], high[axis] = min(low[axis], vertices[vertex, axis]), max(high[axis], vertices[vertex, axis])
+    widest, slab = 0.0, np.empty(len(faces), np.int64)
+    for face in range(len(faces)):
+        a, b, c = vertices[faces[face, 0], 0], vertices[faces[face, 1], 0], vertices[faces[face, 2], 0]
+        slab[face] = _slab_of(min(a, b, c), low[0], high[0])
+        widest = max(widest, max(a, b, c) - min(a, b, c))
+    start, order = grouped(slab, SLABS)
+    return low, high, start, order, widest
+
+
+@compiled
+def _slab_of(x: float, low: float, high: float) -> int:
+    return min(max(int((x - low) / max(high - low, 1e-9) * SLABS), 0), SLABS - 1)
 
 
 @compiled
@@ -244,19 +253,18 @@ def _traced(
 @compiled
 def _crossed_slabs(slabs: Slabs, point: Floats, normal: Floats) -> tuple[int, int]:
     """The first and the last slab with faces that a plane may cross."""
-    last_slab = len(slabs.start) - 2
     if normal[0] == 0.0:
-        return 0, last_slab
+        return 0, SLABS - 1
     least, most = np.inf, -np.inf
     for y in (slabs.low[1], slabs.high[1]):
         for z in (slabs.low[2], slabs.high[2]):
             x = point[0] - ((y - point[1]) * normal[1] + (z - point[2]) * normal[2]) / normal[0]
             least, most = min(least, x), max(most, x)
     margin = slabs.widest + MARGIN_MM
-    # Bounds first: a plane nearly along X has corners far away.
     low, high = slabs.low[0], slabs.high[0]
-    first, last = min(max(least - margin, low), high), max(min(most + margin, high), low)
-    return min(int((first - low) / slabs.thickness), last_slab), min(int((last - low) / slabs.thickness), last_slab)
+    # Bounds first: a plane nearly along X has corners far away.
+    first, last = max(least - margin, low), min(most + margin, high)
+    return _slab_of(first, low, high), _slab_of(last, low, high)
 
 
 @compiled

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye_array
 from scipy.spatial import KDTree
 
+from footscan.cloud.outliers.contested import FEWEST_AT_END, LEG_MM, NOT_CONTESTED, ends_of
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
@@ -38,9 +39,8 @@ ALONE_GROWS, ALONE_MM = 0.5, 0.5
 alone may take the stripe of another head's laser for its own. The same growth holds up to stripes beyond an end that
 were dropped: the foot may reach as far. An end that reaches farther than the second counts as filled. Chosen by hand,
 after a filmed scanner (`draw_assembled`, seed 501) whose heel began too early."""
-FEWEST_AT_END, LEAST_CONFIRMED, LEG_MM = 5, 0.2, 90.0
-"""Points that make an end; share of the points on which cameras must agree for that; and height above which a foot's
-length does not end. Chosen by hand."""
+LEAST_CONFIRMED = 0.2
+"""Share of the points on which cameras must agree for the ends to be confirmed. Chosen by hand."""
 OF_DISAGREEMENT = 1.5
 """Errors of the mean of all cameras, relative to their systematic disagreement, and as broad as a camera's view: each
 camera errs, and what all of them have in common does not show. Tuned on `draw_assembled`, seeds 801 to 810 without
@@ -116,7 +116,7 @@ class Evidence(NamedTuple):
     """Of the foot; None: it stood still"""
     lasers_apart_mm: float = math.inf
     """Largest distance between the laser planes of two heads: so much too far out may one camera alone see an end"""
-    contested_mm: tuple[float, float] = (math.inf, -math.inf)
+    contested_mm: tuple[float, float] = NOT_CONTESTED
     """Least and greatest X of the foot with stripes that were dropped for contradicting other cameras"""
 
 
@@ -206,10 +206,12 @@ def _beyond(
     stripes are broad, but less than one step high. The outermost stripe may touch the foot beside its cap: filled
     surface less than one step from an end counts from the measured surface that is nearest.
     """
-    x, seen = vertices[:, 0], vertices[~filled, 0]
+    x = vertices[:, 0]
     if cloud is not None and len(cloud) > 2 * FEWEST_AT_END:
-        seen = np.sort(cloud["x"].astype(np.float64))[FEWEST_AT_END - 1 : 1 - FEWEST_AT_END]
-    beyond = np.maximum(seen.min() - x, x - seen.max())
+        first, last = ends_of(cloud["x"])
+    else:
+        first, last = float(x[~filled].min()), float(x[~filled].max())
+    beyond = np.maximum(first - x, x - last)
     cap = filled & (np.minimum(x - x.min(), x.max() - x) < step_mm)
     if cap.any() and not filled.all():
         nearest = KDTree(vertices[~filled]).query(vertices[cap])[1]
@@ -230,10 +232,10 @@ def _contested(vertices: Floats, cloud: NDArray[np.void] | None, contested_mm: t
     low = vertices[vertices[:, 2] < LEG_MM, 0]
     if cloud is None or len(cloud) < FEWEST_AT_END or not len(low):
         return np.zeros(len(vertices))
-    seen, x = np.sort(cloud["x"].astype(np.float64)), vertices[:, 0]
+    (first_seen, last_seen), x = ends_of(cloud["x"]), vertices[:, 0]
     before, behind = max(low.min() - contested_mm[0], 0.0), max(contested_mm[1] - low.max(), 0.0)
-    first = np.clip(seen[FEWEST_AT_END - 1] + before - x, 0.0, before)
-    return np.asarray(first + np.clip(x - seen[-FEWEST_AT_END] + behind, 0.0, behind))
+    first = np.clip(first_seen + before - x, 0.0, before)
+    return np.asarray(first + np.clip(x - last_seen + behind, 0.0, behind))
 
 
 def seen_ends(cloud: NDArray[np.void]) -> SeenEnds | None:
@@ -244,9 +246,7 @@ def seen_ends(cloud: NDArray[np.void]) -> SeenEnds | None:
     cloud : (N,) of `POINT_DTYPE`, fused
     """
     low = cloud[cloud["z"] < LEG_MM]
-    confirmed = np.sort(low["x"][low["cameras"] > 1].astype(np.float64))
+    confirmed = low["x"][low["cameras"] > 1]
     if len(confirmed) < max(FEWEST_AT_END, LEAST_CONFIRMED * len(low)):
         return None
-    every = np.sort(low["x"].astype(np.float64))
-    first, last = FEWEST_AT_END - 1, -FEWEST_AT_END
-    return SeenEnds((float(confirmed[first]), float(confirmed[last])), (float(every[first]), float(every[last])))
+    return SeenEnds(ends_of(confirmed), ends_of(low["x"]))

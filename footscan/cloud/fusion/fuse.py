@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +33,7 @@ class Fusion(NamedTuple):
 def fuse(
     points: NDArray[np.void] | Iterable[NDArray[np.void]],
     parameters: FusionParameters,
-    heads: Mapping[int, int] = MappingProxyType({}),
+    heads: Mapping[int, int] | None = None,
 ) -> Fusion:
     """Fuse the points of several cameras to one cloud in which skin that several cameras saw appears once.
 
@@ -96,7 +95,7 @@ def fuse(
             for camera, away in sorted(corrected.too_far.items())
         ]
         + [*_worse(before, after)],
-        heads={camera: head for camera, head in heads.items() if camera in stripes.cameras},
+        heads={camera: head for camera, head in (heads or {}).items() if camera in stripes.cameras},
     )
     return Fusion(merged.points[~off], report)
 

@@ -1,5 +1,7 @@
 """Stripes beyond the ends of the foot that one head's cameras saw, and the others' denied."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,15 +9,27 @@ from footscan.cloud.points import PLANE_MM, stripe_step
 from footscan.rows import distinct_rows
 
 LEG_MM = 90.0
-"""Height above which a foot does not end."""
+"""Height above which a foot's length does not end. Chosen by hand."""
 FEWEST_AT_END, FEWEST_IN_STRIPE = 5, 20
 """Points that make an end, and points of one frame that make a stripe. Chosen by hand."""
+NOT_CONTESTED = (math.inf, -math.inf)
+"""Ends beyond which no stripe was dropped."""
 END_MM, MARGIN_MM = 10.0, 3.0
 """The last part of the foot that was kept, and by how much what continues it may be broader. Chosen by hand."""
 MOST_MM = 10.0
 """Farthest beyond an end that a foot is thought to reach. Chosen by hand."""
 GAP_STEPS = 2.5
 """Steps of the travel between two stripes up to which the second continues the first. Chosen by hand."""
+
+
+def ends_of(x: NDArray[np.floating]) -> tuple[float, float]:
+    """Least and greatest of N coordinates, N >= 5, that a few strays beyond do not move.
+
+    >>> ends_of(np.arange(100.0))
+    (4.0, 95.0)
+    """
+    ordered = np.sort(x.astype(np.float64))
+    return float(ordered[FEWEST_AT_END - 1]), float(ordered[-FEWEST_AT_END])
 
 
 def contested_ends(kept: NDArray[np.void], denied: NDArray[np.void]) -> tuple[float, float]:
@@ -31,7 +45,7 @@ def contested_ends(kept: NDArray[np.void], denied: NDArray[np.void]) -> tuple[fl
 
     Returns
     -------
-    Least and greatest X of the foot with these stripes, mm; without kept points (0, 0).
+    Least and greatest X of the foot with these stripes, mm; `NOT_CONTESTED` without kept points.
 
     Examples
     --------
@@ -44,16 +58,16 @@ def contested_ends(kept: NDArray[np.void], denied: NDArray[np.void]) -> tuple[fl
     """
     low = kept[kept["z"] < LEG_MM]
     if len(low) < FEWEST_AT_END:
-        return 0.0, 0.0
+        return NOT_CONTESTED
+    first, last = ends_of(low["x"])
     gap_mm = GAP_STEPS * max(stripe_step(kept), PLANE_MM)
-    return 0.0 - _reach(low, denied, -1.0, gap_mm), _reach(low, denied, 1.0, gap_mm)
+    return 0.0 - _reach(low, -first, denied, -1.0, gap_mm), _reach(low, last, denied, 1.0, gap_mm)
 
 
-def _reach(kept: NDArray[np.void], denied: NDArray[np.void], way: float, gap_mm: float) -> float:
-    """How far stripes reach, along X times `way`."""
-    along = way * kept["x"].astype(np.float64)
-    end = kept_end = float(np.partition(along, -FEWEST_AT_END)[-FEWEST_AT_END])
-    last = kept[along > end - END_MM]
+def _reach(kept: NDArray[np.void], kept_end: float, denied: NDArray[np.void], way: float, gap_mm: float) -> float:
+    """How far stripes reach beyond the end of what was kept, along X times `way`."""
+    end = kept_end
+    last = kept[way * kept["x"] > end - END_MM]
     beyond = way * denied["x"] > end
     for axis in "yz":
         beyond &= np.abs(denied[axis] - (last[axis].min() + last[axis].max()) / 2) < np.ptp(last[axis]) / 2 + MARGIN_MM

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from footscan.cloud.contact import above_glass, estimate_glass, moved_warning
 from footscan.cloud.outliers.body import body_range, is_apart
 from footscan.cloud.outliers.clutter import is_island, is_static
-from footscan.cloud.outliers.contested import contested_ends
+from footscan.cloud.outliers.contested import NOT_CONTESTED, contested_ends
 from footscan.cloud.outliers.ghost import is_ghost
 from footscan.cloud.outliers.glass import is_below_sole, is_plate
 from footscan.cloud.outliers.inside import is_inside
@@ -64,7 +64,7 @@ class Removed:
     """The glass on which the foot stands; points were judged by their height above it."""
     lasers_apart_mm: float = math.inf
     """As of `planes_apart`, over the points that are kept."""
-    contested_mm: tuple[float, float] = (math.inf, -math.inf)
+    contested_mm: tuple[float, float] = NOT_CONTESTED
     """As of `contested_ends`; nothing is contested where no other cameras were asked."""
 
 

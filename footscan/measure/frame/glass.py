@@ -10,8 +10,6 @@ from schemas.glass import GlassPlane, Plane
 UNSAFE_MM = 3.0
 """Distance from Z = 0 beyond which the plate was not just moved: 3 mm are the seats and shims of a plate. A foot that
 stands farther away leaves the part of the laser planes in which the reference object stood. Chosen by hand."""
-
-
 UNKNOWN_MM, UNKNOWN_DEG = 0.5, 0.2
 """Standard deviations of height and tilt of a plate in its seats, where the scan does not show it. Chosen by hand."""
 HALF_FOOT_MM = (100.0, 30.0)
