@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from footscan.measure.bodies.raw_mesh import RawMesh
+from footscan.measure.bodies.shell import continued
 from footscan.measure.foot_landmarks import find_landmarks
 from footscan.measure.frame.foot_frame import Body, FootFrame, foot_frame
 from footscan.measure.measures import measure_foot, take_measures
@@ -28,6 +29,9 @@ DEEPER_MM = 5.0
 about this to the floor. Chosen by hand."""
 HIGHER_MM = 5.0
 """By this much the cut through the leg is raised, to see what rests on it; chosen by hand."""
+HIGHER_RIM_MM = 5.0, 10.0
+"""By so much the skin of a shell goes on beyond its rim: feet are longest and broadest at 10 to 25 mm. Chosen by
+hand."""
 LEAST_TILT_DEG = 0.05
 """A floor that is known better is not tilted; chosen by hand."""
 LONGER = (1.2, 1.45, 1.7)
@@ -43,6 +47,8 @@ by hand."""
 LEG_CUT = "it rests on the cut through the leg"
 OF_SOLE = ("arch_height", "arch_index", "chippaux_smirak_index", "staheli_index", "clarke_angle")
 """Measures of the sole itself."""
+OF_UPPER_SIDE = ("scan_height", "foot_volume", "foot_surface", "instep_length", "instep_girth_min")
+"""Measures that rest on the upper side, whatever they are without it."""
 OF_TOES = ("foot_length", "toe_length", "toe_height", "toe_1_angle", "toe_5_angle")
 """Measures of the toes themselves."""
 OF_HEEL = (
@@ -140,6 +146,10 @@ def _variants(mesh: RawMesh, side: Side, axis: Axis, manual: Mapping[str, Floats
             mesh._replace(vertices=mesh.vertices + HIGHER_MM * np.outer(mesh.lid, up)), np.eye(4), side, axis, manual
         )
         yield _Variants(LEG_CUT, _filled_up([longer]), ())
+    if mesh.shell is not None:
+        shapes = [continued(mesh.vertices, mesh.faces, mesh.shell.transform[2, :3], mm) for mm in HIGHER_RIM_MM]
+        higher = [_measured(mesh._replace(vertices=v, faces=f), np.eye(4), side, axis, manual) for v, f in shapes]
+        yield _Variants("the upper side is missing", _filled_up(higher), OF_UPPER_SIDE)
     if mesh.missing:
         foot = foot_frame(mesh.vertices, mesh.faces, side, axis, manual, body=_body(mesh))
         completed = [_taken(one, manual) for one in _completed(foot, "heel" in mesh.missing)]
@@ -152,7 +162,7 @@ def _variants(mesh: RawMesh, side: Side, axis: Axis, manual: Mapping[str, Floats
 def _body(mesh: RawMesh, motion: Floats | None = None) -> Body:
     """What is known of the mesh; `motion` is a (4, 4) error of its floor, which matters if the sole was not seen."""
     if mesh.closing is None:
-        return Body(not mesh.missing)
+        return Body(not mesh.missing, shell=mesh.shell)
     return Body(not mesh.missing, mesh.to_floor if motion is None else motion @ mesh.to_floor)
 
 

@@ -55,7 +55,7 @@ def floor_faces(vertices: Floats, faces: Faces) -> tuple[NDArray[np.bool_], tupl
             spread = ((middles[near] - middle) * weight[:, None]).T @ (middles[near] - middle)
             fitted = np.linalg.eigh(spread)[1][:, 0]
             normal, here = (fitted if fitted @ normal > 0 else -fitted), near
-        if areas[near].sum() < LEAST_SHARE * areas.sum():
+        if np.count_nonzero(near) < 3 or areas[near].sum() < LEAST_SHARE * areas.sum():
             continue
         for up in (normal, -normal):
             height = (vertices - middle) @ up

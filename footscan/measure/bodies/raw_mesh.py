@@ -8,10 +8,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, KDTree, QhullError
 
+from footscan.measure.bodies.ends import Part, missing_ends
 from footscan.measure.bodies.floor import floor_faces
+from footscan.measure.bodies.shell import find_shell
 from footscan.measure.bodies.sole import close_sole
 from footscan.measure.frame.foot_frame import CONVEX
-from footscan.measure.frame.pose import find_pose, volume
+from footscan.measure.frame.pose import Pose, find_pose, volume
 from footscan.mesh.rigid_transform import apply
 from footscan.mesh.topology import directed_edges, face_components, used_vertices
 from footscan.rows import distinct_rows
@@ -20,8 +22,6 @@ from schemas.base.errors import Finding
 Floats = NDArray[np.float64]
 Faces = NDArray[np.int32]
 MeshUnit = Literal["mm", "cm", "m", "in"]
-
-Part = Literal["heel", "toes"]
 
 MILLIMETRES: dict[MeshUnit, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 FOOT_MM = (115.0, 335.0), (100.0, 380.0)
@@ -45,13 +45,6 @@ OPEN_EDGES = 0.001
 Chosen by hand."""
 COARSE_MM = 0.02
 """A larger rounding of coordinates by single precision is reported; chosen by hand."""
-END, LOW, BLUNT, ROUNDED = 0.06, 0.15, 0.97, 0.4
-"""Test of a whole heel or toes: in the last END of the length and up to LOW lengths high, skin that faces ahead, but by
-less than the cosine BLUNT (a flat cut faces ahead by more), covers more than the share ROUNDED. Whole feet have 0.65 to
-0.95, cut ones up to 0.2."""
-BALL_STATION, GAPS = 0.70, 0.05
-"""At this share of the length a foot is one piece, even with its toes spread; the gaps between the fingers of a hand
-take more than this share of its breadth. Chosen by hand."""
 
 
 class RawMesh(NamedTuple):
@@ -78,6 +71,8 @@ class RawMesh(NamedTuple):
     """Standard deviation of the tilt of a floor that follows from the rim of an open sole"""
     to_floor: Floats = np.eye(4)
     """(4, 4) from the frame of the mesh to one with the floor at Z = 0"""
+    shell: Pose | None = None
+    """Pose of a shell, a foot without its upper side, in mm; None if the upper side was seen"""
 
 
 def prepare_feet(
@@ -149,14 +144,19 @@ def _prepared(
     meetings = _meetings(faces)
     is_closed = _is_closed(meetings, notes)
     faces = _outward(vertices, faces, meetings, notes)
-    pose = find_pose(vertices, faces)
+    shell = find_shell(vertices, faces)
+    if shell is None:
+        pose = find_pose(vertices, faces)
+    else:
+        vertices, faces, pose = shell
+        notes.append("the upper side was not seen, only the sole with its rim")
     mesh_unit = _unit(pose.length, unit)
     missing: tuple[Part, ...] = ()
     if pose.convexity < CONVEX:  # foot_frame refuses a more convex body
-        missing = _missing_ends(apply(pose.transform, vertices) / pose.length, faces)
+        missing = missing_ends(apply(pose.transform, vertices) / pose.length, faces)
     notes += [f"the foot is cut off or open at the {part}" for part in missing]
     level = None if floor is None else float(apply(pose.transform, floor[0][None])[0, 2])
-    sole = close_sole(apply(pose.transform, vertices), faces, pose.length, level)
+    sole = close_sole(apply(pose.transform, vertices), faces, pose.length, level) if shell is None else None
     if sole is not None:
         vertices, faces = apply(np.linalg.inv(pose.transform), sole.vertices), sole.faces
         notes.append("the sole was not seen and was closed flat at the floor")
@@ -181,6 +181,7 @@ def _prepared(
         _at(vertices, pose.leg_end, LID_REACH * pose.length),
         0.0 if sole is None else float(np.degrees(np.arctan(sole.uneven / (pose.length / 2)))),
         to_floor,
+        None if shell is None else pose.scaled(factor),
     )
 
 
@@ -324,61 +325,6 @@ def _unit(length: float, stated: MeshUnit | None) -> MeshUnit:
             raise Finding(f"the surface is {length:.3g} long, which is {sizes}; expected the unit to be stated")
     expected = f"expected a foot of {least:.0f} to {greatest:.0f} mm in one of {', '.join(MILLIMETRES)}"
     raise Finding(f"the surface is {length:.3g} long, {expected}")
-
-
-def _missing_ends(places: Floats, faces: Faces) -> tuple[Part, ...]:
-    """Returns the ends that a foot lacks. Refuse one that lacks both, and a hand.
-
-    Parameters
-    ----------
-    places : (V, 3) vertices in foot lengths, floor at Z = 0, heel to toes along X
-    """
-    corners = places[faces]
-    low = corners[corners[:, :, 2].mean(axis=1) < LOW]
-    if not len(low):
-        raise Finding("the surface has nothing near its floor, expected a foot")
-    rear, front = float(low[:, :, 0].min()), float(low[:, :, 0].max())
-    ends: tuple[tuple[Part, float, float], ...] = (("heel", rear, -1.0), ("toes", front, 1.0))
-    missing: list[Part] = []
-    for part, end, ahead in ends:
-        last = low[np.abs(low[:, :, 0].mean(axis=1) - end) < END]
-        if _rounded(last, ahead) < ROUNDED:
-            missing.append(part)
-    if len(missing) == 2:
-        raise Finding("the surface is cut off or open at the heel and at the toes, expected a foot with one of them")
-    if missing:
-        return tuple(missing)
-    low[:, :, 0] -= rear
-    if _parted(low) > GAPS:
-        raise Finding("the surface has gaps from side to side where a foot has its ball, expected a foot")
-    return ()
-
-
-def _rounded(triangles: Floats, ahead: float) -> float:
-    """Share of an end's outline, seen along X from `ahead`, that is skin and no flat cut: 0 to 1 of its hull."""
-    if len(triangles) < 3:
-        return 1.0
-    crosses = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
-    seen = ahead * crosses[:, 0]
-    round_ = seen < BLUNT * np.linalg.norm(crosses, axis=1)
-    return float(seen[round_].sum() / ConvexHull(triangles[:, :, 1:].reshape(-1, 2)).volume)
-
-
-def _parted(triangles: Floats) -> float:
-    """Share of the breadth of the section across the ball that lies between its parts."""
-    is_ahead = triangles[:, :, 0] > BALL_STATION
-    crossing = triangles[is_ahead.any(axis=1) & ~is_ahead.all(axis=1)]
-    if not len(crossing):
-        return 1.0
-    x, y = crossing[:, :, 0] - BALL_STATION, crossing[:, :, 1]
-    next_x, next_y = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
-    cut = (x > 0) != (next_x > 0)
-    at = y + (next_y - y) * x / np.where(cut, x - next_x, 1.0)
-    first, last = np.where(cut, at, np.inf).min(axis=1), np.where(cut, at, -np.inf).max(axis=1)
-    order = np.argsort(first)
-    reached = np.maximum.accumulate(last[order])
-    gaps = np.clip(first[order][1:] - reached[:-1], 0.0, None)
-    return float(gaps.sum() / (reached[-1] - first.min()))
 
 
 def _report_rounding(vertices: Floats, factor: float, notes: list[str]) -> None:

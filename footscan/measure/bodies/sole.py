@@ -28,6 +28,8 @@ that is pressed flat on a glass leaves it smoothly. Chosen by hand."""
 SKIRT = 1e-4
 """Least height of the skin between rim and closing, as a share of the length: no triangle lacks area."""
 
+DOWN = np.array([0.0, 0.0, -1.0])
+
 
 class Sole(NamedTuple):
     """A foot with a closed sole."""
@@ -53,18 +55,18 @@ def close_sole(vertices: Floats, faces: Faces, length: float, floor: float | Non
     length : of the foot, in the same unit
     floor : Z of the floor; default: that of the lowest vertex
     """
-    lid = _flat_lid(vertices, faces, length)
+    lid = flat_lid(vertices, faces, length)
     if lid.any():
         vertices, faces = used_vertices(vertices, faces[~lid])
-    holes = [rim for rim in _holes(faces, len(vertices)) if _is_sole(vertices, rim, length)]
-    area = sum(_area(vertices[rim])[2] for rim in holes)
+    openings = [rim for rim in holes(faces, len(vertices)) if _is_sole(vertices, rim, length)]
+    area = sum(opening_area(vertices[rim])[2] for rim in openings)
     if area < OPEN_SHARE * length**2:
         return None
     level = min(float(vertices[:, 2].min()), np.inf if floor is None else floor) - SKIRT * length
-    uneven = float(np.std(vertices[np.concatenate(holes).ravel(), 2]))
+    uneven = float(np.std(vertices[np.concatenate(openings).ravel(), 2]))
     parts, added = [faces], [vertices]
     count = len(vertices)
-    for rim in holes:
+    for rim in openings:
         ends, number = np.unique(rim, return_inverse=True)
         first, second = (number.reshape(rim.shape) + count).T
         on_floor = vertices[ends] * [1, 1, 0] + [0, 0, level]
@@ -77,14 +79,22 @@ def close_sole(vertices: Floats, faces: Faces, length: float, floor: float | Non
     return Sole(np.concatenate(added), np.concatenate(parts).astype(np.int32), closing, level, uneven)
 
 
-def _flat_lid(vertices: Floats, faces: Faces, length: float) -> NDArray[np.bool_]:
-    """Returns (F,) the faces of a flat lid over the sole; none without one."""
+def flat_lid(vertices: Floats, faces: Faces, length: float, out: Floats = DOWN) -> NDArray[np.bool_]:
+    """Returns (F,) the faces of a flat lid; none without one.
+
+    Parameters
+    ----------
+    vertices : (V, 3)
+    faces : (F, 3), looking outward
+    length : of the foot, in the unit of the vertices
+    out : (3,) unit vector, to where the lid looks; default: over the sole
+    """
     corners = vertices[faces]
     crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     doubled = np.linalg.norm(crosses, axis=1)
     normals = crosses / np.maximum(doubled, 1e-300)[:, None]
-    near = np.abs(corners[:, :, 2] - vertices[:, 2].min()).max(axis=1) < EXACT * length
-    lid = near & (normals[:, 2] < -LID_FACING)
+    near = ((vertices @ out).max() - corners @ out).max(axis=1) < EXACT * length
+    lid = near & (normals @ out > LID_FACING)
     if doubled[lid].sum() / 2 < OPEN_SHARE * length**2:
         return np.zeros(len(faces), np.bool_)
     neighbours = face_neighbours(np.ascontiguousarray(faces, np.int64), len(vertices))
@@ -96,7 +106,7 @@ def _flat_lid(vertices: Floats, faces: Faces, length: float) -> NDArray[np.bool_
     return lid if lengths[sharp].sum() > FLAT_SHARE * lengths.sum() else np.zeros(len(faces), np.bool_)
 
 
-def _holes(faces: Faces, count: int) -> list[NDArray[np.int64]]:
+def holes(faces: Faces, count: int) -> list[NDArray[np.int64]]:
     """Returns the rim of each hole: (E, 2) open edges, as they run along their faces."""
     corners = np.ascontiguousarray(faces, np.int64)
     face, slot = np.nonzero(face_neighbours(corners, count) < 0)
@@ -108,14 +118,16 @@ def _holes(faces: Faces, count: int) -> list[NDArray[np.int64]]:
     return [rims[hole == number] for number in np.unique(hole)]
 
 
-def _area(rims: Floats) -> Floats:
-    """Returns (3,) the area vector of a hole; it looks into the body."""
+def opening_area(rims: Floats) -> Floats:
+    """Returns (3,) the area vector of a hole with edges between `rims` (E, 2, 3); it looks into the body."""
+    if not len(rims):
+        return np.zeros(3)
     from_middle = rims - rims.mean(axis=(0, 1))
     total: Floats = np.cross(from_middle[:, 0], from_middle[:, 1]).sum(axis=0) / 2
     return total
 
 
 def _is_sole(vertices: Floats, rim: NDArray[np.int64], length: float) -> bool:
-    area = _area(vertices[rim])
+    area = opening_area(vertices[rim])
     low = float(vertices[rim][:, :, 2].mean()) < LOW * length
     return bool(low and area[2] > LEVEL * np.linalg.norm(area) and area[2] > 0)

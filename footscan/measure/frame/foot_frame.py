@@ -56,6 +56,8 @@ class Body(NamedTuple):
     """False accepts the proportions of a foot without its toes or its heel"""
     to_floor: Floats | None = None
     """(4, 4) from the frame of the mesh to one with the floor at Z = 0; None: the floor is the glass or the sole"""
+    shell: Pose | None = None
+    """Pose of a foot without its upper side; None: its upper side is there"""
 
 
 class FootFrame(NamedTuple):
@@ -127,13 +129,13 @@ def foot_frame(
     """
     places, faces = used_vertices(np.asarray(vertices, np.float64), keep_large_components(faces, STRAY_SHARE))
     _check_size(places)
-    pose = find_pose(places, faces)
     body = body or Body()
+    pose = body.shell or find_pose(places, faces)
     transform, floor = _on_floor(places, pose, to_glass(glass), body.to_floor)
     samples = dense_points(places, faces, SPACING_MM)
     moved = apply(transform, samples)
     if body.is_whole:
-        _check_form(moved, pose)
+        _check_form(moved, pose, body.shell is None)
 
     lead = _medial_lead(moved, pose.length)
     form: Side = "right" if lead >= 0 else "left"
@@ -216,7 +218,7 @@ def _on_floor(vertices: Floats, pose: Pose, to_glass: Floats, to_floor: Floats |
     return transform, floor
 
 
-def _check_form(samples: Floats, pose: Pose) -> None:
+def _check_form(samples: Floats, pose: Pose, has_upper_side: bool) -> None:
     """Raise `Finding` if the form is not that of a foot; `samples` with the floor at Z = 0 and the heel near X = 0."""
     length = pose.length
     _check_length(length)
@@ -227,7 +229,7 @@ def _check_form(samples: Floats, pose: Pose) -> None:
         raise Finding("the surface is round or a block without hollows, expected a foot")
     x, z = samples[:, 0], samples[:, 2]
     hind, toes = z[x < (1 - TOES) * length].max(initial=0.0), z[x > TOES * length].max(initial=0.0)
-    if not toes < DESCENT * hind:
+    if has_upper_side and not toes < DESCENT * hind:
         heights = f"the surface is {hind:.0f} mm high at one end and {toes:.0f} mm at the other"
         raise Finding(f"{heights}, expected a foot, whose toes are lower than its heel with the leg")
     low = samples[samples[:, 2] <= low_height(length)]

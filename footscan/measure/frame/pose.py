@@ -68,14 +68,22 @@ class Pose(NamedTuple):
     leg_end: Floats | None
     """(N, 3) vertices of the flat end of the cut leg, in the mesh's frame; None without such an end."""
 
+    def scaled(self, factor: float) -> "Pose":
+        """The pose of a mesh whose coordinates are those of this one times a factor."""
+        transform = self.transform.copy()
+        transform[:3, 3] *= factor
+        end = None if self.leg_end is None else factor * self.leg_end
+        return Pose(transform, factor * self.length, factor * self.residual, self.stands, self.convexity, end)
 
-def find_pose(vertices: Floats, faces: NDArray[np.integer]) -> Pose:
+
+def find_pose(vertices: Floats, faces: NDArray[np.integer], up: Floats | None = None) -> Pose:
     """Find the pose of a foot's mesh in any position and unit. Left and right feet are treated alike.
 
     Parameters
     ----------
     vertices : (V, 3) float64, any unit
     faces : (F, 3), all looking outward or all inward
+    up : (3,) unit vector, about upwards; default: follows from the form
 
     Raises
     ------
@@ -89,10 +97,10 @@ def find_pose(vertices: Floats, faces: NDArray[np.integer]) -> Pose:
     inside = volume(vertices, faces)
     skin = _skin(vertices, faces if inside >= 0 else faces[:, ::-1])
     candidates = _hull_faces(vertices, hull)
-    downs = [normal for normal, _ in candidates[:LARGEST]]
+    downs = [normal for normal, _ in candidates[:LARGEST]] if up is None else [-up]
     best = max((_standing(vertices, skin, -down) for down in downs), key=lambda standing: standing.score)
-    up, offset, residual, stands = _floor(vertices, skin, hull, best)
-    transform = _standing_transform(vertices, up, offset, best)
+    upwards, offset, residual, stands = _floor(vertices, skin, hull, best)
+    transform = _standing_transform(vertices, upwards, offset, best)
     end = _leg_end(vertices, candidates, transform, best.length)
     return Pose(transform, best.length, residual, stands, abs(inside) / float(hull.volume), end)
 

@@ -59,10 +59,12 @@ def junction_point(vertices: Floats, faces: NDArray[np.integer], length: float, 
     angle, radius = np.arctan2(z, x), np.hypot(x, z)
     ahead = (angle > np.deg2rad(SECTOR_DEG[0])) & (angle < np.deg2rad(SECTOR_DEG[1]))
     angle, radius, y, z = angle[ahead], radius[ahead], points[ahead, 1], points[ahead, 2]
+    if not len(radius):
+        return None
     edges = np.deg2rad(np.linspace(*SECTOR_DEG, SECTORS + 1))
     sector = np.clip(np.searchsorted(edges, angle) - 1, 0, SECTORS - 1)
     farthest = highest_of_each(sector, radius, SECTORS)
-    outline = np.where(farthest >= 0, radius[farthest], np.inf) if len(radius) else np.full(SECTORS, np.inf)
+    outline = np.where(farthest >= 0, radius[farthest], np.inf)
     outline[z[farthest] > min(top - BELOW_CUT_MM, CREASE_MM * scale)] = np.inf  # the cut does not belong to the outline
     nearest = int(np.argmin(outline))
     if nearest in (0, SECTORS - 1) or not np.isfinite(outline[nearest - 1 : nearest + 2]).all():

@@ -9,11 +9,12 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from footscan.measure.bodies.raw_mesh import RawMesh, prepare_feet
+from footscan.measure.measures import measure_foot
 from footscan.measure.partial import measure_pair, measure_raw
 from footscan.mesh.topology import vertex_normals
 from footscan.virtual.foot.foot import Foot, make_foot
 from schemas.base.errors import Finding
-from schemas.measures import Measures
+from schemas.measures import Measure, Measures
 
 Shape = tuple[np.ndarray, np.ndarray]
 
@@ -26,6 +27,11 @@ OF_THE_CUT = ("scan_height",)
 @lru_cache
 def known_foot() -> Foot:
     return make_foot(resolution_mm=2.0)
+
+
+@lru_cache
+def measured_whole() -> dict[str, Measure]:
+    return measure_foot(known_foot().vertices, known_foot().faces, "right").measures
 
 
 def cut(keep: tuple[float, float, float], at: float, cap: bool = False) -> Shape:
@@ -114,6 +120,16 @@ OTHERS: dict[str, Callable[[], Shape]] = {
     "rough and cut at 3 mm": lambda: rough(cut(UP, 3.0), 0.2),
 }
 
+SHELLS: dict[str, Callable[[], Shape]] = {
+    "sole up to 10 mm": lambda: cut(DOWN, 10.0),
+    "sole up to 15 mm": lambda: cut(DOWN, 15.0),
+    "sole up to 15 mm, closed": lambda: cut(DOWN, 15.0, cap=True),
+    "sole up to 25 mm": lambda: cut(DOWN, 25.0),
+    "sole up to 25 mm, closed": lambda: cut(DOWN, 25.0, cap=True),
+    "sole up to 35 mm, rough": lambda: rough(cut(DOWN, 35.0), 0.2),
+    "sole up to 25 mm, in metres, with strays": lambda: in_metres(with_strays(cut(DOWN, 25.0))),
+}
+
 
 def taken(shape: Shape) -> tuple[RawMesh, Measures]:
     vertices = Rotation.random(random_state=5).apply(shape[0])
@@ -133,7 +149,7 @@ def check(measures: Measures) -> None:
     assert wrong == {}
 
 
-@pytest.mark.parametrize("shape", (SOLE_OPEN | OTHERS).values(), ids=(SOLE_OPEN | OTHERS).keys())
+@pytest.mark.parametrize("shape", (SOLE_OPEN | OTHERS | SHELLS).values(), ids=(SOLE_OPEN | OTHERS | SHELLS).keys())
 def test_no_measure_that_is_ok_is_wrong(shape: Callable[[], Shape]) -> None:
     check(taken(shape())[1])
 
@@ -154,6 +170,36 @@ def test_a_sole_that_was_not_seen_is_closed_flat_by_the_floor(shape: Callable[[]
         assert "closed by the floor" in str(measures[name].note)
     for name in ("arch_height", "arch_index", "staheli_index"):
         assert measures[name].status == "incomplete"
+
+
+@pytest.mark.parametrize("shape", SHELLS.values(), ids=SHELLS.keys())
+def test_a_sole_alone_is_measured_as_far_as_it_goes(shape: Callable[[], Shape]) -> None:
+    mesh, found = taken(shape())
+    assert "the upper side was not seen, only the sole with its rim" in mesh.notes
+    measures, true = found.measures, measured_whole()
+    for name in ("arch_index", "chippaux_smirak_index", "staheli_index"):
+        assert measures[name].value == pytest.approx(true[name].value, abs=0.01), name
+    assert measures["foot_length"].value == pytest.approx(true["foot_length"].value, abs=5.0)
+    for name in ("instep_height", "instep_girth", "heel_girth", "ankle_girth", "foot_volume", "scan_height"):
+        assert measures[name].status == "incomplete", name
+    for name, measure in measures.items():
+        if measure.value is not None and measure.uncertainty is not None and (value := true[name].value) is not None:
+            assert abs(measure.value - value) < max(LEAST_MM, SCATTERS * measure.uncertainty), name
+
+
+def test_the_length_of_a_low_sole_is_uncertain_and_that_of_a_higher_one_is_not() -> None:
+    for height, status in ((10.0, "uncertain"), (15.0, "uncertain"), (30.0, "ok")):
+        length = taken(cut(DOWN, height))[1].measures["foot_length"]
+        assert length.status == status, height
+        assert ("the upper side is missing" in str(length.note)) == (status == "uncertain")
+
+
+def test_a_tray_is_no_sole() -> None:
+    box = trimesh.creation.box(extents=(260, 90, 25))
+    vertices, faces = trimesh.remesh.subdivide_to_size(box.vertices, box.faces, 8.0)
+    tray = faces[(vertices[faces][:, :, 2] < 12.4).any(axis=1)]
+    with pytest.raises(Finding):
+        taken((vertices, tray))
 
 
 def test_a_floor_that_is_joined_to_the_foot_is_cut_away() -> None:
