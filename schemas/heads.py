@@ -48,8 +48,10 @@ class HeadsReport(Document):
     """The same if the heads are where this report says."""
     largest_mm: Length = 0.0
     """Largest displacement of a point along X."""
+    strays_mm: Length = 0.0
+    """How far a head strays from its place, from one stretch of the travel to the next, root mean square"""
     is_corrected: bool = False
     """True if the points of this scan were displaced so."""
     warnings: list[str] = Field(default_factory=list)
     doubt: str | None = None
-    """Reason for which measures are uncertain, if the heads are farther off than a scan can make good."""
+    """Reason for which measures are uncertain, if heads are farther off than a scan can make good, or one strays."""

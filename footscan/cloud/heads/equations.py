@@ -25,6 +25,8 @@ SHIFTS = 2
 """Numbers of a motion of the foot: those of a camera's motion without the turn."""
 FAR = 4.0
 """Standard deviations beyond which an origin explains nothing. Chosen by hand."""
+FEWEST_IN_STRETCH = 40
+"""Comparisons of two heads on a stretch of the travel that show where a head is there. Chosen by hand."""
 CONVERGING, REJECTING = 3, 2
 """Iterations of the robust least squares, with the weights of Huber and of Tukey: a bound of time."""
 
@@ -51,6 +53,8 @@ class FoundPlaces(NamedTuple):
     unmoved_mm: float
     """Robust standard deviation of the distances between cameras of two heads with the heads as calibrated; cameras are
     moved all the same"""
+    strays_mm: float = 0.0
+    """As of `strays`"""
 
 
 def unmoved_heads(known: Floats, cameras: int) -> HeadFit:
@@ -159,6 +163,30 @@ def spread_unmoved(comparisons: Comparisons, change: Floats, distance: Floats, k
     rest = distance - displacements(change, comparisons, known)
     still = unmoved_heads(np.zeros(known.shape), cameras)
     return solve(comparisons, np.zeros(change.shape), rest, still).spread_mm
+
+
+def strays(comparisons: Comparisons, change: Floats, distance: Floats, fit: HeadFit) -> float:
+    """How far a head strays from its place in the fit, from one stretch of the travel to the next, mm.
+
+    It is the root mean square over stretches of the offset that explains best what the fit leaves of `distance` (M,),
+    of the head for which it is largest; 0 without comparisons of two heads.
+    """
+    left = distance - motions_seen(comparisons, fit) - displacements(change, comparisons, fit.places)
+    noise, heads = np.sqrt(comparisons.variance), change.shape[1]
+    known = PRIOR_SD[0] ** -2.0 * np.eye(heads) + (GAUGE * PRIOR_SD[0]) ** -2.0 * np.ones((heads, heads))
+    offsets = []
+    for stretch in np.unique(comparisons.stretch[comparisons.is_across]):
+        here = comparisons.is_across & (comparisons.stretch == stretch)
+        if np.count_nonzero(here) < FEWEST_IN_STRETCH:
+            continue
+        rows, offset = change[here], np.zeros(heads)
+        for _ in range(CONVERGING):
+            apart = np.abs(left[here] - rows @ offset) / noise[here]
+            scale = max(1.0, MAD_TO_SD * float(np.median(apart)))
+            weighted = rows.T * (INDEPENDENT * huber_weights(apart / scale) / (scale * noise[here]) ** 2)
+            offset = np.linalg.solve(weighted @ rows + known, weighted @ left[here])
+        offsets.append(offset)
+    return float(np.sqrt(np.mean(np.square(offsets), axis=0)).max()) if offsets else 0.0
 
 
 def spread_of(distances: Floats) -> float:

@@ -23,6 +23,7 @@ from footscan.cloud.heads.equations import (
     same_line,
     solve,
     spread_unmoved,
+    strays,
     unmoved_heads,
 )
 from footscan.cloud.heads.planes import (
@@ -92,14 +93,15 @@ def find_heads(points: NDArray[np.void], views: Mapping[int, View], parameters: 
     if across < FEWEST:
         return nothing.model_copy(update={"comparisons": across})
     start = unmoved_heads(known, len(heads))
+    strays_mm = 0.0
     if np.ptp(known[:, 0]) <= LINE_MM:
-        start, unmoved_mm = first_places(first.every(-(-len(first.distance) // USED)), known, len(heads))
+        start, unmoved_mm, strays_mm = first_places(first.every(-(-len(first.distance) // USED)), known, len(heads))
         fit = start
     if np.ptp(start.places[:, 0]) > LINE_MM:
-        fit, unmoved_mm = _refined(ordered[::THINNED], bare, heads, start, known, x_mm)
+        fit, unmoved_mm, strays_mm = _refined(ordered[::THINNED], bare, heads, start, known, x_mm)
     moved = fit.places - known
     fit = fit._replace(places=moved - moved.mean(axis=0))
-    found = nothing.model_copy(update={"comparisons": across})
+    found = nothing.model_copy(update={"comparisons": across, "strays_mm": round(strays_mm, 4)})
     return report_of(found, heads, fit, unmoved_mm, parameters, filmed=planes_filmed(views, heads))
 
 
@@ -116,21 +118,22 @@ def _refined(
     The first places stay where frames of different heads are not of one moment, or no camera sees the lines of two
     heads: there a line of another head cannot be assigned.
     """
-    head_of, unmoved_mm = head_indices(heads), fit.spread_mm
+    head_of, unmoved_mm, strays_mm = head_indices(heads), fit.spread_mm, 0.0
     for _ in range(ROUNDS):
         places = fit.places
         moved, views_there = displaced(points, places, head_of, x_mm), views_at(views, heads, places, x_mm)
         seen = lasers_seen(moved, views_there, heads)
         if not _is_of_one_moment(seen) or _travels_alone(seen, places):
-            return FoundPlaces(fit, unmoved_mm)
+            return FoundPlaces(fit, unmoved_mm, strays_mm)
         of_laser, laser = _in_laser_planes(moved, seen, views_there, heads)
         comparisons = compare(of_laser, laser, views, head_of, x_mm, NEAR_MM)
         change, distance = _of_lines(comparisons, fit)
         fit = solve(comparisons, change, distance, fit)
         unmoved_mm = spread_unmoved(comparisons, change, distance, known, len(heads))
+        strays_mm = strays(comparisons, change, distance, fit)
         if np.max(np.abs(fit.places - places) * HALF_MM) < SETTLED_MM:
             break
-    return FoundPlaces(fit, unmoved_mm)
+    return FoundPlaces(fit, unmoved_mm, strays_mm)
 
 
 def _is_of_one_moment(seen: LasersSeen) -> bool:

@@ -10,12 +10,14 @@ from footscan.cloud.fusion.stripes import Floats
 from footscan.cloud.heads.comparisons import HEAD_TERMS, Comparisons
 from footscan.cloud.heads.equations import (
     FoundPlaces,
+    HeadFit,
     likeliest,
     merged_lines,
     own_lines,
     same_line,
     solve,
     spread_unmoved,
+    strays,
     unmoved_heads,
 )
 
@@ -45,16 +47,17 @@ def first_places(comparisons: Comparisons, known: Floats, cameras: int) -> Found
     lines += [same_line(comparisons, np.full(len(distance), head), heads) for head in range(heads)]
     origins = [merged_lines(comparisons, heads), *lines, own_lines(comparisons, heads)]
     firsts = [likeliest(comparisons, origins, distance, start)] if known.any() else origins[:3]
-    fits = []
+    fits: list[tuple[HeadFit, Floats]] = []
     for first in firsts:
-        fit = solve(comparisons, first, distance, start)
+        change, fit = first, solve(comparisons, first, distance, start)
         for _ in range(ROUNDS):
             change = likeliest(comparisons, origins, distance, fit)
             fit = solve(comparisons, change, distance, fit)
-        fits.append(fit)
+        fits.append((fit, change))
     change = likeliest(comparisons, origins, distance, calibrated)
     unmoved_mm = spread_unmoved(comparisons, change, distance, known, cameras)
-    return FoundPlaces(min(fits, key=lambda fit: fit.spread_mm), unmoved_mm)
+    best, explained = min(fits, key=lambda found: found[0].spread_mm)
+    return FoundPlaces(best, unmoved_mm, strays(comparisons, explained, distance, best))
 
 
 def _offsets(comparisons: Comparisons, heads: int) -> Floats:

@@ -58,6 +58,16 @@ def test_a_large_offset_puts_the_measures_in_doubt() -> None:
     assert "film the body that shows the laser planes (`footscan calibrate film`" in report.doubt
 
 
+@pytest.mark.parametrize(("lost_mm", "is_doubted"), [(0.0, False), (1.5, True)])
+def test_a_head_that_loses_steps_puts_the_measures_in_doubt(lost_mm: float, is_doubted: bool) -> None:
+    before, after = points_of((0.0, 0.0, 0.0)), points_of((0.0, -lost_mm, 0.0))
+    half = float(np.median(before["plane"]))
+    points = np.concatenate([before[before["plane"] <= half], after[after["plane"] > half]])
+    report = find_heads(points, views(), HeadParameters())
+    assert ("lost steps" in str(report.doubt)) == is_doubted
+    assert (report.strays_mm > 0.05) == is_doubted
+
+
 def test_a_turned_plane_is_found() -> None:
     report = find_heads(points_of((0.0, 0.0, 0.0), turn=0.008), views(), HeadParameters())
     yaw = places_of(report)[:, 1]
