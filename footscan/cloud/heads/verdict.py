@@ -21,8 +21,8 @@ has shown all laser planes. Maps that err by a tenth of a millimetre look a litt
 
 STRAYS_MM, STRAYS_SPREADS = 0.05, 2.0
 """Straying of a head beyond which its motor has lost steps: this far, and so many robust standard deviations of the
-distances between cameras of two heads. Chosen by hand: scanners as designed and scanners that a body calibrated
-(`draw_assembled`, seeds 701, 702, 803, 804) have 0.2 to 0.7 of these, heads that lost 1.5 mm 3 to 5."""
+distances between cameras of two heads. Chosen by hand: scanners as designed (`draw_assembled`, seeds 701 and 702) have
+0.2 of these, scanners that a body calibrated (803 to 807) 0.5 to 1.3, heads that lost 1.5 mm 3 to 5."""
 
 
 def report_of(
