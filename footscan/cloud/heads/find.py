@@ -118,22 +118,23 @@ def _refined(
     The first places stay where frames of different heads are not of one moment, or no camera sees the lines of two
     heads: there a line of another head cannot be assigned.
     """
-    head_of, unmoved_mm, strays_mm = head_indices(heads), fit.spread_mm, 0.0
+    head_of, explained = head_indices(heads), None
     for _ in range(ROUNDS):
         places = fit.places
         moved, views_there = displaced(points, places, head_of, x_mm), views_at(views, heads, places, x_mm)
         seen = lasers_seen(moved, views_there, heads)
         if not _is_of_one_moment(seen) or _travels_alone(seen, places):
-            return FoundPlaces(fit, unmoved_mm, strays_mm)
+            break
         of_laser, laser = _in_laser_planes(moved, seen, views_there, heads)
         comparisons = compare(of_laser, laser, views, head_of, x_mm, NEAR_MM)
         change, distance = _of_lines(comparisons, fit)
         fit = solve(comparisons, change, distance, fit)
-        unmoved_mm = spread_unmoved(comparisons, change, distance, known, len(heads))
-        strays_mm = strays(comparisons, change, distance, fit)
+        explained = comparisons, change, distance
         if np.max(np.abs(fit.places - places) * HALF_MM) < SETTLED_MM:
             break
-    return FoundPlaces(fit, unmoved_mm, strays_mm)
+    if explained is None:
+        return FoundPlaces(fit, fit.spread_mm)
+    return FoundPlaces(fit, spread_unmoved(*explained, known, len(heads)), strays(*explained, fit))
 
 
 def _is_of_one_moment(seen: LasersSeen) -> bool:

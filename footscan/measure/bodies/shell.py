@@ -26,6 +26,8 @@ OPEN_SHARE = 0.1
 Chosen by hand."""
 LIDS = 4
 """Number of triangles of the hull in whose plane a lid is sought, the largest first; chosen by hand."""
+REAR, FRONT = (0.08, 0.22), (0.78, 0.92)
+"""Shares of the length near both ends, of which the heel's is narrower; chosen by hand."""
 LEAST_RISE = 0.5
 """Skin that goes on beyond the rim rises by at least this share of its way: outlines grow by less than 1.8 times the
 height that is missing. Chosen by hand."""
@@ -130,7 +132,7 @@ def _runs_backwards(places: Floats) -> bool:
     """True if the broader end, the ball, lies at the lower X."""
     x, y = places[:, 0] - places[:, 0].min(), places[:, 1]
     share = x / x.max()
-    rear, front = (np.ptp(y[(share > first) & (share < last)]) for first, last in ((0.08, 0.22), (0.78, 0.92)))
+    rear, front = (np.ptp(y[(share > first) & (share < last)]) for first, last in (REAR, FRONT))
     return bool(rear > front)
 
 
