@@ -21,6 +21,10 @@ Floats = NDArray[np.float64]
 ERROR_MM, ERROR_GROWS, REACH_MM = 0.015, 0.04, 10.0
 """Standard deviation of a measured vertex, its growth per mm into filled surface, and the distance over which vertices
 share their error. Tuned on virtual feet: docs/surface.md."""
+COMMON_MM = 0.015
+"""Standard deviation that a whole part of the foot, as broad as `WIDE_MM`, has in common: stripes and surfaces that are
+a little too far in make a girth too small all around. Tuned on ideal scanners (`draw_assembled`, seeds 701 and 702, as
+designed), whose girths at waist and instep are 0.13 to 0.18 mm too small."""
 NARROW_MM = 3.0
 """The smaller distance over which vertices share noise, and the errors of ends: the tip of a toe moves to its side if
 one half of its cap errs. Chosen by hand, after scanners (`draw_assembled`, seeds 805 and 806) whose axes through the
@@ -34,6 +38,10 @@ scanners without pictures whose planes a body has shown: `draw_assembled`, seeds
 END_GROWS = 0.08
 """Growth of the standard deviation per mm along the travel beyond the outermost stripe, at heel and toes: some 0.06 of
 heels and 0.1 of toes on 50 scans of virtual feet (`draw_assembled`)."""
+SHORT_GROWS = 2.0
+"""Growth of the standard deviation per mm by which the surface falls short of the outermost stripe. Chosen by hand,
+after two scans with 4 mm between stripes (`draw_assembled`, seeds 701 and 702, as designed): ends 0.3 to 0.5 mm short
+of the stripe are 0.6 to 0.8 mm short of the foot."""
 ALONE_GROWS, ALONE_MM = 0.5, 1.0
 """Growth of the standard deviation per mm along the travel beyond the last place where two cameras agree: one camera
 alone may take the stripe of another head's laser for its own. The same growth holds up to stripes beyond an end that
@@ -47,6 +55,10 @@ OF_DISAGREEMENT = 1.5
 """Errors of the mean of all cameras, relative to their systematic disagreement, and as broad as a camera's view: each
 camera errs, and what all of them have in common does not show. Tuned on `draw_assembled`, seeds 801 to 810 without
 pictures, 511 and 512 with films, and `draw_world`, seeds 6001 to 6024."""
+STRIPES_MM, OF_HEADS = 0.02, 2.0
+"""Robust standard deviation of the distances between cameras of two heads that travel perfectly, along the normal, and
+errors of X relative to what exceeds it: skin that two heads see hardly faces X. Chosen by hand: ideal scanners
+(`draw_assembled`, seeds 701 and 703) have the first, and 0.07 mm if their heads jitter and ripple by 0.2 mm."""
 SWAY_MM = 0.05
 """Standard deviation of slow movement of the foot, along X and across, that no stripe shows: over a tenth of a metre it
 looks like the form of another foot. Chosen by hand."""
@@ -120,6 +132,8 @@ class Evidence(NamedTuple):
     """Largest distance between the laser planes of two heads: so much too far out may one camera alone see an end"""
     contested_mm: tuple[float, float] = NOT_CONTESTED
     """Least and greatest X of the foot with stripes that were dropped for contradicting other cameras"""
+    heads_apart_mm: float = 0.0
+    """Robust standard deviation of the distances between cameras of two heads"""
 
 
 NO_EVIDENCE = Evidence()
@@ -165,12 +179,16 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside])[0]
     apart_mm = 0.0 if agreement is None else agreement.systematic_mm
     contested_mm = _contested(vertices, cloud, evidence.contested_mm)
-    ends = END_GROWS * np.maximum(beyond_mm, 0.0) + ALONE_GROWS * (alone_mm + contested_mm)
+    short_mm = _short(vertices, cloud, step_mm)
+    ends = END_GROWS * np.maximum(beyond_mm, 0.0) + ALONE_GROWS * (alone_mm + contested_mm) + SHORT_GROWS * short_mm
+    along_mm = OF_HEADS * math.sqrt(max(evidence.heads_apart_mm**2 - STRIPES_MM**2, 0.0))
     fields = [
         *_broad_and_narrow("noise", _noise(vertices, cloud, step_mm)),
+        ErrorField("noise", np.full(len(vertices), COMMON_MM), WIDE_MM),
         ErrorField("filling", np.where(inside, ERROR_GROWS * gap_mm, 0.0), REACH_MM),
         *_broad_and_narrow("ends", ends),
         ErrorField("cameras", np.full(len(vertices), OF_DISAGREEMENT * apart_mm), WIDE_MM),
+        ErrorField("cameras", along_mm * normals[:, 0], REACH_MM, is_of_section=True),
         ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, is_of_section=True),
         ErrorField("sway", SWAY_MM * normals[:, 0], WIDE_MM, is_of_section=True),
         ErrorField("sway", SWAY_MM * normals[:, 1], WIDE_MM, is_of_section=True),
@@ -238,6 +256,18 @@ def _contested(vertices: Floats, cloud: NDArray[np.void] | None, contested_mm: t
     before, behind = max(low.min() - contested_mm[0], 0.0), max(contested_mm[1] - low.max(), 0.0)
     first = np.clip(first_seen + before - x, 0.0, before)
     return np.asarray(first + np.clip(x - last_seen + behind, 0.0, behind))
+
+
+def _short(vertices: Floats, cloud: NDArray[np.void] | None, step_mm: float) -> Floats:
+    """Return (V,) how far the surface falls short of the outermost stripe, mm; over one step within its ends it falls
+    to 0.
+    """
+    x, low = vertices[:, 0], vertices[vertices[:, 2] < LEG_MM, 0]
+    if cloud is None or len(cloud) < FEWEST_AT_END or not len(low):
+        return np.zeros(len(vertices))
+    first, last = ends_of(cloud["x"][cloud["z"] < LEG_MM])
+    heel = max(low.min() - first, 0.0) * np.clip(1.0 - (x - low.min()) / step_mm, 0.0, 1.0)
+    return np.asarray(heel + max(last - low.max(), 0.0) * np.clip(1.0 - (low.max() - x) / step_mm, 0.0, 1.0))
 
 
 def seen_ends(cloud: NDArray[np.void]) -> SeenEnds | None:

@@ -100,6 +100,25 @@ def test_an_end_beyond_which_stripes_were_dropped_makes_the_length_uncertain(foo
         assert ((length.uncertainty or 0.0) > 1.5) == (beyond_mm > 0.0)
 
 
+def test_an_end_that_falls_short_of_the_outermost_stripe_is_worth_less(foot: Mesh) -> None:
+    cloud = make_points(foot.vertices, camera=1)
+    cloud["cameras"] = 2
+    cloud["x"][np.argsort(cloud["x"])[:10]] -= 0.4
+    length = measure_scanned_foot(foot, "right", GlassPlane(), evidence=Evidence(cloud)).measures["foot_length"]
+    assert 0.5 < (length.budget or {})["ends"] < 1.0
+
+
+def test_heads_that_disagree_widen_what_rests_on_x(foot: Mesh) -> None:
+    parts = []
+    for apart_mm in (0.02, 0.1):
+        evidence = Evidence(heads_apart_mm=apart_mm)
+        measures = measure_scanned_foot(foot, "right", GlassPlane(), evidence=evidence).measures
+        parts.append([(measures[name].budget or {}).get("cameras", 0.0) for name in ("foot_length", "foot_breadth")])
+    assert parts[0] == [0.0, 0.0]
+    assert parts[1][0] > 0.15
+    assert parts[1][1] < 0.05
+
+
 def test_heights_are_worth_less_where_the_glass_was_not_seen(foot: Mesh) -> None:
     seen = GlassPlane(below_foot_sd_mm=0.02, tilt_x_sd_deg=0.01, tilt_y_sd_deg=0.01)
     for glass, least, most in ((seen, 0.02, 0.03), (GlassPlane(), 0.5, 1.0)):
