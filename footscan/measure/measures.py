@@ -18,7 +18,7 @@ from footscan.measure.foot_surface import FootSurface
 from footscan.measure.frame.foot_frame import Body, FootFrame, foot_frame
 from footscan.measure.frame.glass import glass_doubt, glass_sd
 from footscan.measure.quantity import NotMeasurable, Quantity
-from footscan.measure.replicates import REPLICATES, replicates
+from footscan.measure.replicates import REPLICATES, of_replicates
 from footscan.measure.roughness import Roughness
 from footscan.measure.uncertainty import Scatter, SurfaceErrors, scatter_of, with_landmarks
 from footscan.mesh.rigid_transform import apply
@@ -221,8 +221,8 @@ def measure_foot(
     axis : the requested foot axis
     manual : landmarks set by a person: name to (3,) mm in the frame of the mesh
     errors : errors of the V vertices by their cause; default: inferred from the roughness of the mesh
-    count : number of replicates by which the errors of the vertices are propagated, see `replicates`; 0: propagation is
-        linear; default: `REPLICATES` if the mesh is rough, 0 if not
+    count : number of replicates by which the errors of the vertices are propagated, see `of_replicates`; 0: propagation
+        is linear; default: `REPLICATES` if the mesh is rough, 0 if not
     filled : (V,) true for vertices that were filled, not measured
     calibration : name of a measure to (a, b): the reported value is a + b times the measured one
     glass : the scanner's glass in the frame of the mesh; default: at Z = 0
@@ -286,7 +286,8 @@ def take_measures(
     known = SurfaceErrors(foot.vertices, [ErrorField("noise", surface.errors)] if errors is None else errors)
     if count is None:
         count = REPLICATES if errors is None and np.median(surface.errors) > ROUGH_MM else 0
-    scatter = scatter_of([_values(one, surface.roughness) for one in replicates(foot, known, count)], count)
+    values = of_replicates(foot, known, count, partial(_values, rough=surface.roughness))
+    scatter = scatter_of(values, count)
     calibrations = calibration or {}
     to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
     measures = {

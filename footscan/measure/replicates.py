@@ -5,7 +5,9 @@ moves by hundredths. What that does to a measure is not linear, and is found by 
 101:2008.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from footscan.measure.landmarks.dense_points import dense_points
 from footscan.measure.uncertainty import SurfaceErrors
 from footscan.mesh.rigid_transform import apply, low_height
 from footscan.mesh.topology import vertex_normals
+from footscan.side_by_side import together
 from schemas.base.errors import Finding
 
 REPLICATES = 16
@@ -24,21 +27,27 @@ SEED = 101
 """Replicates of one foot are the same in every run."""
 
 Floats = NDArray[np.float64]
+_Result = TypeVar("_Result")
 
 
-def replicates(foot: FootFrame, errors: SurfaceErrors, count: int) -> Iterator[FootFrame]:
-    """Displace a foot at random, `count` times, and find its axis anew.
+def of_replicates(
+    foot: FootFrame, errors: SurfaceErrors, count: int, compute: Callable[[FootFrame], _Result]
+) -> list[_Result]:
+    """Displace a foot at random, `count` times, find its axis anew, and return what `compute` makes of each.
 
     The floor stays where it is. A replicate that is no foot any more is left out.
     """
     normals = vertex_normals(foot.vertices, foot.faces)
     random = np.random.default_rng(SEED)
-    for _ in range(count):
-        away = errors.draw(random)
+    displaced = [foot.vertices + errors.draw(random)[:, None] * normals for _ in range(count)]
+
+    def of_one(vertices: Floats) -> list[_Result]:
         try:
-            yield _reframed(foot, foot.vertices + away[:, None] * normals)
+            return [compute(_reframed(foot, vertices))]
         except Finding:
-            continue
+            return []
+
+    return [result for results in together(partial(of_one, one) for one in displaced) for result in results]
 
 
 def _reframed(foot: FootFrame, vertices: Floats) -> FootFrame:

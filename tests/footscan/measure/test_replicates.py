@@ -5,7 +5,7 @@ import pytest
 
 from footscan.measure.frame.foot_frame import foot_frame
 from footscan.measure.measures import measure_foot
-from footscan.measure.replicates import replicates
+from footscan.measure.replicates import of_replicates
 from footscan.measure.uncertainty import SurfaceErrors, scatter_of
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
@@ -71,7 +71,7 @@ def of_places(places: np.ndarray, is_of_section: bool) -> SurfaceErrors:
 def test_replicates_are_the_same_in_every_run(foot: Mesh) -> None:
     frame = foot_frame(foot.vertices, foot.faces, "right")
     errors = SurfaceErrors(frame.vertices, [ErrorField("noise", np.full(len(frame.vertices), SD_MM), REACH_MM)])
-    first, again = (list(replicates(frame, errors, 2)) for _ in range(2))
+    first, again = (of_replicates(frame, errors, 2, lambda one: one) for _ in range(2))
     for one, other in zip(first, again, strict=True):
         np.testing.assert_array_equal(one.vertices, other.vertices)
     assert np.abs(first[0].vertices - first[1].vertices).max() > SD_MM
