@@ -167,7 +167,6 @@ class OpenScan:
                 self.movement,
                 self._cleaned[1].lasers_apart_mm,
                 self._cleaned[1].contested_mm,
-                self.heads.after_mm or 0.0,
             ),
         )
         return measures.model_copy(update={"posture": self.recorded.document.posture})

@@ -157,9 +157,8 @@ def scan_steps(
         ply_inputs["texture"] = add(Step(scan.name, "texture", f"{STEPS}.texture", None, texture_inputs))
     add(Step(scan.name, "foot.ply", f"{STEPS}.foot_ply", foot, ply_inputs))
     report_inputs: dict[str, Input] = {
-        "heads": heads, "clean": cleaned, "fused": fused, "oriented": oriented, "surface": mesh,
-        "measures": measures, "quality": quality, "calibration": maps, "about": _about(scan, parameters),
-        **points, **of_cameras,
+        "clean": cleaned, "fused": fused, "oriented": oriented, "surface": mesh, "measures": measures,
+        "quality": quality, "calibration": maps, "about": _about(scan, parameters), **points, **of_cameras,
     }  # fmt: skip
     add(
         Step(

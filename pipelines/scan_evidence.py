@@ -5,12 +5,11 @@ from collections.abc import Mapping
 from footscan.surface.errors import Evidence
 from pipelines.arrays import unpack
 from schemas.fusion import FusionReport
-from schemas.heads import HeadsReport
 from schemas.movement import MovementReport
 
 
 def evidence_of(inputs: Mapping[str, bytes]) -> Evidence:
-    """Collect the evidence; `inputs`: `clean`, `fused` and `heads`."""
+    """Collect the evidence; `inputs`: `clean` and `fused`."""
     cleaned, fused = unpack(inputs["clean"]), unpack(inputs["fused"])
     return Evidence(
         cloud=fused["cloud"],
@@ -18,5 +17,4 @@ def evidence_of(inputs: Mapping[str, bytes]) -> Evidence:
         movement=MovementReport.model_validate_json(cleaned["movement"].tobytes()),
         lasers_apart_mm=cleaned["lasers_apart"].item(),
         contested_mm=tuple(cleaned["contested"].tolist()),
-        heads_apart_mm=HeadsReport.model_validate_json(inputs["heads"]).after_mm or 0.0,
     )

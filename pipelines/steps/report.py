@@ -34,9 +34,9 @@ FRAMES_SHOWN = 12
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
     """Make the page of a scan, as HTML.
 
-    `inputs`: `calibration`, `heads`, `clean`, `fused`, `oriented`, `surface`, `measures`, `quality`, `about`, and
-    `verified` if the scan has a truth; for each camera `manifest-N`, `stripe-N` and `points-N`; `places`: each camera's
-    array of frames, `array-N`.
+    `inputs`: `calibration`, `clean`, `fused`, `oriented`, `surface`, `measures`, `quality`, `about`, and `verified` if
+    the scan has a truth; for each camera `manifest-N`, `stripe-N` and `points-N`; `places`: each camera's array of
+    frames, `array-N`.
     """
     surface = unpack(inputs["surface"])
     about = json.loads(inputs["about"])

@@ -11,6 +11,7 @@ from footscan.surface.errors import Evidence, SeenEnds, scan_errors, seen_ends
 from footscan.virtual.foot.foot import make_foot
 from schemas.fusion import Disagreement, FusionReport, PairDisagreement
 from schemas.glass import GlassPlane
+from schemas.movement import MovementReport
 
 
 @pytest.fixture(scope="module")
@@ -108,14 +109,13 @@ def test_an_end_that_falls_short_of_the_outermost_stripe_is_worth_less(foot: Mes
     assert 0.5 < (length.budget or {})["ends"] < 1.0
 
 
-def test_heads_that_disagree_widen_what_rests_on_x(foot: Mesh) -> None:
+def test_heads_that_jitter_widen_what_rests_on_x(foot: Mesh) -> None:
     parts = []
-    for apart_mm in (0.02, 0.1):
-        evidence = Evidence(heads_apart_mm=apart_mm)
+    for tremor_mm in (0.03, 0.08):
+        evidence = Evidence(movement=MovementReport(tremor_mm=tremor_mm))
         measures = measure_scanned_foot(foot, "right", GlassPlane(), evidence=evidence).measures
-        parts.append([(measures[name].budget or {}).get("cameras", 0.0) for name in ("foot_length", "foot_breadth")])
-    assert parts[0] == [0.0, 0.0]
-    assert parts[1][0] > 0.15
+        parts.append([(measures[name].budget or {}).get("tremor", 0.0) for name in ("foot_length", "foot_breadth")])
+    assert parts[1][0] > max(4.0 * parts[0][0], 0.1)
     assert parts[1][1] < 0.05
 
 
