@@ -42,12 +42,12 @@ SHORT_GROWS = 2.0
 """Growth of the standard deviation per mm by which the surface falls short of the outermost stripe. Chosen by hand,
 after two scans with 4 mm between stripes (`draw_assembled`, seeds 701 and 702, as designed): ends 0.3 to 0.5 mm short
 of the stripe are 0.6 to 0.8 mm short of the foot."""
-ALONE_GROWS, ALONE_MM = 0.5, 1.0
+ALONE_GROWS, ALONE_MM = 0.5, 2.0
 """Growth of the standard deviation per mm along the travel beyond the last place where two cameras agree: one camera
 alone may take the stripe of another head's laser for its own. The same growth holds up to stripes beyond an end that
-were dropped: the foot may reach as far. An end that reaches farther than the second, half a step of the travel, counts
-as filled, and nearer it is worth less doubt: stripes of heads that are apart end at different places. Chosen by hand,
-after a filmed scanner (`draw_assembled`, seed 501) whose heel began too early, and seeds 901 to 940 and 961 to 970
+were dropped: the foot may reach as far. An end that reaches farther than the second, a step of the travel, counts as
+filled, and nearer it is worth less doubt: stripes of heads that are apart end at different places. Chosen by hand,
+after a filmed scanner (`draw_assembled`, seed 501) whose heel began too early, and seeds 901 to 940 and 961 to 978
 without pictures, whose lengths were right to 0.4 mm but for two."""
 LEAST_CONFIRMED = 0.2
 """Share of the points on which cameras must agree for the ends to be confirmed. Chosen by hand."""
@@ -202,7 +202,7 @@ def _of_ends_alone(alone_mm: Floats) -> Floats:
     """(V,) standard deviations of ends that one camera alone saw from (V,) mm on, mm.
 
     >>> _of_ends_alone(np.array([0.0, 0.5, 1.0, 2.0])).tolist()
-    [0.0, 0.125, 0.5, 1.0]
+    [0.0, 0.0625, 0.25, 1.0]
     """
     return np.asarray(ALONE_GROWS * alone_mm * np.minimum(alone_mm / ALONE_MM, 1.0))
 
