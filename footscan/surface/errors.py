@@ -271,9 +271,10 @@ def _short(vertices: Floats, cloud: NDArray[np.void] | None, step_mm: float) -> 
     to 0.
     """
     x, low = vertices[:, 0], vertices[vertices[:, 2] < LEG_MM, 0]
-    if cloud is None or len(cloud) < FEWEST_AT_END or not len(low):
+    stripes = np.zeros(0) if cloud is None else cloud["x"][cloud["z"] < LEG_MM]
+    if len(stripes) < FEWEST_AT_END or not len(low):
         return np.zeros(len(vertices))
-    first, last = ends_of(cloud["x"][cloud["z"] < LEG_MM])
+    first, last = ends_of(stripes)
     heel = max(low.min() - first, 0.0) * np.clip(1.0 - (x - low.min()) / step_mm, 0.0, 1.0)
     return np.asarray(heel + max(last - low.max(), 0.0) * np.clip(1.0 - (low.max() - x) / step_mm, 0.0, 1.0))
 

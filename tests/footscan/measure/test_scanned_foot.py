@@ -109,6 +109,11 @@ def test_an_end_that_falls_short_of_the_outermost_stripe_is_worth_less(foot: Mes
     assert 0.5 < (length.budget or {})["ends"] < 1.0
 
 
+def test_a_cloud_of_the_leg_alone_says_nothing_of_the_ends(foot: Mesh) -> None:
+    leg = make_points(foot.vertices[foot.vertices[:, 2] > 80.0], camera=1)
+    assert np.isfinite(scan_errors(foot, Evidence(leg)).deviations).all()
+
+
 def test_heads_that_jitter_widen_what_rests_on_x(foot: Mesh) -> None:
     parts = []
     for tremor_mm in (0.03, 0.08):
