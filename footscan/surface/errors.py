@@ -26,9 +26,9 @@ COMMON_MM = 0.015
 a little too far in make a girth too small all around. Tuned on ideal scanners (`draw_assembled`, seeds 701 and 702, as
 designed), whose girths at waist and instep are 0.13 to 0.18 mm too small."""
 NARROW_MM = 3.0
-"""The smaller distance over which vertices share noise, and the errors of ends: the tip of a toe moves to its side if
-one half of its cap errs. Chosen by hand, after scanners (`draw_assembled`, seeds 805 and 806) whose axes through the
-second toe were off by 0.4 degrees."""
+"""The smaller distance over which vertices share noise, and what is filled at the ends: the tip of a toe moves to its
+side if one half of its cap errs. Chosen by hand, after scanners (`draw_assembled`, seeds 805 and 806) whose axes
+through the second toe were off by 0.4 degrees."""
 USUAL_STEP_MM = 2.0
 """Distance of stripes at which that holds. It grows with the square of a longer one, as the sagitta of the skin between
 two stripes does."""
@@ -42,13 +42,16 @@ SHORT_GROWS = 2.0
 """Growth of the standard deviation per mm by which the surface falls short of the outermost stripe. Chosen by hand,
 after two scans with 4 mm between stripes (`draw_assembled`, seeds 701 and 702, as designed): ends 0.3 to 0.5 mm short
 of the stripe are 0.6 to 0.8 mm short of the foot."""
-ALONE_GROWS, ALONE_MM = 0.5, 2.0
+ALONE_GROWS, DROPPED_GROWS, ALONE_MM = 0.35, 0.5, 2.0
 """Growth of the standard deviation per mm along the travel beyond the last place where two cameras agree: one camera
-alone may take the stripe of another head's laser for its own. The same growth holds up to stripes beyond an end that
-were dropped: the foot may reach as far. An end that reaches farther than the second, a step of the travel, counts as
+alone may take the stripe of another head's laser for its own. The second growth holds up to stripes beyond an end that
+were dropped: the foot may reach as far. An end that reaches farther than the third, a step of the travel, counts as
 filled, and nearer it is worth less doubt: stripes of heads that are apart end at different places. Chosen by hand,
 after a filmed scanner (`draw_assembled`, seed 501) whose heel began too early, and seeds 901 to 940 and 961 to 978
 without pictures, whose lengths were right to 0.4 mm but for two."""
+ASIDE = 0.1
+"""Errors of an end that vary over `NARROW_MM`, relative to those along the travel that it has as a whole. Chosen by
+hand, after `draw_assembled`, seeds 971 to 978."""
 LEAST_CONFIRMED = 0.2
 """Share of the points on which cameras must agree for the ends to be confirmed. Chosen by hand."""
 OF_DISAGREEMENT = 1.5
@@ -153,15 +156,6 @@ class ScanErrors(NamedTuple):
         return np.asarray(np.sqrt(sum(field.deviations**2 for field in self.fields)))
 
 
-class SeenEnds(NamedTuple):
-    """Where the skin ends along the travel."""
-
-    confirmed_mm: tuple[float, float]
-    """Least and greatest X at which two cameras or more agree on it"""
-    seen_mm: tuple[float, float]
-    """Least and greatest X at which any camera saw it"""
-
-
 def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     """Estimate the errors of a scanned surface.
 
@@ -172,25 +166,26 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     seen = np.ones(len(vertices), bool) if mesh.filled is None else ~mesh.filled
     step_mm = USUAL_STEP_MM if cloud is None else stripe_step(cloud) or USUAL_STEP_MM
     beyond_mm = _beyond(vertices, ~seen, cloud, step_mm)
-    alone_mm = np.minimum(_alone(vertices[:, 0], None if cloud is None else seen_ends(cloud)), evidence.lasers_apart_mm)
     gap_mm = np.maximum(beyond_mm, 0.0)
     inside = ~seen & (beyond_mm <= 0)
     gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside])[0]
     apart_mm = 0.0 if agreement is None else agreement.systematic_mm
-    contested_mm = _contested(vertices, cloud, evidence.contested_mm)
-    short_mm = _short(vertices, cloud, step_mm)
-    ends = END_GROWS * np.maximum(beyond_mm, 0.0) + _of_ends_alone(alone_mm + contested_mm) + SHORT_GROWS * short_mm
+    ends = _ends(vertices, evidence)
+    shift_mm = np.max([np.zeros(len(vertices)), *(end.shift_at(vertices[:, 0], step_mm) for end in ends)], axis=0)
     fields = [
         *_broad_and_narrow("noise", _noise(vertices, cloud, step_mm)),
         ErrorField("noise", np.full(len(vertices), COMMON_MM), WIDE_MM),
         ErrorField("filling", np.where(inside, ERROR_GROWS * gap_mm, 0.0), REACH_MM),
-        *_broad_and_narrow("ends", ends),
+        *_broad_and_narrow("ends", END_GROWS * np.maximum(beyond_mm, 0.0)),
+        ErrorField("ends", shift_mm * normals[:, 0], WIDE_MM, is_of_section=True),
+        ErrorField("ends", ASIDE * shift_mm, NARROW_MM),
         ErrorField("cameras", np.full(len(vertices), OF_DISAGREEMENT * apart_mm), WIDE_MM),
         ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, is_of_section=True),
         ErrorField("sway", SWAY_MM * normals[:, 0], WIDE_MM, is_of_section=True),
         ErrorField("sway", SWAY_MM * normals[:, 1], WIDE_MM, is_of_section=True),
     ]
-    return ScanErrors(fields, (gap_mm > RELIABLE_MM) | (alone_mm + contested_mm > ALONE_MM))
+    is_alone = [end.depth(vertices[:, 0], end.unsure_mm) > ALONE_MM for end in ends]
+    return ScanErrors(fields, np.any([gap_mm > RELIABLE_MM, *is_alone], axis=0))
 
 
 def _broad_and_narrow(cause: ErrorCause, deviations: Floats) -> list[ErrorField]:
@@ -198,13 +193,60 @@ def _broad_and_narrow(cause: ErrorCause, deviations: Floats) -> list[ErrorField]
     return [ErrorField(cause, math.sqrt(0.5) * deviations, reach_mm) for reach_mm in (REACH_MM, NARROW_MM)]
 
 
-def _of_ends_alone(alone_mm: Floats) -> Floats:
-    """(V,) standard deviations of ends that one camera alone saw from (V,) mm on, mm.
+class _End(NamedTuple):
+    """Heel or toes."""
 
-    >>> _of_ends_alone(np.array([0.0, 0.5, 1.0, 2.0])).tolist()
-    [0.0, 0.0625, 0.25, 1.0]
-    """
-    return np.asarray(ALONE_GROWS * alone_mm * np.minimum(alone_mm / ALONE_MM, 1.0))
+    x: float
+    """Of the outermost vertex below the leg, mm"""
+    alone_mm: float = 0.0
+    """How far beyond the last place where two cameras agree one camera alone saw it"""
+    dropped_mm: float = 0.0
+    """How far beyond the surface stripes were dropped"""
+    short_mm: float = 0.0
+    """How far the surface falls short of the outermost stripe"""
+
+    @property
+    def unsure_mm(self) -> float:
+        """Length of the part along the travel that no second camera confirms."""
+        return self.alone_mm + self.dropped_mm
+
+    @property
+    def shift_mm(self) -> float:
+        """Standard deviation of its place along the travel.
+
+        >>> [round(_End(0.0, alone_mm).shift_mm, 3) for alone_mm in (0.0, 0.5, 1.0, 2.0, 3.0)]
+        [0.0, 0.044, 0.175, 0.7, 1.05]
+        """
+        unsure_mm = ALONE_GROWS * self.alone_mm + DROPPED_GROWS * self.dropped_mm
+        return unsure_mm * min(self.unsure_mm / ALONE_MM, 1.0) + SHORT_GROWS * self.short_mm
+
+    def depth(self, x: Floats, most_mm: float) -> Floats:
+        """(V,) how far vertices at `x` (V,) mm lie beyond the place `most_mm` within the end, mm."""
+        return np.asarray(np.clip(most_mm - np.abs(x - self.x), 0.0, None))
+
+    def shift_at(self, x: Floats, step_mm: float) -> Floats:
+        """(V,) standard deviations that vertices at `x` (V,) mm have in common with the end, along the travel, mm.
+
+        They fall to 0 within the part that no second camera confirms, at least within one step of the travel.
+        """
+        falls_mm = max(self.unsure_mm, step_mm)
+        return self.shift_mm * self.depth(x, falls_mm) / falls_mm
+
+
+def _ends(vertices: Floats, evidence: Evidence) -> list[_End]:
+    """Find heel and toes, and what is not known of them; nothing of a body without a low part."""
+    low, cloud = vertices[vertices[:, 2] < LEG_MM, 0], evidence.cloud
+    stripes = np.zeros(0) if cloud is None else cloud["x"][cloud["z"] < LEG_MM]
+    if cloud is None or len(stripes) < FEWEST_AT_END or not len(low):
+        return []
+    surface, outermost, confirmed = (low.min(), low.max()), ends_of(stripes), confirmed_ends(cloud)
+    ends = []
+    for side, outward in enumerate((-1.0, 1.0)):
+        alone = 0.0 if confirmed is None else outward * (outermost[side] - confirmed[side])
+        dropped, short = (outward * (seen[side] - surface[side]) for seen in (evidence.contested_mm, outermost))
+        alone = min(alone, evidence.lasers_apart_mm)
+        ends.append(_End(float(surface[side]), float(alone), max(float(dropped), 0.0), max(float(short), 0.0)))
+    return ends
 
 
 def _noise(vertices: NDArray[np.float64], cloud: NDArray[np.void] | None, step_mm: float) -> NDArray[np.float64]:
@@ -247,40 +289,8 @@ def _beyond(
     return np.asarray(beyond)
 
 
-def _alone(x: NDArray[np.float64], ends: SeenEnds | None) -> NDArray[np.float64]:
-    """Return (V,) how far the surface up to each vertex rests on what one camera alone saw of its end, mm."""
-    if ends is None:
-        return np.zeros(len(x))
-    first = np.clip(ends.confirmed_mm[0] - x, 0.0, ends.confirmed_mm[0] - ends.seen_mm[0])
-    return np.asarray(first + np.clip(x - ends.confirmed_mm[1], 0.0, ends.seen_mm[1] - ends.confirmed_mm[1]))
-
-
-def _contested(vertices: Floats, cloud: NDArray[np.void] | None, contested_mm: tuple[float, float]) -> Floats:
-    """Return (V,) how far dropped stripes reach beyond the surface, mm; over as far within its ends it falls to 0."""
-    low = vertices[vertices[:, 2] < LEG_MM, 0]
-    if cloud is None or len(cloud) < FEWEST_AT_END or not len(low):
-        return np.zeros(len(vertices))
-    (first_seen, last_seen), x = ends_of(cloud["x"]), vertices[:, 0]
-    before, behind = max(low.min() - contested_mm[0], 0.0), max(contested_mm[1] - low.max(), 0.0)
-    first = np.clip(first_seen + before - x, 0.0, before)
-    return np.asarray(first + np.clip(x - last_seen + behind, 0.0, behind))
-
-
-def _short(vertices: Floats, cloud: NDArray[np.void] | None, step_mm: float) -> Floats:
-    """Return (V,) how far the surface falls short of the outermost stripe, mm; over one step within its ends it falls
-    to 0.
-    """
-    x, low = vertices[:, 0], vertices[vertices[:, 2] < LEG_MM, 0]
-    stripes = np.zeros(0) if cloud is None else cloud["x"][cloud["z"] < LEG_MM]
-    if len(stripes) < FEWEST_AT_END or not len(low):
-        return np.zeros(len(vertices))
-    first, last = ends_of(stripes)
-    heel = max(low.min() - first, 0.0) * np.clip(1.0 - (x - low.min()) / step_mm, 0.0, 1.0)
-    return np.asarray(heel + max(last - low.max(), 0.0) * np.clip(1.0 - (low.max() - x) / step_mm, 0.0, 1.0))
-
-
-def seen_ends(cloud: NDArray[np.void]) -> SeenEnds | None:
-    """Find where a cloud ends; None if its cameras hardly agree anywhere.
+def confirmed_ends(cloud: NDArray[np.void]) -> tuple[float, float] | None:
+    """Least and greatest X, mm, at which two cameras or more agree on a cloud; None if they hardly agree anywhere.
 
     Parameters
     ----------
@@ -288,6 +298,4 @@ def seen_ends(cloud: NDArray[np.void]) -> SeenEnds | None:
     """
     low = cloud[cloud["z"] < LEG_MM]
     confirmed = low["x"][low["cameras"] > 1]
-    if len(confirmed) < max(FEWEST_AT_END, LEAST_CONFIRMED * len(low)):
-        return None
-    return SeenEnds(ends_of(confirmed), ends_of(low["x"]))
+    return ends_of(confirmed) if len(confirmed) >= max(FEWEST_AT_END, LEAST_CONFIRMED * len(low)) else None

@@ -7,7 +7,7 @@ from footscan.cloud.points import make_points
 from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
-from footscan.surface.errors import Evidence, SeenEnds, scan_errors, seen_ends
+from footscan.surface.errors import Evidence, confirmed_ends, scan_errors
 from footscan.virtual.foot.foot import make_foot
 from schemas.fusion import Disagreement, FusionReport, PairDisagreement
 from schemas.glass import GlassPlane
@@ -136,9 +136,9 @@ def test_the_ends_that_cameras_confirm() -> None:
     x = np.arange(100.0)
     cloud = make_points(np.column_stack([x, x * 0, x * 0]), camera=1)
     cloud["cameras"] = np.where(x < 20.0, 1, 2)
-    assert seen_ends(cloud) == SeenEnds((24.0, 95.0), (4.0, 95.0))
+    assert confirmed_ends(cloud) == (24.0, 95.0)
     cloud["cameras"] = 1
-    assert seen_ends(cloud) is None
+    assert confirmed_ends(cloud) is None
 
 
 def test_a_vertex_is_less_sure_far_from_what_was_seen(foot: Mesh) -> None:
