@@ -37,6 +37,7 @@ def sigmas(foot: Mesh, count: int) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_the_standard_deviations_hold_the_errors(foot: Mesh) -> None:
     by_replicates, linear = sigmas(foot, count=16), sigmas(foot, count=0)
     assert np.mean(by_replicates < 3) >= 0.98

@@ -20,6 +20,12 @@ def foot() -> Mesh:
     return Mesh(made.vertices, made.faces)
 
 
+@pytest.fixture(autouse=True)
+def few_replicates(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is tested here does not need the standard deviations to the last digit."""
+    monkeypatch.setattr("footscan.measure.scanned_foot.REPLICATES", 6)
+
+
 def with_filled(foot: Mesh, share: float) -> Mesh:
     """The foot with this share of its sole filled, from the heel on."""
     down = (vertex_normals(foot.vertices, foot.faces)[:, 2] < -0.7) & (foot.vertices[:, 2] < 20.0)

@@ -50,6 +50,7 @@ def test_a_world_without_errors_is_measured_as_it_is(outcomes: dict[int, WorldOu
     assert errors["instep_girth"] == pytest.approx(0.0, abs=1.0)
 
 
+@pytest.mark.slow
 def test_a_body_shows_where_the_planes_lie(tmp_path: Path) -> None:
     """Heads that are off by millimetres: with the film of the body the surface is nearly that of an ideal scanner."""
     assembled = draw_assembled(4)

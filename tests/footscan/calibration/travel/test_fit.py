@@ -106,7 +106,12 @@ def test_the_body_may_stand_at_any_angle(turn_deg: float) -> None:
     assert np.abs(fit.planes[::2, 0] - centred(fit)[:, 0]).max() < 0.05
 
 
-@pytest.mark.parametrize("form", [(1.3, 0.6, 1.2), (1.1, 1.0, 1.0), (0.8, 0.8, 0.8)])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "form", [(1.1, 1.0, 1.0), pytest.param((1.3, 0.6, 1.2), marks=SLOW), pytest.param((0.8, 0.8, 0.8), marks=SLOW)]
+)
 def test_another_body_is_refused(form: tuple[float, float, float]) -> None:
     body = standard_body()
     with pytest.raises(Finding, match="is it the film of this body"):
