@@ -6,8 +6,9 @@ not: a point is assigned to the laser in whose plane more cameras saw it in the 
 cameras see it at different moments of the frame, between which the stripe moves on.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ from footscan.cloud.outliers.moments import (
 from footscan.cloud.points import camera_numbers, coordinates
 from footscan.cloud.views import View
 from footscan.compiled import compiled
+from footscan.side_by_side import together
 from schemas.calibration import LaserPlane, laser_of_view, view_number
 
 Floats = NDArray[np.float64]
@@ -52,6 +54,8 @@ BROAD = 0.2
 CLOSE = 0.3
 """A point that no other camera confirms is of another laser if it is brought this near to the skin, in units of the way
 that it is moved. Chosen by hand."""
+AT_ONCE = 8192
+"""Places whose surroundings are in the memory at once, some 20 MB: a bound of space."""
 LINKED_MM = 1.0
 """Distance up to which successive points are of one stripe; they are sampled every 0.3 mm. Chosen by hand."""
 FEWEST_AT_END = 20
@@ -242,14 +246,29 @@ def _met_other_laser(
 
 def _heights(skin: KDTree, places: Floats) -> Floats:
     """Distances (N,) of places (N, 3) from the plane through the points around them; infinite where there are few."""
+    starts = range(0, len(places), AT_ONCE)
+    pieces = together(partial(_heights_of_few, skin, places[start : start + AT_ONCE]) for start in starts)
+    return np.concatenate([np.zeros(0), *pieces])
+
+
+def _heights_of_few(skin: KDTree, places: Floats) -> Floats:
     heights = np.full(len(places), np.inf)
-    for n, place in enumerate(places):
-        near = skin.data[skin.query_ball_point(place, AROUND_MM)]
-        if len(near) >= FEWEST:
-            middle = near.mean(axis=0)
-            _, extents, axes = np.linalg.svd(near - middle, full_matrices=False)
-            if extents[1] > BROAD * extents[0]:
-                heights[n] = abs((place - middle) @ axes[2])
+    near: Sequence[list[int]] = np.asarray(skin.query_ball_point(places, AROUND_MM), np.object_).tolist()
+    counts = np.array([len(one) for one in near], np.intp)
+    rows = np.flatnonzero(counts >= FEWEST)
+    if not rows.size:
+        return heights
+    counts = counts[rows]
+    starts = np.cumsum(counts) - counts
+    # From the place itself, so that moments of second order lose no digits.
+    away = skin.data[np.concatenate([near[row] for row in rows])] - np.repeat(places[rows], counts, axis=0)
+    middle = np.add.reduceat(away, starts) / counts[:, None]
+    away -= np.repeat(middle, counts, axis=0)
+    squares = np.add.reduceat(away[:, :, None] * away[:, None, :], starts)
+    extents, axes = np.linalg.eigh(squares)
+    is_broad = extents[:, 1] > BROAD**2 * extents[:, 2]
+    height = np.abs(np.einsum("ni,ni->n", middle, axes[:, :, 0]))
+    heights[rows] = np.where(is_broad, height, np.inf)
     return heights
 
 
