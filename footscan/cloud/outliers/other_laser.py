@@ -261,7 +261,7 @@ def _heights_of_few(skin: KDTree, places: Floats) -> Floats:
     counts = counts[rows]
     starts = np.cumsum(counts) - counts
     # From the place itself, so that moments of second order lose no digits.
-    away = skin.data[np.concatenate([near[row] for row in rows])] - np.repeat(places[rows], counts, axis=0)
+    away = skin.data[np.concatenate([near[row] for row in rows.tolist()])] - np.repeat(places[rows], counts, axis=0)
     middle = np.add.reduceat(away, starts) / counts[:, None]
     away -= np.repeat(middle, counts, axis=0)
     squares = np.add.reduceat(away[:, :, None] * away[:, None, :], starts)
