@@ -74,8 +74,9 @@ def verify(store: Store) -> Audit:
 
     Damaged files are removed and will be made again. A damaged pin stays: the user must learn what is no longer kept.
     """
-    files = 0
-    damaged = []
+    damaged = [store.files.path(name) for name in store.files.damaged_packs()]  # they have been logged
+    files = len(damaged)
+    store.files.remove_all(store.files.damaged_packs())
     for folder in (*CHECKS, PINS):
         for name in [name for name, _ in store.files.sizes(folder)]:
             files += 1

@@ -5,13 +5,15 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
 from pipelines.engine.explain import code_of, inputs_of, kind_of
+from pipelines.engine.files.packs import FOLDER as PACKS
+from pipelines.engine.files.packs import PACKED, in_batches
 from pipelines.engine.store.lease import FOLDER as LEASES
 from pipelines.engine.store.lease import Lease, live_leases
 from pipelines.engine.store.pins import read_pins
 from pipelines.engine.store.store import Store, blob_name, latest_name, row_name
 from pipelines.engine.trace import Actions, blob_digest, read_actions, row_key
 
-FOLDERS = ("actions", "blobs", "latest", "pins", LEASES)
+FOLDERS = (*PACKED, "blobs", "pins", PACKS, LEASES)
 """Folders of a store."""
 CODE, VALUES, OTHER = "(code)", "(values)", "(other)"
 """Kinds of blobs that are not the result of a step."""
@@ -133,11 +135,11 @@ def find_garbage(
 def delete(garbage: Garbage, store: Store) -> tuple[list[str], list[Lease]]:
     """Delete garbage; stops if a run is under way or begins. Returns the deleted names and the leases of such runs."""
     deleted: list[str] = []
-    for number, name in enumerate(garbage.names):
-        if number % CHECK_EVERY == 0 and (live := live_leases(store)):
+    for names in in_batches(garbage.names, CHECK_EVERY):
+        if live := live_leases(store):
             return deleted, live
-        store.files.remove(name)
-        deleted.append(name)
+        store.files.remove_all(names)
+        deleted += names
     return deleted, []
 
 

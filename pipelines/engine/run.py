@@ -18,7 +18,7 @@ from pipelines.engine.actions.code import CodeIdentity, code_identity, code_text
 from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Failure, Input, Outcome, Output, SourceFile, Step, Success, Value
 from pipelines.engine.files.digest import file_state
-from pipelines.engine.files.places import Files
+from pipelines.engine.files.packs import PackedFiles
 from pipelines.engine.plan import Plan, cached_outcome, without_places
 from pipelines.engine.pool import OnStepEnd, Pool, StepEnd, Task
 from pipelines.engine.store.store import Acceptance, Row, Store
@@ -207,7 +207,7 @@ def _keep_code(identity: CodeIdentity, store: Store) -> None:
     _STORED_CODE.add((store.files, identity.digest))
 
 
-_STORED_CODE: set[tuple[Files, str]] = set()
+_STORED_CODE: set[tuple[PackedFiles, str]] = set()
 
 
 def content_of(step: Step, source: Input, digest: str, store: Store) -> bytes:

@@ -13,8 +13,9 @@ from typing import Self
 from pipelines.engine.actions.step import Failure, Outcome, Step
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.file_digests import FileDigests
+from pipelines.engine.files.packs import MANY
 from pipelines.engine.plan import Plan, make_plan
-from pipelines.engine.pool import OnStepEnd, Pool
+from pipelines.engine.pool import OnStepEnd, Pool, StepEnd
 from pipelines.engine.run import run_plan
 from pipelines.engine.store.lease import lease
 from pipelines.engine.store.store import Store, open_store
@@ -54,15 +55,35 @@ class Workspace:
         A run removes a damaged result when it notices it; a further run makes that result again.
         """
         reported: set[str] = set()
+        ran = 0
+
+        def on_end(end: StepEnd) -> None:
+            nonlocal ran
+            ran += end.ran
+            if end.ran and ran % MANY == 0:
+                self._pack()
+            on_step_end(end)
+
         while True:  # steps after a damaged result may find more damage
-            outcomes = run_plan(self.plan(steps), self.store, pool=pool, on_step_end=on_step_end)
+            outcomes = run_plan(self.plan(steps), self.store, pool=pool, on_step_end=on_end)
             failures = [outcome for outcome in outcomes.values() if isinstance(outcome, Failure)]
             damaged = {failure.problem for failure in failures if failure.kind == "damaged"}
             if not damaged - reported:
+                if ran:
+                    self._pack()
                 return outcomes
             for problem in sorted(damaged - reported):
                 log.warning("%s", problem)
             reported |= damaged
+
+    def _pack(self) -> None:
+        """Pack the small files of the store if they are many."""
+        try:
+            if names := self.store.files.many_by_themselves():
+                with lease(self.store):
+                    self.store.files.pack(names)
+        except (Fault, OSError) as error:  # they stay as they are
+            log.warning("%s", error)
 
     def lease(self) -> AbstractContextManager[str]:
         """Hold a lease: others do not delete results while it is held."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipelines.archive.job import Job, workspace_of
-from pipelines.engine.files.places import LocalFiles
+from pipelines.engine.files.packs import in_batches
 from pipelines.engine.store.erasure_notes import FOLDER, note_name
 from pipelines.engine.store.lease import Lease, lease, live_leases
 from pipelines.engine.store.store import Store
@@ -130,10 +130,10 @@ def erase(erasure: Erasure) -> list[Lease]:
 
 
 def _erase_from_store(erasure: Erasure, own_lease: str) -> list[Lease]:
-    for number, name in enumerate(erasure.shares.names):
-        if number % CHECK_EVERY == 0 and (live := [run for run in live_leases(erasure.store) if run.name != own_lease]):
+    for names in in_batches(erasure.shares.names, CHECK_EVERY):
+        if live := [run for run in live_leases(erasure.store) if run.name != own_lease]:
             return live
-        erasure.store.files.remove(name)
+        erasure.store.files.remove_all(names)
     if erasure.store.verified is not None:
         erasure.store.verified.keep_only(erasure.shares.kept_keys)
     roots = [place.absolute() for place in erasure.belongings.folders]
@@ -181,7 +181,7 @@ def _remove_empty_parents(erasure: Erasure) -> None:
 
 def _clear_folders(erasure: Erasure, kind: str) -> None:
     """Remove folders of pins or notes in the store that are empty, since their names hold the patient's."""
-    if isinstance(erasure.store.files, LocalFiles):
+    if (store := erasure.store.folder) is not None:
         for folder in (f"{kind}/{erasure.subject.patient}", kind):
             with suppress(OSError):
-                Path(erasure.store.files.path(folder)).rmdir()
+                (store / folder).rmdir()

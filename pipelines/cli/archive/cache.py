@@ -202,13 +202,12 @@ def unpin(scan: ScanName, workflow: OfWorkflow = None, place: Place = None, as_j
 
 def open_place(place: Path | str, group: int | None = None) -> "Store":
     """Open the store at a place without an index of what was verified; RefusedInput if there is none."""
-    from pipelines.engine.files.places import LocalFiles
     from pipelines.engine.store.permissions import warn_if_others_can_write
     from pipelines.engine.store.store import open_store
 
     store = open_store(place)
-    if isinstance(store.files, LocalFiles) and not Path(store.files.root).is_dir():
-        raise RefusedInput(store.files.root, "no such folder, expected the store of a run")
+    if store.folder is not None and not store.folder.is_dir():
+        raise RefusedInput(store.folder, "no such folder, expected the store of a run")
     warn_if_others_can_write(store, group)
     return store
 

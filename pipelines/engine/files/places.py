@@ -31,6 +31,10 @@ class Files(Protocol):
         """Content of the file; FileNotFoundError if it is missing, Fault or another OSError if it cannot be read."""
         ...
 
+    def read_part(self, name: str, start: int, length: int) -> bytes:
+        """Content of the file from byte `start` on, `length` bytes of it; errors as above."""
+        ...
+
     def write(self, name: str, data: bytes) -> None:
         """Write `data` atomically: a reader finds the old content or the new. Fault if it cannot be written."""
         ...
@@ -67,6 +71,11 @@ class LocalFiles:
     def read(self, name: str) -> bytes:
         with open(self.path(name), "rb") as file:  # noqa: PTH123 (a Path costs as much as the reading)
             return file.read()
+
+    def read_part(self, name: str, start: int, length: int) -> bytes:
+        with open(self.path(name), "rb") as file:  # noqa: PTH123 (as above)
+            file.seek(start)
+            return file.read(length)
 
     def write(self, name: str, data: bytes) -> None:
         write_atomically(Path(self.path(name)), data)
@@ -120,6 +129,10 @@ class RemoteFiles:
     def read(self, name: str) -> bytes:
         with self._file_system(name, "read") as (system, inside):
             return bytes(system.cat_file(inside))
+
+    def read_part(self, name: str, start: int, length: int) -> bytes:
+        with self._file_system(name, "read") as (system, inside):
+            return bytes(system.cat_file(inside, start=start, end=start + length))
 
     def write(self, name: str, data: bytes) -> None:
         try:

@@ -6,14 +6,14 @@ import stat
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
+from pathlib import Path
 
-from pipelines.engine.files.places import LocalFiles
 from pipelines.engine.store.store import Store
 
 log = logging.getLogger("footscan.store")
 
-FOLDERS = ("", "blobs", "actions", "latest", "pins", "runs")
-"""The folder of a store, and the folders in it."""
+FOLDERS = ("blobs", "actions", "latest", "packs", "pins", "runs")
+"""Folders of a store."""
 
 
 def warn_if_others_can_write(store: Store, group: int | None = None) -> None:
@@ -22,15 +22,15 @@ def warn_if_others_can_write(store: Store, group: int | None = None) -> None:
     Digests show damage, but not a deliberate exchange. The rights of a store at a URL are unknown. Members of the
     workflow's `group` may write.
     """
-    if isinstance(store.files, LocalFiles) and hasattr(os, "geteuid"):
-        _warn(store.files, group)
+    if store.folder is not None and hasattr(os, "geteuid"):
+        _warn(store.folder, group)
 
 
 @cache
-def _warn(files: LocalFiles, group: int | None) -> None:
-    for path in _folders(files):
+def _warn(store: Path, group: int | None) -> None:
+    for path in _folders(store):
         try:
-            status = os.stat(path)  # noqa: PTH116 (names of a store are text, as in `LocalFiles`)
+            status = path.stat()
         except OSError:
             continue
         is_shared = status.st_gid == group
@@ -42,12 +42,10 @@ def _warn(files: LocalFiles, group: int | None) -> None:
             return
 
 
-def _folders(files: LocalFiles) -> Iterator[str]:
-    """The folders of a store and their sub-folders, which hold only files."""
+def _folders(store: Path) -> Iterator[Path]:
+    """The folder of a store, those in it, and their sub-folders, which hold only files."""
+    yield store
     for folder in FOLDERS:
-        path = files.path(folder).rstrip("/")
-        yield path
-        if not folder:
-            continue
-        with suppress(OSError), os.scandir(path) as entries:
-            yield from sorted(entry.path for entry in entries if entry.is_dir())
+        yield store / folder
+        with suppress(OSError), os.scandir(store / folder) as entries:
+            yield from sorted(Path(entry.path) for entry in entries if entry.is_dir())

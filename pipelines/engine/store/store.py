@@ -14,7 +14,8 @@ from typing import Any
 
 from pipelines.engine.actions.key import PreImage, key_of
 from pipelines.engine.files.digest import sha256
-from pipelines.engine.files.places import Files, open_files
+from pipelines.engine.files.packs import PackedFiles
+from pipelines.engine.files.places import LocalFiles, open_files
 from pipelines.engine.files.seal import UNSEALING_ERRORS, UnsealedError, sealed, unsealed
 from pipelines.engine.files.secret import secret_of
 from pipelines.engine.store.verified_index import VerifiedIndex, VerifiedRow
@@ -72,13 +73,19 @@ class Latest:
 class Store:
     """A content store and an action cache in one place."""
 
-    files: Files
+    files: PackedFiles
     verified: VerifiedIndex | None = None
     secret: bytes | None = field(default=None, repr=False)
     """Secret of the store's owner, if the store is sealed."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _reopened, (self.files,)  # the index belongs to one machine, and a secret must not be pickled
+
+    @property
+    def folder(self) -> Path | None:
+        """Its folder; None if the store is at a URL."""
+        place = self.files.place
+        return Path(place.root) if isinstance(place, LocalFiles) else None
 
     def put(self, data: bytes) -> str:
         """Store `data`; returns its digest."""
@@ -211,12 +218,12 @@ class Store:
 
 def open_store(place: Path | str, verified: Path | None = None) -> Store:
     """Open the store at a path or URL, with the index of verified results in the file `verified`."""
-    files = open_files(place)
+    files = PackedFiles(open_files(place))
     secret = secret_of(files)
     return Store(files, None if verified is None else VerifiedIndex(verified, secret), secret)
 
 
-def _reopened(files: Files) -> Store:
+def _reopened(files: PackedFiles) -> Store:
     """Open the store of a pickled one in another process."""
     return Store(files, None, secret_of(files))
 

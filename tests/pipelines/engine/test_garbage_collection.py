@@ -166,16 +166,16 @@ def test_a_run_that_begins_while_garbage_is_deleted_stops_it(
     run_steps(*chain(3))
     unneeded = garbage(store)
     monkeypatch.setattr("pipelines.engine.garbage_collection.CHECK_EVERY", 1)
-    original = type(store.files).remove
+    original = type(store.files).remove_all
     with ExitStack() as runs:
 
-        def remove(files: Any, name: str) -> None:
-            original(files, name)
+        def remove_all(files: Any, names: Any) -> None:
+            original(files, names)
             runs.enter_context(lease(store))
 
-        monkeypatch.setattr(type(store.files), "remove", remove)
+        monkeypatch.setattr(type(store.files), "remove_all", remove_all)
         deleted, live = delete(unneeded, store)
-        monkeypatch.setattr(type(store.files), "remove", original)
+        monkeypatch.setattr(type(store.files), "remove_all", original)
     assert deleted == unneeded.names[:1]
     assert len(live) == 1
     assert store.files.state(unneeded.names[1]) is not None

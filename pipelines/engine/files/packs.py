@@ -1,0 +1,311 @@
+"""Small files of a store in packs: the rows of ten thousand scans are a hundred files, not half a million.
+
+A file is written by itself, so that a crash loses nothing and many runs may write side by side. Once there are many,
+they are gathered into packs that never change, as Git does with its objects (gitformat-pack(5)). A file that lies by
+itself counts before one in a pack, and a later pack counts before an earlier one.
+
+A pack begins with a table of its files (`ENTRY`); their contents follow. Its name is
+`packs/FOLDER/NUMBER-FILES-DIGEST`: its place in the order of packs, the number of its files, the digest of its table.
+"""
+
+import logging
+import re
+import time
+from array import array
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import groupby
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.engine.files.digest import sha256
+from pipelines.engine.files.places import Files
+
+log = logging.getLogger("footscan.store")
+
+PACKED = ("actions", "latest")
+"""Folders whose files are packed; those are named `FOLDER/ab/DIGEST.json`, by a SHA-256 digest that begins with ab."""
+FOLDER = "packs"
+"""Folder of the packs, one folder in it for each of `PACKED`."""
+MANY = 4096
+"""Number of files by themselves from which they are packed. Chosen by hand: a folder of so many is listed in 10 ms."""
+PACK_BYTES = 8_000_000
+"""Size up to which a pack is filled: a bound of what one removal writes anew. Chosen by hand."""
+TRIES = 3
+"""How often a file is looked for while other processes merge packs. Chosen by hand."""
+
+ENTRY = np.dtype([("digest", "V32"), ("offset", "<u8"), ("length", "<u4"), ("written", "<f8")])
+"""An entry of the table: digest in the file's name, place of its content behind the table, bytes, and the time when the
+file was written, s since 1970."""
+
+Table = NDArray[np.void]
+
+_FILE = re.compile(r"(\w+)/([0-9a-f]{2})/(\2[0-9a-f]{62})\.json").fullmatch
+_PACK = re.compile(rf"{FOLDER}/\w+/(\d+)-(\d+)-([0-9a-f]{{64}})").fullmatch
+
+
+class _File(NamedTuple):
+    """A file to be packed."""
+
+    digest: bytes
+    """In its name"""
+    written: float
+    """s since 1970"""
+    data: bytes
+
+
+class _Pack(NamedTuple):
+    """A pack of which the table was read."""
+
+    name: str
+    state: str | None
+    """Of its file, see `Files.state`"""
+    table: Table
+    """(N,) of `ENTRY`"""
+
+    @property
+    def number(self) -> int:
+        """Its place in the order of packs."""
+        return int(self.name.rpartition("/")[2].partition("-")[0])
+
+    @property
+    def bytes(self) -> int:
+        """Size of what it holds."""
+        return int(self.table["length"].sum())
+
+    def place(self, entry: np.void) -> tuple[int, int]:
+        """Place of a content in its file, and its length, bytes."""
+        return self.table.nbytes + int(entry["offset"]), int(entry["length"])
+
+
+class _Index:
+    """What the packs of one folder hold.
+
+    Parameters
+    ----------
+    listed : names of all packs that are there, in their order
+    packs : those whose tables are sound
+    """
+
+    def __init__(self, listed: Sequence[str] = (), packs: Sequence[_Pack] = ()) -> None:
+        self.listed, self.packs = list(listed), list(packs)
+        table = np.concatenate([np.zeros(0, ENTRY), *(pack.table for pack in packs)])
+        number = np.repeat(np.arange(len(packs)), [len(pack.table) for pack in packs])
+        words = np.frombuffer(table["digest"].tobytes(), ">u8").reshape(-1, 4)
+        order = np.lexsort((number, *words.T[::-1]))
+        is_last = np.append(np.any(np.diff(words[order].view("<u8"), axis=0) != 0, axis=1), True)[: len(order)]
+        kept = order[is_last]
+        self.table, self._pack = table[kept], number[kept].tolist()
+        self._starts = array("Q", words[kept, 0].astype(np.uint64).tobytes())
+
+    def find(self, digest: bytes) -> tuple[_Pack, np.void] | None:
+        """The latest pack that has a file, and its entry there."""
+        start = int.from_bytes(digest[:8])
+        place = bisect_left(self._starts, start)
+        while place < len(self._starts) and self._starts[place] == start:
+            entry = self.table[place]
+            if entry["digest"].tobytes() == digest:
+                return self.packs[self._pack[place]], entry
+            place += 1
+        return None
+
+
+@dataclass(frozen=True)
+class PackedFiles:
+    """The files of a place, of which small ones may lie in packs; see `Files`."""
+
+    place: Files
+    _indexes: dict[str, _Index] = field(default_factory=dict, compare=False, repr=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return PackedFiles, (self.place,)  # other processes read the tables themselves
+
+    def path(self, name: str) -> str:
+        """See `Files`, as for all methods up to `pack`."""
+        return self.place.path(name)
+
+    def read(self, name: str) -> bytes:
+        with suppress(FileNotFoundError):
+            return self.place.read(name)
+        for _ in range(TRIES):
+            if (found := self._find(name)) is None:
+                break
+            pack, entry = found
+            with suppress(FileNotFoundError):
+                return self.place.read_part(pack.name, *pack.place(entry))
+            self._indexes.clear()  # another process has merged the pack with others
+        raise FileNotFoundError(self.path(name))
+
+    def read_part(self, name: str, start: int, length: int) -> bytes:
+        return self.place.read_part(name, start, length)
+
+    def write(self, name: str, data: bytes) -> None:
+        self.place.write(name, data)
+
+    def remove(self, name: str) -> None:
+        self.remove_all([name])
+
+    def state(self, name: str) -> str | None:
+        state = self.place.state(name)
+        if state is None and (found := self._find(name)) is not None:
+            state = f"{found[1]['offset']} in {found[0].state}"
+        return state
+
+    def written(self, name: str) -> float | None:
+        written = self.place.written(name)
+        if written is None and (found := self._find(name)) is not None:
+            written = float(found[1]["written"])
+        return written
+
+    def sizes(self, folder: str) -> Iterator[tuple[str, int]]:
+        inside = f"{folder}/" if folder else ""
+        packed = [name for name in PACKED if f"{name}/".startswith(inside) or inside.startswith(f"{name}/")]
+        if not packed:
+            yield from self.place.sizes(folder)
+            return
+        entries = ((name, entry) for name in packed for entry in self._listed_anew(name).table)
+        sizes = {_file_name(name, entry["digest"].tobytes()): int(entry["length"]) for name, entry in entries}
+        sizes = {name: size for name, size in sizes.items() if name.startswith(inside)}
+        sizes |= {name: size for name, size in self.place.sizes(folder) if not _PACK(name)}
+        yield from sorted(sizes.items())
+
+    def many_by_themselves(self) -> list[str]:
+        """Names of the small files that lie by themselves, of folders with `MANY` of them or more."""
+        by_folder = [[name for name, _ in self.place.sizes(folder) if _FILE(name)] for folder in PACKED]
+        return [name for names in by_folder if len(names) >= MANY for name in names]
+
+    def pack(self, names: Iterable[str]) -> None:
+        """Gather small files that lie by themselves into packs."""
+        for folder, group in groupby(names, key=_folder):
+            self._gather(folder, list(group))
+
+    def remove_all(self, names: Iterable[str]) -> None:
+        """Remove files, if they exist; each pack that holds some of them is written anew, once."""
+        digests: dict[str, set[bytes]] = {}
+        for name in names:
+            self.place.remove(name)
+            if (match := _FILE(name)) and match[1] in PACKED:
+                digests.setdefault(match[1], set()).add(bytes.fromhex(match[3]))
+        for folder, removed in digests.items():
+            for pack in self._listed_anew(folder).packs:
+                is_kept = np.array([entry.tobytes() not in removed for entry in pack.table["digest"]])
+                if not is_kept.all():
+                    kept = [file for file, is_one in zip(self._files_of(pack), is_kept, strict=True) if is_one]
+                    if kept:
+                        self._write_pack(folder, pack.number, kept)
+                    self.place.remove(pack.name)
+            self._indexes.pop(folder, None)
+
+    def damaged_packs(self) -> list[str]:
+        """Names of the packs whose tables are damaged: nobody can tell what they hold."""
+        indexes = [self._listed_anew(folder) for folder in PACKED]
+        return [name for index in indexes for name in set(index.listed) - {pack.name for pack in index.packs}]
+
+    def _find(self, name: str) -> tuple[_Pack, np.void] | None:
+        match = _FILE(name)
+        if match is None or match[1] not in PACKED:
+            return None
+        digest, index = bytes.fromhex(match[3]), self._indexes.get(match[1])
+        found = None if index is None else index.find(digest)
+        return found or self._listed_anew(match[1]).find(digest)  # another process may have packed it meanwhile
+
+    def _listed_anew(self, folder: str) -> _Index:
+        """The index of a folder; tables of packs that were not there before are read."""
+        index = self._indexes.get(folder)
+        listed = sorted(name for name, _ in self.place.sizes(f"{FOLDER}/{folder}") if _PACK(name))
+        if index is None or index.listed != listed:
+            before = {} if index is None else {pack.name: pack for pack in index.packs}
+            packs = [before.get(name) or self._read_table(name) for name in listed]
+            index = self._indexes[folder] = _Index(listed, [pack for pack in packs if pack is not None])
+        return index
+
+    def _read_table(self, name: str) -> _Pack | None:
+        match = _PACK(name)
+        assert match is not None
+        try:
+            state, table = self.place.state(name), self.place.read_part(name, 0, int(match[2]) * ENTRY.itemsize)
+        except FileNotFoundError:  # another process has merged it with others
+            return None
+        except OSError:
+            table = b""
+        if sha256(table) != match[3]:
+            log.warning("%s: damaged, what it holds will be made again", self.path(name))
+            return None
+        return _Pack(name, state, np.frombuffer(table, ENTRY))
+
+    def _files_of(self, pack: _Pack) -> list[_File]:
+        data = self.place.read(pack.name)
+        places = [pack.place(entry) for entry in pack.table]
+        return [
+            _File(entry["digest"].tobytes(), float(entry["written"]), data[start : start + length])
+            for entry, (start, length) in zip(pack.table, places, strict=True)
+        ]
+
+    def _gather(self, folder: str, names: Sequence[str]) -> None:
+        states = {name: self.place.state(name) for name in names}
+        packs = self._listed_anew(folder).packs
+        number = packs[-1].number + 1 if packs else 1
+        merged: list[_Pack] = []
+        while packs and packs[-1].bytes < PACK_BYTES / 2:  # earlier ones must stay before what lies between
+            merged.insert(0, packs[-1])
+            packs = packs[:-1]
+        files = {file.digest: file for pack in merged for file in self._files_of(pack)}
+        for name in names:
+            with suppress(FileNotFoundError):
+                file = _File(_digest(name), self.place.written(name) or time.time(), self.place.read(name))
+                files[file.digest] = file
+        ends = np.cumsum([len(file.data) for file in files.values()])
+        for part in np.split(np.array([*files], object), np.flatnonzero(np.diff(ends // PACK_BYTES)) + 1):
+            self._write_pack(folder, number, [files[digest] for digest in part])
+            number += 1
+        for pack in merged:
+            self.place.remove(pack.name)
+        for name, state in states.items():
+            if self.place.state(name) == state:  # not written again meanwhile
+                self.place.remove(name)
+
+    def _write_pack(self, folder: str, number: int, files: Sequence[_File]) -> None:
+        table = np.zeros(len(files), ENTRY)
+        lengths = [len(file.data) for file in files]
+        for column, values in (
+            ("digest", np.frombuffer(b"".join(file.digest for file in files), ENTRY["digest"])),
+            ("offset", np.cumsum([0, *lengths[:-1]])),
+            ("length", lengths),
+            ("written", [file.written for file in files]),
+        ):
+            table[column] = values
+        head = table.tobytes()
+        name = f"{FOLDER}/{folder}/{number:08}-{len(files)}-{sha256(head)}"
+        self.place.write(name, head + b"".join(file.data for file in files))
+        self._indexes.pop(folder, None)
+
+
+def in_batches(names: Sequence[str], size: int) -> Iterator[Sequence[str]]:
+    """Split names into batches for `PackedFiles.remove_all`, in their order.
+
+    Names of files that may lie in packs, one behind the other, are one batch, so that no pack is written twice.
+
+    >>> row = f"actions/aa/{64 * 'a'}.json"
+    >>> [len(batch) for batch in in_batches([row, row, row, "blobs/a", "blobs/b", "blobs/c"], 2)]
+    [3, 2, 1]
+    """
+    for is_packed, group in groupby(names, key=lambda name: _folder(name) in PACKED):
+        batch = list(group)
+        step = len(batch) if is_packed else size
+        yield from (batch[start : start + step] for start in range(0, len(batch), step))
+
+
+def _file_name(folder: str, digest: bytes) -> str:
+    return f"{folder}/{digest.hex()[:2]}/{digest.hex()}.json"
+
+
+def _folder(name: str) -> str:
+    return name.partition("/")[0]
+
+
+def _digest(name: str) -> bytes:
+    return bytes.fromhex(name.rpartition("/")[2].removesuffix(".json"))
