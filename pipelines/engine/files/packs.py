@@ -11,8 +11,6 @@ A pack begins with a table of its files (`ENTRY`); their contents follow. Its na
 import logging
 import re
 import time
-from array import array
-from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -77,9 +75,18 @@ class _Pack(NamedTuple):
         """Size of what it holds."""
         return int(self.table["length"].sum())
 
-    def place(self, entry: np.void) -> tuple[int, int]:
-        """Place of a content in its file, and its length, bytes."""
+    def span(self, number: int) -> tuple[int, int]:
+        """Place of the content of a file, by its number in the table, and its length, bytes."""
+        entry = self.table[number]
         return self.table.nbytes + int(entry["offset"]), int(entry["length"])
+
+
+class _Packed(NamedTuple):
+    """A file in a pack."""
+
+    pack: _Pack
+    number: int
+    """In its table"""
 
 
 class _Index:
@@ -93,25 +100,11 @@ class _Index:
 
     def __init__(self, listed: Sequence[str] = (), packs: Sequence[_Pack] = ()) -> None:
         self.listed, self.packs = list(listed), list(packs)
-        table = np.concatenate([np.zeros(0, ENTRY), *(pack.table for pack in packs)])
-        number = np.repeat(np.arange(len(packs)), [len(pack.table) for pack in packs])
-        words = np.frombuffer(table["digest"].tobytes(), ">u8").reshape(-1, 4)
-        order = np.lexsort((number, *words.T[::-1]))
-        is_last = np.append(np.any(np.diff(words[order].view("<u8"), axis=0) != 0, axis=1), True)[: len(order)]
-        kept = order[is_last]
-        self.table, self._pack = table[kept], number[kept].tolist()
-        self._starts = array("Q", words[kept, 0].astype(np.uint64).tobytes())
-
-    def find(self, digest: bytes) -> tuple[_Pack, np.void] | None:
-        """The latest pack that has a file, and its entry there."""
-        start = int.from_bytes(digest[:8])
-        place = bisect_left(self._starts, start)
-        while place < len(self._starts) and self._starts[place] == start:
-            entry = self.table[place]
-            if entry["digest"].tobytes() == digest:
-                return self.packs[self._pack[place]], entry
-            place += 1
-        return None
+        self.files: dict[bytes, _Packed] = {}
+        """By the digest in its name, each in the latest pack that has it"""
+        for pack in packs:
+            digests = pack.table["digest"].tolist()
+            self.files |= {digest: _Packed(pack, number) for number, digest in enumerate(digests)}
 
 
 @dataclass(frozen=True)
@@ -134,9 +127,8 @@ class PackedFiles:
         for _ in range(TRIES):
             if (found := self._find(name)) is None:
                 break
-            pack, entry = found
             with suppress(FileNotFoundError):
-                return self.place.read_part(pack.name, *pack.place(entry))
+                return self.place.read_part(found.pack.name, *found.pack.span(found.number))
             self._indexes.clear()  # another process has merged the pack with others
         raise FileNotFoundError(self.path(name))
 
@@ -152,13 +144,13 @@ class PackedFiles:
     def state(self, name: str) -> str | None:
         state = self.place.state(name)
         if state is None and (found := self._find(name)) is not None:
-            state = f"{found[1]['offset']} in {found[0].state}"
+            state = f"{found.number} in {found.pack.state}"
         return state
 
     def written(self, name: str) -> float | None:
         written = self.place.written(name)
         if written is None and (found := self._find(name)) is not None:
-            written = float(found[1]["written"])
+            written = float(found.pack.table["written"][found.number])
         return written
 
     def sizes(self, folder: str) -> Iterator[tuple[str, int]]:
@@ -167,9 +159,11 @@ class PackedFiles:
         if not packed:
             yield from self.place.sizes(folder)
             return
-        entries = ((name, entry) for name in packed for entry in self._listed_anew(name).table)
-        sizes = {_file_name(name, entry["digest"].tobytes()): int(entry["length"]) for name, entry in entries}
-        sizes = {name: size for name, size in sizes.items() if name.startswith(inside)}
+        sizes = {}
+        for one in packed:
+            for digest, file in self._listed_anew(one).files.items():
+                if (name := _file_name(one, digest)).startswith(inside):
+                    sizes[name] = int(file.pack.table["length"][file.number])
         sizes |= {name: size for name, size in self.place.sizes(folder) if not _PACK(name)}
         yield from sorted(sizes.items())
 
@@ -205,13 +199,13 @@ class PackedFiles:
         indexes = [self._listed_anew(folder) for folder in PACKED]
         return [name for index in indexes for name in set(index.listed) - {pack.name for pack in index.packs}]
 
-    def _find(self, name: str) -> tuple[_Pack, np.void] | None:
+    def _find(self, name: str) -> _Packed | None:
         match = _FILE(name)
         if match is None or match[1] not in PACKED:
             return None
         digest, index = bytes.fromhex(match[3]), self._indexes.get(match[1])
-        found = None if index is None else index.find(digest)
-        return found or self._listed_anew(match[1]).find(digest)  # another process may have packed it meanwhile
+        found = None if index is None else index.files.get(digest)
+        return found or self._listed_anew(match[1]).files.get(digest)  # another process may have packed it meanwhile
 
     def _listed_anew(self, folder: str) -> _Index:
         """The index of a folder; tables of packs that were not there before are read."""
@@ -239,10 +233,10 @@ class PackedFiles:
 
     def _files_of(self, pack: _Pack) -> list[_File]:
         data = self.place.read(pack.name)
-        places = [pack.place(entry) for entry in pack.table]
+        spans = [pack.span(number) for number in range(len(pack.table))]
         return [
             _File(entry["digest"].tobytes(), float(entry["written"]), data[start : start + length])
-            for entry, (start, length) in zip(pack.table, places, strict=True)
+            for entry, (start, length) in zip(pack.table, spans, strict=True)
         ]
 
     def _gather(self, folder: str, names: Sequence[str]) -> None:
