@@ -12,9 +12,13 @@ from typing import NamedTuple
 from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.explain import changes, reason
+from pipelines.engine.files.packs import State as FileState
 from pipelines.engine.store.store import Store
 from pipelines.engine.store.verified_index import VerifiedRow
 
+MANY = 1000
+"""Steps from which the store is listed, rather than asked for each row and blob. Chosen by hand: a listing gives 1000
+files at once."""
 NO_SEAL = "its row bears no seal of the store's owner"
 
 
@@ -60,8 +64,9 @@ def make_plan(steps: Sequence[Step], store: Store) -> Plan:
     """
     planned: dict[str, PlannedStep] = {}
     with _without_garbage_collection(), nullcontext() if store.verified is None else store.verified.reading():
+        state = store.files.snapshot() if len(steps) >= MANY else store.files.state
         for step in steps:
-            planned[step.name] = _plan_step(step, planned, store)
+            planned[step.name] = _plan_step(step, planned, store, state)
     return Plan(list(planned.values()))
 
 
@@ -107,7 +112,7 @@ def with_places(problem: str, places: Mapping[str, Path]) -> str:
     return problem
 
 
-def _plan_step(step: Step, planned: dict[str, PlannedStep], store: Store) -> PlannedStep:
+def _plan_step(step: Step, planned: dict[str, PlannedStep], store: Store, state: FileState) -> PlannedStep:
     digests: dict[str, str] = {}
     for name, source in step.inputs.items():
         if not isinstance(source, Output):
@@ -120,7 +125,7 @@ def _plan_step(step: Step, planned: dict[str, PlannedStep], store: Store) -> Pla
             return PlannedStep(step, State.WAITS, None, f"waits for {_label(producer.step)}")
         digests[name] = producer.outcome.digest
     image = image_text(step, digests)
-    outcome = cached_outcome(step, store.lookup(key_of(image)))
+    outcome = cached_outcome(step, store.lookup(key_of(image), state))
     if outcome is not None:
         return PlannedStep(step, State.HIT, outcome, "")
     return PlannedStep(step, State.MISS, None, _reason(step, image, store))

@@ -11,7 +11,7 @@ A pack begins with a table of its files (`ENTRY`); their contents follow. Its na
 import logging
 import re
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -41,6 +41,8 @@ ENTRY = np.dtype([("digest", "V32"), ("offset", "<u8"), ("length", "<u4"), ("wri
 file was written, s since 1970."""
 
 Table = NDArray[np.void]
+State = Callable[[str], str | None]
+"""The state of a file by its name; None if it is missing."""
 
 _FILE = re.compile(r"(\w+)/([0-9a-f]{2})/(\2[0-9a-f]{62})\.json").fullmatch
 _PACK = re.compile(rf"{FOLDER}/\w+/(\d+)-(\d+)-([0-9a-f]{{64}})").fullmatch
@@ -87,6 +89,11 @@ class _Packed(NamedTuple):
     pack: _Pack
     number: int
     """In its table"""
+
+    @property
+    def state(self) -> str:
+        """See `Files.state`."""
+        return f"{self.number} in {self.pack.state}"
 
 
 class _Index:
@@ -144,7 +151,27 @@ class PackedFiles:
     def state(self, name: str) -> str | None:
         state = self.place.state(name)
         if state is None and (found := self._find(name)) is not None:
-            state = f"{found.number} in {found.pack.state}"
+            state = found.state
+        return state
+
+    def states(self, folder: str) -> dict[str, str] | None:
+        return self.place.states(folder)
+
+    def snapshot(self) -> State:
+        """`state` of rows and blobs at present: of a store at a URL, listings take the place of a request a file."""
+        states: dict[str, str] = {}
+        for folder in ("actions", "blobs"):
+            if (of_folder := self.place.states(folder)) is None:
+                return self.state
+            states |= of_folder
+        packed = self._listed_anew("actions").files
+
+        def state(name: str) -> str | None:
+            if (known := states.get(name)) is None and (match := _FILE(name)):
+                file = packed.get(bytes.fromhex(match[3]))
+                known = None if file is None else file.state
+            return known
+
         return state
 
     def written(self, name: str) -> float | None:

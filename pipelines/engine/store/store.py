@@ -14,7 +14,7 @@ from typing import Any
 
 from pipelines.engine.actions.key import PreImage, key_of
 from pipelines.engine.files.digest import sha256
-from pipelines.engine.files.packs import PackedFiles
+from pipelines.engine.files.packs import PackedFiles, State
 from pipelines.engine.files.places import LocalFiles, open_files
 from pipelines.engine.files.seal import UNSEALING_ERRORS, UnsealedError, sealed, unsealed
 from pipelines.engine.files.secret import secret_of
@@ -112,9 +112,13 @@ class Store:
         """Return True if the blob exists; only `get` checks its content."""
         return self.files.state(blob_name(digest)) is not None
 
-    def lookup(self, key: str) -> VerifiedRow | None:
-        """Return the recorded outcome of an action; None if there is none, or its result is missing or damaged."""
-        row_state = self.files.state(row_name(key))
+    def lookup(self, key: str, state: State | None = None) -> VerifiedRow | None:
+        """Return the recorded outcome of an action; None if there is none, or its result is missing or damaged.
+
+        state : as of `PackedFiles.snapshot`; default: of the files as they are
+        """
+        state = state or self.files.state
+        row_state = state(row_name(key))
         if row_state is None:
             return None
         verified_row = None if self.verified is None else self.verified.get(key)
@@ -126,7 +130,7 @@ class Store:
         if verified_row.digest is None:
             self._remember(key, verified_row)
             return verified_row
-        blob_state = self.files.state(blob_name(verified_row.digest))
+        blob_state = state(blob_name(verified_row.digest))
         if blob_state is None:
             return None
         if verified_row.blob != blob_state:

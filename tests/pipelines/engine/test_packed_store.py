@@ -1,17 +1,19 @@
 """A store whose rows lie in packs plans, collects garbage and is checked like any other."""
 
 import time
+import uuid
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from pipelines.engine.actions.step import Output, Step, Value
+from pipelines.engine.actions.step import Output, Step, Success, Value
 from pipelines.engine.audit import verify
+from pipelines.engine.files.places import RemoteFiles
 from pipelines.engine.garbage_collection import delete, find_garbage, read_contents
 from pipelines.engine.plan import State
 from pipelines.engine.pool import StepEnd, Threads
-from pipelines.engine.store.store import Store
+from pipelines.engine.store.store import Store, blob_name
 from pipelines.engine.workspace import Workspace
 
 
@@ -59,6 +61,30 @@ def test_what_another_process_packed_is_found(workspace: Workspace, package: Any
     assert other.plan(steps(package)).to_run
     run(workspace, steps(package))
     assert other.plan(steps(package)).to_run == []
+
+
+@pytest.mark.parametrize("is_packed", [False, True])
+def test_a_store_at_a_url_is_listed_for_a_large_plan(
+    package: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_packed: bool
+) -> None:
+    workspace = Workspace(f"memory://{uuid.uuid4().hex}", tmp_path)
+    run(workspace, steps(package))
+    run(workspace, steps(package, b"other"))
+    if is_packed:
+        files = workspace.store.files
+        files.pack([name for folder in ("actions", "latest") for name, _ in files.place.sizes(folder)])
+    workspace.plan(steps(package))
+    workspace.close()
+    monkeypatch.setattr("pipelines.engine.plan.MANY", 2)
+    with monkeypatch.context() as patch:
+        patch.setattr(RemoteFiles, "state", lambda *_: pytest.fail("no file is asked for by itself"))
+        patch.setattr(Store, "row", lambda *_: pytest.fail("no row is read again"))
+        planned = workspace.plan(steps(package))
+    assert planned.to_run == []
+    outcome = planned.steps[1].outcome
+    assert isinstance(outcome, Success)
+    workspace.store.files.remove(blob_name(outcome.digest))
+    assert len(workspace.plan(steps(package)).to_run) == 2  # their results are equal, one blob
 
 
 def test_garbage_in_packs_goes(workspace: Workspace, package: Any) -> None:
