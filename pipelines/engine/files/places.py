@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from datetime import datetime
 from functools import cache, partial
 from operator import itemgetter
 from pathlib import Path
@@ -267,9 +268,13 @@ def _listed(system: Any, folder: str) -> list[dict[str, Any]]:
 
 
 def _state(info: Mapping[str, Any]) -> str:
-    """A file's metadata as text. A listing and a request for one file may give the same time in different digits."""
+    """A file's metadata as text, the same from a listing and from a request for the file alone.
+
+    S3 lists times in milliseconds and gives those of one file in seconds; others list seconds since 1970, not dates.
+    """
     facts = DIGESTS if any(info.get(fact) for fact in DIGESTS) else TIMES
-    return " ".join(str(info.get(fact)) for fact in ("size", *facts))
+    found = [info.get(fact) for fact in ("size", *facts)]
+    return " ".join(str(fact.timestamp() if isinstance(fact, datetime) else fact) for fact in found)
 
 
 def _error_text(error: Exception) -> str:
