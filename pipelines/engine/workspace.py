@@ -82,8 +82,8 @@ class Workspace:
             if names := self.store.files.many_by_themselves():
                 with lease(self.store):
                     self.store.files.pack(names)
-        except (Fault, OSError) as error:  # they stay as they are
-            log.warning("%s", error)
+        except (Fault, OSError) as error:  # they stay as they are, and the next run tries again
+            log.debug("%s", error)
 
     def lease(self) -> AbstractContextManager[str]:
         """Hold a lease: others do not delete results while it is held."""
