@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.engine.files.digest import sha256
-from pipelines.engine.files.places import Files
+from pipelines.engine.files.places import Files, RemoteFiles
 
 log = logging.getLogger("footscan.store")
 
@@ -154,23 +154,26 @@ class PackedFiles:
             state = found.state
         return state
 
-    def states(self, folder: str) -> dict[str, str] | None:
+    def states(self, folder: str) -> dict[str, str]:
         return self.place.states(folder)
 
     def snapshot(self) -> State:
-        """`state` of rows and blobs at present: of a store at a URL, listings take the place of a request a file."""
-        states: dict[str, str] = {}
-        for folder in ("actions", "blobs"):
-            if (of_folder := self.place.states(folder)) is None:
-                return self.state
-            states |= of_folder
-        packed = self._listed_anew("actions").files
+        """`state` of rows and blobs at present, for many of them.
+
+        Rows that lie by themselves are few, and the others are in packs: none has to be looked for. Blobs of a store at
+        a URL are listed, instead of a request for each.
+        """
+        packed, states = self._listed_anew("actions").files, self.place.states("actions")
+        is_remote = isinstance(self.place, RemoteFiles)
+        if is_remote:
+            states |= self.place.states("blobs")
 
         def state(name: str) -> str | None:
-            if (known := states.get(name)) is None and (match := _FILE(name)):
-                file = packed.get(bytes.fromhex(match[3]))
-                known = None if file is None else file.state
-            return known
+            known = states.get(name)
+            if known is None and name.startswith("actions/"):
+                file = packed.get(_digest(name))
+                return None if file is None else file.state
+            return known if is_remote or known is not None else self.place.state(name)
 
         return state
 

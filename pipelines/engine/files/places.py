@@ -56,8 +56,8 @@ class Files(Protocol):
         cannot tell."""
         ...
 
-    def states(self, folder: str) -> dict[str, str] | None:
-        """States of all files below a folder, by name; None if asking for each is as quick. Fault as above."""
+    def states(self, folder: str) -> dict[str, str]:
+        """States of all files below a folder, by name. Fault as above."""
         ...
 
     def written(self, name: str) -> float | None:
@@ -103,9 +103,9 @@ class LocalFiles:
         # ctime cannot be set back.
         return f"{status.st_size} {status.st_mtime_ns} {status.st_ctime_ns} {status.st_ino}"
 
-    def states(self, folder: str) -> dict[str, str] | None:
-        del folder
-        return None
+    def states(self, folder: str) -> dict[str, str]:
+        states = ((name, self.state(name)) for name, _ in self.sizes(folder))
+        return {name: state for name, state in states if state is not None}
 
     def written(self, name: str) -> float | None:
         try:
@@ -170,7 +170,7 @@ class RemoteFiles:
             return None
         return _state(info)
 
-    def states(self, folder: str) -> dict[str, str] | None:
+    def states(self, folder: str) -> dict[str, str]:
         return {name: _state(info) for name, info in self._below(folder)}
 
     def written(self, name: str) -> float | None:
