@@ -74,9 +74,10 @@ def verify(store: Store) -> Audit:
 
     Damaged files are removed and will be made again. A damaged pin stays: the user must learn what is no longer kept.
     """
-    damaged = [store.files.path(name) for name in store.files.damaged_packs()]  # they have been logged
+    packs = store.files.damaged_packs()  # they have been logged
+    damaged = [store.files.path(name) for name in packs]
     files = len(damaged)
-    store.files.remove_all(store.files.damaged_packs())
+    store.files.remove_all(packs)
     for folder in (*CHECKS, PINS):
         for name in [name for name, _ in store.files.sizes(folder)]:
             files += 1
@@ -93,7 +94,7 @@ def seal_store(store: Store, *, every: bool = False) -> Sealing:
     """Seal the sound rows, last actions and pins of a store: all if the store had no secret yet or `every` is set."""
     secret = store.secret
     if secret is None:
-        secret, every = make_secret(store.files), True
+        secret, every = make_secret(store.files.place), True
     sealed_count = unsealed_count = 0
     for name in [name for folder in ("actions", "latest", PINS) for name, _ in store.files.sizes(folder)]:
         data = _read(name, store)

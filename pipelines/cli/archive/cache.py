@@ -166,7 +166,7 @@ def seal(
 
     sealing = seal_store(_store(workflow, place), every=every)
     store = _store(workflow, place)
-    facts = {"store": _place(store), "secret": str(secret_file(store.files)), **vars(sealing)}
+    facts = {"store": _place(store), "secret": str(secret_file(store.files.place)), **vars(sealing)}
     if as_json:
         print_json(facts)
         return

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import groupby
+from itertools import groupby, takewhile
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -139,9 +139,6 @@ class PackedFiles:
             self._indexes.clear()  # another process has merged the pack with others
         raise FileNotFoundError(self.path(name))
 
-    def read_part(self, name: str, start: int, length: int) -> bytes:
-        return self.place.read_part(name, start, length)
-
     def write(self, name: str, data: bytes) -> None:
         self.place.write(name, data)
 
@@ -153,9 +150,6 @@ class PackedFiles:
         if state is None and (found := self._find(name)) is not None:
             state = found.state
         return state
-
-    def states(self, folder: str) -> dict[str, str]:
-        return self.place.states(folder)
 
     def snapshot(self) -> State:
         """`state` of rows and blobs at present, for many of them.
@@ -216,12 +210,11 @@ class PackedFiles:
                 digests.setdefault(match[1], set()).add(bytes.fromhex(match[3]))
         for folder, removed in digests.items():
             for pack in self._listed_anew(folder).packs:
-                is_kept = np.array([entry.tobytes() not in removed for entry in pack.table["digest"]])
-                if not is_kept.all():
-                    kept = [file for file, is_one in zip(self._files_of(pack), is_kept, strict=True) if is_one]
-                    if kept:
-                        self._write_pack(folder, pack.number, kept)
-                    self.place.remove(pack.name)
+                if removed.isdisjoint(pack.table["digest"].tolist()):
+                    continue
+                if kept := [file for file in self._files_of(pack) if file.digest not in removed]:
+                    self._write_pack(folder, pack.number, kept)
+                self.place.remove(pack.name)
             self._indexes.pop(folder, None)
 
     def damaged_packs(self) -> list[str]:
@@ -273,10 +266,8 @@ class PackedFiles:
         states = {name: self.place.state(name) for name in names}
         packs = self._listed_anew(folder).packs
         number = packs[-1].number + 1 if packs else 1
-        merged: list[_Pack] = []
-        while packs and packs[-1].bytes < PACK_BYTES / 2:  # earlier ones must stay before what lies between
-            merged.insert(0, packs[-1])
-            packs = packs[:-1]
+        # The last ones alone: an earlier one must stay before what lies between.
+        merged = [*takewhile(lambda pack: pack.bytes < PACK_BYTES / 2, reversed(packs))][::-1]
         files = {file.digest: file for pack in merged for file in self._files_of(pack)}
         for name in names:
             with suppress(FileNotFoundError):

@@ -223,13 +223,13 @@ class Store:
 def open_store(place: Path | str, verified: Path | None = None) -> Store:
     """Open the store at a path or URL, with the index of verified results in the file `verified`."""
     files = PackedFiles(open_files(place))
-    secret = secret_of(files)
+    secret = secret_of(files.place)
     return Store(files, None if verified is None else VerifiedIndex(verified, secret), secret)
 
 
 def _reopened(files: PackedFiles) -> Store:
     """Open the store of a pickled one in another process."""
-    return Store(files, None, secret_of(files))
+    return Store(files, None, secret_of(files.place))
 
 
 def blob_name(digest: str) -> str:
