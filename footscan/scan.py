@@ -16,7 +16,7 @@ from footscan.cloud.fusion.fuse import Fusion, fuse
 from footscan.cloud.heads.find import find_heads
 from footscan.cloud.heads.planes import corrected, heads_of
 from footscan.cloud.mapping import map_stripe, refuse_other_size
-from footscan.cloud.movement.tremor import steadied
+from footscan.cloud.movement.steady import steadied
 from footscan.cloud.normals import estimate_normals
 from footscan.cloud.outliers.remove import Removed, remove_outliers
 from footscan.cloud.points import POINT_DTYPE, of_cameras

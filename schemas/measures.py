@@ -11,8 +11,8 @@ Status = Literal["ok", "uncertain", "incomplete"]
 ErrorCause = Literal["noise", "filling", "ends", "cameras", "tremor", "sway", "glass", "landmarks"]
 """Why a measure errs: noise of the stripes and of the surface through them; surface that was filled; ends of the foot
 that no stripe shows, or one camera alone; cameras that disagree; tremor of the foot, or heads that do not run evenly;
-slow movement of the foot, which cannot be seen; the glass, from which heights count; landmarks that lie on a plateau,
-and move with the others."""
+slow movement of the foot, which heads hardly show; the glass, from which heights count; landmarks on a plateau, which
+move with the others."""
 Position = tuple[float, float, float]
 
 

@@ -61,9 +61,9 @@ OF_DISAGREEMENT = 1.5
 """Errors of the mean of all cameras, relative to their systematic disagreement, and as broad as a camera's view: each
 camera errs, and what all of them have in common does not show. Tuned on `draw_assembled`, seeds 801 to 810 without
 pictures, 511 and 512 with films, and `draw_world`, seeds 6001 to 6024."""
-SWAY_MM = 0.05
-"""Standard deviation of slow movement of the foot, along X and across, that no stripe shows: over a tenth of a metre it
-looks like the form of another foot. Chosen by hand."""
+SWAY_MM = 0.06
+"""Standard deviation of slow movement of the foot, along X and across, of a scan that has none: over a tenth of a metre
+it looks like the form of another foot. That of most feet, see `footscan.cloud.movement.sway`."""
 FORM_MM, OF_TREMOR = 0.03, 2.0
 """Tremor that the form of a still foot looks like, and errors of X relative to what exceeds it where the foot was not
 moved back: heads that jitter also ripple, which no stripe shows. Chosen by hand: ideal scanners (`draw_assembled`,
@@ -173,6 +173,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     inside = ~seen & (beyond_mm <= 0)
     gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside])[0]
     apart_mm = 0.0 if agreement is None else agreement.systematic_mm
+    sway_mm = (evidence.movement and evidence.movement.sway_by_axis_mm) or (SWAY_MM, SWAY_MM)
     ends = _ends(vertices, evidence)
     shift_mm = np.max([np.zeros(len(vertices)), *(end.shift_at(vertices[:, 0], step_mm) for end in ends)], axis=0)
     fields = [
@@ -185,8 +186,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
         ErrorField("ends", ASIDE * shift_mm, NARROW_MM),
         ErrorField("cameras", np.full(len(vertices), OF_DISAGREEMENT * apart_mm), WIDE_MM),
         ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, is_of_section=True),
-        ErrorField("sway", SWAY_MM * normals[:, 0], WIDE_MM, is_of_section=True),
-        ErrorField("sway", SWAY_MM * normals[:, 1], WIDE_MM, is_of_section=True),
+        *(ErrorField("sway", sway_mm[axis] * normals[:, axis], WIDE_MM, is_of_section=True) for axis in (0, 1)),
     ]
     is_alone = [end.depth(vertices[:, 0], end.unsure_mm) > ALONE_MM for end in ends]
     return ScanErrors(fields, np.any([gap_mm > RELIABLE_MM, *is_alone], axis=0))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.heads.planes import corrected, heads_of
-from footscan.cloud.movement.tremor import steadied
+from footscan.cloud.movement.steady import steadied
 from footscan.cloud.outliers.remove import remove_outliers
 from footscan.cloud.views import views_of
 from pipelines.arrays import pack, unpack

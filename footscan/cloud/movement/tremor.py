@@ -2,8 +2,7 @@
 
 A foot trembles at 8 to 12 Hz (R. J. Elble, Journal of Clinical Neurophysiology 13(6), 1996), so that each stripe lies
 elsewhere than those before and after it say. Skin is smooth over a few millimetres of the travel: what all stripes of a
-frame have in common beside their neighbours is movement. Slow movement along the travel looks like another foot, and is
-not seen.
+frame have in common beside their neighbours is movement.
 """
 
 from collections.abc import Mapping
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from footscan.cloud.fusion.agreement import GAP_STEPS
-from footscan.cloud.fusion.stripes import Floats, Stripes, sort_stripes, traces_of, ways_to_neighbours
+from footscan.cloud.fusion.stripes import Floats, Stripes, traces_of, ways_to_neighbours
 from footscan.cloud.points import stripe_step
 from footscan.compiled import compiled
 from footscan.robust import MAD_TO_SD, huber_weights
@@ -63,33 +62,29 @@ class FrameMoves(NamedTuple):
     """(F, 3) mm"""
 
 
-def steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArray[np.void], MovementReport]:
-    """Move the points of a foot that trembles back to where it is on average.
+def find_tremor(stripes: Stripes, heads: Mapping[int, int]) -> MovementReport:
+    """Estimate the tremor of a foot, and the way by which it can be moved back.
 
     Parameters
     ----------
-    points : (N,) of `POINT_DTYPE`, mm, scanner frame, of all cameras, without outliers
+    stripes : of all cameras, without outliers, mm, scanner frame
     heads : camera -> number of its head; frames of all heads with one number are of one moment
     """
-    comparisons = _compare(points)
+    comparisons = _compare(stripes)
     every = _moves(comparisons, np.ones(len(comparisons.frame), np.bool_))
     if every is None:
-        return points, MovementReport()
+        return MovementReport()
     x, known = _integrated(every), np.isfinite(every.way[:, 0])
     tremor = float(np.sqrt(np.mean(x[known] ** 2)))
     report = MovementReport(tremor_mm=round(tremor, 4))
     if tremor < LEAST_TREMOR_MM:
-        return points, report
+        return report
     agreement = _agreement(comparisons, heads)
     report = report.model_copy(update={"agreement": agreement})
     if agreement is not None and agreement < LEAST_AGREEMENT:
-        return points, report
-    moved, way = points.copy(), _continued(x, known)
-    frame = points["frame"].astype(np.intp) - (every.first - CONTINUED)
-    is_near = (frame >= 0) & (frame < len(way))
-    for name in ("x", "plane"):
-        moved[name][is_near] -= way[frame[is_near]].astype(np.float32)
-    return moved, report.model_copy(
+        return report
+    way = _continued(x, known)
+    return report.model_copy(
         update={
             "first_frame": max(every.first - CONTINUED, 0),
             "x_mm": np.round(way[max(CONTINUED - every.first, 0) :], 4).tolist(),
@@ -113,8 +108,7 @@ class _Comparisons(NamedTuple):
     """(M, 3) derivatives of that by a movement of the foot in X, Y and Z"""
 
 
-def _compare(points: NDArray[np.void]) -> _Comparisons:
-    stripes = sort_stripes([points])
+def _compare(stripes: Stripes) -> _Comparisons:
     sample = np.flatnonzero(stripes.points["supported"] & ~stripes.bent & np.any(stripes.normals != 0, axis=1))[::EVERY]
     ways = ways_to_neighbours(
         sample,

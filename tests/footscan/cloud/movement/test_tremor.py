@@ -1,49 +1,11 @@
 """A foot that trembles is moved back; one that stands still is not, whatever its form."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
-from footscan.cloud.movement.tremor import steadied
+from footscan.cloud.movement.steady import steadied
 from footscan.cloud.points import make_points
-from footscan.virtual.foot.foot import make_foot
-
-STEP_MM, FRAMES = 2.0, 90  # up to the toes, whose sections are several
-HEADS = {1: 1, 2: 2}
-
-
-def scan(moved_mm: np.ndarray) -> np.ndarray:
-    """Stripes of two cameras, one on either side of a foot that lies at `moved_mm` (2, F) along X for each of them."""
-    parts = []
-    for camera, side in ((1, 1.0), (2, -1.0)):
-        for frame in range(FRAMES):
-            plane = 8.0 + STEP_MM * frame
-            section = section_at(plane - moved_mm[camera - 1, frame])
-            section = section[side * (section[:, 0] - section[:, 0].mean()) > -10.0]
-            angle = np.arctan2(section[:, 1] - section[:, 1].mean(), section[:, 0] - section[:, 0].mean())
-            section = section[np.argsort(angle)]
-            xyz = np.column_stack([np.full(len(section), plane), section])
-            parts.append(make_points(xyz, camera, frame, source=np.arange(len(section))))
-    return np.concatenate(parts)
-
-
-@cache
-def foot_edges() -> tuple[np.ndarray, np.ndarray]:
-    """Both ends (E, 3) of each edge of a foot, mm."""
-    foot = make_foot(resolution_mm=2.0)
-    pairs = [foot.faces[:, list(pair)] for pair in ((0, 1), (1, 2), (2, 0))]
-    edges = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
-    return foot.vertices[edges[:, 0]], foot.vertices[edges[:, 1]]
-
-
-def section_at(x: float) -> np.ndarray:
-    """(N, 2) Y and Z where the edges of the foot cross the plane at X = x, mm."""
-    first, second = foot_edges()
-    crosses = (first[:, 0] < x) != (second[:, 0] < x)
-    first, second = first[crosses], second[crosses]
-    share = (x - first[:, 0]) / (second[:, 0] - first[:, 0])
-    return np.asarray((first + share[:, None] * (second - first))[:, 1:])
+from tests.helpers.moving_foot import FRAMES, HEADS, scan
 
 
 @pytest.mark.parametrize("per_frame", [2.9, 2.4])

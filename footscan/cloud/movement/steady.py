@@ -1,0 +1,49 @@
+"""Movement of the foot while it was scanned: a tremor is taken back, slow movement is reported."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from footscan.cloud.fusion.stripes import sort_stripes
+from footscan.cloud.movement.sway import sway_of
+from footscan.cloud.movement.tremor import find_tremor
+from schemas.movement import MovementReport
+
+WARN_MM = 0.25
+"""Slow movement from which another scan is asked for. Chosen by hand."""
+
+
+def steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArray[np.void], MovementReport]:
+    """Move the points of a foot that trembles back to where it is on average, and estimate its slow movement.
+
+    Parameters
+    ----------
+    points : (N,) of `POINT_DTYPE`, mm, scanner frame, of all cameras, without outliers
+    heads : camera -> number of its head; frames of all heads with one number are of one moment
+    """
+    stripes = sort_stripes([points])
+    report = find_tremor(stripes, heads)
+    if report.x_mm:
+        points = _moved_back(points, report)
+        stripes = sort_stripes([points])
+    sizes = sway_of(stripes, heads)
+    if sizes is None:
+        return points, report
+    sway = math.hypot(*sizes)
+    x, y = (round(size, 4) for size in sizes)
+    slow = f"the foot moved slowly, by {sway:.1f} mm (root mean square): scan again, and see that it stands still"
+    warnings = [*report.warnings, *([slow] if sway > WARN_MM else [])]
+    return points, report.model_copy(
+        update={"sway_mm": round(sway, 4), "sway_by_axis_mm": (x, y), "warnings": warnings}
+    )
+
+
+def _moved_back(points: NDArray[np.void], tremor: MovementReport) -> NDArray[np.void]:
+    moved, way = points.copy(), np.array(tremor.x_mm)
+    frame = points["frame"].astype(np.intp) - tremor.first_frame
+    is_near = (frame >= 0) & (frame < len(way))
+    for name in ("x", "plane"):
+        moved[name][is_near] -= way[frame[is_near]].astype(np.float32)
+    return moved

@@ -1,0 +1,53 @@
+"""A foot that moves slowly is found where heads film the same skin at different times."""
+
+import numpy as np
+import pytest
+
+from footscan.cloud.fusion.stripes import sort_stripes
+from footscan.cloud.movement.steady import WARN_MM, steadied
+from footscan.cloud.movement.sway import sway_of
+from tests.helpers.moving_foot import FRAMES, HEADS, scan
+
+STILL = np.zeros((2, FRAMES))
+SWAYING = np.tile(0.7 * np.sin(0.17 * np.arange(FRAMES)), (2, 1))  # 0.5 Hz at 18 frames a second
+AHEAD_MM = 4.0
+
+
+def sizes_of(points: np.ndarray) -> tuple[float, float]:
+    sizes = sway_of(sort_stripes([points]), HEADS)
+    assert sizes is not None
+    return sizes
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_sway_is_found_along_and_across_the_travel(axis: int) -> None:
+    moved = [STILL, STILL]
+    moved[axis] = SWAYING
+    sizes = sizes_of(scan(moved[0], moved[1], AHEAD_MM))
+    assert 0.25 < sizes[axis] < 1.0  # true: 0.5
+    assert sizes[1 - axis] < 0.2
+
+
+def test_heads_that_are_apart_as_a_whole_are_no_sway() -> None:
+    apart = STILL + np.array([[0.0], [0.3]])
+    for points in (scan(STILL, None, AHEAD_MM), scan(STILL, apart, AHEAD_MM), scan(apart, None, AHEAD_MM)):
+        assert max(sizes_of(points)) < 0.1
+
+
+def test_planes_that_coincide_leave_the_sway_of_most_feet() -> None:
+    assert max(sizes_of(scan(STILL, SWAYING))) < 0.1
+
+
+def test_a_foot_that_moved_slowly_is_reported_and_left_where_it_is() -> None:
+    points = scan(STILL, SWAYING, AHEAD_MM)
+    moved, report = steadied(points, HEADS)
+    np.testing.assert_array_equal(moved, points)
+    assert report.sway_mm > WARN_MM
+    assert "moved slowly" in report.warnings[-1]
+
+
+def test_one_head_alone_shows_no_sway() -> None:
+    points = scan(STILL, SWAYING, AHEAD_MM)
+    assert sway_of(sort_stripes([points]), {1: 1, 2: 1}) is None
+    assert sway_of(sort_stripes([points[points["camera"] == 1]]), HEADS) is None
+    assert sway_of(sort_stripes([points[:0]]), HEADS) is None
