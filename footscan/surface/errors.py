@@ -61,9 +61,10 @@ OF_DISAGREEMENT = 1.5
 """Errors of the mean of all cameras, relative to their systematic disagreement, and as broad as a camera's view: each
 camera errs, and what all of them have in common does not show. Tuned on `draw_assembled`, seeds 801 to 810 without
 pictures, 511 and 512 with films, and `draw_world`, seeds 6001 to 6024."""
-SWAY_MM = 0.06
-"""Standard deviation of slow movement of the foot, along X and across, of a scan that has none: over a tenth of a metre
-it looks like the form of another foot. That of most feet, see `footscan.cloud.movement.sway`."""
+SWAY_MM, SWAY_STEPS = 0.1, 12.0
+"""Standard deviation of slow movement of the foot, along X and across, where nothing is known of it, as in
+`footscan.cloud.movement.sway`; and the steps of the travel over which it varies. Over a tenth of a metre it looks like
+the form of another foot. Chosen by hand, the second one for a sway of 0.7 Hz, which turns over in 13 frames."""
 FORM_MM, OF_TREMOR = 0.03, 2.0
 """Tremor that the form of a still foot looks like, and errors of X relative to what exceeds it where the foot was not
 moved back: heads that jitter also ripple, which no stripe shows. Chosen by hand: ideal scanners (`draw_assembled`,
@@ -186,7 +187,10 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
         ErrorField("ends", ASIDE * shift_mm, NARROW_MM),
         ErrorField("cameras", np.full(len(vertices), OF_DISAGREEMENT * apart_mm), WIDE_MM),
         ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, is_of_section=True),
-        *(ErrorField("sway", sway_mm[axis] * normals[:, axis], WIDE_MM, is_of_section=True) for axis in (0, 1)),
+        *(
+            ErrorField("sway", sway_mm[axis] * normals[:, axis], SWAY_STEPS * step_mm, is_of_section=True)
+            for axis in (0, 1)
+        ),
     ]
     is_alone = [end.depth(vertices[:, 0], end.unsure_mm) > ALONE_MM for end in ends]
     return ScanErrors(fields, np.any([gap_mm > RELIABLE_MM, *is_alone], axis=0))

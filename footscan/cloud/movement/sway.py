@@ -16,7 +16,7 @@ from scipy.linalg import solve_triangular
 from footscan.cloud.fusion.agreement import GAP_STEPS, find_overlaps
 from footscan.cloud.fusion.stripes import Floats, Stripes, traces_of, ways_to_neighbours
 from footscan.cloud.points import stripe_step
-from footscan.robust import MAD_TO_SD, huber_weights
+from footscan.robust import MAD_TO_SD, cauchy_weights
 
 Ints = NDArray[np.intp]
 
@@ -47,8 +47,8 @@ ROUNDS = 8
 SIZES_MM = 0.05 * 2.0 ** np.arange(6)
 """Standard deviations of the movement along an axis that are tried: those of a foot that stands on glass, to those of
 one that steps."""
-RARER = 4.0
-"""A size is rarer than half of it by two to the power of this: without any comparison 0.06 mm are expected. Chosen by
+RARER = 2.0
+"""A size is rarer than half of it by two to the power of this: without any comparison 0.1 mm are expected. Chosen by
 hand."""
 
 
@@ -184,7 +184,7 @@ def _normal_equations(change: Floats, distance: Floats, shows: float, prior: Flo
         normal, right = weighted.T @ change, weighted.T @ distance
         left = np.abs(distance - change @ np.linalg.solve(normal + np.diag(prior), right))
         spread = max(MAD_TO_SD * float(np.median(left)), LEAST_MM)
-        weights = huber_weights(left / spread)
+        weights = cauchy_weights(left / spread)
     return normal, right
 
 

@@ -17,7 +17,7 @@ from footscan.cloud.fusion.agreement import GAP_STEPS
 from footscan.cloud.fusion.stripes import Floats, Stripes, traces_of, ways_to_neighbours
 from footscan.cloud.points import stripe_step
 from footscan.compiled import compiled
-from footscan.robust import MAD_TO_SD, huber_weights
+from footscan.robust import MAD_TO_SD, cauchy_weights, huber_weights
 from schemas.movement import MovementReport
 
 Ints = NDArray[np.intp]
@@ -199,7 +199,7 @@ def _integrated(moves: FrameMoves) -> Floats:
         bands[-1] += PRIOR_MM**-2.0
         sums = np.bincount(around.ravel(), np.outer(weights * right, FOURTH).ravel(), count)
         x = np.asarray(solveh_banded(bands, sums, check_finite=False))
-        weights = noise**-2.0 / (1.0 + ((right - x[around] @ FOURTH) / (2.0 * noise)) ** 2)
+        weights = noise**-2.0 * cauchy_weights((right - x[around] @ FOURTH) / noise)
     return x
 
 
