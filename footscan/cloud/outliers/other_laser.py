@@ -151,16 +151,19 @@ def lasers_seen(points: NDArray[np.void], views: Mapping[int, View], heads: Mapp
     frames = np.flatnonzero(ends)
     laser = own.copy()
     seen_by = camera_numbers(points)
-    support, at_own = np.zeros(apart.shape), np.zeros(len(points))
+    at_own = np.zeros(len(points))
     late = late_rows(points, views) + (0.0 if ahead is None else ahead)
     moved = late[:, None] * motion(points, late)
     spread = SLOPE_ERROR * np.linalg.norm(moved, axis=1)
+
+    def support_in(place: Floats, counts: Mask) -> Floats:
+        return smoothed(_support(place, seen_by, counts, linked, frames, spread), linked)
+
     for turn in range(ROUNDS):
-        for number in range(len(numbers)):
-            counts = np.isfinite(places[number, :, 0]) & ((laser == number) | (turn == 0))
-            support[number] = smoothed(
-                _support(places[number] - moved, seen_by, counts, linked, frames, spread), linked
-            )
+        counts = [np.isfinite(place[:, 0]) & ((laser == n) | (turn == 0)) for n, place in enumerate(places)]
+        support = np.array(
+            together(partial(support_in, place - moved, count) for place, count in zip(places, counts, strict=True))
+        )
         at_own = np.take_along_axis(support, own[None], axis=0)[0]
         may_be = np.where((apart > LEAST_MM) & (apart < FARTHEST_MM), support - BETTER, -np.inf)
         best = np.argmax(may_be, axis=0)
@@ -319,14 +322,13 @@ def _linked(points: NDArray[np.void]) -> Mask:
 
 def smoothed(support: Floats, linked: Mask) -> Floats:
     """The mean (N,) over neighbours along the stripe."""
-    stripe = np.concatenate([[0], np.cumsum(~linked[:-1])])
-    total, count = support.copy(), np.ones(len(support))
-    for way in range(1, SMOOTHED + 1):
-        same = stripe[way:] == stripe[:-way]
-        for here, there in ((slice(None, -way), slice(way, None)), (slice(way, None), slice(None, -way))):
-            total[here] += np.where(same, support[there], 0.0)
-            count[here] += same
-    return np.asarray(total / count)
+    number = np.arange(len(support))
+    ends = np.append(np.flatnonzero(~linked[:-1]), len(support) - 1)  # the last point of each stripe
+    stripe = np.searchsorted(ends, number)
+    first = np.maximum(number - SMOOTHED, np.append(0, ends + 1)[stripe])
+    beyond = np.minimum(number + SMOOTHED, ends[stripe]) + 1
+    total = np.append(0.0, np.cumsum(support))
+    return np.asarray((total[beyond] - total[first]) / (beyond - first))
 
 
 @compiled
