@@ -12,6 +12,7 @@ from pathlib import Path
 from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.files.digest import sha256
+from pipelines.engine.files.names import blob_digest, latest_name, row_key
 from pipelines.engine.files.seal import UNSEALING_ERRORS, sealed, unsealed
 from pipelines.engine.files.secret import make_secret
 from pipelines.engine.plan import Plan, without_places
@@ -20,8 +21,7 @@ from pipelines.engine.store.lease import FOLDER as LEASES
 from pipelines.engine.store.lease import leases
 from pipelines.engine.store.pins import FOLDER as PINS
 from pipelines.engine.store.pins import read_pin
-from pipelines.engine.store.store import Store, latest_name
-from pipelines.engine.trace import blob_digest, row_key
+from pipelines.engine.store.store import Store
 from schemas.base.errors import DamagedError, Finding, RefusedInput
 
 log = logging.getLogger("footscan.store")

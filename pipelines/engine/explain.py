@@ -12,7 +12,8 @@ from typing import Any
 from pipelines.engine.actions.code import CodeIdentity, code_identity, code_text
 from pipelines.engine.actions.key import PreImage
 from pipelines.engine.actions.step import Output, Step, Value
-from pipelines.engine.store.store import Store, plain_hex
+from pipelines.engine.files.names import plain_hex
+from pipelines.engine.store.store import Store
 
 GONE = "its result is gone"
 """Reason of a miss whose pre-image has not changed."""

@@ -5,13 +5,14 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
 from pipelines.engine.explain import code_of, inputs_of, kind_of
+from pipelines.engine.files.names import blob_digest, blob_name, latest_name, row_key, row_name
 from pipelines.engine.files.packs import FOLDER as PACKS
 from pipelines.engine.files.packs import PACKED, in_batches
 from pipelines.engine.store.lease import FOLDER as LEASES
 from pipelines.engine.store.lease import Lease, live_leases
 from pipelines.engine.store.pins import read_pins
-from pipelines.engine.store.store import Store, blob_name, latest_name, row_name
-from pipelines.engine.trace import Actions, blob_digest, read_actions, row_key
+from pipelines.engine.store.store import Store
+from pipelines.engine.trace import Actions, read_actions
 
 FOLDERS = (*PACKED, "blobs", "pins", PACKS, LEASES)
 """Folders of a store."""

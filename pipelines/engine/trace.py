@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import PurePosixPath
 from typing import Any
 
 from pipelines.engine.explain import code_of, inputs_of, kind_of
+from pipelines.engine.files.names import row_key
 from pipelines.engine.store.store import Acceptance, Latest, Row, Store
 from schemas.base.errors import RefusedInput
 from schemas.base.json_files import parse_json
@@ -91,29 +91,6 @@ def read_actions(store: Store) -> Actions:
     names = (name for name, _ in store.files.sizes("latest") if name.endswith(".json"))
     latest_actions = (store.read_latest(name) for name in names)
     return Actions(rows, [latest for latest in latest_actions if latest is not None])
-
-
-def row_key(name: str) -> str | None:
-    """The key in the file name of a row; None for another file.
-
-    Examples
-    --------
-    >>> key = 64 * "a"
-    >>> row_key(f"actions/aa/{key}.json") == key
-    True
-    >>> row_key(f"blobs/aa/{key}") is None
-    True
-    """
-    path = PurePosixPath(name)
-    is_row = path.suffix == ".json" and _is_hex(path.stem) and path.parts[:2] == ("actions", path.stem[:2])
-    return path.stem if is_row and len(path.parts) == 3 else None
-
-
-def blob_digest(name: str) -> str | None:
-    """The digest in the file name of a blob; None for another file."""
-    parts = PurePosixPath(name).parts
-    is_blob = len(parts) == 3 and parts[0] == "blobs" and _is_hex(parts[2]) and parts[1] == parts[2][:2]
-    return parts[2] if is_blob else None
 
 
 def trace(digest: str, actions: Actions, store: Store, scan: str = "") -> Trace | None:
@@ -202,7 +179,3 @@ def parsed(content: bytes | None) -> Any:
         return parse_json("value", content.decode())
     except (RefusedInput, UnicodeDecodeError):
         return None
-
-
-def _is_hex(text: str) -> bool:
-    return len(text) == 64 and set("0123456789abcdef").issuperset(text)

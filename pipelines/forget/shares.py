@@ -4,11 +4,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from pipelines.engine.explain import code_of, inputs_of
+from pipelines.engine.files.names import blob_digest, blob_name, latest_name, row_key, row_name
 from pipelines.engine.garbage_collection import reached
 from pipelines.engine.store.pins import FOLDER as PINS
 from pipelines.engine.store.pins import read_pins
-from pipelines.engine.store.store import Store, blob_name, latest_name, row_name
-from pipelines.engine.trace import Actions, blob_digest, read_actions, row_key
+from pipelines.engine.store.store import Store
+from pipelines.engine.trace import Actions, read_actions
 from pipelines.forget.subject import Subject
 
 

@@ -133,7 +133,7 @@ def _explain(planned: "PlannedStep", plan: "Plan", store: "Store") -> Explanatio
     from pipelines.engine.actions.key import image_text, key_of
     from pipelines.engine.audit import input_digests
     from pipelines.engine.explain import changes, inputs_of
-    from pipelines.engine.store.store import row_name
+    from pipelines.engine.files.names import row_name
 
     step = planned.step
     digests = input_digests(step, {one.step.name: one.outcome for one in plan.steps})

@@ -21,12 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.engine.files.digest import sha256
+from pipelines.engine.files.names import BLOBS, LATEST, ROWS, file_name, split_name
 from pipelines.engine.files.places import Files, RemoteFiles
 
 log = logging.getLogger("footscan.store")
 
-PACKED = ("actions", "latest")
-"""Folders whose files are packed; those are named `FOLDER/ab/DIGEST.json`, by a SHA-256 digest that begins with ab."""
+PACKED = (ROWS, LATEST)
+"""Folders whose files are packed."""
 FOLDER = "packs"
 """Folder of the packs, one folder in it for each of `PACKED`."""
 MANY = 4096
@@ -44,7 +45,6 @@ Table = NDArray[np.void]
 State = Callable[[str], str | None]
 """The state of a file by its name; None if it is missing."""
 
-_FILE = re.compile(r"(\w+)/([0-9a-f]{2})/(\2[0-9a-f]{62})\.json").fullmatch
 _PACK = re.compile(rf"{FOLDER}/\w+/(\d+)-(\d+)-([0-9a-f]{{64}})").fullmatch
 
 
@@ -157,15 +157,15 @@ class PackedFiles:
         Rows that lie by themselves are few, and the others are in packs: none has to be looked for. Blobs of a store at
         a URL are listed, instead of a request for each.
         """
-        packed, states = self._listed_anew("actions").files, self.place.states("actions")
+        packed, states = self._listed_anew(ROWS).files, self.place.states(ROWS)
         is_remote = isinstance(self.place, RemoteFiles)
         if is_remote:
-            states |= self.place.states("blobs")
+            states |= self.place.states(BLOBS)
 
         def state(name: str) -> str | None:
             known = states.get(name)
-            if known is None and name.startswith("actions/"):
-                file = packed.get(_digest(name))
+            if known is None and (parts := _split(name)) is not None and parts[0] == ROWS:
+                file = packed.get(parts[1])
                 return None if file is None else file.state
             return known if is_remote or known is not None else self.place.state(name)
 
@@ -186,19 +186,19 @@ class PackedFiles:
         sizes = {}
         for one in packed:
             for digest, file in self._listed_anew(one).files.items():
-                if (name := _file_name(one, digest)).startswith(inside):
+                if (name := file_name(one, digest.hex())).startswith(inside):
                     sizes[name] = int(file.pack.table["length"][file.number])
         sizes |= {name: size for name, size in self.place.sizes(folder) if not _PACK(name)}
         yield from sorted(sizes.items())
 
     def many_by_themselves(self) -> list[str]:
         """Names of the small files that lie by themselves, of folders with `MANY` of them or more."""
-        by_folder = [[name for name, _ in self.place.sizes(folder) if _FILE(name)] for folder in PACKED]
+        by_folder = [[name for name, _ in self.place.sizes(folder) if split_name(name)] for folder in PACKED]
         return [name for names in by_folder if len(names) >= MANY for name in names]
 
     def pack(self, names: Iterable[str]) -> None:
         """Gather small files that lie by themselves into packs."""
-        for folder, group in groupby(names, key=_folder):
+        for folder, group in groupby(names, key=lambda name: name.partition("/")[0]):
             self._gather(folder, list(group))
 
     def remove_all(self, names: Iterable[str]) -> None:
@@ -206,8 +206,8 @@ class PackedFiles:
         digests: dict[str, set[bytes]] = {}
         for name in names:
             self.place.remove(name)
-            if (match := _FILE(name)) and match[1] in PACKED:
-                digests.setdefault(match[1], set()).add(bytes.fromhex(match[3]))
+            if (parts := _split(name)) is not None:
+                digests.setdefault(parts[0], set()).add(parts[1])
         for folder, removed in digests.items():
             for pack in self._listed_anew(folder).packs:
                 if removed.isdisjoint(pack.table["digest"].tolist()):
@@ -223,12 +223,12 @@ class PackedFiles:
         return [name for index in indexes for name in set(index.listed) - {pack.name for pack in index.packs}]
 
     def _find(self, name: str) -> _Packed | None:
-        match = _FILE(name)
-        if match is None or match[1] not in PACKED:
+        if (parts := _split(name)) is None:
             return None
-        digest, index = bytes.fromhex(match[3]), self._indexes.get(match[1])
+        folder, digest = parts
+        index = self._indexes.get(folder)
         found = None if index is None else index.files.get(digest)
-        return found or self._listed_anew(match[1]).files.get(digest)  # another process may have packed it meanwhile
+        return found or self._listed_anew(folder).files.get(digest)  # another process may have packed it meanwhile
 
     def _listed_anew(self, folder: str) -> _Index:
         """The index of a folder; tables of packs that were not there before are read."""
@@ -269,9 +269,10 @@ class PackedFiles:
         # The last ones alone: an earlier one must stay before what lies between.
         merged = [*takewhile(lambda pack: pack.bytes < PACK_BYTES / 2, reversed(packs))][::-1]
         files = {file.digest: file for pack in merged for file in self._files_of(pack)}
-        for name in names:
+        digests = {name: parts[1] for name in names if (parts := _split(name)) is not None}
+        for name, digest in digests.items():
             with suppress(FileNotFoundError):
-                file = _File(_digest(name), self.place.written(name) or time.time(), self.place.read(name))
+                file = _File(digest, self.place.written(name) or time.time(), self.place.read(name))
                 files[file.digest] = file
         ends = np.cumsum([len(file.data) for file in files.values()])
         for part in np.split(np.array([*files], object), np.flatnonzero(np.diff(ends // PACK_BYTES)) + 1):
@@ -308,19 +309,13 @@ def in_batches(names: Sequence[str], size: int) -> Iterator[Sequence[str]]:
     >>> [len(batch) for batch in in_batches([row, row, row, "blobs/a", "blobs/b", "blobs/c"], 2)]
     [3, 2, 1]
     """
-    for is_packed, group in groupby(names, key=lambda name: _folder(name) in PACKED):
+    for is_packed, group in groupby(names, key=lambda name: _split(name) is not None):
         batch = list(group)
         step = len(batch) if is_packed else size
         yield from (batch[start : start + step] for start in range(0, len(batch), step))
 
 
-def _file_name(folder: str, digest: bytes) -> str:
-    return f"{folder}/{digest.hex()[:2]}/{digest.hex()}.json"
-
-
-def _folder(name: str) -> str:
-    return name.partition("/")[0]
-
-
-def _digest(name: str) -> bytes:
-    return bytes.fromhex(name.rpartition("/")[2].removesuffix(".json"))
+def _split(name: str) -> tuple[str, bytes] | None:
+    """Folder and digest of a file that may lie in a pack; None for another file."""
+    parts = split_name(name)
+    return None if parts is None or parts[0] not in PACKED else (parts[0], bytes.fromhex(parts[1]))

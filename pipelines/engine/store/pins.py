@@ -1,7 +1,8 @@
 """Pins: scans whose present results are kept, whatever is computed for them later."""
 
+from pipelines.engine.files.names import plain_hex
 from pipelines.engine.files.seal import UNSEALING_ERRORS, sealed, unsealed
-from pipelines.engine.store.store import Store, plain_hex
+from pipelines.engine.store.store import Store
 from schemas.base.errors import DamagedError, RefusedInput
 from schemas.base.model import pseudonym
 

@@ -7,13 +7,13 @@ changed since it was checked is not read again (`verified`).
 
 import contextlib
 import logging
-import re
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from pipelines.engine.actions.key import PreImage, key_of
 from pipelines.engine.files.digest import sha256
+from pipelines.engine.files.names import blob_name, latest_name, plain_hex, row_name
 from pipelines.engine.files.packs import PackedFiles, State
 from pipelines.engine.files.places import LocalFiles, open_files
 from pipelines.engine.files.seal import UNSEALING_ERRORS, UnsealedError, sealed, unsealed
@@ -230,38 +230,6 @@ def open_store(place: Path | str, verified: Path | None = None) -> Store:
 def _reopened(files: PackedFiles) -> Store:
     """Open the store of a pickled one in another process."""
     return Store(files, None, secret_of(files.place))
-
-
-def blob_name(digest: str) -> str:
-    """Return the file name of a blob; ValueError if `digest` is not a SHA-256 digest.
-
-    Examples
-    --------
-    >>> blob_name(64 * "a")[:12]
-    'blobs/aa/aaa'
-    """
-    return f"blobs/{plain_hex(digest)[:2]}/{digest}"
-
-
-def row_name(key: str) -> str:
-    """Return the file name of an action's row."""
-    return f"actions/{plain_hex(key)[:2]}/{key}.json"
-
-
-def latest_name(step_name: str) -> str:
-    """Return the name of the file that names the last action of a step."""
-    digest = sha256(step_name.encode())
-    return f"latest/{digest[:2]}/{digest}.json"
-
-
-_IS_HEX = re.compile("[0-9a-f]{64}").fullmatch
-
-
-def plain_hex(digest: Any) -> str:
-    """Return `digest` if it is a SHA-256 digest, else raise ValueError: a text from a file must not become a path."""
-    if not isinstance(digest, str) or not _IS_HEX(digest):
-        raise ValueError(f"{str(digest)[:80]!r} is no SHA-256 digest")
-    return digest
 
 
 def _verified_row(state: str, row: Row, blob_state: str | None) -> VerifiedRow:

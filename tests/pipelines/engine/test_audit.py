@@ -12,10 +12,11 @@ from pipelines.engine.actions.step import Output, SourceFile, Step, Value
 from pipelines.engine.audit import Audit, Difference, repeat, repeatable, sample, verify
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
+from pipelines.engine.files.names import blob_name, latest_name, row_name
 from pipelines.engine.plan import make_plan
 from pipelines.engine.store.lease import lease
 from pipelines.engine.store.pins import pin
-from pipelines.engine.store.store import Row, Store, blob_name, latest_name, row_name
+from pipelines.engine.store.store import Row, Store
 from schemas.base.errors import DamagedError
 from schemas.base.model import canonical_json
 

@@ -9,7 +9,8 @@ import pytest
 from pipelines.engine.actions.key import image_text
 from pipelines.engine.actions.step import Output, Step, Value
 from pipelines.engine.explain import BETWEEN, Change, changes, code_of, inputs_of, kind_of, reason, side_by_side
-from pipelines.engine.store.store import Store, blob_name
+from pipelines.engine.files.names import blob_name
+from pipelines.engine.store.store import Store
 from schemas.base.model import Document
 
 

@@ -10,11 +10,12 @@ import pytest
 
 from pipelines.engine.actions.step import Output, Step, Value
 from pipelines.engine.audit import repeatable
+from pipelines.engine.files.names import blob_name, row_name
 from pipelines.engine.garbage_collection import CODE, VALUES, Garbage, delete, find_garbage, read_contents
 from pipelines.engine.plan import make_plan
 from pipelines.engine.store.lease import lease
 from pipelines.engine.store.pins import pin, unpin
-from pipelines.engine.store.store import Store, blob_name, open_store, row_name
+from pipelines.engine.store.store import Store, open_store
 from schemas.base.errors import DamagedError
 from schemas.base.model import Document
 

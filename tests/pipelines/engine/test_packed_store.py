@@ -9,11 +9,12 @@ import pytest
 
 from pipelines.engine.actions.step import Output, Step, Success, Value
 from pipelines.engine.audit import verify
+from pipelines.engine.files.names import blob_name
 from pipelines.engine.files.places import RemoteFiles
 from pipelines.engine.garbage_collection import delete, find_garbage, read_contents
 from pipelines.engine.plan import State
 from pipelines.engine.pool import StepEnd, Threads
-from pipelines.engine.store.store import Store, blob_name
+from pipelines.engine.store.store import Store
 from pipelines.engine.workspace import Workspace
 
 

@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 
 from pipelines.engine.actions.step import Failure, Output, Step, Success, Value
+from pipelines.engine.files.names import blob_name
 from pipelines.engine.plan import State, make_plan, with_places, without_places
-from pipelines.engine.store.store import Store, blob_name
+from pipelines.engine.store.store import Store
 from schemas.base.model import Document
 
 RunSteps = Callable[..., Any]

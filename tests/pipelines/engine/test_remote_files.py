@@ -15,12 +15,13 @@ from pipelines.engine import audit
 from pipelines.engine import garbage_collection as collect
 from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Failure, Step, Success, Value
+from pipelines.engine.files.names import blob_name, row_name
 from pipelines.engine.files.places import open_files
 from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import Threads
 from pipelines.engine.run import run_plan
 from pipelines.engine.store.lease import lease, live_leases
-from pipelines.engine.store.store import Row, Store, blob_name, open_store, row_name
+from pipelines.engine.store.store import Row, Store, open_store
 from schemas.base.errors import Fault
 
 PLACE = "made-up://bucket/feet"

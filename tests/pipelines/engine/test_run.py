@@ -10,10 +10,11 @@ import pytest
 from pipelines.engine.actions.key import key_of
 from pipelines.engine.actions.step import Failure, Output, SourceFile, Step, Success, Value
 from pipelines.engine.files.file_digests import FileDigests
+from pipelines.engine.files.names import blob_name
 from pipelines.engine.plan import make_plan
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.run import run_plan
-from pipelines.engine.store.store import Row, Store, blob_name
+from pipelines.engine.store.store import Row, Store
 from schemas.base.errors import Fault
 from schemas.base.model import Document
 

@@ -9,8 +9,9 @@ import pytest
 from pipelines.engine.actions.key import key_of
 from pipelines.engine.actions.step import Output, SourceFile, Step, Value
 from pipelines.engine.files.file_digests import FileDigests
-from pipelines.engine.store.store import Row, Store, row_name
-from pipelines.engine.trace import Trace, blob_digest, read_actions, row_key, trace
+from pipelines.engine.files.names import blob_digest, row_key, row_name
+from pipelines.engine.store.store import Row, Store
+from pipelines.engine.trace import Trace, read_actions, trace
 from schemas.base.model import Document
 
 

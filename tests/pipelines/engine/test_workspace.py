@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.engine.store.store import blob_name
+from pipelines.engine.files.names import blob_name
 from pipelines.engine.workspace import Workspace
 
 

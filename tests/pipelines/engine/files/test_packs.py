@@ -12,9 +12,9 @@ import pytest
 
 from pipelines.engine.files import packs
 from pipelines.engine.files.digest import sha256
+from pipelines.engine.files.names import blob_name, latest_name, row_name
 from pipelines.engine.files.packs import PackedFiles
 from pipelines.engine.files.places import Files, open_files
-from pipelines.engine.store.store import blob_name, latest_name, row_name
 from schemas.base.errors import Fault
 
 ROWS = [row_name(sha256(f"row {number}".encode())) for number in range(40)]

@@ -11,11 +11,12 @@ import fsspec
 import pytest
 
 from pipelines.engine.actions.step import Output, Step, Success, Value
+from pipelines.engine.files.names import blob_name
 from pipelines.engine.files.places import Files, LocalFiles, RemoteFiles, open_files
 from pipelines.engine.plan import State, make_plan
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.run import run_plan
-from pipelines.engine.store.store import blob_name, open_store
+from pipelines.engine.store.store import open_store
 from schemas.base.errors import Fault, RefusedInput
 
 NAME = "blobs/ab/abcd"

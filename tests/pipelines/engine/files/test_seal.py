@@ -13,8 +13,9 @@ from pipelines.engine.actions.key import key_of
 from pipelines.engine.audit import seal_store, verify
 from pipelines.engine.files import secret as secret_file
 from pipelines.engine.files.digest import sha256
+from pipelines.engine.files.names import blob_name, row_name
 from pipelines.engine.files.seal import seal_of, sealed, unsealed
-from pipelines.engine.store.store import Row, Store, blob_name, open_store, row_name
+from pipelines.engine.store.store import Row, Store, open_store
 from pipelines.engine.store.verified_index import VerifiedRow
 from schemas.base.errors import RefusedInput
 

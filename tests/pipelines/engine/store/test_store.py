@@ -11,7 +11,8 @@ import pytest
 from pipelines.engine.actions.key import key_of
 from pipelines.engine.files import places as files_module
 from pipelines.engine.files.digest import sha256
-from pipelines.engine.store.store import Latest, Row, Store, blob_name, row_name
+from pipelines.engine.files.names import blob_name, row_name
+from pipelines.engine.store.store import Latest, Row, Store
 from pipelines.engine.store.verified_index import VerifiedRow
 from schemas.base.errors import Fault
 from schemas.base.model import canonical_json

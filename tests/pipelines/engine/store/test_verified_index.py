@@ -15,8 +15,9 @@ from typing import Any
 import pytest
 
 from pipelines.engine.actions.key import key_of
+from pipelines.engine.files.names import blob_name, row_name
 from pipelines.engine.store import verified_index as memory_module
-from pipelines.engine.store.store import Row, Store, blob_name, open_store, row_name
+from pipelines.engine.store.store import Row, Store, open_store
 from pipelines.engine.store.verified_index import VerifiedIndex, VerifiedRow
 
 FLIPS = 150 if (asked := os.environ.get("FOOTSCAN_FUZZ")) is None else 20 * int(asked)
