@@ -61,7 +61,7 @@ OF_DISAGREEMENT = 1.5
 """Errors of the mean of all cameras, relative to their systematic disagreement, and as broad as a camera's view: each
 camera errs, and what all of them have in common does not show. Tuned on `draw_assembled`, seeds 801 to 810 without
 pictures, 511 and 512 with films, and `draw_world`, seeds 6001 to 6024."""
-SWAY_MM, SWAY_STEPS = 0.1, 12.0
+SWAY_MM, SWAY_STEPS = 0.07, 12.0
 """Standard deviation of slow movement of the foot, along X and across, where nothing is known of it, as in
 `footscan.cloud.movement.sway`; and the steps of the travel over which it varies. Over a tenth of a metre it looks like
 the form of another foot. Chosen by hand, the second one for a sway of 0.7 Hz, which turns over in 13 frames."""

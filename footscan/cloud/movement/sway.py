@@ -47,8 +47,8 @@ ROUNDS = 8
 SIZES_MM = 0.05 * 2.0 ** np.arange(6)
 """Standard deviations of the movement along an axis that are tried: those of a foot that stands on glass, to those of
 one that steps."""
-RARER = 2.0
-"""A size is rarer than half of it by two to the power of this: without any comparison 0.1 mm are expected. Chosen by
+RARER = 3.0
+"""A size is rarer than half of it by two to the power of this: without any comparison 0.07 mm are expected. Chosen by
 hand."""
 
 
