@@ -149,7 +149,7 @@ def check(measures: Measures) -> None:
     assert wrong == {}
 
 
-@pytest.mark.parametrize("shape", (SOLE_OPEN | OTHERS | SHELLS).values(), ids=(SOLE_OPEN | OTHERS | SHELLS).keys())
+@pytest.mark.parametrize("shape", OTHERS.values(), ids=OTHERS.keys())
 def test_no_measure_that_is_ok_is_wrong(shape: Callable[[], Shape]) -> None:
     check(taken(shape())[1])
 
@@ -157,6 +157,7 @@ def test_no_measure_that_is_ok_is_wrong(shape: Callable[[], Shape]) -> None:
 @pytest.mark.parametrize("shape", SOLE_OPEN.values(), ids=SOLE_OPEN.keys())
 def test_a_sole_that_was_not_seen_is_closed_flat_by_the_floor(shape: Callable[[], Shape]) -> None:
     mesh, found = taken(shape())
+    check(found)
     assert "the sole was not seen and was closed flat at the floor" in mesh.notes
     assert mesh.closing is not None
     height = mesh.vertices @ mesh.to_floor[2, :3] + mesh.to_floor[2, 3]
@@ -175,6 +176,7 @@ def test_a_sole_that_was_not_seen_is_closed_flat_by_the_floor(shape: Callable[[]
 @pytest.mark.parametrize("shape", SHELLS.values(), ids=SHELLS.keys())
 def test_a_sole_alone_is_measured_as_far_as_it_goes(shape: Callable[[], Shape]) -> None:
     mesh, found = taken(shape())
+    check(found)
     assert "the upper side was not seen, only the sole with its rim" in mesh.notes
     measures, true = found.measures, measured_whole()
     for name in ("arch_index", "chippaux_smirak_index", "staheli_index"):
