@@ -20,6 +20,7 @@ from pipelines.cli.archive.workers import (
     Workers,
     chosen_pool,
 )
+from pipelines.cli.terminal.compiling import compile_loops
 from pipelines.cli.terminal.output import AsJson, message, print_json, print_line, print_table
 from schemas.base.errors import Fault, FootscanError, RefusedInput
 
@@ -114,7 +115,7 @@ def _run(
     if planned.steps:
         message(_summary(planned))
     if planned.to_run >= MANY_STEPS:
-        _compile()
+        compile_loops()
     ends = []
     with StepProgress(planned.to_run, len(job.folders), log) as progress:
 
@@ -136,15 +137,6 @@ def _run(
             for warning in end.warnings:
                 message(f"{end.scan}: {warning}")
     return ends
-
-
-def _compile() -> None:
-    """Compile the loops of a scan on all cores, where that was not done yet."""
-    from footscan.ahead_of_time import compile_ahead, is_compiled
-
-    if not is_compiled():
-        message("compiling for this machine, once; on two cores that takes about half a minute")
-        compile_ahead()
 
 
 def _profile(path: Path | None, *, watch: bool) -> "Profile | None":

@@ -19,6 +19,7 @@ from pipelines.cli.live.options import (
     opened_rig,
     plain_world,
 )
+from pipelines.cli.terminal.compiling import compile_loops
 from pipelines.cli.terminal.output import AsJson, message, print_json, print_line
 from schemas.base.errors import Fault, FootscanError, RefusedInput
 
@@ -122,6 +123,8 @@ def scan(
             end_mm=400.0 if to_mm is None else to_mm, mm_per_s=speed or 400.0 / 11.0,
             dark_grid_mm=grid_mm if texture else DARK_GRID_MM,
         )  # fmt: skip
+    if measure:
+        compile_loops()
     with opened_rig(rig, virtual_folder, world, calibrated=True) as opened:
         used = _with_travel(opened.rig, speed, from_mm, to_mm)
         today = datetime.datetime.now().astimezone().date()

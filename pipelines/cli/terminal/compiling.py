@@ -1,0 +1,12 @@
+"""Compiling, with a message, before a command that measures."""
+
+from pipelines.cli.terminal.output import message
+
+
+def compile_loops() -> None:
+    """Compile the loops of a scan on all cores, where that was not done yet."""
+    from footscan.ahead_of_time import compile_ahead, is_compiled
+
+    if not is_compiled():
+        message("compiling for this machine, once; on two cores that takes about half a minute")
+        compile_ahead()
