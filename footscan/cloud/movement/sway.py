@@ -55,9 +55,9 @@ hand."""
 def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> tuple[float, float] | None:
     """Estimate the standard deviations of the slow movement of a foot, along X and Y, mm.
 
-    They are root mean squares over the probability of each size, given the comparisons. Where these show little, as of
-    a foot on one axis, the size is that of most feet. What a head that is shifted or turned as a whole adds to the
-    distances is estimated along with the movement, for each pair of heads.
+    They are root mean squares over the probability of each size, given the comparisons; where these show little, the
+    size is that of most feet. What a head that is shifted or turned as a whole adds to the distances is estimated along
+    with the movement, for each pair of heads.
 
     Parameters
     ----------
