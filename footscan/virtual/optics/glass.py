@@ -6,6 +6,8 @@ The plate lies between Z = -`THICKNESS_MM` and Z = 0, the face that the foot sta
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.compiled import compiled
+
 Floats = NDArray[np.float64]
 
 THICKNESS_MM = 6.0
@@ -34,18 +36,25 @@ def sine_from_below(source: Floats, points: Floats, passes: int = 1, thickness: 
     -------
     (N,) float64, 0 <= s < 1.
     """
-    offset = points[:, :2] - source[:2]
-    distance = np.sqrt(offset[:, 0] ** 2 + offset[:, 1] ** 2)
-    air = np.maximum(points[:, 2], 0.0) - thickness - source[2]
-    glass = passes * thickness
+    return _sines(np.ascontiguousarray(source), np.ascontiguousarray(points), passes * thickness, thickness)
+
+
+@compiled
+def _sines(source: Floats, points: Floats, glass: float, thickness: float) -> Floats:
     n2 = REFRACTIVE_INDEX**2
-    tangent = distance / (air + glass)
-    for _ in range(_NEWTON_STEPS):
-        # In glass: s / sqrt(n^2 - s^2) with s^2 = q^2 / (1 + q^2) is q / sqrt(n^2 + (n^2 - 1) q^2).
-        root = np.sqrt(n2 + (n2 - 1.0) * tangent**2)
-        excess = air * tangent + glass * tangent / root - distance
-        tangent = tangent - excess / (air + glass * n2 / (root * root * root))
-    return np.asarray(tangent / np.sqrt(1.0 + tangent**2))
+    sines = np.empty(len(points))
+    for k in range(len(points)):
+        x, y = points[k, 0] - source[0], points[k, 1] - source[1]
+        distance = np.sqrt(x * x + y * y)
+        air = max(points[k, 2], 0.0) - thickness - source[2]
+        tangent = distance / (air + glass)
+        for _ in range(_NEWTON_STEPS):
+            # In glass: s / sqrt(n^2 - s^2) with s^2 = q^2 / (1 + q^2) is q / sqrt(n^2 + (n^2 - 1) q^2).
+            root = np.sqrt(n2 + (n2 - 1.0) * (tangent * tangent))
+            excess = air * tangent + glass * tangent / root - distance
+            tangent = tangent - excess / (air + glass * n2 / (root * root * root))
+        sines[k] = tangent / np.sqrt(1.0 + tangent * tangent)
+    return sines
 
 
 def directions_from_below(source: Floats, points: Floats, passes: int = 1, thickness: float = THICKNESS_MM) -> Floats:

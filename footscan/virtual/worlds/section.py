@@ -10,6 +10,7 @@ from footscan.virtual.optics.scene import Mesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 SPACING_MM = 0.3
 """Distance of points along a cut: about a pixel. Chosen by hand."""
@@ -46,16 +47,11 @@ class CutMesh:
 
     def ends_near(self, distance: Floats, mm: float) -> Ints:
         """Vertices, (K,), whose edges may be cut if `distance`, (V,) mm at the vertices, changes by less than `mm`."""
-        first, second = distance[self._edges[:, 0]], distance[self._edges[:, 1]]
-        is_near = np.zeros(len(distance), np.bool_)
-        is_near[self._edges[(np.minimum(first, second) < mm) & (np.maximum(first, second) > -mm)]] = True
-        return np.flatnonzero(is_near)
+        return np.flatnonzero(_ends_near(self._edges, distance, mm))
 
     def cut(self, distance: Floats) -> Cut:
         """Cut where `distance`, (V,) mm at the vertices, is zero."""
-        above = distance > 0.0
-        crosses = above[self._edges[:, 0]] != above[self._edges[:, 1]]
-        edges = np.flatnonzero(crosses)
+        edges = np.flatnonzero(_crosses(self._edges, distance))
         if not len(edges):
             return Cut(np.empty((0, 3)), np.empty((0, 3)))
         row_of_edge = np.full(len(self._edges), -1, np.int64)
@@ -82,6 +78,26 @@ def _resampled(points: Floats, normals: Floats) -> tuple[Floats, Floats]:
     even = np.column_stack([np.interp(at, along, column) for column in points.T])
     turned = np.column_stack([np.interp(at, along, column) for column in normals.T])
     return even, turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30)
+
+
+@compiled
+def _ends_near(edges: Ints, distance: Floats, mm: float) -> Mask:
+    """(V,) whether a vertex is the end of an edge that may be cut if `distance` (V,) changes by less than `mm`."""
+    is_near = np.zeros(len(distance), np.bool_)
+    for edge in range(len(edges)):
+        first, second = distance[edges[edge, 0]], distance[edges[edge, 1]]
+        if min(first, second) < mm and max(first, second) > -mm:
+            is_near[edges[edge, 0]] = is_near[edges[edge, 1]] = True
+    return is_near
+
+
+@compiled
+def _crosses(edges: Ints, distance: Floats) -> Mask:
+    """(E,) whether `distance` (V,) changes its sign along an edge."""
+    crosses = np.empty(len(edges), np.bool_)
+    for edge in range(len(edges)):
+        crosses[edge] = (distance[edges[edge, 0]] > 0.0) != (distance[edges[edge, 1]] > 0.0)
+    return crosses
 
 
 @compiled
