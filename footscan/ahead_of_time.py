@@ -57,11 +57,6 @@ def compile_share(share: int, of: int) -> None:
         loop.compile(tuple(type_of(argument) for argument in arguments))
 
 
-def load_all() -> None:
-    """Load the listed loops into this process; those that are not compiled yet are."""
-    compile_share(0, 1)
-
-
 def spec_of(argument: types.Type) -> Spec:
     """The argument type as JSON.
 

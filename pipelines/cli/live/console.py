@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Thread
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -128,18 +127,7 @@ def _opened(
         light = None if opened.world is None else light_by_hand(rig, 1.0, EXPOSURE_MS)
         settings = settings_of(opened.file, files.captures, files.reference, files.body, light)
         with LiveScanner(rig) as scanner:
-            Thread(target=_get_ready_to_measure, name="load what measures", daemon=True).start()
             guide = None
             if settings is not None:
                 guide = Guide(LiveStanding(scanner), settings, None if opened.world is None else opened.world.put)
             yield LiveAdapter(scanner, archive, results, light, opened.world), guide
-
-
-def _get_ready_to_measure() -> None:
-    """Load what measures a scan, so that the first person who is scanned does not wait for it: some seconds, and half a
-    minute more where its loops are not compiled yet."""
-    import pipelines.live.measuring  # noqa: F401
-    from footscan.ahead_of_time import compile_ahead, load_all
-
-    compile_ahead()
-    load_all()
