@@ -2,12 +2,14 @@
 
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 from chromium import Opened, needs_chromium
 from live_command import COMMANDS, WITHIN_SECONDS, Scanner, order, scanners
+from playwright.sync_api import TimeoutError as NotLoadedError
 from playwright.sync_api import expect
 
 pytestmark = [needs_chromium, pytest.mark.real_time]  # a server is to stop heads within 0.3 s
@@ -32,7 +34,9 @@ def test_stop_does_not_wait_for_connections_of_other_tabs(scanner: Scanner, cont
     process = scanner.start("console")
     assert process.stdout is not None
     address = str(process.stdout.readline()).strip()
-    tabs = [Opened(context.new_page(), address).page for _ in range(TABS)]
+    tabs = [Opened(context.new_page(), address).page for _ in range(TABS - 1)]
+    with suppress(NotLoadedError):  # a tab before it may hold two connections: then all are taken already
+        tabs.append(Opened(context.new_page(), address).page)
     for tab in tabs:
         expect(tab.locator("#state-name")).not_to_have_text("Connecting to the server")
     order(address, "take-over")
