@@ -35,7 +35,7 @@ def test_stop_does_not_wait_for_connections_of_other_tabs(scanner: Scanner, cont
     assert process.stdout is not None
     address = str(process.stdout.readline()).strip()
     tabs = [Opened(context.new_page(), address).page for _ in range(TABS - 1)]
-    with suppress(NotLoadedError):  # a tab before it may hold two connections: then all are taken already
+    with suppress(NotLoadedError):  # it waits for a connection: none is left then
         tabs.append(Opened(context.new_page(), address).page)
     for tab in tabs:
         expect(tab.locator("#state-name")).not_to_have_text("Connecting to the server")
