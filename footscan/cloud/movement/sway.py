@@ -13,18 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from footscan.cloud.fusion.agreement import GAP_STEPS, find_overlaps
-from footscan.cloud.fusion.stripes import Floats, Stripes, traces_of, ways_to_neighbours
-from footscan.cloud.points import stripe_step
+from footscan.cloud.fusion.agreement import find_overlaps
+from footscan.cloud.fusion.stripes import Floats, Stripes
+from footscan.cloud.movement.tremor import LEAST_MM, STEEPEST, chord_beside
 from footscan.robust import MAD_TO_SD, cauchy_weights
 
 Ints = NDArray[np.intp]
 
 REACH_MM = 2.0
 """Largest distance between the stripes of two heads. Chosen by hand."""
-SLOPE_REACH_MM, STEEPEST = 6.0, 3.0
-"""Distance along the normal within which the stripes before and after show the same skin, and its slope along X beyond
-which it is left out. Chosen by hand."""
 CENTRE = np.array([0.0, 50.0])
 """Y and Z, mm, about which heads are turned: the middle of the scan volume."""
 TURN_MM = 50.0
@@ -38,8 +35,6 @@ APART_MM = 1.0
 SHOWS = 0.2
 """Independent comparisons that a stripe and another camera make up: errors of neighbouring points, and of the maps of
 both cameras, are correlated. Chosen by hand, after two scanners (`draw_assembled`, seeds 501 and 502 with films)."""
-LEAST_MM = 0.005
-"""Least spread of the comparisons. Chosen by hand."""
 FEWEST = 200
 """Comparisons that show a movement."""
 ROUNDS = 8
@@ -106,12 +101,7 @@ def _contradictions(stripes: Stripes, heads: Mapping[int, int]) -> _Contradictio
     head_of = np.array([heads.get(int(camera), 0) for camera in stripes.cameras], np.intp)
     own, other = head_of[stripes.camera[overlaps.point]], head_of[overlaps.other]
     between = np.flatnonzero((own > 0) & (other > 0) & (own != other))
-    traces = traces_of(stripes, stripes.yz, stripes.sigma)
-    gap = GAP_STEPS * stripe_step(stripes.points)
-    before, x_before, after, x_after = ways_to_neighbours(
-        overlaps.point[between], SLOPE_REACH_MM, gap, max(len(stripes.cameras), 1), traces
-    ).T
-    slope = (after - before) / np.maximum(x_after - x_before, LEAST_MM)
+    _, slope = chord_beside(stripes, overlaps.point[between])
     good = np.abs(slope) < STEEPEST  # false for NaN
     between, slope = between[good], slope[good]
     point, own, other = overlaps.point[between], own[between], other[between]

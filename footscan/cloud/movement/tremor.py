@@ -110,19 +110,23 @@ class _Comparisons(NamedTuple):
 
 def _compare(stripes: Stripes) -> _Comparisons:
     sample = np.flatnonzero(stripes.points["supported"] & ~stripes.bent & np.any(stripes.normals != 0, axis=1))[::EVERY]
-    ways = ways_to_neighbours(
+    away, slope = chord_beside(stripes, sample)
+    good = (np.abs(slope) < STEEPEST) & (np.abs(away) < FARTHEST_MM)  # false for NaN
+    return _of(stripes, sample[good], away[good], slope[good])
+
+
+def chord_beside(stripes: Stripes, sample: Ints) -> tuple[Floats, Floats]:
+    """How far the points `sample` (M,) lie from the chord between the stripes of the same camera before and after them,
+    (M,) mm along their normals, and the slope (M,) of the chord along X; NaN where there is none."""
+    before, x_before, after, x_after = ways_to_neighbours(
         sample,
         REACH_MM,
         GAP_STEPS * stripe_step(stripes.points),
         max(len(stripes.cameras), 1),
         traces_of(stripes, stripes.yz, stripes.sigma),
-    )
-    before, x_before, after, x_after = ways.T
+    ).T
     x, apart = stripes.x[sample], np.maximum(x_after - x_before, LEAST_MM)
-    away = -(before * (x_after - x) + after * (x - x_before)) / apart
-    slope = (after - before) / apart
-    good = (np.abs(slope) < STEEPEST) & (np.abs(away) < FARTHEST_MM)  # false for NaN
-    return _of(stripes, sample[good], away[good], slope[good])
+    return -(before * (x_after - x) + after * (x - x_before)) / apart, (after - before) / apart
 
 
 def _of(stripes: Stripes, sample: Ints, away: Floats, slope: Floats) -> _Comparisons:
