@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from footscan.compiled import compiled
+
 Floats = NDArray[np.float64]
 
 
@@ -52,7 +54,7 @@ class Quantity(NamedTuple):
         """
         moves = self.gradient * errors
         if shares is not None:
-            moves = shares.T @ moves
+            moves = _moves_of_shared(moves, shares.data, shares.indices, shares.indptr, shares.shape[1])
         deviation = float(np.sqrt(np.sum(moves**2)))
         return deviation if np.isfinite(deviation) else None
 
@@ -67,6 +69,22 @@ class Quantity(NamedTuple):
         doubts = [doubt for doubt in (self.doubt, other.doubt) if doubt is not None]
         gradient = self.gradient - other.gradient
         return Quantity(self.value - other.value, gradient, "; ".join(dict.fromkeys(doubts)) or None)
+
+
+@compiled
+def _moves_of_shared(
+    moves: Floats, shares: Floats, errors: NDArray[np.integer], starts: NDArray[np.integer], count: int
+) -> Floats:
+    """Returns (count,) the moves of the errors that (V,) vertices share, from the rows of a sparse (V, count) matrix.
+
+    A measure rests on few vertices: most moves are 0.
+    """
+    total = np.zeros(count)
+    for vertex in range(len(moves)):
+        if moves[vertex] != 0.0:
+            for k in range(starts[vertex], starts[vertex + 1]):
+                total[errors[k]] += moves[vertex] * shares[k]
+    return total
 
 
 def combined(value: float, *terms: tuple[float, Quantity]) -> Quantity:

@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from footscan.cloud.outliers.contested import FEWEST_AT_END, LEG_MM, NOT_CONTESTED, ends_of
 from footscan.cloud.points import coordinates, stripe_step
+from footscan.compiled import compiled
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
 from schemas.fusion import FusionReport
@@ -114,17 +115,42 @@ class ErrorField(NamedTuple):
 def _shares(places: Floats, reach_mm: float) -> csr_array:
     """(V, N) linear interpolation at `places` (V, D) between errors at the N nodes of a grid, of unit variance."""
     cells = places / reach_mm
-    low = np.floor(cells).astype(np.int64)
-    part = cells - low
-    low -= low.min(axis=0)
-    size = low.max(axis=0) + 2
-    corners = np.array(list(np.ndindex((2,) * places.shape[1])))
-    numbers = np.stack([np.ravel_multi_index((low + corner).T, size) for corner in corners], axis=1)
-    weights = np.stack([np.prod(np.where(corner, part, 1.0 - part), axis=1) for corner in corners], axis=1)
-    weights /= np.sqrt(np.sum(weights**2, axis=1, keepdims=True))
-    nodes, columns = np.unique(numbers, return_inverse=True)
-    starts = np.arange(len(places) + 1) * len(corners)
-    return csr_array((weights.ravel(), columns.ravel(), starts), shape=(len(places), len(nodes)))
+    cells -= np.floor(cells.min(axis=0))
+    size = cells.max(axis=0).astype(np.int64) + 2
+    columns, weights, count = _corners_of_cells(cells, size)
+    starts = np.arange(len(places) + 1) * columns.shape[1]
+    return csr_array((weights.ravel(), columns.ravel(), starts), shape=(len(places), count))
+
+
+@compiled
+def _corners_of_cells(cells: Floats, size: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats, int]:
+    """Returns (V, 2^D) the corners of each place's cell, numbered without gaps in the order of the grid, (V, 2^D) their
+    weights and the number of all corners.
+
+    cells : (V, D) places in a grid of `size` (D,) nodes
+    """
+    dimensions = len(size)
+    corners = 2**dimensions
+    node, weight = np.empty((len(cells), corners), np.int64), np.empty((len(cells), corners))
+    number = np.zeros(np.prod(size), np.int64)
+    for k in range(len(cells)):
+        squares = 0.0
+        for corner in range(corners):
+            place, share = 0, 1.0
+            for axis in range(dimensions):
+                low = int(cells[k, axis])
+                part, ahead = cells[k, axis] - low, (corner >> (dimensions - 1 - axis)) & 1
+                place = place * size[axis] + low + ahead
+                share *= part if ahead else 1.0 - part
+            node[k, corner], weight[k, corner] = place, share
+            number[place] = 1
+            squares += share * share
+        weight[k] /= np.sqrt(squares)
+    number = np.cumsum(number) - 1
+    for k in range(len(cells)):
+        for corner in range(corners):
+            node[k, corner] = number[node[k, corner]]
+    return node, weight, number[-1] + 1
 
 
 class Evidence(NamedTuple):

@@ -100,16 +100,13 @@ def summit(points: Floats, axis: int, sign: int, window: Window, depth: float) -
     (True, False)
     """
     across = [k for k in range(3) if k != axis]
-    low, high = np.array(window, np.float64).T
-    first, second = (points[:, k].copy() for k in across)
-    height = sign * points[:, axis]
-    inside = (first >= low[0]) & (first <= high[0]) & (second >= low[1]) & (second <= high[1])
-    if np.count_nonzero(inside) < 3:
+    low, high = np.ascontiguousarray(np.array(window, np.float64).T)
+    position, height = _within(points, axis, float(sign), low, high, -np.inf)
+    if len(height) < 3:
         return None
-    centre, top = _start(np.column_stack([first[inside], second[inside]]), height[inside], depth)
-    near = height > top - 4 * depth - 2.0
-    near &= (np.abs(first - centre[0]) < 2 * RADIUS_MM[2]) & (np.abs(second - centre[1]) < 2 * RADIUS_MM[2])
-    position, height = np.column_stack([first[near], second[near]]), height[near]
+    centre, top = _start(position, height, depth)
+    wide = 2 * RADIUS_MM[2]
+    position, height = _within(points, axis, float(sign), centre - wide, centre + wide, top - 4 * depth - 2.0)
     cap, fitted_cap = Cap(np.eye(2) / NEAR_MM, depth, LEAST_MISFIT_MM), None
     for round_ in range(ROUNDS):
         fitted = _fit(position - centre, height, cap)
@@ -135,6 +132,19 @@ LINE = np.linspace(-1.0, 1.0, GRID)
 """(GRID,) places across a cap, in radii"""
 DISC = np.array([(u, v) for u in LINE for v in LINE if u * u + v * v <= 1.0])
 """(D, 2) even places on a cap, in radii"""
+
+
+@compiled
+def _within(points: Floats, axis: int, sign: float, low: Floats, high: Floats, least: float) -> tuple[Floats, Floats]:
+    """Returns (N, 2) places across `axis` and (N,) heights of the points between two bounds, from a least height on."""
+    first, second = (1 if axis == 0 else 0), (1 if axis == 2 else 2)
+    position, height, count = np.empty((len(points), 2)), np.empty(len(points)), 0
+    for k in range(len(points)):
+        u, v, up = points[k, first], points[k, second], sign * points[k, axis]
+        if low[0] <= u <= high[0] and low[1] <= v <= high[1] and up >= least:
+            position[count, 0], position[count, 1], height[count] = u, v, up
+            count += 1
+    return position[:count].copy(), height[:count].copy()
 
 
 def _start(position: Floats, height: Floats, depth: float) -> tuple[Floats, float]:

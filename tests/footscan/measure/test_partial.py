@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 import trimesh
+from _pytest.mark import ParameterSet
 from scipy.spatial.transform import Rotation
 
 from footscan.measure.bodies.raw_mesh import RawMesh, prepare_feet
@@ -131,6 +132,19 @@ SHELLS: dict[str, Callable[[], Shape]] = {
 }
 
 
+RARE = (
+    *("cut at 1 mm", "cut at 8 mm", "in metres"),
+    *("without toes, open", "without forefoot, closed", "cut low"),
+    *("sole up to 10 mm", "sole up to 15 mm, closed", "sole up to 25 mm"),
+)
+"""Bodies between others, with the slow tests."""
+
+
+def each(shapes: dict[str, Callable[[], Shape]]) -> list[ParameterSet]:
+    marks = {name: [pytest.mark.slow] if name in RARE else [] for name in shapes}
+    return [pytest.param(shape, id=name, marks=marks[name]) for name, shape in shapes.items()]
+
+
 def taken(shape: Shape) -> tuple[RawMesh, Measures]:
     vertices = Rotation.random(random_state=5).apply(shape[0])
     (mesh,) = prepare_feet(vertices, shape[1])
@@ -149,12 +163,12 @@ def check(measures: Measures) -> None:
     assert wrong == {}
 
 
-@pytest.mark.parametrize("shape", OTHERS.values(), ids=OTHERS.keys())
+@pytest.mark.parametrize("shape", each(OTHERS))
 def test_no_measure_that_is_ok_is_wrong(shape: Callable[[], Shape]) -> None:
     check(taken(shape())[1])
 
 
-@pytest.mark.parametrize("shape", SOLE_OPEN.values(), ids=SOLE_OPEN.keys())
+@pytest.mark.parametrize("shape", each(SOLE_OPEN))
 def test_a_sole_that_was_not_seen_is_closed_flat_by_the_floor(shape: Callable[[], Shape]) -> None:
     mesh, found = taken(shape())
     check(found)
@@ -173,7 +187,7 @@ def test_a_sole_that_was_not_seen_is_closed_flat_by_the_floor(shape: Callable[[]
         assert measures[name].status == "incomplete"
 
 
-@pytest.mark.parametrize("shape", SHELLS.values(), ids=SHELLS.keys())
+@pytest.mark.parametrize("shape", each(SHELLS))
 def test_a_sole_alone_is_measured_as_far_as_it_goes(shape: Callable[[], Shape]) -> None:
     mesh, found = taken(shape())
     check(found)

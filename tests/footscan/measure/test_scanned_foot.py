@@ -16,7 +16,7 @@ from schemas.movement import MovementReport
 
 @pytest.fixture(scope="module")
 def foot() -> Mesh:
-    made = make_foot()
+    made = make_foot(resolution_mm=2.0)
     return Mesh(made.vertices, made.faces)
 
 

@@ -34,6 +34,7 @@ def test_a_scan_with_a_fault_that_can_be_corrected_is_measured(name: str, seed: 
         assert found.error == pytest.approx(0.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_foot_that_has_moved_between_the_passes_is_not_trusted(tmp_path: Path) -> None:
     outcome = outcome_of("foot moved along", 615, tmp_path)
     assert "ok" not in {measure.status for measure in outcome.measures.values()}
