@@ -231,7 +231,7 @@ class Console:
                 self._warning = None
             warning = None if self._warning is None else self._warning[1]
         return {
-            "state": {"name": state.name, "words": state.words, "progress": state.progress},
+            "state": {"name": state.name, "words": state.words, "progress": state.progress, "left_s": state.left_s},
             "action": action,
             "problem": problem,
             "warning": warning,

@@ -2,6 +2,7 @@
 
 import logging
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -16,6 +17,8 @@ Activity = Literal[
     "disconnected", "idle", "preparing", "homing", "filming", "storing", "reconstructing", "done", "failed"
 ]  # fmt: skip
 """`preparing`: the scanner is reserved for work that needs none of its devices, such as a calculation."""
+SETTLED_SECONDS = 5.0
+"""Time from which the rate of an activity is known, and shortest time left that is estimated. Chosen by hand."""
 StateName = Activity | Literal["door open", "alarm"]
 
 
@@ -28,10 +31,17 @@ class ScannerState:
     """What the scanner does, or why it failed."""
     progress: float | None = None
     """Share of the activity that is done, 0 to 1; None if unknown."""
+    left_s: float | None = None
+    """Estimated time that is left, s; None where it is short, or unknown."""
 
     def __str__(self) -> str:
         share = "" if self.progress is None else f" {100 * self.progress:.0f} %"
-        return self.name + share + (f": {self.words}" if self.words else "")
+        left = "" if self.left_s is None else f", about {_in_words(self.left_s)} left"
+        return self.name + share + left + (f": {self.words}" if self.words else "")
+
+
+def _in_words(seconds: float) -> str:
+    return f"{10 * round(seconds / 10):.0f} s" if seconds < 95.0 else f"{seconds / 60:.0f} min"
 
 
 OnState = Callable[[ScannerState], None]
@@ -45,6 +55,7 @@ class StateBoard:
         self._listeners: list[OnState] = []
         self._lock = threading.Lock()
         self._working = threading.Lock()
+        self._since = time.monotonic()
 
     @property
     def state(self) -> ScannerState:
@@ -60,6 +71,7 @@ class StateBoard:
     def tell(self, name: Activity, words: str = "", progress: float | None = None) -> None:
         """Set a new state."""
         with self._lock:
+            self._since = time.monotonic()
             self._state = state = ScannerState(name, words, progress)
             listeners = list(self._listeners)
         for listener in listeners:
@@ -68,7 +80,11 @@ class StateBoard:
     def progress(self, share: float) -> None:
         """Set the progress of the present activity, 0 to 1."""
         with self._lock:
-            self._state = state = replace(self._state, progress=min(max(share, 0.0), 1.0))
+            share = min(max(share, 0.0), 1.0)
+            passed = time.monotonic() - self._since
+            left_s = passed * (1.0 - share) / share if share > 0.0 and passed > SETTLED_SECONDS else None
+            is_long = left_s is not None and left_s > SETTLED_SECONDS
+            self._state = state = replace(self._state, progress=share, left_s=left_s if is_long else None)
             listeners = list(self._listeners)
         for listener in listeners:
             listener(state)

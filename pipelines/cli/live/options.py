@@ -81,15 +81,18 @@ def plain_world(virtual: bool, folder: Path, subject: Literal["block", "nothing"
 
 
 class StateTeller:
-    """Print a line for each state of the scanner."""
+    """Print a line for each state of the scanner, and now and then one of an activity that takes long."""
 
     def __init__(self) -> None:
-        self._told = ("", "")
+        self._told = ("", "", 0)
 
     def __call__(self, state: "ScannerState") -> None:
         """Print the line of a new state."""
-        if (state.name, state.words) != self._told:
-            self._told = (state.name, state.words)
+        tenth = 0 if state.left_s is None or state.progress is None else int(10 * state.progress)
+        told, self._told = self._told, (state.name, state.words, tenth)
+        if tenth and tenth != told[2]:
+            message(str(state))
+        elif (state.name, state.words) != told[:2]:
             message(f"{state.name}: {state.words}" if state.words else state.name)
 
 

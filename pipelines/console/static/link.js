@@ -85,11 +85,12 @@ const footscan = (() => {
   function show(seen) {
     if (latest && latest.action === "jog" && seen.action !== "jog") stayPresent(false);
     latest = seen;
-    const {name, words, progress} = seen.state;
+    const {name, words, progress, left_s: left} = seen.state;
     element("state").dataset.level = LEVELS[name] || "busy";
     say(element("state-name"), NAMES[name] || name);
     say(element("state-words"), name === "done" ? "" : words);
-    element("count").textContent = name === "filming" ? countOf(seen.frames) : "";
+    const count = name === "filming" ? countOf(seen.frames) : "";
+    element("count").textContent = [count, left ? timeLeft(left) : ""].filter(Boolean).join(", ");
     element("progress").hidden = progress === null;
     if (progress !== null) element("progress").value = progress;
     element("others").hidden = seen.in_charge || !seen.others;
@@ -98,6 +99,8 @@ const footscan = (() => {
   }
 
   const counted = (count, what) => `${count.toLocaleString("en")} ${what}${count === 1 ? "" : "s"}`;
+
+  const timeLeft = seconds => seconds < 95 ? `about ${10 * Math.round(seconds / 10)} s left` : `about ${Math.round(seconds / 60)} min left`;
 
   // Not announced by a screen reader: it changes every second.
   function countOf(frames) {
