@@ -215,8 +215,8 @@ def reason_against(module: Path, imported: str) -> str | None:
         return "schemas imports pydantic, yaml and the standard library"
     if package == "footscan" and (top == "pipelines" or top in ORCHESTRATION):
         return "footscan knows nothing of the dataflow, of Dask or of a command line"
-    if package == "footscan" and top == "footscan" and below[:1] in (["compiled"], ["child_process"]):
-        return None  # how loops are compiled and processes end says nothing of what is computed
+    if package == "footscan" and top == "footscan" and below[:1] in (["compiled"], ["child_process"], ["clock"]):
+        return None  # how loops are compiled, processes end and clocks run says nothing of what is computed
     if package == "footscan" and top == "footscan" and (below[:1] == ["virtual"]) != (room == "virtual"):
         return "the virtual scanner and the reconstruction share nothing but schemas"
     return None

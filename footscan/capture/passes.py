@@ -1,11 +1,11 @@
 """One pass of the heads along the foot: standing in the dark, with light, and optionally back in the dark."""
 
 import threading
-import time
 from collections import defaultdict
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
+from footscan import clock
 from footscan.capture.board.head import Travel
 from footscan.capture.board.heads import Heads
 from footscan.capture.cameras.deck import CameraDeck
@@ -165,6 +165,6 @@ def _with_lead(plan: PassPlan, heads: Heads) -> tuple[float, float]:
 
 
 def _stand(deck: CameraDeck) -> Travel:
-    begin = time.monotonic()
+    begin = clock.seconds()
     deck.wait_beyond(begin + DARK_SECONDS, LATEST_SECONDS)
-    return Travel(begin, time.monotonic())
+    return Travel(begin, clock.seconds())

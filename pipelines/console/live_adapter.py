@@ -2,12 +2,12 @@
 
 import datetime
 import shutil
-import time
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
 
+from footscan import clock
 from footscan.capture.cameras.stream import StreamHealth
 from footscan.capture.cameras.usb_bus import Pass
 from pipelines.calibration_check import scanner_check
@@ -45,8 +45,8 @@ class Glass(Protocol):
     subject: str
     """What stands on it."""
 
-    def put(self, subject: str, progress: Callable[[int, int], None] | None = None) -> None:
-        """Put another subject onto it; `progress` hears of the pictures that are made."""
+    def put(self, subject: str) -> None:
+        """Put another subject onto it."""
         ...
 
     def write_known(self, file: Path) -> None:
@@ -123,8 +123,8 @@ class LiveAdapter:
     def film(self, patient: str, side: Side, *, posture: Posture = "unknown", keep_partial: bool) -> Scanned:
         """As `Scanner.film`."""
         if self._glass is not None and side != self._glass.subject:
-            with self._scanner.waiting_for(f"putting the virtual {side} foot onto the glass") as progress:
-                self._glass.put(side, progress)
+            with self._scanner.waiting_for(f"putting the virtual {side} foot onto the glass"):
+                self._glass.put(side)
         today = datetime.datetime.now().astimezone().date()
         name = ScanName(patient, next_scan_name(self._archive, patient, side, today), side, today, posture)
         order = ScanOrder(name, self._archive, self._results, light=self._light, keep_partial=keep_partial)
@@ -170,7 +170,7 @@ class LiveAdapter:
         door = "" if heads.board.watches_door else "; it has no input for a lid: opening a lid stops nothing"
         level = LEVELS.get(state.name, "ok" if heads.board.watches_door else "warning")
         yield Device("Controller", level, f"{state.words}{door}", state.remedy)
-        reports = heads.log.between(time.monotonic() - REPORT_SECONDS, float("inf"))
+        reports = heads.log.between(clock.seconds() - REPORT_SECONDS, float("inf"))
         for head in self._head_numbers:
             if not heads.board.homed:
                 yield Device(f"Head {head}", "warning", "position unknown", "home the heads")

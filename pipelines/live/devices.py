@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Collection
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from footscan import clock
 from footscan.capture.board.head import Head
 from footscan.capture.cameras.devices import CameraDevice, list_cameras
 from footscan.capture.cameras.source import CameraSource
@@ -13,6 +14,7 @@ from footscan.capture.cameras.usb_bus import Pass, UsbCamera, plan_passes
 from footscan.capture.cameras.usb_topology import usb_place
 from footscan.capture.film_frames import CameraTiming
 from footscan.capture.frame_positions import Timed
+from footscan.clock import LONGEST_HOLD_SECONDS
 from schemas.base.errors import RefusedInput
 from schemas.rig import Rig, RigCamera
 
@@ -35,8 +37,17 @@ def heads_of(rig: Rig) -> list[Head]:
 
 
 def sources_of(rig: Rig) -> dict[int, CameraSource]:
-    """Source of the frames of each camera, by camera."""
-    return {camera.id: CameraSource(camera.device, frames_per_second=rig.frames_per_second) for camera in rig.cameras}
+    """Source of the frames of each camera, by camera.
+
+    Those of a virtual world may be silent for as long as its clock may be held.
+    """
+    sources = {
+        camera.id: CameraSource(camera.device, frames_per_second=rig.frames_per_second) for camera in rig.cameras
+    }
+    if not clock.is_of_a_world():
+        return sources
+    longest = LONGEST_HOLD_SECONDS
+    return {camera: replace(source, open_s=longest, read_s=longest) for camera, source in sources.items()}
 
 
 def timing_of(camera: RigCamera, exposure_ms: float | None = None) -> CameraTiming:

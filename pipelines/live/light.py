@@ -1,11 +1,11 @@
 """Light of a scan: laser power and exposure of each camera, set by hand or measured."""
 
-import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+from footscan import clock
 from footscan.capture.board.heads import Heads
 from footscan.capture.cameras.deck import CameraDeck
 from footscan.capture.cameras.stream import CapturedFrame
@@ -108,7 +108,7 @@ def standing_frames(
     The frames of the first `settle_seconds` are left out, and of the last `SETTLE_SECONDS`. A camera that gave no frame
     has an empty list.
     """
-    begin = time.monotonic()
+    begin = clock.seconds()
     jpegs: dict[int, list[bytes]] = {camera: [] for camera in deck.open_cameras}
 
     def keep(frame: CapturedFrame) -> None:

@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
+from footscan import clock
 from footscan.capture.board.heads import SLACK_MM, Heads
 from footscan.capture.cameras.deck import CameraDeck
 from footscan.capture.cameras.stream import CapturedFrame
@@ -114,9 +115,9 @@ class LiveScanner:
             self._refuse_stopped()
             heads.jog(by_mm, mm_per_s, head)
             try:
-                limit = time.monotonic() + JOG_FACTOR * abs(by_mm) / mm_per_s + JOG_SECONDS
+                limit = clock.seconds() + JOG_FACTOR * abs(by_mm) / mm_per_s + JOG_SECONDS
                 x_mm = heads.position_mm()  # a new report, so that the state is that after the order
-                while heads.state.name == "jogging" and time.monotonic() < limit:
+                while heads.state.name == "jogging" and clock.seconds() < limit:
                     time.sleep(WATCH_SECONDS)
                     x_mm = heads.position_mm()
                 moves = [by_mm if moved else 0.0 for moved in heads.carriages.carried(head)]
@@ -140,10 +141,10 @@ class LiveScanner:
         self._stop_heads(ANSWERING if self._working.is_set() else UNDER_WAY)
 
     @contextmanager
-    def waiting_for(self, words: str) -> Iterator[Callable[[int, int], None]]:
-        """Reserve the scanner for work that needs no device; yields a function that reports the progress."""
+    def waiting_for(self, words: str) -> Iterator[None]:
+        """Reserve the scanner for work that needs no device."""
         with self._at_work("preparing", words), self._stop_reported():
-            yield lambda done, total: self._board.tell("preparing", words, done / total)
+            yield
             self._refuse_stopped()
             self._board.tell("disconnected" if self._heads is None else "idle")
 
@@ -384,7 +385,7 @@ class LiveScanner:
             except Fault:
                 with suppress(Fault):  # the state reports it
                     self._stop_heads(UNDER_WAY)
-            for latest in heads.log.between(time.monotonic() - REPORT_SECONDS, math.inf)[-1:]:
+            for latest in heads.log.between(clock.seconds() - REPORT_SECONDS, math.inf)[-1:]:
                 self._board.progress(
                     (latest.x_mm[(plan.head or 1) - 1] - plan.start_mm) / (plan.end_mm - plan.start_mm)
                 )

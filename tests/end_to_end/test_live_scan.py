@@ -9,14 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from footscan.capture import frame_positions
 from footscan.frames.travel import read_positions
 from footscan.recordings.scans import read_scan
-from pipelines.live import storing
-from pipelines.live.rig_file import read_rig, write_rig
 from pipelines.live.virtual import rig as virtual_rig
-from pipelines.live.virtual.world import CAMERAS, LATENCIES_S
-from schemas.rig import RigLatency
+from pipelines.live.virtual.world import CAMERAS
 
 pytestmark = pytest.mark.real_time  # cameras stream while heads move
 
@@ -25,7 +21,7 @@ Footscan = Callable[..., subprocess.CompletedProcess[str]]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of a virtual scanner whose rig says of each camera that it is 40 ms late, give or take 12."""
+    """Of a virtual scanner as it is delivered."""
     return tmp_path_factory.mktemp("virtual")
 
 
@@ -50,15 +46,7 @@ def test_devices_of_a_rig_are_told(footscan: Footscan, folder: Path) -> None:
 def test_a_scan_is_filmed_and_stored(
     footscan: Footscan, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(storing, "LARGEST_SD_MM", 5.0)  # a busy host times frames badly, and says so
-    monkeypatch.setattr(frame_positions, "LARGEST_SD_MM", 5.0)
-    (folder / "calibration-1.json").write_text("{}")  # not used: nothing is measured
-    footscan("devices", "--virtual", "--virtual-folder", folder)
-    rig = read_rig(folder / "rig.yaml")
-    late = RigLatency(seconds=sum(LATENCIES_S) / 2, sd_s=0.012)
-    cameras = [camera.model_copy(update={"latency": late}) for camera in rig.cameras]
-    write_rig(folder / "rig.yaml", rig.model_copy(update={"cameras": cameras}))
-    monkeypatch.setattr(virtual_rig, "_calibrate", None)
+    monkeypatch.setattr(virtual_rig, "_calibrate", None)  # the scanner is delivered with a calibration
     done = footscan(
         "scan", "P0001", "right", "--virtual", "--virtual-folder", folder, "--out", tmp_path / "archive",
         "--from-mm", "180", "--to-mm", "210", "--speed", "60", "--grid-mm", "3", "--no-measure", "--json",

@@ -1,6 +1,6 @@
 """A stand-in of a scanner that films standing objects: it shows frames of a recorded capture."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -63,11 +63,11 @@ class StandingStandIn:
         raise Fault(f"{place}: no heads here")
 
     @contextmanager
-    def waiting_for(self, words: str) -> Iterator[Callable[[int, int], None]]:
+    def waiting_for(self, words: str) -> Iterator[None]:
         self.busy.append(words)
-        yield lambda *_: None
+        yield
 
-    def put(self, subject: str, _progress: Callable[[int, int], None]) -> None:
+    def put(self, subject: str) -> None:
         """Puts `reference K` onto the glass."""
         self.standing = int(subject.removeprefix("reference "))
 

@@ -6,11 +6,11 @@ board does on its own. Positions are machine positions; `heads` converts them to
 
 import atexit
 import threading
-import time
 from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Self
 
+from footscan import clock
 from footscan.capture.board.emergency_stop import HOLD, LastStop, slows_down
 from footscan.capture.board.state import BoardState, state_from
 from footscan.capture.board.termination import BOARDS
@@ -283,9 +283,9 @@ class Controller:
 
         Two welcomes may arrive: one after the restart when the port is opened, and one after our reset.
         """
-        deadline = time.monotonic() + CONNECT_SECONDS
+        deadline = clock.seconds() + CONNECT_SECONDS
         welcome = self._board.wait_for_welcome(0, 0.1)
-        while not welcome and time.monotonic() < deadline:
+        while not welcome and clock.seconds() < deadline:
             self._board.write(RESET)
             welcome = self._board.wait_for_welcome(0, ASKS_EVERY_SECONDS)
         if not welcome:
@@ -322,8 +322,8 @@ class Controller:
         report = self.status().report
         if report.state in ("Run", "Jog"):
             self.hold()
-        deadline = time.monotonic() + self._board.patience_seconds
-        while slows_down(report) and time.monotonic() < deadline:
+        deadline = clock.seconds() + self._board.patience_seconds
+        while slows_down(report) and clock.seconds() < deadline:
             report = self.status().report
 
     def _stop_quietly(self) -> None:

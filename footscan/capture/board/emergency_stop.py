@@ -4,6 +4,7 @@ import threading
 import time
 from contextlib import suppress
 
+from footscan import clock
 from footscan.capture.grbl.protocol import CLOSED, RESET, RESETS, GrblProtocol
 from footscan.capture.grbl.report import Report
 from schemas.base.errors import Fault
@@ -53,7 +54,7 @@ class LastStop:
         if board.poll.rests:  # a board that homes accepts a reset only
             board.let_go(why, LOOKS_SECONDS)
         else:
-            held = time.monotonic()
+            held = clock.seconds()
             board.write_past_all(HOLD)
             board.let_go(why, LOOKS_SECONDS)
             self._wait_until_halted(held)
@@ -61,15 +62,15 @@ class LastStop:
             before = board.standstills
             if not board.write_past_all(RESET):
                 return False
-            deadline = time.monotonic() + WELCOME_SECONDS
-            while time.monotonic() < deadline:
+            deadline = clock.seconds() + WELCOME_SECONDS
+            while clock.seconds() < deadline:
                 if board.standstills > before:
                     return True
                 time.sleep(LOOKS_SECONDS)
         return False
 
     def _wait_until_halted(self, held: float) -> None:
-        while time.monotonic() < held + HALT_SECONDS:
+        while clock.seconds() < held + HALT_SECONDS:
             with suppress(Fault):  # the connection is lost
                 self._board.poll.ask()
             time.sleep(LOOKS_SECONDS)

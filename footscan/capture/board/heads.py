@@ -6,11 +6,11 @@ letting them creep.
 """
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Self
 
+from footscan import clock
 from footscan.capture.board.carriages import AXIS_LETTERS, Carriages
 from footscan.capture.board.controller import Controller
 from footscan.capture.board.head import Head, Travel
@@ -139,7 +139,7 @@ class Heads:
         moved = self.carriages.moved(head).items()
         farthest = max((leader.world(at[axis]) for axis, leader in moved), key=lambda x: abs(x - x_mm))
         if abs(farthest - x_mm) < SLACK_MM / 2.0:
-            now = time.monotonic()
+            now = clock.seconds()
             return Travel(now, now)
         return self._run(farthest, x_mm, speed, 0.0, head)
 
@@ -159,9 +159,9 @@ class Heads:
         way = by if max(x) + by <= self.reach_mm[1] else -by
         target = {axis: at[axis] + head.direction * way for axis, head in self.carriages.leaders.items()}
         feed = CREEP_MM_PER_S * math.sqrt(len(target))
-        begin = time.monotonic()
+        begin = clock.seconds()
         self._go_machine(target, feed, power, seconds)
-        end = time.monotonic()
+        end = clock.seconds()
         self._go_machine({axis: at[axis] for axis in target}, 10.0 * feed, 0.0)
         return Travel(begin, end)
 
@@ -252,10 +252,10 @@ class Heads:
         # The feed is the speed in the space of the axes that move: for three equal ones, sqrt(3) times their speed.
         feed = mm_per_s * math.hypot(*along) / max(*along, 1e-9)
         seconds = abs(end_mm - begin_mm) / mm_per_s + 2.0 * mm_per_s / min(self.setup.mm_per_s2)
-        began = time.monotonic()
+        began = clock.seconds()
         self._brightest = 0.0
         self._go_machine(target, feed, power, seconds)
-        ended = time.monotonic()
+        ended = clock.seconds()
         self._check_light(power, seconds)
         return Travel(began, ended)
 

@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from types import TracebackType
 from typing import Self
 
+from footscan import clock
 from footscan.capture.cameras.frame_clock import FrameTimes
 from footscan.capture.cameras.source import CameraSource
 from footscan.capture.cameras.stream import CameraStream, CapturedFrame, StreamHealth
@@ -86,8 +87,8 @@ class CameraDeck:
 
     def wait_beyond(self, seconds: float, timeout_s: float) -> None:
         """Wait until every open camera has sent a frame after `seconds`, or for `timeout_s`."""
-        end = time.monotonic() + timeout_s
-        while time.monotonic() < end:
+        end = clock.seconds() + timeout_s
+        while clock.seconds() < end:
             last = [self._latest.get(camera) for camera in self.open_cameras]
             if all(frame is not None and frame.seconds > seconds for frame in last):
                 return
@@ -109,13 +110,13 @@ class CameraDeck:
             sink(frame)
 
     def _wait_for(self, cameras: Collection[int], frames: int, timeout_s: float) -> dict[int, str]:
-        end = time.monotonic() + timeout_s
+        end = clock.seconds() + timeout_s
         problems = {}
         for camera, stream in self._opened():
             if camera not in cameras:
                 continue
             try:
-                stream.wait_for_frames(frames, max(end - time.monotonic(), 0.1 if timeout_s else 0.0))
+                stream.wait_for_frames(frames, max(end - clock.seconds(), 0.1 if timeout_s else 0.0))
             except Fault as fault:
                 problems[camera] = str(fault)
         return problems

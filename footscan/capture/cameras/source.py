@@ -12,6 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from footscan import clock
 from schemas.base.errors import Fault, RefusedInput
 from schemas.base.image_size import FRAME_SIZE, ImageSize
 
@@ -104,7 +105,7 @@ def packets(container: "InputContainer", source: CameraSource, stopping: threadi
         if device is not None and not _device_has_frame(device, source, stopping):
             return
         packet = next(demuxed, None)
-        arrived = time.monotonic()
+        arrived = clock.seconds()
         if packet is None or (packet.size == 0 and packet.pts is None):  # the second one is there to flush a decoder
             return
         stamp = None if device is None else driver_stamp(packet.pts, packet.time_base, arrived)

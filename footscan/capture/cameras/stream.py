@@ -6,7 +6,6 @@ looking at; a scan under way has lost the frames in between, and `health` says s
 """
 
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 
+from footscan import clock
 from footscan.capture.cameras.frame_clock import Bools, Floats, FrameTimes, RunningNumber, number_frames
 from footscan.capture.cameras.jpeg_check import torn_reason
 from footscan.capture.cameras.source import CameraSource, opened, packets
@@ -41,7 +41,7 @@ class CapturedFrame:
     number: int
     """Number of earlier exposures of the camera. Provisional: `CameraStream.times` is exact afterwards."""
     seconds: float
-    """`time.monotonic()` s: the stamp of the driver if there is one, or else the arrival of its last byte."""
+    """`clock.seconds()`, s: the stamp of the driver if there is one, or else the arrival of its last byte."""
     jpeg: bytes
     problem: str | None
     """`torn: ...`, `repeated: ...` or `reconnected: ...`; None for a sound frame. Late and lost ones: `times`."""
@@ -66,7 +66,7 @@ class StreamHealth:
     overflowed: int = 0
     """Number of frames for which the receiver had no room: lost, with their places in `times` kept."""
     last_seconds: float | None = None
-    """Arrival of the last frame, `time.monotonic()` s."""
+    """Arrival of the last frame, `clock.seconds()`, s."""
 
 
 class CameraStream:
@@ -88,7 +88,7 @@ class CameraStream:
         self.source = source
         self._deliver = deliver
         self._health = StreamHealth("connecting")
-        self._since = time.monotonic()
+        self._since = clock.seconds()
         self._lock = threading.Lock()
         self._came = threading.Condition(self._lock)
         self._stopping = threading.Event()
@@ -102,7 +102,7 @@ class CameraStream:
         """The present health, even if the driver of the camera does not return."""
         with self._lock:
             health, since = self._health, self._since
-        quiet = time.monotonic() - max(since, health.last_seconds or since)
+        quiet = clock.seconds() - max(since, health.last_seconds or since)
         if health.state == "streaming" and quiet > self.source.read_s:
             problem = f"camera {self.camera}: connected, but no frame for {quiet:.1f} s"
             return replace(health, state="silent", problem=problem)
@@ -119,7 +119,7 @@ class CameraStream:
             return self._health.state == "streaming" and self._health.received >= frames
 
         with self._came:
-            if self._came.wait_for(is_so, timeout_s):
+            if clock.wait_for(self._came, is_so, timeout_s):
                 return
             received = self._health.received
         problem = self.health.problem or "the camera sends too slowly"
@@ -179,6 +179,7 @@ class CameraStream:
         before = b""
         reconnected = self.health.connections > 0
         for packet in packets(container, self.source, self._stopping):
+            clock.received(self.camera)
             problem = None
             if reconnected:
                 problem = "reconnected: first after a lost connection"
@@ -202,7 +203,7 @@ class CameraStream:
                     received=health.received + 1,
                     torn=health.torn + (reason is not None),
                     repeated=health.repeated + is_repeated,
-                    last_seconds=time.monotonic(),
+                    last_seconds=clock.seconds(),
                 )
                 self._came.notify_all()
             try:
@@ -216,7 +217,7 @@ class CameraStream:
     def _tell(self, state: State, problem: str | None) -> None:
         with self._lock:
             self._health = replace(self._health, state=state, problem=problem)
-            self._since = time.monotonic()
+            self._since = clock.seconds()
 
 
 class _ReceiverError(Exception):

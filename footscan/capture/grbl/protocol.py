@@ -6,11 +6,11 @@ for an answer fail.
 """
 
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
+from footscan import clock
 from footscan.capture.grbl.codes import alarm_in_words, error_in_words
 from footscan.capture.grbl.report import Alarm, Answer, Feedback, Garbled, Message, Report, Welcome, read_line
 from footscan.capture.grbl.serial_line import SerialLine
@@ -88,7 +88,7 @@ class GrblProtocol:
         self._line.close()
 
     def write(self, data: bytes) -> float:
-        """Send realtime commands; returns the time at which they were sent, `time.monotonic()` s."""
+        """Send realtime commands; returns the time at which they were sent, `clock.seconds()`, s."""
         return self._line.write(data)
 
     def send(self, line: str, limit_seconds: float) -> list[Message]:
@@ -133,7 +133,7 @@ class GrblProtocol:
         asked = self.poll.ask()
         patience = self.patience_seconds + LOST_QUERY_SECONDS
         with self.changed:
-            while (left := max(asked, self.poll.quiet_until) + patience - time.monotonic()) > 0.0:
+            while (left := max(asked, self.poll.quiet_until) + patience - clock.seconds()) > 0.0:
                 self.refuse_lost()
                 latest = self.poll.latest
                 if latest is not None and latest.asked >= asked and not self.restarting:
@@ -158,7 +158,7 @@ class GrblProtocol:
     def wait_for_welcome(self, before: int, seconds: float) -> bool:
         """Wait for a welcome beyond the number `before`; returns True if it arrived."""
         with self.changed:
-            self.changed.wait_for(lambda: self.welcomes > before or self.lost is not None, seconds)
+            clock.wait_for(self.changed, lambda: self.welcomes > before or self.lost is not None, seconds)
             self.refuse_lost()
             return self.welcomes > before
 
@@ -202,7 +202,7 @@ class GrblProtocol:
                 raise RefusedInput("G-code", f"{expected}, found {line[:40]!r}")
         sent = [Sent(line, len(line) + 1) for line in lines]
         with self.changed:
-            ready = self.changed.wait_for(lambda: self._can_speak(lines), self.patience_seconds)
+            ready = clock.wait_for(self.changed, lambda: self._can_speak(lines), self.patience_seconds)
             self.refuse_lost()
             if self.deaf and self.alarm is not None:
                 raise Fault(alarm_in_words(self.alarm))
@@ -225,9 +225,9 @@ class GrblProtocol:
         left, held = self.patience_seconds + limit_seconds, 0.0
         with self.changed:
             while sent.error is None and sent.failed is None and left > 0.0 and held < LONGEST_HOLD_SECONDS:
-                began = time.monotonic()
+                began = clock.seconds()
                 self.changed.wait(min(left, 0.1))
-                passed = time.monotonic() - began
+                passed = clock.seconds() - began
                 latest = self.poll.latest
                 if latest is not None and latest.report.state in ("Hold", "Door"):
                     held += passed

@@ -3,12 +3,12 @@
 import errno
 import os
 import threading
-import time
 from collections.abc import Callable
 from termios import error as termios_error
 
 import serial
 
+from footscan import clock
 from schemas.base.errors import Fault, RefusedInput
 
 BAUD = 115_200
@@ -60,14 +60,14 @@ class SerialLine:
         self._thread.start()
 
     def write(self, data: bytes) -> float:
-        """Send `data`; returns the time of sending, `time.monotonic()` s. Fault if the line is lost."""
+        """Send `data`; returns the time of sending, `clock.seconds()`. Fault if the line is lost."""
         try:
             with self._writing:
                 if not self._open:
                     raise Fault("the connection to the board is closed")
                 if self.sealed is not None and data not in HARMLESS:
                     raise Fault(self.sealed)
-                seconds = time.monotonic()
+                seconds = clock.seconds()
                 self._port.write(data)
                 return seconds
         except (OSError, termios_error) as error:  # SerialException is an OSError
@@ -105,7 +105,7 @@ class SerialLine:
             except (OSError, termios_error, TypeError) as error:  # pyserial's own state is gone when closed under it
                 self._lose(error)
                 return
-            seconds = time.monotonic()
+            seconds = clock.seconds()
             waiting += data
             *lines, rest = waiting.split(b"\n")
             waiting = bytearray(rest[-LONGEST_LINE:])

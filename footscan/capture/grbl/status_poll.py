@@ -2,12 +2,12 @@
 
 import statistics
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from footscan import clock
 from footscan.capture.grbl.report import Report
 from footscan.capture.grbl.serial_line import BYTES_PER_SECOND
 from schemas.base.errors import Fault
@@ -31,7 +31,7 @@ class TimedReport:
 
     report: Report
     asked: float
-    """`time.monotonic()` s of the oldest query that it may answer."""
+    """`clock.seconds()`, s, of the oldest query that it may answer."""
     seconds: float
     """Middle of the interval in which the board can have read its position."""
     uncertain_seconds: float
@@ -49,7 +49,7 @@ class StatusPoll:
         self.rests = False
         """True while no queries are sent."""
         self.quiet_until = 0.0
-        """No queries are sent before this time, `time.monotonic()` s."""
+        """No queries are sent before this time, `clock.seconds()`, s."""
         self._write = write
         self._on_silence = on_silence
         self._patience = patience_seconds
@@ -80,7 +80,7 @@ class StatusPoll:
 
     def ask(self) -> float:
         """Send a query at once; a report whose `asked` is at or after the returned time answers it."""
-        now = time.monotonic()
+        now = clock.seconds()
         if not self._thread.is_alive():
             self._query()
         self._wanted.set()
@@ -96,7 +96,7 @@ class StatusPoll:
             with self._lock:
                 if self._asked is not None:  # a query that arrived too late for an answer before is answered now
                     self._asked = None
-                    self.quiet_until = time.monotonic() + QUIET_SECONDS
+                    self.quiet_until = clock.seconds() + QUIET_SECONDS
             self.rests = False
 
     def forget(self) -> None:
@@ -137,7 +137,7 @@ class StatusPoll:
                 return  # the line is lost, and has reported it
 
     def _ask_or_complain(self) -> None:
-        now = time.monotonic()
+        now = clock.seconds()
         with self._lock:
             asked = self._asked
         if asked is None:
@@ -153,7 +153,7 @@ class StatusPoll:
 
     def _query(self) -> None:
         with self._lock:
-            self._asked = self._asked_again = time.monotonic()
+            self._asked = self._asked_again = clock.seconds()
         self._write(QUERY)
 
     def _interval(self) -> float:

@@ -11,12 +11,12 @@ import signal
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from footscan import clock
 from footscan.virtual.board.firmware import Firmware
 from footscan.virtual.board.line import BoardLine, Direction, Harm, Mishap
 from footscan.virtual.board.memory import Build, Memory
@@ -66,12 +66,12 @@ class Board:
         memory = Memory()
         memory.settings.update(settings or {})
         self.memory = memory
-        self.motion = Motion(self.rails, heads_at, self.gait.motion_seconds(time.monotonic()))
+        self.motion = Motion(self.rails, heads_at, self.gait.motion_seconds(clock.seconds()))
         self.firmware = Firmware(self.motion, memory, build or Build(), self._say)
         self._lock = threading.RLock()
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, name="virtual board", daemon=True)
-        self.firmware.now = time.monotonic()
+        self.firmware.now = clock.seconds()
         self.firmware.power_up()
 
     @property
@@ -133,7 +133,7 @@ class Board:
 
     def pause(self, seconds: float) -> None:
         """The step generator stands still for so long, from now on."""
-        self._now_set(lambda: self.gait.pauses.append((time.monotonic(), seconds)))
+        self._now_set(lambda: self.gait.pauses.append((clock.seconds(), seconds)))
 
     def restart(self) -> None:
         """A reset button pressed, or power lost for a moment: motors stand, the position is forgotten."""
@@ -159,7 +159,7 @@ class Board:
 
     def _happened(self, seconds: float) -> float:
         """That time on the motion's clock, all that happened until then computed."""
-        seconds = min(seconds, time.monotonic())
+        seconds = min(seconds, clock.seconds())
         moment = self.gait.motion_seconds(seconds)
         if moment > self.motion.moment:
             self.motion.advance(moment)
@@ -167,29 +167,29 @@ class Board:
 
     def _now_set(self, change: Callable[[], object]) -> None:
         with self._lock:
-            self._happened(time.monotonic())
+            self._happened(clock.seconds())
             change()
 
     def _power_cycle(self) -> None:
         self.motion.kill()
-        self.firmware.now = time.monotonic()
+        self.firmware.now = clock.seconds()
         self.firmware.power_up(self.boot_seconds)
 
     def _run(self) -> None:
         while not self._ends.is_set():
-            opened = self.line.wait(max(min(TICK_SECONDS, self.line.next_due() - time.monotonic()), 0.0))
+            opened = self.line.wait(max(min(TICK_SECONDS, self.line.next_due() - clock.seconds()), 0.0))
             with self._lock:
                 if opened:  # as on boards with an Arduino's USB
                     self._power_cycle()
-                heard = self.line.read(time.monotonic())
-                now = time.monotonic()  # after what was heard: a query is answered with what is so later
+                heard = self.line.read(clock.seconds())
+                now = clock.seconds()  # after what was heard: a query is answered with what is so later
                 if not self.frozen:
                     self.firmware.receive(heard)
                     self.firmware.tick(now, self.gait.motion_seconds(now))
                 self.line.deliver(now)
 
     def _say(self, text: str) -> None:
-        self.line.write(text, time.monotonic())
+        self.line.write(text, clock.seconds())
 
 
 def main() -> None:

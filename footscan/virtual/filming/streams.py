@@ -9,7 +9,6 @@ import itertools
 import json
 import queue
 import threading
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -20,6 +19,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
 
+from footscan import clock
 from footscan.virtual.filming.stream_faults import FaultKind, StreamFault, fault_of, torn
 
 BOUNDARY = "frame"
@@ -31,9 +31,9 @@ POLL_SECONDS = 0.1
 """Longest time until a server notices its end. Chosen by hand."""
 
 Picture = Callable[[int, float], bytes]
-"""The JPEG that a camera takes at `seconds` of `time.monotonic()`."""
+"""The JPEG that a camera takes at `seconds` of `clock.seconds()`."""
 Exposures = Callable[[int], Iterator[float]]
-"""When a camera exposes, in seconds of `time.monotonic()`; may wait until it happens."""
+"""When a camera exposes, in `clock.seconds()`; may wait until it happens."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class SentFrame:
     number: int
     """On the camera's own clock, from 0."""
     exposed: float
-    """Seconds of `time.monotonic()`."""
+    """`clock.seconds()`."""
     sent: float | None
     """When its last byte was handed to the network; None: never, because of a fault or for lack of a client."""
     fault: FaultKind | None
@@ -57,7 +57,7 @@ def free_running(
 
     def exposures(camera: int) -> Iterator[float]:
         random = np.random.default_rng((seed, camera))
-        first = time.monotonic() + jitter_s + period * random.random()
+        first = clock.seconds() + jitter_s + period * random.random()
         for number in itertools.count() if count is None else range(count):
             yield first + number * period + jitter_s * random.uniform(-1, 1)
 
@@ -153,7 +153,7 @@ class _Camera:
         self.settings = {"exposure": 10.0, "gain": 0.0}
         self.stopping = threading.Event()
         self._is_cut = False
-        self._camera, self._picture, self._exposures = camera, picture, exposures
+        self.number, self._picture, self._exposures = camera, picture, exposures
         self._delays, self._faults = delays, faults
         self._record: list[SentFrame] = []
         self._clients: list[queue.Queue[_Outgoing | None]] = []
@@ -201,23 +201,41 @@ class _Camera:
         with self._lock:
             if client in self._clients:
                 self._clients.remove(client)
+        with suppress(queue.Empty):
+            while True:
+                if (frame := client.get_nowait()) is not None:
+                    self.let_go(frame.number)
+
+    def let_go(self, number: int) -> None:
+        """The clock need not wait for the picture of an exposure any longer."""
+        clock.release((self.number, number))
 
     def note_sent(self, number: int) -> None:
         with self._lock:
             was = self._record[number]
-            self._record[number] = SentFrame(number, was.exposed, time.monotonic(), was.fault)
+            self._record[number] = SentFrame(number, was.exposed, clock.seconds(), was.fault)
 
     def _expose(self) -> None:
+        try:
+            self._expose_on()
+        finally:
+            clock.release(self.number)
+
+    def _expose_on(self) -> None:
         held: list[_Outgoing] = []
         before = b""
         for number, seconds in enumerate(self._exposures):
-            if self.stopping.wait(max(0.0, seconds - time.monotonic())):
+            clock.hold(self.number, seconds)
+            if clock.wait_until(self.stopping, seconds):
                 return
+            due = max(seconds + next(self._delays), clock.seconds())
+            clock.hold((self.number, number), due)
+            clock.release(self.number)
             with self._lock:
                 fault = fault_of(self._faults, number)
                 kind = fault.kind if fault else None
                 self._record.append(SentFrame(number, seconds, None, kind))
-            jpeg = _marked(self._picture(self._camera, seconds), number)
+            jpeg = _marked(self._picture(self.number, seconds), number)
             if kind == "repeat":
                 jpeg = before or jpeg
             before = jpeg
@@ -225,18 +243,25 @@ class _Camera:
                 jpeg = torn(jpeg, number)
             self._cut(kind == "cut")
             if kind in {"drop", "cut"}:
+                self.let_go(number)
                 continue
-            held.append(_Outgoing(number, seconds + next(self._delays), jpeg))
+            held.append(_Outgoing(number, due, jpeg))
             if kind == "stall" and fault is not None and number + 1 < fault.first + fault.count:
+                self.let_go(number)
                 continue
             self._hand_out(held)
             held.clear()
 
     def _hand_out(self, frames: Sequence[_Outgoing]) -> None:
+        waited_for = set()
         with self._lock:
             for client, frame in itertools.product(self._clients, frames):
                 with suppress(queue.Full):  # a client that does not keep up: the record says so
                     client.put_nowait(frame)
+                    waited_for.add(frame.number)
+        for frame in frames:
+            if frame.number not in waited_for:
+                self.let_go(frame.number)
 
     def _cut(self, is_cut: bool) -> None:
         """Hangs up on all clients, and takes none until it is called again."""
@@ -297,10 +322,17 @@ class _Handler(BaseHTTPRequestHandler):
                     if camera.is_attached(client):
                         continue
                     return
-                if frame is None or camera.stopping.wait(max(0.0, frame.due - time.monotonic())):
+                if frame is None:
                     return
-                head = f"Content-Type: image/jpeg\r\nContent-Length: {len(frame.jpeg)}\r\n\r\n"
-                self.wfile.write(b"".join((head.encode(), frame.jpeg, f"\r\n--{BOUNDARY}\r\n".encode())))
+                try:
+                    if clock.wait_until(camera.stopping, frame.due):
+                        return
+                    head = f"Content-Type: image/jpeg\r\nContent-Length: {len(frame.jpeg)}\r\n\r\n"
+                    before = clock.receipts(camera.number)
+                    self.wfile.write(b"".join((head.encode(), frame.jpeg, f"\r\n--{BOUNDARY}\r\n".encode())))
+                    clock.wait_for_receipt(camera.number, before)
+                finally:
+                    camera.let_go(frame.number)
                 camera.note_sent(frame.number)
         except OSError:
             return  # the client has gone

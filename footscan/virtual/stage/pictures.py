@@ -1,14 +1,13 @@
 """Pictures of what stands on the glass, one for each place of the heads on a fine grid, kept in a folder.
 
-Rendering a picture takes a tenth of a second: eight cameras at full rate want fifteen times what two cores render. So
-pictures of a whole travel are rendered before it starts, and once for all: the folder's name tells what is on them.
+Rendering a picture takes a tenth of a second, and eight cameras at full rate want fifteen times what two cores render.
+The world's clock waits for them. What has been rendered is kept: the folder's name tells what is on the pictures.
 """
 
 import os
 import threading
-from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from functools import lru_cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from math import log2
 from multiprocessing import get_context
@@ -27,8 +26,6 @@ from footscan.virtual.optics.texture import random_texture
 from schemas.base.model import canonical_json
 from schemas.parameters.simulation import SimulationSettings
 
-Progress = Callable[[int, int], None]
-
 LEVELS_A_STOP = 4
 """Power, exposure and gain are rendered in steps of a quarter of a stop, 19 %: the nearest step is shown. Chosen by
 hand, for time."""
@@ -36,10 +33,12 @@ FAINTEST = 2.0**-8
 """A power or exposure below this is taken as 0. Chosen by hand."""
 GRAIN_GREY = 3.0
 """Its standard deviation, grey levels; compression leaves about as much as a camera's own noise does."""
-INDICES_A_TASK = 10
-"""Pictures that a process renders at a time. Chosen by hand; no byte depends on it."""
-_RENDERERS_A_PROCESS = 2
-"""A bound of memory: a renderer takes 90 MB."""
+POLITE = 10
+"""Niceness of a process that renders. Chosen by hand."""
+WORKERS = 2
+"""Processes that render, each for the cameras that are its own."""
+_RENDERERS_A_PROCESS = 4
+"""Those of its cameras at one power: a renderer takes 90 MB."""
 
 
 class StageLight(NamedTuple):
@@ -71,14 +70,11 @@ class StagePictures:
     the gain, as shot noise is. Read noise, which would grow with all of the gain, is smaller than that here.
     """
 
-    def __init__(
-        self, subject: Subject, settings: SimulationSettings, cache: Path, grid_mm: float = 0.5, workers: int = 2
-    ) -> None:
+    def __init__(self, subject: Subject, settings: SimulationSettings, cache: Path, grid_mm: float = 0.5) -> None:
         self.grid_mm = grid_mm
         self._job = _Job(subject, settings, grid_mm)
         self._folder = cache / self._job.digest()
-        self._workers = workers
-        self._pool: ProcessPoolExecutor | None = None
+        self._pools: dict[int, ProcessPoolExecutor] = {}
         self._opening = threading.Lock()
 
     def __enter__(self) -> "StagePictures":
@@ -90,9 +86,9 @@ class StagePictures:
     def close(self) -> None:
         """End the processes; rendered pictures stay readable."""
         with self._opening:
-            if self._pool is not None:
-                self._pool.shutdown(cancel_futures=True)
-                self._pool = None
+            for pool in self._pools.values():
+                pool.shutdown(cancel_futures=True)
+            self._pools.clear()
 
     def picture(self, camera: int, index: int, light: StageLight) -> bytes:
         """Returns the JPEG picture, from the folder or rendered now (some tenths of a second)."""
@@ -101,34 +97,8 @@ class StagePictures:
         try:
             return path.read_bytes()
         except FileNotFoundError:
-            self._processes().submit(_render, camera, light, [index], path.parent).result()
+            self._process_of(camera).submit(_render, camera, light, index, path).result()
             return path.read_bytes()
-
-    def prepare(
-        self, cameras: Iterable[int], indices: Iterable[int], light: StageLight, progress: Progress | None = None
-    ) -> int:
-        """Render missing pictures and return their number; `progress` gets the number of pictures done and in total."""
-        light = light.nearest_level()
-        wanted = sorted({self._seen(index) for index in indices})
-        tasks = []
-        for camera in cameras:
-            missing = [index for index in wanted if not self._path(camera, index, light).exists()]
-            tasks += [(camera, missing[k : k + INDICES_A_TASK]) for k in range(0, len(missing), INDICES_A_TASK)]
-        total, done = sum(len(part) for _, part in tasks), 0
-        futures = [
-            self._processes().submit(_render, camera, light, part, self._path(camera, 0, light).parent)
-            for camera, part in tasks
-        ]
-        try:
-            for future, (_, part) in zip(futures, tasks, strict=True):
-                future.result()
-                done += len(part)
-                if progress is not None:
-                    progress(done, total)
-        except BaseException:  # such as a broken pipe: nobody needs the remaining pictures
-            self.close()
-            raise
-        return total
 
     def with_grain(self, jpeg: bytes, number: int) -> bytes:
         """Returns the picture with some more noise: two pictures of a camera never have the same bytes."""
@@ -143,13 +113,13 @@ class StagePictures:
         level = "-".join(f"{factor:.3f}" for factor in light)
         return self._folder / level / f"cam{camera}" / f"{index}.jpg"
 
-    def _processes(self) -> ProcessPoolExecutor:
+    def _process_of(self, camera: int) -> ProcessPoolExecutor:
+        worker = camera % WORKERS
         with self._opening:
-            if self._pool is None:
+            if worker not in self._pools:
                 # Spawned: a forked process inherits locks of threads that it does not have.
-                spawn = get_context("spawn")
-                self._pool = ProcessPoolExecutor(self._workers, spawn, _open_studio, (self._job,))
-            return self._pool
+                self._pools[worker] = ProcessPoolExecutor(1, get_context("spawn"), _open_studio, (self._job,))
+            return self._pools[worker]
 
 
 class _Job(NamedTuple):
@@ -166,15 +136,18 @@ class _Job(NamedTuple):
         content.update(repr((self.grid_mm, self.subject.surface)).encode())
         if mesh is not None:
             content.update(mesh.vertices.tobytes() + mesh.faces.tobytes())
-        for module in _modules_that_render():
-            content.update(module.read_bytes())
+        content.update(digest_of_rendering().encode())
         return content.hexdigest()[:16]
 
 
-def _modules_that_render() -> Iterator[Path]:
+@cache
+def digest_of_rendering() -> str:
+    """SHA-256 of the modules that render."""
     virtual = Path(__file__).parents[1]
-    yield from sorted((virtual / "optics").glob("*.py"))
-    yield from (virtual / "filming/render.py", virtual / "room/room.py", virtual / "portable.py", Path(__file__))
+    others = (virtual / "filming/render.py", virtual / "room/room.py", virtual / "portable.py", Path(__file__))
+    return sha256(
+        b"".join(file.read_bytes() for file in (*sorted((virtual / "optics").glob("*.py")), *others))
+    ).hexdigest()
 
 
 def _nearest_level(factor: float) -> float:
@@ -215,13 +188,13 @@ _studios: list[_Studio] = []
 
 def _open_studio(job: _Job) -> None:
     end_with_parent()
+    os.nice(POLITE)  # the clock waits for pictures, and nothing waits for those who read it
     _studios[:] = [_Studio(job)]
 
 
-def _render(camera: int, light: StageLight, indices: list[int], folder: Path) -> None:
-    """Write pictures into `folder`; each appears under its name when it is complete."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for index in indices:
-        partial = folder / f"{index}.{os.getpid()}.part"
-        partial.write_bytes(_studios[0].jpeg(camera, index, light))
-        partial.replace(folder / f"{index}.jpg")
+def _render(camera: int, light: StageLight, index: int, path: Path) -> None:
+    """Write a picture; it appears under its name when it is complete."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(f".{os.getpid()}.part")
+    partial.write_bytes(_studios[0].jpeg(camera, index, light))
+    partial.replace(path)

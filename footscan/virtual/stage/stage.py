@@ -16,13 +16,13 @@ Approximated is:
 """
 
 import threading
-import time
 from collections.abc import Callable, Iterator
 from itertools import count
 from math import floor
 
 import numpy as np
 
+from footscan import clock
 from footscan.virtual.stage.pictures import StageLight, StagePictures
 
 Positions = tuple[float, float, float]
@@ -46,10 +46,9 @@ class Stage:
 
     Parameters
     ----------
-    position_at : X in mm, scanner frame, of the three heads at a time in seconds, which has passed.
+    position_at : X in mm, scanner frame, of the three heads at a time of the clock, which has passed.
     power_at : of the lasers at such a time, 1 being that of the settings, 0 off.
     light_of : exposure and gain that a camera is set to, 1 being those of the settings.
-    now : the clock of both, seconds.
     """
 
     def __init__(
@@ -58,13 +57,11 @@ class Stage:
         position_at: Callable[[float], Positions],
         power_at: Callable[[float], float] = lambda _: 1.0,
         light_of: Callable[[int], tuple[float, float]] = lambda _: (1.0, 1.0),
-        now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._pictures = pictures
         self._position_at = position_at
         self._power_at = power_at
         self._light_of = light_of
-        self._now = now
         self._closed = threading.Event()
         self._shown: dict[int, tuple[object, int, list[bytes]]] = {}
 
@@ -100,10 +97,11 @@ class Stage:
         """
         random = np.random.default_rng([camera, 6])
         period = 1.0 / frames_per_second
-        start = self._now() + random.uniform(0.0, period)
+        start = clock.seconds() + random.uniform(0.0, period)
         for number in count():
             middle = start + number * period
-            if self._closed.wait(max(middle + jitter_seconds - self._now(), 0.0)):
+            clock.hold(camera, middle + jitter_seconds)
+            if clock.wait_until(self._closed, middle + jitter_seconds):
                 return
             aim = middle + random.uniform(-jitter_seconds, jitter_seconds)
             yield self._crossing_near(camera, aim, middle - jitter_seconds, middle + jitter_seconds)
@@ -135,9 +133,3 @@ class Stage:
             else:
                 after = middle
         return (before + after) / 2.0
-
-
-def indices_of_travel(start_mm: float, end_mm: float, grid_mm: float) -> range:
-    """Returns the indices of the pictures that heads pass, with those around both ends."""
-    low, high = sorted((start_mm, end_mm))
-    return range(floor(low / grid_mm), floor(high / grid_mm) + 2)

@@ -60,7 +60,7 @@ def console(
     ] = None,
     virtual: Virtual = False,
     virtual_folder: VirtualFolder = VIRTUAL_FOLDER,
-    grid_mm: GridMm = 0.5,
+    grid_mm: GridMm = 0.45,
 ) -> None:
     """Run the scanner from a web page. Ctrl-C ends it, with the lasers off."""
     from pipelines.console.console import Console

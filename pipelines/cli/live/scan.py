@@ -101,7 +101,7 @@ def scan(
         float,
         typer.Option(min=0, max=25, rich_help_panel=OF_VIRTUAL, help="Jitter of the cameras' exposure times, ms."),
     ] = 10.0,
-    grid_mm: GridMm = 0.5,
+    grid_mm: GridMm = 0.45,
     as_json: AsJson = False,
 ) -> int:
     """Scan a foot: home, film, store, reconstruct and measure."""

@@ -35,7 +35,6 @@ from schemas.base.errors import RefusedInput
 from schemas.calibration import Calibration, read_calibration
 from schemas.rig import Rig
 
-OnProgress = Callable[[int, int], None]
 FEWEST = 3
 """Placements from which a scanner can be calibrated, unless the object has fewer. Chosen by hand."""
 
@@ -53,7 +52,7 @@ class StandingScanner(Protocol):
         """Film the body, one head after the other, into the folder `place`."""
         ...
 
-    def waiting_for(self, words: str) -> AbstractContextManager[OnProgress]:
+    def waiting_for(self, words: str) -> AbstractContextManager[None]:
         """Reserve the scanner for work that does not need its devices."""
         ...
 
@@ -65,7 +64,7 @@ class Guide:
         self,
         scanner: StandingScanner,
         settings: GuideSettings,
-        put: Callable[[str, OnProgress], None] | None = None,
+        put: Callable[[str], None] | None = None,
     ) -> None:
         """`put` puts `reference K` or `body` onto the glass of a virtual scanner."""
         self._scanner, self._settings, self._put = scanner, settings, put
@@ -148,8 +147,8 @@ class Guide:
             what, subject, words = "body", "body", "A"
         else:
             what, subject, words = "object", f"reference {number}", f"{self._placement(number)}: a"
-        with self._scanner.waiting_for(f"putting the virtual {what} onto the glass") as progress:
-            self._put(subject, progress)
+        with self._scanner.waiting_for(f"putting the virtual {what} onto the glass"):
+            self._put(subject)
         words = f"{words} virtual {what} stands there now. Film it."
         actions = tuple(action for action in self._view.actions if action != "put")
         self._show(replace(self._view, step=step, words=words, complaints=(), actions=actions))

@@ -1,6 +1,6 @@
 """The live scanner as the guide needs it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -39,10 +39,10 @@ class LiveStanding:
             film_body(self._scanner, place, body, light)
 
     @contextmanager
-    def waiting_for(self, words: str) -> Iterator[Callable[[int, int], None]]:
+    def waiting_for(self, words: str) -> Iterator[None]:
         """As `StandingScanner.waiting_for`."""
-        with _stop_in_words(), self._scanner.waiting_for(words) as progress:
-            yield progress
+        with _stop_in_words(), self._scanner.waiting_for(words):
+            yield
 
 
 @contextmanager

@@ -4,11 +4,13 @@ import json
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from queue import Empty, Queue
+from tempfile import TemporaryDirectory
 from typing import Any, Self
 
+from footscan import clock
 from pipelines.live.virtual.world import SubjectName, World
 from schemas.base.errors import Fault
 
@@ -21,15 +23,19 @@ END_SECONDS = 30.0
 class WorldProcess:
     """A virtual world in a process of its own; a context manager."""
 
-    def __init__(self, world: World, progress: Callable[[int, int], None] | None = None) -> None:
-        """Start the process and wait for its pictures, whose progress is reported to `progress`.
+    def __init__(self, world: World) -> None:
+        """Start the process; its clock is that of this process until `close`.
 
         Raises
         ------
         Fault
             The process could not be started.
         """
-        command = [sys.executable, "-m", "pipelines.live.virtual.world", world.model_dump_json()]
+        self._open = ExitStack()
+        folder = Path(
+            self._open.enter_context(TemporaryDirectory(prefix="footscan-clock-", ignore_cleanup_errors=True))
+        )
+        command = [sys.executable, "-m", "pipelines.live.virtual.world", world.model_dump_json(), str(folder / "clock")]
         self.subject = world.subject
         """The subject on the glass."""
         self._process = subprocess.Popen(
@@ -39,7 +45,8 @@ class WorldProcess:
         self._reader = threading.Thread(target=self._read, name="virtual world", daemon=True)
         self._reader.start()
         try:
-            offer = self._answer("ready", progress)
+            offer = self._answer("ready")
+            self._open.enter_context(clock.following(folder / "clock"))
         except BaseException:
             self.close()
             raise
@@ -52,16 +59,16 @@ class WorldProcess:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def put(self, subject: SubjectName, progress: Callable[[int, int], None] | None = None) -> None:
+    def put(self, subject: SubjectName) -> None:
         """Put another subject onto the glass."""
-        self.order({"put": subject}, progress)
+        self.order({"put": subject})
         self.subject = subject
 
     def write_known(self, file: Path) -> None:
         """Write the known measures of the foot on the glass into a file."""
         self.order({"known": str(file.resolve())})
 
-    def order(self, order: dict[str, Any], progress: Callable[[int, int], None] | None = None) -> None:
+    def order(self, order: dict[str, Any]) -> None:
         """Send an order of `pipelines.live.virtual.world.obey`, and wait until it is done."""
         assert self._process.stdin is not None
         try:
@@ -69,10 +76,10 @@ class WorldProcess:
             self._process.stdin.flush()
         except OSError:
             raise Fault("the virtual world has ended") from None
-        self._answer("done", progress)
+        self._answer("done")
 
     def close(self) -> None:
-        """End the process."""
+        """End the process, and go by the system's clock again."""
         if self._process.stdin is not None:
             self._process.stdin.close()
         try:
@@ -83,8 +90,9 @@ class WorldProcess:
         self._reader.join()
         if self._process.stdout is not None:
             self._process.stdout.close()
+        self._open.close()
 
-    def _answer(self, name: str, progress: Callable[[int, int], None] | None) -> Any:
+    def _answer(self, name: str) -> Any:
         while True:
             try:
                 message = self._messages.get(timeout=ANSWER_SECONDS)
@@ -94,8 +102,6 @@ class WorldProcess:
                 raise Fault("the virtual world has ended")
             if name in message:
                 return message[name]
-            if progress is not None and "pictures" in message:
-                progress(*message["pictures"])
 
     def _read(self) -> None:
         assert self._process.stdout is not None

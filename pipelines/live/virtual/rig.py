@@ -24,6 +24,7 @@ from pipelines.live.latencies import measure_latencies, rig_with
 from pipelines.live.light import light_by_hand
 from pipelines.live.rig_file import read_rig, write_rig
 from pipelines.live.scanner import LiveScanner
+from pipelines.live.virtual.delivery import Delivery, delivery_of
 from pipelines.live.virtual.process import WorldProcess
 from pipelines.live.virtual.world import CAMERAS, EXPOSURE_MS, World, block_range_mm
 from pipelines.simulate import filmed_calibration_steps
@@ -48,41 +49,43 @@ class VirtualRig:
 
 @contextmanager
 def virtual_rig(
-    folder: Path, world: World, on_progress: OnProgress, *, calibrated: bool = True
+    folder: Path, world: World, on_progress: OnProgress, *, calibrated: bool = True, is_delivered: bool = True
 ) -> Iterator[VirtualRig]:
     """Run the virtual scanner of `folder` in a world of its own, and prepare what is missing in the folder.
 
     Parameters
     ----------
     calibrated : True to make a missing calibration, and to measure missing latencies
+    is_delivered : True to take those with which the scanner is delivered, if there are any
     """
-
-    def pictures(done: int, total: int) -> None:
-        on_progress("pictures", done, total)
-
     file = folder / "rig.yaml"
-    rig = _stored_rig(file, world)
+    delivery = delivery_of(world.scanner_seed) if is_delivered else None
+    rig = _stored_rig(file, world, delivery)
     world = _with_objects(world, folder)
     lacks_latency = calibrated and any(camera.latency is None for camera in rig.cameras)
     calibration = folder / f"calibration-{world.scanner_seed}.json"
     if calibrated and not _has_calibration(rig) and not calibration.exists():
-        on_progress("calibration", 0, 1)
-        _calibrate(folder, calibration, world.scanner_seed)
-    with WorldProcess(world.model_copy(update={"subject": "block"}) if lacks_latency else world, pictures) as process:
+        if delivery is not None:
+            write_atomically(calibration, (delivery.calibration.model_dump_json() + "\n").encode())
+        else:
+            on_progress("calibration", 0, 1)
+            _calibrate(folder, calibration, world.scanner_seed)
+    with WorldProcess(world.model_copy(update={"subject": "block"}) if lacks_latency else world) as process:
         rig = _plugged_in(rig, process, calibration)
         write_rig(file, rig)
         if lacks_latency:
             rig = _with_latencies(rig, world, on_progress)
             write_rig(file, rig)
-            process.put(world.subject, pictures)
+            process.put(world.subject)
         yield VirtualRig(rig, file, process)
 
 
-def _stored_rig(file: Path, world: World) -> Rig:
+def _stored_rig(file: Path, world: World, delivery: Delivery | None) -> Rig:
     scanner = f"virtual-{world.scanner_seed}"
     if file.exists() and (rig := read_rig(file)).scanner == scanner:
         return rig
-    cameras = [RigCamera(id=camera, device=f"camera {camera}") for camera in CAMERAS]
+    latencies = {} if delivery is None else delivery.latencies
+    cameras = [RigCamera(id=camera, device=f"camera {camera}", latency=latencies.get(camera)) for camera in CAMERAS]
     return Rig(format="footscan.rig/1", scanner=scanner, port="unknown", cameras=cameras)
 
 

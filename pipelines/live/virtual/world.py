@@ -1,36 +1,34 @@
 """The virtual world: a board, eight cameras, and the subject on the glass.
 
-    python -m pipelines.live.virtual.world '{"pictures": "...", "subject": "right"}'
+    python -m pipelines.live.virtual.world '{"pictures": "...", "subject": "right"}' CLOCK
 
-runs as a process of its own and, like hardware, shares only a serial port and eight addresses with the scanner. On
-standard output it writes the progress of its pictures and then its addresses, on standard input it reads orders, each a
-JSON document in one line. It ends when standard input ends.
+runs as a process of its own and, like hardware, shares only a serial port and eight addresses with the scanner, and a
+clock, which waits for the pictures. On standard output it writes the addresses, on standard input it reads orders, each
+a JSON document in one line. It ends when standard input ends.
 """
 
 import json
 import sys
 import threading
-import time
 from collections.abc import Iterator, Mapping
-from math import ceil, floor
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field
 
+from footscan import clock
 from footscan.calibration.travel.body import TURN_DEG
 from footscan.mesh.formats.files import read_mesh
 from footscan.virtual.board.board import Board
-from footscan.virtual.board.memory import SET_UP
 from footscan.virtual.board.rails import Gait
 from footscan.virtual.filming.streams import VirtualStreams
 from footscan.virtual.foot.foot import Foot, FootShape, make_foot, sample_shape
 from footscan.virtual.optics.scene import SKIN, Mesh
-from footscan.virtual.stage.pictures import Progress, StageLight, StagePictures, Subject
+from footscan.virtual.stage.pictures import StagePictures, Subject
 from footscan.virtual.stage.reference import read_reference, standard_reference
 from footscan.virtual.stage.reference_stage import NOTHING, block_subject, reference_subject
-from footscan.virtual.stage.stage import Positions, Stage, indices_of_travel
+from footscan.virtual.stage.stage import Positions, Stage
 from footscan.virtual.stage.standing import stand_on_glass
 from pipelines.engine.files.atomic import write_atomically
 from schemas.base.errors import RefusedInput
@@ -49,21 +47,6 @@ WATCHED_EVERY_S = 0.02
 """Interval at which the middle of the travel is watched for."""
 MOVES_SECONDS = 0.1
 """Heads move if their position differs from that so long before."""
-RAIL_MM = (-20.0, 412.0)
-"""Ends of the rails, X."""
-BLOCK_MM_PER_S = 90.0
-"""Largest speed at which heads pass the block."""
-EVEN_SECONDS = 0.3
-"""Time before and behind a travel in which heads move evenly, with light; before it they accelerate."""
-ACCELERATIONS = (120, 121, 122)
-"""Numbers of the board's settings of the accelerations, mm/s^2."""
-SLACK_MM = 2.0
-"""Largest distance of a head from its target, and from the other heads."""
-BODY_REACH_MM = 90.0
-"""Half of the travel over the body that is rendered beforehand, from its middle: the standard body turned by any angle
-does not reach further."""
-CREEP_MM = 1.5
-"""Way of standing heads while a placement is filmed: 3 s at 0.5 mm/s."""
 BLOCK_REACH_MM = 86.0
 """Half of the travel over the block, from its middle: the block does not reach further."""
 
@@ -91,8 +74,9 @@ class World(Document):
     end_mm: float = 400.0
     mm_per_s: Annotated[float, Field(gt=0, le=200)] = 400.0 / 11.0
     """Speed of the heads along a foot."""
-    grid_mm: Annotated[float, Field(gt=0, le=10)] = 0.5
-    """Spacing of the positions with pictures with light."""
+    grid_mm: Annotated[float, Field(gt=0, le=10)] = 0.45
+    """Spacing of the positions with pictures with light. The way between two frames is no multiple of it: exposures
+    would all keep the same distance from the camera's clock."""
     dark_grid_mm: Annotated[float, Field(gt=0, le=400)] = 100.0
     """Spacing of the positions with pictures without light; in the dark a head is shown at the nearest one."""
     ripple: Annotated[float, Field(ge=0, le=0.5)] = 0.0
@@ -110,14 +94,14 @@ class World(Document):
 class VirtualWorld:
     """A running virtual world; a context manager."""
 
-    def __init__(self, world: World, progress: Progress | None = None) -> None:
+    def __init__(self, world: World) -> None:
         self._world = world
         self._settings = SimulationSettings(
             ambient=world.light, scanner_seed=world.scanner_seed, laser_exposure=world.brightness
         )
         self._foot: Foot | None = None
         self._ends, self._is_whole = threading.Event(), threading.Event()
-        self._pictures = self._prepared(world.subject, progress)
+        self._pictures = self._pictures_of(world.subject)
         self.board = Board(gait=Gait(world.ripple)).start()
         self.stage = Stage(self._pictures, self._shown_at, self._power_at, self._light_of)
         random = np.random.default_rng([world.scanner_seed, 9])
@@ -144,9 +128,9 @@ class VirtualWorld:
         """The connections of the scanner: the serial port, and the address of each camera."""
         return {"port": self.board.port, "cameras": {camera: self.streams.url(camera) for camera in CAMERAS}}
 
-    def put(self, subject: SubjectName, progress: Progress | None = None) -> None:
+    def put(self, subject: SubjectName) -> None:
         """Put another subject onto the glass."""
-        before, self._pictures = self._pictures, self._prepared(subject, progress)
+        before, self._pictures = self._pictures, self._pictures_of(subject)
         self.stage.put(self._pictures)
         before.close()
 
@@ -166,27 +150,8 @@ class VirtualWorld:
         self.board.close()
         self._pictures.close()
 
-    def _prepared(self, subject: SubjectName, progress: Progress | None) -> StagePictures:
-        world = self._world
-        pictures = StagePictures(self._subject(subject), self._settings, Path(world.pictures), world.grid_mm)
-        rail = range(floor(RAIL_MM[0] / world.dark_grid_mm), ceil(RAIL_MM[1] / world.dark_grid_mm) + 1)
-        dark = {round(k * world.dark_grid_mm / world.grid_mm) for k in rail}
-        pictures.prepare(CAMERAS, dark, StageLight(0.0), progress)
-        pictures.prepare(CAMERAS, indices_of_travel(*self._lit_mm(subject), world.grid_mm), StageLight(), progress)
-        return pictures
-
-    def _lit_mm(self, subject: SubjectName) -> tuple[float, float]:
-        """Range of X, mm, in which heads may have light."""
-        start, end, speed = self._world.start_mm, self._world.end_mm, self._world.mm_per_s
-        if subject.startswith("reference"):
-            return self._middle_mm, self._middle_mm + CREEP_MM
-        if subject == "block":
-            start, end = block_range_mm(self._world)
-            speed = BLOCK_MM_PER_S
-        if subject == "body":
-            start, end = self._middle_mm - BODY_REACH_MM, self._middle_mm + BODY_REACH_MM
-        run_up = EVEN_SECONDS * speed + speed**2 / (2.0 * min(SET_UP[axis] for axis in ACCELERATIONS)) + SLACK_MM
-        return max(start - run_up, RAIL_MM[0]), min(end + run_up, RAIL_MM[1])
+    def _pictures_of(self, subject: SubjectName) -> StagePictures:
+        return StagePictures(self._subject(subject), self._settings, Path(self._world.pictures), self._world.grid_mm)
 
     def _shown_at(self, seconds: float) -> Positions:
         """X of the heads in the picture, mm: their position, in the dark rounded to `dark_grid_mm`."""
@@ -199,7 +164,7 @@ class VirtualWorld:
     def _power_at(self, seconds: float) -> float:
         """Power of the lasers in the picture: full power for any light on moving heads.
 
-        While heads accelerate the board dims the lasers, but no pictures of dimmed light are prepared.
+        While heads accelerate the board dims the lasers; pictures of many powers would be seen for a moment each.
         """
         power = self.board.laser_at(seconds)
         moves = self.board.position_at(seconds) != self.board.position_at(seconds - MOVES_SECONDS)
@@ -241,7 +206,7 @@ class VirtualWorld:
         middle_mm = (self._world.start_mm + self._world.end_mm) / 2
         before: float | None = None
         while self._world.pause_s and not self._ends.wait(WATCHED_EVERY_S):
-            now = time.monotonic()
+            now = clock.seconds()
             x = self.board.position_at(now)[0]
             if self.board.laser_at(now) and before is not None and (before < middle_mm) != (x < middle_mm):
                 self.board.pause(self._world.pause_s)
@@ -267,7 +232,7 @@ def obey(world: VirtualWorld, order: Mapping[str, Any]) -> None:
     for name, value in order.items():
         match name:
             case "put":
-                world.put(value, _tell_progress)
+                world.put(value)
             case "known":
                 world.write_known(Path(str(value)))
             case "pause":
@@ -283,15 +248,12 @@ def obey(world: VirtualWorld, order: Mapping[str, Any]) -> None:
 def main() -> None:
     """Run a world until standard input ends."""
     world = World.model_validate_json(sys.argv[1])
-    with VirtualWorld(world, _tell_progress) as running:
+    own_clock = clock.WorldClock(Path(sys.argv[2]))
+    with clock.keeping(own_clock), VirtualWorld(world) as running:
         _tell({"ready": running.offer})
         for line in sys.stdin:
             obey(running, json.loads(line))
             _tell({"done": line.strip()})
-
-
-def _tell_progress(done: int, total: int) -> None:
-    _tell({"pictures": [done, total]})
 
 
 def _tell(document: Mapping[str, Any]) -> None:

@@ -13,7 +13,7 @@ from footscan.virtual.filming.renderers import Shot, Studio
 from footscan.virtual.optics.scene import MATT_GREY, Mesh
 from footscan.virtual.stage.pictures import StageLight, StagePictures, Subject
 from footscan.virtual.stage.reference_stage import NOTHING, block_subject, foot_subject, reference_subject
-from footscan.virtual.stage.stage import FRAMES_PER_SECOND, Stage, indices_of_travel
+from footscan.virtual.stage.stage import FRAMES_PER_SECOND, Stage
 from schemas.parameters.simulation import SimulationSettings
 
 SETTINGS = SimulationSettings()
@@ -35,13 +35,13 @@ class Clock:
 
 @pytest.fixture(scope="module")
 def block_pictures(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StagePictures]:
-    with StagePictures(block_subject(200.0), SETTINGS, tmp_path_factory.mktemp("stage"), workers=1) as pictures:
+    with StagePictures(block_subject(200.0), SETTINGS, tmp_path_factory.mktemp("stage")) as pictures:
         yield pictures
 
 
 @pytest.fixture(scope="module")
 def empty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StagePictures]:
-    with StagePictures(NOTHING, SETTINGS, tmp_path_factory.mktemp("empty"), workers=1) as pictures:
+    with StagePictures(NOTHING, SETTINGS, tmp_path_factory.mktemp("empty")) as pictures:
         yield pictures
 
 
@@ -53,7 +53,8 @@ def stage_with(pictures: StagePictures, monkeypatch: pytest.MonkeyPatch, x_at: o
         assert seconds <= clock.seconds + 1e-9, "a camera cannot know the future"
         return (x_at(seconds),) * 3
 
-    stage = Stage(pictures, position_at, now=clock.now)
+    stage = Stage(pictures, position_at)
+    monkeypatch.setattr("footscan.clock.seconds", clock.now)
     monkeypatch.setattr(stage._closed, "wait", clock.wait)
     return stage
 
@@ -81,11 +82,7 @@ def test_levels_are_a_quarter_of_a_stop_apart() -> None:
 
 
 def test_an_empty_scanner_looks_the_same_everywhere(empty: StagePictures) -> None:
-    heard: list[tuple[int, int]] = []
-    assert empty.prepare([1], range(100), StageLight(), lambda done, total: heard.append((done, total))) == 1
-    assert heard == [(1, 1)]
     assert empty.picture(1, 3, StageLight()) == empty.picture(1, 77, StageLight())
-    assert empty.prepare([1], range(100), StageLight()) == 0
 
 
 def test_another_subject_has_other_pictures(tmp_path: Path) -> None:
@@ -180,8 +177,3 @@ def test_subjects_stand_on_the_glass_where_they_should() -> None:
     placed = reference_subject(70.0, placement=1)
     assert placed.mesh is not None
     assert placed.mesh.vertices.min(axis=0) == pytest.approx([30.0, -10.0, 14.0])
-
-
-def test_indices_cover_the_travel() -> None:
-    assert list(indices_of_travel(0.2, 1.2, 0.5)) == [0, 1, 2, 3]
-    assert indices_of_travel(1.2, 0.2, 0.5) == indices_of_travel(0.2, 1.2, 0.5)
