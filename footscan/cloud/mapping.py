@@ -28,7 +28,7 @@ def map_stripe(
 
     Y and Z follow from the pixel by the camera's calibration, X from the position of the head and, if the calibration
     says it, from the place and the turn of its laser plane. A camera that sees two lasers is mapped by both of its
-    maps; `outliers.which_laser` then finds out in which plane each point lies.
+    maps; `lasers.choose` then finds out in which plane each point lies.
 
     Parameters
     ----------

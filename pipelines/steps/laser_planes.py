@@ -8,8 +8,8 @@ import numpy as np
 
 from footscan.calibration.travel.body import Body
 from footscan.calibration.travel.from_film import CameraTravel, with_laser_planes
+from footscan.cloud.lasers.choose import choose_lasers
 from footscan.cloud.mapping import map_stripe
-from footscan.cloud.outliers.which_laser import choose_lasers
 from footscan.frames.travel import x_of_frames
 from pipelines.arrays import unpack
 from schemas.calibration import Calibration

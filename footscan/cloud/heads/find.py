@@ -36,9 +36,9 @@ from footscan.cloud.heads.planes import (
 )
 from footscan.cloud.heads.start import first_places
 from footscan.cloud.heads.verdict import HALF_MM, report_of
-from footscan.cloud.outliers.moments import renumbered
-from footscan.cloud.outliers.other_laser import FARTHEST_MM, LasersSeen, lasers_seen
-from footscan.cloud.outliers.which_laser import choose_lasers
+from footscan.cloud.lasers.choose import choose_lasers
+from footscan.cloud.lasers.moments import renumbered
+from footscan.cloud.lasers.seen import FARTHEST_MM, LasersSeen, lasers_seen
 from footscan.cloud.views import View
 from schemas.heads import HeadsReport
 from schemas.parameters.heads import HeadParameters

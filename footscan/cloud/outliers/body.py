@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from footscan.cloud.outliers.cell_cameras import cameras_around
+from footscan.cloud.cell_cameras import cameras_around
 from footscan.cloud.outliers.support import PLANES_MM
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.mesh.voxels import EMPTY, Voxels, voxelise

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.contact import above_glass, estimate_glass, moved_warning
+from footscan.cloud.lasers.choose import choose_lasers
+from footscan.cloud.lasers.moments import planes_apart
 from footscan.cloud.outliers.body import body_range, is_apart
 from footscan.cloud.outliers.clutter import is_island, is_static
 from footscan.cloud.outliers.contested import NOT_CONTESTED, contested_ends
@@ -15,11 +17,9 @@ from footscan.cloud.outliers.ghost import is_ghost
 from footscan.cloud.outliers.glass import is_below_sole, is_plate
 from footscan.cloud.outliers.inside import is_inside
 from footscan.cloud.outliers.levels import is_far, is_off_median
-from footscan.cloud.outliers.moments import planes_apart
 from footscan.cloud.outliers.off_surface import is_off_surface
 from footscan.cloud.outliers.other_laser import is_of_other_laser
 from footscan.cloud.outliers.support import END, ISOLATED, UNCONFIRMED, judge_segments
-from footscan.cloud.outliers.which_laser import choose_lasers
 from footscan.cloud.points import camera_numbers
 from footscan.cloud.views import View
 from schemas.glass import GlassPlane

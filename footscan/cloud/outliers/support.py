@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.outliers.cell_cameras import cameras_near
+from footscan.cloud.cell_cameras import cameras_near
 from footscan.cloud.outliers.segments import segments_of
 from footscan.cloud.outliers.visibility import CONFIRMED, DENIED, ask_others, sight_of
 from footscan.cloud.points import coordinates, stripe_step

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.outliers.cell_cameras import cameras_around, cameras_near
+from footscan.cloud.cell_cameras import cameras_around, cameras_near
 from footscan.cloud.planes import SUMS, add_point, plane_normal
 from footscan.cloud.views import View
 from footscan.compiled import compiled

@@ -118,3 +118,23 @@ def test_what_one_camera_alone_sees_beyond_the_end_is_dropped_if_an_extrapolated
         alone = make_points(seen, 1, 20, plane=seen[:, 0])
         found = is_of_other_laser(np.concatenate([points, alone]), VIEWS)
         np.testing.assert_array_equal(found[len(points) :], dropped)
+
+
+def test_cameras_of_one_head_do_not_confirm_each_other_in_the_stripe_of_another_one() -> None:
+    """The first stripe on a heel is that of the laser that stands ahead; cameras of one head displace it alike."""
+    views = {**VIEWS, 4: View(np.array([200.0, -77.0, 202.0]), np.empty((0, 2)), LOWER)}
+    points, _ = scene(views)
+    y = np.arange(-6.0, 6.0, 0.3)
+    x = np.full(len(y), 40.0 + UPPER.offset_mm)
+    first = np.column_stack([x, y, 30.0 + 0.3 * (x - 50.0) + 0.1 * y])
+    own_plane = 40.0 + LOWER.offset_mm
+    mistaken = []
+    for camera in (3, 4):
+        eye = views[camera].centre + np.array([own_plane, 0.0, 0.0])
+        share = (own_plane - x) / (eye[0] - x)
+        seen = first + share[:, None] * (eye - first)
+        mistaken.append(make_points(seen, camera, 20, plane=np.full(len(y), own_plane)))
+    noisy = first + np.outer(np.linspace(0.0, 0.4, len(y)), [0.0, 0.0, 1.0])
+    alone = make_points(noisy, 1, 20, plane=x)
+    found = is_of_other_laser(np.concatenate([points, *mistaken, alone]), views)[len(points) :]
+    np.testing.assert_array_equal(found, np.repeat([True, True, False], len(y)))

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.outliers.cell_cameras import cameras_around
-from footscan.cloud.outliers.other_laser import smoothed
+from footscan.cloud.cell_cameras import cameras_around
+from footscan.cloud.lasers.seen import LINKED_MM, smoothed
 from footscan.cloud.points import camera_numbers, coordinates, stripe_step
 from footscan.mesh.voxels import voxelise
 
@@ -29,8 +29,6 @@ CELL_PART, CELLS_MM = 0.125, (0.5, 2.0)
 Points of one piece of skin lie in a cell and its neighbours, those mapped by the wrong map beyond. Chosen by hand."""
 LEAST_STEP_MM = 0.5
 """Smallest edge of these cells along the travel; it is that from frame to frame. Chosen by hand."""
-LINKED_MM = 1.0
-"""Distance up to which successive points are of one stripe; they are sampled every 0.3 mm. Chosen by hand."""
 BETTER = 0.5
 """Views by which one place must exceed the other one, for a point to be decided by itself. Chosen by hand."""
 ROUNDS = 3

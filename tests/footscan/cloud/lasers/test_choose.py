@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from footscan.cloud.lasers.choose import choose_lasers
 from footscan.cloud.outliers.remove import NO_POINT, REASONS, remove_outliers
-from footscan.cloud.outliers.which_laser import choose_lasers
 from footscan.cloud.points import make_points
 from schemas.calibration import view_number
 from schemas.parameters.outliers import OutlierParameters

@@ -1,0 +1,1 @@
+"""Which of several lasers made each stripe point, and the moment at which a camera saw it."""
