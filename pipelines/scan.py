@@ -36,6 +36,8 @@ DELIVERED = {
     "report.html": "report",
 }
 """The files of a scan's results, and the kind of step that makes each."""
+SHOWN = ("measures.json", "quality.json", "foot.ply")
+"""Files that the operator's page of a foot is made from."""
 
 
 class ScanCalibration(Protocol):

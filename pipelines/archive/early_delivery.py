@@ -11,16 +11,14 @@ from pipelines.scan import DELIVERED
 
 log = logging.getLogger("footscan.archive")
 
-EARLY = ("foot.stl", "measures.json")
-"""Files of the results that do not wait for verification and report."""
 LAST = "report.html"
 """The file that is there once all are."""
 
 
 class EarlyDelivery:
-    """Delivers the files `EARLY` as soon as all of their steps have ended, of scans that have no results yet.
+    """Delivers each file as soon as its step has ended, of scans that have no results yet.
 
-    A scan with earlier results gets new ones all at once: a report must not stand beside measures of another run.
+    A scan with earlier results gets new ones all at once: a report must not lie beside measures of another run.
 
     Parameters
     ----------
@@ -30,18 +28,14 @@ class EarlyDelivery:
     def __init__(self, workspace: Workspace, folders: Mapping[str, Path]) -> None:
         self._workspace = workspace
         self._folders = {scan: folder for scan, folder in folders.items() if not folder.exists()}
-        self._made: dict[str, dict[str, str]] = {scan: {} for scan in self._folders}
 
     def on_step_end(self, end: StepEnd) -> None:
-        """Deliver the files, if the step was the last of them."""
-        made = self._made.get(end.step.scan)
-        files = [file for file in EARLY if DELIVERED[file] == end.step.kind]
-        if made is None or not files or not isinstance(end.outcome, Success):
+        """Deliver the file that the step made, if any."""
+        folder = self._folders.get(end.step.scan)
+        if folder is None or not isinstance(end.outcome, Success):
             return
-        made |= dict.fromkeys(files, end.outcome.digest)
-        if len(made) < len(EARLY):
-            return
-        problem = self._workspace.deliver(made, self._folders[end.step.scan])
+        made = {file: end.outcome.digest for file, kind in DELIVERED.items() if kind == end.step.kind}
+        problem = self._workspace.deliver(made, folder)
         if problem is not None:  # reported at the end of the scan, if it still is one
             log.debug("%s", problem)
 

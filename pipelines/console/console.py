@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pipelines.console.guidance import guidance
 from pipelines.console.operator_lock import OperatorLock
 from pipelines.console.presence import Presence
-from pipelines.console.scanner import Scanner, Side
+from pipelines.console.scanner import Scanned, Scanner, Side
 from pipelines.console.sitting import ScannedFoot, Sitting, judge_scan
 from pipelines.live.calibrating.guide import Guide
 from schemas.base.errors import FootscanError, RefusedInput
@@ -125,8 +125,18 @@ class Console:
         def film() -> ScannedFoot:
             with self._lock:
                 self._sitting = self._sitting.begun(patient)
-            filmed = self.scanner.film(patient, side, posture=posture, keep_partial=keep_partial)
+            filmed = self.scanner.film(
+                patient, side, posture=posture, keep_partial=keep_partial, on_shown=lambda seen: show(judge(seen))
+            )
+            return judge(filmed)
+
+        def judge(filmed: Scanned) -> ScannedFoot:
             return judge_scan(filmed, self.results)
+
+        def show(foot: ScannedFoot) -> None:
+            with self._lock:
+                self._sitting = self._sitting.with_foot(foot)
+            self._wake.set()
 
         self._begin(page, "scan", film)
 
@@ -209,7 +219,7 @@ class Console:
         with self._lock:
             self._action, self._problem = None, problem
             if foot is not None:
-                self._sitting = self._sitting.added(foot)
+                self._sitting = self._sitting.with_foot(foot)
         self._wake.set()
 
     def _look_on(self) -> None:

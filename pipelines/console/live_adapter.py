@@ -17,7 +17,7 @@ from pipelines.live.light import ScanLight
 from pipelines.live.scan_order import ScanOrder
 from pipelines.live.scanner import REPORT_SECONDS, LiveScanner
 from pipelines.live.state import OnState, ScannerState
-from pipelines.live.storing import ScanName, next_scan_name
+from pipelines.live.storing import FilmedScan, ScanName, next_scan_name
 from schemas.base.errors import FootscanError
 from schemas.base.model import Posture
 from schemas.calibration import read_calibration
@@ -120,7 +120,15 @@ class LiveAdapter:
         """As `Scanner.shine`."""
         self._scanner.shine(SHINE_POWER if self._light is None else self._light.power, SHINE_SECONDS)
 
-    def film(self, patient: str, side: Side, *, posture: Posture = "unknown", keep_partial: bool) -> Scanned:
+    def film(
+        self,
+        patient: str,
+        side: Side,
+        *,
+        posture: Posture = "unknown",
+        keep_partial: bool,
+        on_shown: Callable[[Scanned], None] = lambda _: None,
+    ) -> Scanned:
         """As `Scanner.film`."""
         if self._glass is not None and side != self._glass.subject:
             with self._scanner.waiting_for(f"putting the virtual {side} foot onto the glass"):
@@ -128,11 +136,17 @@ class LiveAdapter:
         today = datetime.datetime.now().astimezone().date()
         name = ScanName(patient, next_scan_name(self._archive, patient, side, today), side, today, posture)
         order = ScanOrder(name, self._archive, self._results, light=self._light, keep_partial=keep_partial)
-        result = self._scanner.scan(order)
-        if self._glass is not None:
-            self._glass.write_known(
-                result.stored.place / KNOWN_FILE
-            )  # when all is measured: nothing can read it before
+
+        def write_known(place: Path) -> None:
+            if self._glass is not None:  # when all is measured: nothing can read it before
+                self._glass.write_known(place / KNOWN_FILE)
+
+        def shown(filmed: FilmedScan) -> None:
+            write_known(filmed.place)
+            on_shown(Scanned(patient, name.scan, side, None, dict(filmed.left_out)))
+
+        result = self._scanner.scan(order, shown)
+        write_known(result.stored.place)
         problem = None if result.measured is None else result.measured.problem
         return Scanned(patient, name.scan, side, problem, dict(result.stored.left_out))
 

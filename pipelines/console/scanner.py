@@ -87,8 +87,16 @@ class Scanner(Protocol):
         """Switch the lasers on for a few seconds; the heads do not move."""
         ...
 
-    def film(self, patient: str, side: Side, *, posture: Posture = "unknown", keep_partial: bool) -> Scanned:
-        """Make a scan, from homing to measures."""
+    def film(
+        self,
+        patient: str,
+        side: Side,
+        *,
+        posture: Posture = "unknown",
+        keep_partial: bool,
+        on_shown: Callable[[Scanned], None] = lambda _: None,
+    ) -> Scanned:
+        """Make a scan, from homing to report; `on_shown` is called when the foot can be shown, before the report."""
         ...
 
     def resume(self) -> None:

@@ -38,6 +38,7 @@ from pipelines.console.pages.results import KINDS, guarded, open_result, version
 from pipelines.console.pages.sitting import sitting_page
 from pipelines.console.scanner import Side
 from pipelines.console.stopping import stop_asked
+from pipelines.scan import SHOWN
 from schemas.base.errors import Fault, FootscanError, RefusedInput
 from schemas.base.model import Document, Posture, Pseudonym
 from schemas.rig import HeadNumber
@@ -50,8 +51,6 @@ ALIVE_SECONDS = 10.0
 """Interval of the signs of life to a page while the state does not change; chosen by hand."""
 PAGES_KEPT = 4
 """Pages of feet in the cache: a bound of memory."""
-PAGE_OF = ("measures.json", "quality.json", "foot.ply")
-"""Files that the page of a foot is made from."""
 PART_BYTES = 256 * 1024
 """Bytes that are read of a file at a time: a bound of memory."""
 BACKLOG = 4096
@@ -234,7 +233,7 @@ class _Pages:
 
         def make() -> str:
             results = self._console.results
-            version = version_of(results, patient, scan, *PAGE_OF)
+            version = version_of(results, patient, scan, *SHOWN)
             return guarded(results / patient / scan, lambda: self._foot(patient, scan, version))
 
         return HTMLResponse(await self._in_worker(make))

@@ -36,9 +36,10 @@ class Sitting:
         """The sitting of `patient`: this one, or a new one if the person is another."""
         return self if patient == self.patient else Sitting(patient)
 
-    def added(self, foot: ScannedFoot) -> "Sitting":
-        """The sitting with one more scan."""
-        return replace(self, feet=(*self.feet, foot))
+    def with_foot(self, foot: ScannedFoot) -> "Sitting":
+        """The sitting with one more scan, or with another judgement of a scan that it has."""
+        others = tuple(other for other in self.feet if other.scanned.scan != foot.scanned.scan)
+        return replace(self, feet=(*others, foot))
 
     def pair_href(self) -> str | None:
         """Address of the page of both feet, the last measured one of each side; None if one is missing."""
@@ -70,6 +71,8 @@ def judge_scan(scanned: Scanned, results: Path) -> ScannedFoot:
         measures = read_measures(results, scanned.patient, scanned.scan)
         quality = read_quality(results, scanned.patient, scanned.scan)
     except RefusedInput as error:
-        return ScannedFoot(Scanned(scanned.patient, scanned.scan, scanned.side, str(error)), "poor")
+        return ScannedFoot(replace(scanned, problem=str(error)), "poor")
+    if measures.finding is not None:
+        return ScannedFoot(replace(scanned, problem=measures.finding), "poor")
     length = measures.measures.get("foot_length")
     return ScannedFoot(scanned, worst(quality_lights(measures, quality)), None if length is None else length.value)

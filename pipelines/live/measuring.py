@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipelines.archive.job import job_of_scan, plan_job, run_job
+from pipelines.engine.actions.step import Success
 from pipelines.engine.pool import StepEnd, Threads
+from pipelines.scan import DELIVERED, SHOWN
 from schemas.base.errors import Fault
 from schemas.measures import Measures
 
@@ -24,15 +26,32 @@ class Measured:
     """All that speaks against the measures, as in `ScanEnd`."""
 
 
-def measure_scan(scan: Path, calibration: Path, results: Path, on_progress: Callable[[float], None]) -> Measured:
-    """Reconstruct and measure a scan folder; `on_progress` is called with the share of the steps that have ended."""
+def measure_scan(
+    scan: Path,
+    calibration: Path,
+    results: Path,
+    on_progress: Callable[[float], None],
+    on_shown: Callable[[], None] = lambda: None,
+) -> Measured:
+    """Reconstruct and measure a scan folder.
+
+    Parameters
+    ----------
+    on_progress : is called with the share of the steps that have ended.
+    on_shown : is called when the foot can be shown, before its report is written; never if a step has failed.
+    """
     planned = plan_job(job_of_scan(scan, calibration, results))
+    missing = {DELIVERED[file] for file in SHOWN}
     ended = 0
 
-    def on_step_end(_: StepEnd) -> None:
+    def on_step_end(end: StepEnd) -> None:
         nonlocal ended
         ended += 1
         on_progress(ended / max(planned.to_run, 1))
+        if end.step.kind in missing and isinstance(end.outcome, Success):
+            missing.remove(end.step.kind)
+            if not missing:
+                on_shown()
 
     for end in run_job(planned, Threads(planned.job.threads), on_step_end):
         measures = None

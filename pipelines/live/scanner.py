@@ -148,8 +148,10 @@ class LiveScanner:
             self._refuse_stopped()
             self._board.tell("disconnected" if self._heads is None else "idle")
 
-    def scan(self, order: ScanOrder) -> LiveResult:
+    def scan(self, order: ScanOrder, on_shown: Callable[["FilmedScan"], None] = lambda _: None) -> LiveResult:
         """Film, store, reconstruct and measure a foot.
+
+        `on_shown` is called when the foot can be shown, before its report is written.
 
         Raises
         ------
@@ -169,7 +171,9 @@ class LiveScanner:
                 from pipelines.live.measuring import measure_scan
 
                 self._board.tell("reconstructing", progress=0.0)
-                measured = measure_scan(stored.place, calibration, order.results, self._board.progress)
+                measured = measure_scan(
+                    stored.place, calibration, order.results, self._board.progress, lambda: on_shown(stored)
+                )
             if measured is not None and measured.problem is not None:
                 self._board.tell("failed", measured.problem)
             else:

@@ -102,11 +102,10 @@
     which.replaceChildren(new Option("all heads", ""), ...heads.map(head => new Option(`head ${head}`, head)));
   }
 
-  // The page in charge opens the result when a scan has ended.
+  // The page in charge opens a result as soon as it can be shown.
   function goToResult(now) {
-    const ended = before && before.action === "scan" && now.action === null && !now.problem;
     const last = now.sitting.feet.at(-1);
-    if (ended && now.in_charge && last && last.href)
+    if (before && now.in_charge && last && last.href && last.href !== before.sitting.feet.at(-1)?.href)
       location.assign(last.href);
   }
 

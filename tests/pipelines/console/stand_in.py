@@ -113,7 +113,15 @@ class StandIn:
             self._wait("shine")
             self.lit = False
 
-    def film(self, patient: str, side: Side, *, posture: Posture = "unknown", keep_partial: bool) -> Scanned:
+    def film(
+        self,
+        patient: str,
+        side: Side,
+        *,
+        posture: Posture = "unknown",
+        keep_partial: bool,
+        on_shown: Callable[[Scanned], None] = lambda _: None,
+    ) -> Scanned:
         self._note(f"film {patient} {side} {posture} {keep_partial}")
         self._stopped.clear()
         with self._board.at_work("filming", "pass 1 of 1"):
@@ -130,6 +138,8 @@ class StandIn:
             folder = self._results / patient / name
             folder.mkdir(parents=True)
             self._deliver(folder, side, posture)
+            on_shown(Scanned(patient, name, side))
+            self._wait("reporting")
             self._board.tell("done", str(folder))
             return Scanned(patient, name, side)
 

@@ -25,7 +25,7 @@ def test_two_feet_of_a_person_make_a_pair(web: TestClient, scanner: StandIn, unt
     assert web.post("/do/connect", json={}).status_code == 204
     until(idle)
     assert web.post("/do/scan", json=RIGHT).status_code == 204
-    sitting = until(lambda seen: bool(seen["sitting"]["feet"]))["sitting"]
+    sitting = until(lambda seen: bool(seen["sitting"]["feet"]) and idle(seen))["sitting"]
     assert sitting == {
         "patient": "P1",
         "feet": [
@@ -37,11 +37,10 @@ def test_two_feet_of_a_person_make_a_pair(web: TestClient, scanner: StandIn, unt
         "pair": None,
     }  # fmt: skip
     assert web.post("/do/scan", json={"patient": "P1", "side": "left"}).status_code == 204
-    assert (
-        until(lambda seen: len(seen["sitting"]["feet"]) == 2)["sitting"]["pair"] == "/pair/P1/2026-11-20-L/2026-11-20-R"
-    )
+    both = until(lambda seen: len(seen["sitting"]["feet"]) == 2 and idle(seen))["sitting"]
+    assert both["pair"] == "/pair/P1/2026-11-20-L/2026-11-20-R"
     assert web.post("/do/scan", json=RIGHT).status_code == 204
-    again = until(lambda seen: len(seen["sitting"]["feet"]) == 3)["sitting"]
+    again = until(lambda seen: len(seen["sitting"]["feet"]) == 3 and idle(seen))["sitting"]
     assert again["pair"] == "/pair/P1/2026-11-20-L/2026-11-20-R-2", "the second try counts"
     page = web.get(again["pair"]).text
     assert "Both feet" in page
@@ -52,6 +51,18 @@ def test_two_feet_of_a_person_make_a_pair(web: TestClient, scanner: StandIn, unt
         "connect", "film P1 right half_weight False", "film P1 left unknown False", "film P1 right half_weight False",
         "film P2 left unknown False",
     ]  # fmt: skip
+
+
+def test_a_foot_is_shown_before_its_report_is_written(web: TestClient, scanner: StandIn, until: Until) -> None:
+    scanner.pause = {"reporting"}
+    web.post("/do/connect", json={})
+    until(idle)
+    assert web.post("/do/scan", json=RIGHT).status_code == 204
+    (foot,) = until(lambda seen: bool(seen["sitting"]["feet"]))["sitting"]["feet"]
+    assert foot["length_mm"] is not None
+    assert "Right foot" in web.get(foot["href"]).text
+    scanner.go.set()
+    assert until(idle)["sitting"]["feet"] == [foot]
 
 
 def test_only_one_thing_is_done_at_a_time(web: TestClient, scanner: StandIn, until: Until) -> None:

@@ -171,15 +171,20 @@ def test_known_measures_are_written_when_all_is_measured(tmp_path: Path, monkeyp
         def write_known(self, file: Path) -> None:
             obey(world, {"known": str(file)})
 
-    def scan(_: object) -> SimpleNamespace:
+    shown: list[bool] = []
+
+    def scan(_: object, on_shown: Callable[[object], None]) -> SimpleNamespace:
         place.mkdir(parents=True)
         assert not (place / KNOWN_FILE).exists()
-        return SimpleNamespace(stored=SimpleNamespace(place=place, left_out={}), measured=None)
+        stored = SimpleNamespace(place=place, left_out={})
+        on_shown(stored)
+        return SimpleNamespace(stored=stored, measured=None)
 
     monkeypatch.setattr(scanner, "scan", scan)
     LiveAdapter(scanner, tmp_path / "archive", tmp_path / "results", glass=OfTest()).film(
-        "P1", "left", keep_partial=False
+        "P1", "left", keep_partial=False, on_shown=lambda _: shown.append((place / KNOWN_FILE).exists())
     )
+    assert shown == [True]
     known = read_json(place / KNOWN_FILE, KnownMeasures)
     assert (known.side, known.measures) == ("left", foot.measures)
     world._foot = None

@@ -27,6 +27,7 @@ from pipelines.live.calibrating.stills import live_stills
 from pipelines.live.light import light_by_hand
 from pipelines.live.state import ScannerState
 from pipelines.live.storing import next_scan_name
+from pipelines.scan import SHOWN
 from schemas.base.errors import Fault, Finding, RefusedInput
 from schemas.base.json_files import read_json
 from schemas.calibration_check import CalibrationCheck
@@ -53,8 +54,15 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
     calibration, results = pristine / "calibration.json", bench.home / "results"
     travel = bench.scanner.rig.travel.model_copy(update={"length_mm": FOOT_MM})
     bench.scanner.rig = bench.scanner.rig.model_copy(update={"travel": travel})
-    result = bench.scanner.scan(bench.order(calibration=calibration, results=results))
+    files: list[set[str]] = []
+    result = bench.scanner.scan(
+        bench.order(calibration=calibration, results=results),
+        lambda filmed: files.append({file.name for file in (results / "P7" / filmed.place.name).iterdir()}),
+    )
     assert bench.scanner.state.name == "done"
+    assert len(files) == 1
+    assert files[0] >= set(SHOWN)
+    assert "report.html" not in files[0]
     begun = [name for name, before in zip(bench.states, ["", *bench.states], strict=False) if name != before]
     assert begun == [
         "disconnected", "idle", "filming", "homing", "filming", "storing", "reconstructing", "done"
