@@ -34,7 +34,7 @@ def main() -> None:
         shutil.copytree(source, scan, ignore=shutil.ignore_patterns("frames.zarr"))
         early: list[float] = []
         runs = {
-            "decoding alone": partial(_decode, films),
+            "decoding alone": partial(decode, films),
             "footscan run": lambda: early.append(_run(scan, calibration.resolve(), Path(place) / "results")),
         }
         seconds = interleave(runs, ROUNDS)
@@ -43,7 +43,8 @@ def main() -> None:
     print_ratios(f"A cold scan, {len(films)} films, {frames} frames, two threads", seconds, 1, "scan")
 
 
-def _decode(films: list[Packets]) -> None:
+def decode(films: list[Packets]) -> None:
+    """Decode all frames on two threads."""
     with ThreadPoolExecutor(THREADS) as pool:
         list(pool.map(lambda film: sum(frame is not None for frame in film.decoded()), films))
 

@@ -36,9 +36,9 @@ LEAST_DELAY_S = 5e-4
 LEAST_SPEED_CHANGE_MM_PER_S = 10.0
 LARGEST_SD_S = 0.005
 """At 36 mm/s this is 0.2 mm."""
-LARGEST_FRAME_SD_S = 0.0075
-"""Of what one frame says of the latency: at 36 mm/s this is 0.27 mm, and a scan refuses frames whose places are known
-to 0.3 mm only."""
+LARGEST_FRAME_SD_S = 0.006
+"""Of what one frame says of the latency: at 36 mm/s this is 0.22 mm. A scan refuses frames whose places are known to
+0.3 mm only, and the latency itself and the motion of the head take their share of that."""
 LEAST_FRAMES = 20
 LEAST_POINTS = 30
 """Least stripe points of a frame that shows the object. Chosen by hand."""
