@@ -71,7 +71,9 @@ def _measure(scan: Path, calibration: Path, results: Path) -> float:
     """Reconstruct and measure a stored scan; returns the seconds until the foot can be shown."""
     shutil.rmtree(results, ignore_errors=True)
     start, shown = time.perf_counter(), []
-    measure_scan(scan, calibration, results, lambda _: None, lambda: shown.append(time.perf_counter()))
+    measured = measure_scan(scan, calibration, results, lambda _: None, lambda: shown.append(time.perf_counter()))
+    if not shown:
+        raise RuntimeError(f"{scan}: {measured.problem}")
     return shown[0] - start
 
 

@@ -97,6 +97,11 @@ class ScanRecording:
             self._thread.join()
         self._remove()
 
+    @property
+    def folder(self) -> Path:
+        """The folder of the scan until it has its name."""
+        return self._partial
+
     def open_film(self, name: str) -> None:
         """Begin a film, `cam1` or `cam1-background`."""
         try:

@@ -23,15 +23,12 @@ from pipelines.live.recording_document import ScanStory
 from pipelines.live.scan_order import LiveResult, ScanOrder
 from pipelines.live.state import Activity, OnState, ScannerState, StateBoard, with_board
 from schemas.base.errors import Fault, FootscanError, RefusedInput
-from schemas.calibration_check import CalibrationCheck
 from schemas.rig import Rig
 
 if TYPE_CHECKING:  # heads that are only moved do not wait for Zarr, Dask and the reconstruction
     from footscan.capture.recording import ScanRecording
     from pipelines.live.storing import FilmedScan
 
-FRAME_BYTES = 40_000
-"""Expected size of a frame, for the check of the free space before a scan."""
 WATCH_SECONDS = 0.1
 """Interval at which heads, disk and stops are checked; chosen by hand."""
 JOG_FACTOR, JOG_SECONDS = 2.0, 5.0
@@ -165,7 +162,7 @@ class LiveScanner:
         """
         with self._at_work("filming"):
             calibration = self._calibration(order)
-            stored = self.film(order, check_in_force(calibration))
+            stored = self.film(order, calibration)
             measured = None
             if order.results is not None and calibration is not None:
                 from pipelines.live.measuring import measure_scan
@@ -180,15 +177,17 @@ class LiveScanner:
                 self._board.tell("done", str(stored.place))
             return LiveResult(stored, measured)
 
-    def film(self, order: ScanOrder, check: CalibrationCheck | None = None) -> "FilmedScan":
+    def film(self, order: ScanOrder, calibration: Path | None = None) -> "FilmedScan":
         """Film and store a foot, with the last check of the calibration: the part of `scan` that needs the devices.
 
-        The caller has reserved the scanner."""
+        While the heads return, the foot is measured ahead. The caller has reserved the scanner."""
         from footscan.capture.recording import ScanRecording
-        from pipelines.live.storing import store_scan
+        from pipelines.live.ahead import measuring_ahead
+        from pipelines.live.storing import expected_bytes, name_scan, store_films
 
         for camera in self.rig.cameras:
             timing_of(camera)
+        check = check_in_force(calibration)
         with self._stop_reported(), self._deck.open_after(self._first_cameras()):
             self._connect_board()
             self._home_if_needed()
@@ -199,14 +198,17 @@ class LiveScanner:
             started = datetime.datetime.now().astimezone()
             story = ScanStory(started, light, passes, plan, calibration_check=check)
             place = order.archive / order.name.patient / order.name.scan
-            with ScanRecording(place, self.expected_bytes(travel.length_mm * (2 if order.texture else 1))) as recording:
+            size = expected_bytes(self.rig, travel.length_mm * (2 if order.texture else 1))
+            with ScanRecording(place, size) as recording:
                 for number, planned in enumerate(passes, start=1):
                     words = f"pass {number} of {len(passes)}" if len(passes) > 1 else ""
                     story.filmed.append(self.film_one_pass(planned, plan, light, recording, words, story))
-                story.lost_steps_mm = self._check_steps()
-                self._board.tell("storing")
                 recording.settle()
-                return store_scan(self.rig, order.name, story, self.heads, recording, order.keep_partial)
+                stored = store_films(self.rig, order.name, story, self.heads, recording, order.keep_partial)
+                with measuring_ahead(recording.folder, stored.scan, calibration, order.results):
+                    story.lost_steps_mm = self._check_steps()
+                self._board.tell("storing")
+                return name_scan(self.rig, story, self.heads, recording, stored)
 
     @contextmanager
     def ready(self, words: str = "") -> Iterator[None]:
@@ -372,11 +374,6 @@ class LiveScanner:
         if order.results is not None:
             raise RefusedInput("rig", "is missing, expected the scanner's calibration file", field="calibration")
         return None
-
-    def expected_bytes(self, travel_mm: float) -> int:
-        """Expected size of the frames of all cameras on a travel."""
-        seconds = travel_mm / self.rig.travel.mm_per_s
-        return round(len(self.rig.cameras) * seconds * self.rig.frames_per_second * FRAME_BYTES)
 
     @contextmanager
     def _watched(self, plan: PassPlan, recording: "ScanRecording") -> Iterator[None]:

@@ -3,7 +3,7 @@
 import datetime
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from footscan.capture.board.heads import Heads
 from footscan.capture.film_frames import (
@@ -28,6 +28,8 @@ CHECK_FILE = "calibration.check.json"
 """Name of the check of the calibration in the folder of a scan."""
 LARGEST_SD_MM = 0.3
 """Largest standard deviation of the position of a frame; a frame with a larger one is lost. Chosen by hand."""
+FRAME_BYTES = 40_000
+"""Expected size of a frame, for the check of the free space before a scan."""
 MOST_SCANS = 999
 """Most scans of a day and side of a patient; chosen by hand."""
 
@@ -54,15 +56,28 @@ class FilmedScan:
     """Cameras that are left out, and why."""
 
 
+class StoredFilms(NamedTuple):
+    """The films of a recording that has no name yet."""
+
+    scan: Scan
+    films: dict[int, FilmFrames]
+    """As of `FilmedScan`."""
+    left_out: dict[int, str]
+    """As of `FilmedScan`."""
+
+
 def store_scan(
-    rig: Rig,
-    name: ScanName,
-    story: ScanStory,
-    heads: Heads,
-    recording: ScanRecording,
-    keep_partial: bool,
+    rig: Rig, name: ScanName, story: ScanStory, heads: Heads, recording: ScanRecording, keep_partial: bool
 ) -> FilmedScan:
-    """Compute the positions of the frames, and store the scan.
+    """`store_films`, then `name_scan`; errors as of both."""
+    stored = store_films(rig, name, story, heads, recording, keep_partial)
+    return name_scan(rig, story, heads, recording, stored)
+
+
+def store_films(
+    rig: Rig, name: ScanName, story: ScanStory, heads: Heads, recording: ScanRecording, keep_partial: bool
+) -> StoredFilms:
+    """Compute the positions of the frames, and complete the films.
 
     Raises
     ------
@@ -108,9 +123,14 @@ def store_scan(
             "cameras": sorted(entries, key=lambda entry: int(str(entry["id"]))),
         }
     )
-    document = recording_document(rig, story, films, left_out, heads)
+    return StoredFilms(scan, films, left_out)
+
+
+def name_scan(rig: Rig, story: ScanStory, heads: Heads, recording: ScanRecording, stored: StoredFilms) -> FilmedScan:
+    """Write how the scan was filmed, and give it its name in the archive; Fault if the disk refuses."""
+    document = recording_document(rig, story, stored.films, stored.left_out, heads)
     recording.file(RECORDING_FILE).write_text(document.model_dump_json(indent=2) + "\n", encoding="utf-8")
-    return FilmedScan(recording.finish(scan), films, left_out)
+    return FilmedScan(recording.finish(stored.scan), stored.films, stored.left_out)
 
 
 def _placed(story: ScanStory, camera: RigCamera, filmed: FilmedPass, heads: Heads) -> FilmFrames:
@@ -162,6 +182,11 @@ def _background(
         return nearest_frames(film, back), len(film.x_mm)
     standing = standing_frame(tally, times, timing, filmed.before)
     return ({}, 0) if standing is None else ({0: standing}, 1)
+
+
+def expected_bytes(rig: Rig, travel_mm: float) -> int:
+    """Expected size of the frames of all cameras on a travel."""
+    return round(len(rig.cameras) * travel_mm / rig.travel.mm_per_s * rig.frames_per_second * FRAME_BYTES)
 
 
 def next_scan_name(archive: Path, patient: str, side: Literal["right", "left"], date: datetime.date) -> str:

@@ -9,7 +9,7 @@ from footscan.calibration.travel.body import Body
 from footscan.recordings.scans import SCAN_FILE, RecordedScan
 from footscan.virtual.worlds.film.record import PATIENT
 from footscan.virtual.worlds.machine import Machine, machine_of
-from pipelines.engine.actions.step import Input, Output, Step, Value
+from pipelines.engine.actions.step import Input, Output, Step, Value, steps_to
 from pipelines.engine.files.file_digests import FileDigests
 from pipelines.scan import STEPS, reconstruction_steps, scan_steps
 from pipelines.travel_job import body_value, heads_value, travel_steps
@@ -98,15 +98,8 @@ class WorldGraph:
         return self.to_last()
 
     def to_last(self) -> list[Step]:
-        """Return the last step and those that it needs; of several of one name, the last one."""
-        needed: set[str] = {self.steps[-1].name}
-        kept = []
-        for step in reversed(self.steps):
-            if step.name in needed:
-                needed.remove(step.name)
-                kept.append(step)
-                needed |= {source.step for source in step.inputs.values() if isinstance(source, Output)}
-        return kept[::-1]
+        """Return the last step and those that it needs."""
+        return steps_to(self.steps, lambda step: step is self.steps[-1])
 
 
 def calibration_steps(world: World, body: Body, film: tuple[RecordedScan, FileDigests] | None = None) -> list[Step]:

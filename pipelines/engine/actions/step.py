@@ -1,6 +1,6 @@
 """Steps as the engine runs them: their inputs and outcomes."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -73,6 +73,22 @@ class Step(NamedTuple):
     def name(self) -> str:
         """Unique within a graph, and the same in every run: `patient/scan/extract-3`."""
         return f"{self.scan}/{self.kind}" + (f"-{self.camera}" if self.camera is not None else "")
+
+
+def steps_to(steps: Sequence[Step], is_last: Callable[[Step], bool]) -> list[Step]:
+    """Select those of `steps`, in topological order, for which `is_last` holds, and all that they need.
+
+    Of several of one name, the last one counts.
+    """
+    needed: set[str] = set()
+    seen: set[str] = set()
+    kept = []
+    for step in reversed(steps):
+        if step.name not in seen and (step.name in needed or is_last(step)):
+            kept.append(step)
+            needed |= {source.step for source in step.inputs.values() if isinstance(source, Output)}
+        seen.add(step.name)
+    return kept[::-1]
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from pipelines.live.devices import passes_of, timing_of
 from pipelines.live.light import ScanLight
 from pipelines.live.recording_document import ScanStory
 from pipelines.live.scanner import LiveScanner
-from pipelines.live.storing import ScanName, store_scan
+from pipelines.live.storing import ScanName, expected_bytes, store_scan
 from schemas.rig import Rig
 
 MARGIN_MM = 8.0
@@ -38,7 +38,7 @@ def film_body(scanner: LiveScanner, place: Path, body: Body, light: ScanLight | 
         head: [camera.id for camera in rig.cameras if camera.on_head == head] for head in range(1, 1 + len(rig.heads))
     }
     parts = [(head, part) for head, cameras in by_head.items() if cameras for part in passes_of(rig, cameras)]
-    with ScanRecording(place, scanner.expected_bytes(abs(end_mm - start_mm))) as recording:
+    with ScanRecording(place, expected_bytes(rig, abs(end_mm - start_mm))) as recording:
         with scanner.ready_to_film():
             if light is None:
                 light = scanner.measured_light(passes_of(rig, [camera.id for camera in rig.cameras]), [still_x_mm(rig)])

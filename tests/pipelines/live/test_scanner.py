@@ -19,8 +19,9 @@ from footscan.frames.film import open_film
 from footscan.frames.travel import read_positions
 from footscan.recordings.calibration_checks import check_of_scan, checks_of
 from footscan.recordings.scans import read_scan
+from pipelines.archive.job import Job, PlannedJob, Waiting, plan_job
 from pipelines.calibration_check import store_check
-from pipelines.live import storing
+from pipelines.live import measuring, storing
 from pipelines.live.calibrating.body_film import film_body
 from pipelines.live.calibrating.live import LiveStanding
 from pipelines.live.calibrating.stills import live_stills
@@ -50,11 +51,19 @@ def bench(pristine: Path, tmp_path: Path, lenient: None) -> Iterator[Bench]:  # 
         yield one
 
 
-def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
+def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calibration, results = pristine / "calibration.json", bench.home / "results"
     travel = bench.scanner.rig.travel.model_copy(update={"length_mm": FOOT_MM})
     bench.scanner.rig = bench.scanner.rig.model_copy(update={"travel": travel})
     files: list[set[str]] = []
+    missing: list[Waiting] = []
+
+    def plan(job: Job) -> PlannedJob:
+        planned = plan_job(job, reasons=True)
+        missing.extend(planned.waiting)
+        return planned
+
+    monkeypatch.setattr(measuring, "plan_job", plan)
     result = bench.scanner.scan(
         bench.order(calibration=calibration, results=results),
         lambda filmed: files.append({file.name for file in (results / "P7" / filmed.place.name).iterdir()}),
@@ -63,6 +72,8 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path) -> None:
     assert len(files) == 1
     assert files[0] >= set(SHOWN)
     assert "report.html" not in files[0]
+    assert {step.kind for step in missing} >= {"quality.json", "report"}
+    assert not {step.kind for step in missing} & {"extract", "map"}, "done while the heads returned"
     begun = [name for name, before in zip(bench.states, ["", *bench.states], strict=False) if name != before]
     assert begun == [
         "disconnected", "idle", "filming", "homing", "filming", "storing", "reconstructing", "done"
