@@ -11,6 +11,7 @@ import pytest
 
 from footscan.frames.travel import read_positions
 from footscan.recordings.scans import read_scan
+from footscan.virtual.foot.foot import make_foot
 from pipelines.live.virtual import rig as virtual_rig
 from pipelines.live.virtual.world import CAMERAS
 
@@ -61,6 +62,21 @@ def test_a_scan_is_filmed_and_stored(
         assert np.median(np.diff(x)) == pytest.approx(60.0 / (200 / 11), rel=0.2)
         assert 180 <= x[0] < 195
         assert 195 < x[-1] <= 210
+
+
+@pytest.mark.slow
+def test_a_scan_of_the_scanner_as_it_is_delivered_is_measured(footscan: Footscan, folder: Path, tmp_path: Path) -> None:
+    done = footscan(
+        "scan", "P0001", "right", "--virtual", "--virtual-folder", folder, "--out", tmp_path / "archive",
+        "--results", tmp_path / "results", "--json",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["left_out"] == {}
+    foot = make_foot(side="right")
+    for name in ("foot_length", "foot_breadth", "ball_girth"):
+        measure = told["measures"][name]
+        assert measure["value"] == pytest.approx(foot.measures[name], abs=max(0.3, 3.0 * measure["uncertainty"])), name
 
 
 @pytest.mark.parametrize(
