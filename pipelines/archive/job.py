@@ -318,7 +318,12 @@ def _run_window(
     for scan in window:
         if scan.to_run:
             steps += draw_steps(scan.scan, planned)
-    early = EarlyDelivery(planned.workspace, {scan.scan.name: _target(scan.scan, planned) for scan in window})
+    running = [scan for scan in window if scan.to_run and scan.failure is None]
+    early = EarlyDelivery(
+        planned.workspace,
+        {scan.scan.name: _target(scan.scan, planned) for scan in running},
+        {scan.scan.name: scan.delivered for scan in running},
+    )
 
     def on_end(end: StepEnd) -> None:
         early.on_step_end(end)

@@ -1,5 +1,6 @@
 """Measurement of a new scan by the same dataflow as `footscan run --scan`."""
 
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,18 +41,20 @@ def measure_scan(
     on_progress : is called with the share of the steps that have ended.
     on_shown : is called when the foot can be shown, before its report is written; never if a step has failed.
     """
-    planned = plan_job(job_of_scan(scan, calibration, results))
-    missing = {DELIVERED[file] for file in SHOWN}
+    planned = plan_job(job_of_scan(scan, calibration, results), reasons=True)
+    missing = {DELIVERED[file] for file in SHOWN} & {step.kind for step in planned.waiting}
     ended = 0
+    lock = threading.Lock()
 
     def on_step_end(end: StepEnd) -> None:
         nonlocal ended
-        ended += 1
-        on_progress(ended / max(planned.to_run, 1))
-        if end.step.kind in missing and isinstance(end.outcome, Success):
-            missing.remove(end.step.kind)
-            if not missing:
-                on_shown()
+        with lock:
+            ended += 1
+            on_progress(ended / max(planned.to_run, 1))
+            if end.step.kind in missing and isinstance(end.outcome, Success):
+                missing.remove(end.step.kind)
+                if not missing:
+                    on_shown()
 
     for end in run_job(planned, Threads(planned.job.threads), on_step_end):
         measures = None

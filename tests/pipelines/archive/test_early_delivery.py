@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from pipelines.archive.job import job_of_workflow, plan_job, run_job
+from pipelines.archive.job import draw_steps, job_of_workflow, plan_job, run_job
+from pipelines.engine.actions.step import steps_to
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.steps import report
 
@@ -25,9 +26,20 @@ def run(workflow: Path, watched: Path) -> dict[str, set[str]]:
 def test_stl_and_measures_are_there_before_the_report_is_made(archive: Any) -> None:
     seen = run(archive.workflow, archive.results)
     assert seen["surface"] == set()
-    assert {"foot.stl", "measures.json"} <= seen["report"]
-    assert "report.html" not in seen["report"]
+    assert {"foot.stl", "measures.json"} <= seen["quality.json"]
+    assert "report.html" not in seen["quality.json"]
     assert (archive.results / "report.html").is_file()
+
+
+def test_files_that_are_known_are_there_at_once(archive: Any) -> None:
+    """As after a scan that was measured ahead."""
+    planned = plan_job(job_of_workflow(archive.workflow))
+    steps = steps_to(draw_steps(planned.scans[0].scan, planned), lambda step: step.kind == "measure")
+    with planned.workspace as workspace:
+        workspace.run(steps, Threads(1), lambda _: None)
+    seen = run(archive.workflow, archive.results)
+    assert "measure" not in seen
+    assert "measures.json" in seen["foot.stl"]
 
 
 def test_earlier_results_are_replaced_all_at_once(done: Any) -> None:

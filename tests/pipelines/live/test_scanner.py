@@ -58,8 +58,8 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path, monkeypatc
     files: list[set[str]] = []
     missing: list[Waiting] = []
 
-    def plan(job: Job) -> PlannedJob:
-        planned = plan_job(job, reasons=True)
+    def plan(job: Job, *, reasons: bool) -> PlannedJob:
+        planned = plan_job(job, reasons=reasons)
         missing.extend(planned.waiting)
         return planned
 
