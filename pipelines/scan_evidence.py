@@ -9,7 +9,7 @@ from schemas.movement import MovementReport
 
 
 def evidence_of(inputs: Mapping[str, bytes]) -> Evidence:
-    """Collect the evidence; `inputs`: `clean` and `fused`."""
+    """Collect the evidence; `inputs`: `clean`, `fused` and `surface`."""
     cleaned, fused = unpack(inputs["clean"]), unpack(inputs["fused"])
     return Evidence(
         cloud=fused["cloud"],
@@ -17,4 +17,5 @@ def evidence_of(inputs: Mapping[str, bytes]) -> Evidence:
         movement=MovementReport.model_validate_json(cleaned["movement"].tobytes()),
         lasers_apart_mm=cleaned["lasers_apart"].item(),
         contested_mm=tuple(cleaned["contested"].tolist()),
+        tip_doubts_mm=tuple(unpack(inputs["surface"])["tip_doubts"].tolist()),
     )

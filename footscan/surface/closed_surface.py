@@ -51,7 +51,8 @@ def close_surface(
 ) -> Mesh:
     """Compute a closed mesh through `points`, with each vertex marked as measured or filled.
 
-    Where the leg was cut flat, the metadata name the Z of the cut: `cut_mm`.
+    The metadata name the standard deviations of the X of both ends, where the tips lie beyond the stripes:
+    `tip_doubts_mm`; and, where the leg was cut flat, the Z of the cut: `cut_mm`.
 
     Parameters
     ----------
@@ -98,8 +99,9 @@ def close_surface(
     edges = directed_edges(faces)
     rim = np.setdiff1d(edges[free[edges[:, 0]], 1], np.flatnonzero(free | on_lid))
     vertices = fair(vertices, faces, rim, np.flatnonzero(free))
+    doubts = [end.doubt_mm(end.reached_mm(vertices)) for end in ends]
     vertices = drawn_to_tips(vertices, ends)
-    metadata = {} if height is None else {"cut_mm": repr(height)}
+    metadata = {"tip_doubts_mm": " ".join(map(repr, doubts))} | ({} if height is None else {"cut_mm": repr(height)})
     return with_normals(Mesh(vertices, faces, camera=origin, filled=~is_measured, metadata=metadata))
 
 

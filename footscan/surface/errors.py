@@ -166,6 +166,8 @@ class Evidence(NamedTuple):
     """Largest distance between the laser planes of two heads: so much too far out may one camera alone see an end"""
     contested_mm: tuple[float, float] = NOT_CONTESTED
     """Least and greatest X of the foot with stripes that were dropped for contradicting other cameras"""
+    tip_doubts_mm: tuple[float, float] = (0.0, 0.0)
+    """Standard deviation of the X of heel and toes, where they lie beyond the stripes"""
 
 
 NO_EVIDENCE = Evidence()
@@ -238,6 +240,8 @@ class _End(NamedTuple):
     """How far beyond the surface stripes were dropped"""
     short_mm: float = 0.0
     """How far the surface falls short of the outermost stripe"""
+    tip_mm: float = 0.0
+    """Standard deviation of its place beyond the outermost stripe, along the travel"""
 
     @property
     def unsure_mm(self) -> float:
@@ -252,7 +256,8 @@ class _End(NamedTuple):
         [0.0, 0.044, 0.175, 0.7, 1.05]
         """
         unsure_mm = ALONE_GROWS * self.alone_mm + DROPPED_GROWS * self.dropped_mm
-        return unsure_mm * min(self.unsure_mm / ALONE_MM, 1.0) + SHORT_GROWS * self.short_mm
+        seen_mm = unsure_mm * min(self.unsure_mm / ALONE_MM, 1.0) + SHORT_GROWS * self.short_mm
+        return math.hypot(seen_mm, self.tip_mm)
 
     def depth(self, x: Floats, most_mm: float) -> Floats:
         """(V,) how far vertices at `x` (V,) mm lie beyond the place `most_mm` within the end, mm."""
@@ -279,7 +284,8 @@ def _ends(vertices: Floats, evidence: Evidence) -> list[_End]:
         alone = 0.0 if confirmed is None else outward * (outermost[side] - confirmed[side])
         dropped, short = (outward * (seen[side] - surface[side]) for seen in (evidence.contested_mm, outermost))
         alone = min(alone, evidence.lasers_apart_mm)
-        ends.append(_End(float(surface[side]), float(alone), max(float(dropped), 0.0), max(float(short), 0.0)))
+        unsure = float(alone), max(float(dropped), 0.0), max(float(short), 0.0)
+        ends.append(_End(float(surface[side]), *unsure, evidence.tip_doubts_mm[side]))
     return ends
 
 

@@ -13,12 +13,14 @@ from schemas.parameters.surface import SurfaceParameters
 def run(inputs: Mapping[str, bytes], parameters: SurfaceParameters, places: Mapping[str, Path]) -> bytes:
     """Reconstruct the surface of the cloud.
 
-    `inputs`: `oriented`. The result holds `vertices` and `faces`, and the optional attributes of the mesh.
+    `inputs`: `oriented`. The result holds `vertices` and `faces`, the optional attributes of the mesh, and how doubtful
+    the tips of its ends are, `tip_doubts`, mm.
     """
     del places
     oriented = unpack(inputs["oriented"])
     mesh = surface_of_cloud(oriented["cloud"], oriented["normals"], parameters)
     optional = {"normals": mesh.normals, "camera": mesh.camera, "filled": mesh.filled}
     cut = {"cut_mm": np.array(float(mesh.metadata["cut_mm"]))} if "cut_mm" in mesh.metadata else {}
+    doubts = np.array(mesh.metadata.get("tip_doubts_mm", "0.0 0.0").split(), np.float64)
     attributes = {name: values for name, values in optional.items() if values is not None}
-    return pack(vertices=mesh.vertices, faces=mesh.faces, **attributes, **cut)
+    return pack(vertices=mesh.vertices, faces=mesh.faces, tip_doubts=doubts, **attributes, **cut)

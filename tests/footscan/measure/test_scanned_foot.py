@@ -107,6 +107,15 @@ def test_an_end_beyond_which_stripes_were_dropped_makes_the_length_uncertain(foo
         assert ((length.uncertainty or 0.0) > 1.5) == (beyond_mm > 0.0)
 
 
+def test_a_doubtful_tip_widens_the_length(foot: Mesh) -> None:
+    cloud = make_points(foot.vertices, camera=1)
+    cloud["cameras"] = 2
+    evidence = Evidence(cloud, tip_doubts_mm=(0.4, 0.3))
+    measures = measure_scanned_foot(foot, "right", GlassPlane(), evidence=evidence).measures
+    assert 0.4 < (measures["foot_length"].budget or {})["ends"] < 0.6
+    assert (measures["foot_breadth"].budget or {}).get("ends", 0.0) < 0.05
+
+
 def test_an_end_that_falls_short_of_the_outermost_stripe_is_worth_less(foot: Mesh) -> None:
     cloud = make_points(foot.vertices, camera=1)
     cloud["cameras"] = 2

@@ -119,6 +119,13 @@ def test_cap_is_drawn_halfway_to_the_foretold_tip() -> None:
     assert (moved[:, 1:] == vertices[:, 1:]).all()
 
 
+def test_a_tip_of_which_two_predictions_contradict_each_other_is_doubtful() -> None:
+    for tip_mm, is_broad, doubt_mm in ((1.0, False, 0.0), (1.6, False, 0.3), (1.6, True, 0.6), (None, False, 0.15)):
+        end = TravelEnd(1, 10.0, 0.0, STEP, tip_mm, is_broad)
+        assert end.doubt_mm(1.0) == pytest.approx(doubt_mm)
+        assert end.doubt_mm(-0.5) == 0.0
+
+
 def test_cap_ends_within_what_is_possible() -> None:
     ends = (TravelEnd(-1, 0.0, 1.5, 2.3, 9.0), TravelEnd(1, 10.0, 1.5, 2.3, 0.0))
     moved = drawn_to_tips(np.array([[-2.4, 0, 0], [5.0, 0, 0], [11.0, 0, 0]]), ends)
