@@ -86,8 +86,9 @@ def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mappin
     strange |= _not_yet_met(points, own, decided & ~strange, at_own > elsewhere + BETTER)
     decided |= strange
     confirmed = decided & ~strange
-    strange |= ~decided & _beyond_ends(points, own, confirmed, planes)
-    return strange | _met_other_laser(points, np.flatnonzero(~decided & ~strange), confirmed, places, planes)
+    ends = _confirmed_ends(points, own, confirmed)
+    strange |= ~decided & _beyond_ends(points, ends, planes)
+    return strange | _met_other_laser(points, np.flatnonzero(~decided & ~strange), confirmed, places, planes, ends)
 
 
 def _vote(strange: Mask, decided: Mask, linked: Mask) -> Mask:
@@ -117,30 +118,50 @@ def _not_yet_met(points: NDArray[np.void], head: Ints, confirmed: Mask, certain:
     return np.asarray(not_met[head, frame])
 
 
-def _beyond_ends(points: NDArray[np.void], head: Ints, confirmed: Mask, planes: Floats) -> Mask:
-    """Select the points (N,) that lie beyond the first or the last confirmed place along the travel, and are worth less
-    than an end that is extrapolated: planes (H, N) of other heads are far from theirs.
-
-    The first stripes on a heel or on toes are often those of one laser, seen by the cameras of all heads. Points of
-    heads of which hardly any is confirmed, as with a single camera, are not selected.
-    """
+def _confirmed_ends(points: NDArray[np.void], head: Ints, confirmed: Mask) -> Floats:
+    """X of the first and of the last confirmed place, (2, N) mm, for points of each head; infinite for points of heads
+    of which hardly any is confirmed, as with a single camera."""
     x = np.sort(points["x"][confirmed])
-    if len(x) < 2 * FEWEST_AT_END:
-        return np.zeros(len(points), np.bool_)
-    beyond = np.maximum(x[FEWEST_AT_END - 1] - points["x"], points["x"] - x[-FEWEST_AT_END])
+    ends = np.repeat([[-np.inf], [np.inf]], len(points), axis=1)
+    if len(x) >= 2 * FEWEST_AT_END:
+        counts = np.bincount(head[confirmed], minlength=int(head.max()) + 1)
+        says = (counts > FEW * counts.max())[head]
+        ends[:, says] = x[[FEWEST_AT_END - 1, -FEWEST_AT_END], None]
+    return ends
+
+
+def _is_beyond(x: Floats, ends: Floats) -> Mask:
+    """Whether X (N,) is beyond the `ends` (2, N)."""
+    return np.asarray((x < ends[0]) | (x > ends[1]))
+
+
+def _beyond_ends(points: NDArray[np.void], ends: Floats, planes: Floats) -> Mask:
+    """Select the points (N,) that lie beyond the confirmed `ends` (2, N) along the travel, and are worth less than an
+    end that is extrapolated: planes (H, N) of other heads are far from theirs.
+
+    The first stripes on a heel or on toes are often those of one laser, seen by the cameras of all heads.
+    """
+    beyond = np.maximum(ends[0] - points["x"], points["x"] - ends[1])
     way = np.nan_to_num(np.abs(planes - points["plane"]))
     doubt = np.where(way < FARTHEST_MM, way, 0.0).max(axis=0)
-    counts = np.bincount(head[confirmed], minlength=int(head.max()) + 1)
-    says = counts > FEW * counts.max()
-    return np.asarray((beyond > 0.0) & (doubt > np.maximum(LEAST_MM, EXTRAPOLATED * beyond)) & says[head])
+    return np.asarray((beyond > 0.0) & (doubt > np.maximum(LEAST_MM, EXTRAPOLATED * np.maximum(beyond, 0.0))))
 
 
 def _met_other_laser(
-    points: NDArray[np.void], doubtful: NDArray[np.intp], confirmed: Mask, places: Floats, planes: Floats
+    points: NDArray[np.void],
+    doubtful: NDArray[np.intp],
+    confirmed: Mask,
+    places: Floats,
+    planes: Floats,
+    ends: Floats,
 ) -> Mask:
     """Select those of the `doubtful` points that lie on the skin if they are of another laser, and off it if not.
 
-    confirmed : (N,) points that make the skin. places, planes : of each point in the plane of each head
+    Beyond the ends there is no skin to lie on: the stripe of another laser on the cap of a heel, which cameras of this
+    head alone may see, is selected if it is not on the skin in its own plane.
+
+    confirmed : (N,) points that make the skin. places, planes : of each point in the plane of each head. ends : (2, N)
+    X of the first and the last confirmed place
     """
     strange = np.zeros(len(points), np.bool_)
     if not confirmed.any() or not doubtful.size:
@@ -148,6 +169,7 @@ def _met_other_laser(
     xyz = coordinates(points)
     skin = KDTree(xyz[confirmed])
     own = _heights(skin, xyz[doubtful])
+    is_between = ~_is_beyond(xyz[doubtful, 0], ends[:, doubtful])
     for head_places, plane in zip(places, planes, strict=True):
         x = xyz[doubtful, 0] + plane[doubtful] - points["plane"][doubtful]
         there = np.column_stack([x, head_places[doubtful]])
@@ -156,6 +178,7 @@ def _met_other_laser(
         height = np.full(len(doubtful), np.inf)
         height[known] = _heights(skin, there[known])
         strange[doubtful] |= (height < CLOSE * way) & (height < own)
+        strange[doubtful] |= known & is_between & _is_beyond(x, ends[:, doubtful]) & (own > CLOSE * way)
     return strange
 
 

@@ -15,6 +15,7 @@ VIEWS = {
 }
 
 
+LOWER_PAIR = {**VIEWS, 4: View(np.array([200.0, -77.0, 202.0]), np.empty((0, 2)), LOWER)}
 AT_ONCE = {1: 0.0, 2: 0.0, 3: 0.0}
 
 
@@ -122,7 +123,7 @@ def test_what_one_camera_alone_sees_beyond_the_end_is_dropped_if_an_extrapolated
 
 def test_cameras_of_one_head_do_not_confirm_each_other_in_the_stripe_of_another_one() -> None:
     """The first stripe on a heel is that of the laser that stands ahead; cameras of one head displace it alike."""
-    views = {**VIEWS, 4: View(np.array([200.0, -77.0, 202.0]), np.empty((0, 2)), LOWER)}
+    views = LOWER_PAIR
     points, _ = scene(views)
     y = np.arange(-6.0, 6.0, 0.3)
     x = np.full(len(y), 40.0 + UPPER.offset_mm)
@@ -138,3 +139,13 @@ def test_cameras_of_one_head_do_not_confirm_each_other_in_the_stripe_of_another_
     alone = make_points(noisy, 1, 20, plane=x)
     found = is_of_other_laser(np.concatenate([points, *mistaken, alone]), views)[len(points) :]
     np.testing.assert_array_equal(found, np.repeat([True, True, False], len(y)))
+
+
+def test_the_stripe_of_another_laser_on_a_cap_that_nobody_else_sees_is_found() -> None:
+    """It comes to lie within the foot, 1 mm behind the last confirmed place; the other plane is 3 mm ahead of it."""
+    points, _ = scene(LOWER_PAIR)
+    for frame, dropped in ((20, True), (11, False)):
+        x = np.full(20, 2.0 * frame + LOWER.offset_mm)
+        seen = np.column_stack([x, np.linspace(-3.0, 3.0, 20), np.full(20, 60.0)])  # no skin is there
+        found = is_of_other_laser(np.concatenate([points, make_points(seen, 3, frame, plane=x)]), LOWER_PAIR)
+        np.testing.assert_array_equal(found[len(points) :], dropped)
