@@ -33,7 +33,7 @@ from footscan.stripe.film import extract_film
 from footscan.stripe.laser import adapted
 from footscan.stripe.points import StripePoints
 from footscan.surface.errors import Evidence
-from footscan.surface.surface_of_cloud import surface_of_cloud
+from footscan.surface.surface_of_cloud import surface_of_cloud, tip_doubts_mm
 from schemas.base.errors import Finding, RefusedInput
 from schemas.base.json_files import read_text
 from schemas.calibration import Calibration, calibration_from_json
@@ -167,6 +167,7 @@ class OpenScan:
                 self.movement,
                 self._cleaned[1].lasers_apart_mm,
                 self._cleaned[1].contested_mm,
+                tip_doubts_mm(self.mesh),
             ),
         )
         return measures.model_copy(update={"posture": self.recorded.document.posture})

@@ -11,6 +11,12 @@ from footscan.surface.closed_surface import close_surface
 from schemas.parameters.surface import SurfaceParameters
 
 
+def tip_doubts_mm(mesh: Mesh) -> tuple[float, float]:
+    """Standard deviations of the X of heel and toes of a surface of `surface_of_cloud`; 0 where stripes show them."""
+    heel, toes = mesh.metadata.get("tip_doubts_mm", "0.0 0.0").split()
+    return float(heel), float(toes)
+
+
 def surface_of_cloud(cloud: NDArray[np.void], normals: NDArray[np.float64], parameters: SurfaceParameters) -> Mesh:
     """Mesh a fused cloud, by `close_surface` or by `mesh_cloud`.
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from footscan.surface.surface_of_cloud import surface_of_cloud
+from footscan.surface.surface_of_cloud import surface_of_cloud, tip_doubts_mm
 from pipelines.arrays import pack, unpack
 from schemas.parameters.surface import SurfaceParameters
 
@@ -21,6 +21,5 @@ def run(inputs: Mapping[str, bytes], parameters: SurfaceParameters, places: Mapp
     mesh = surface_of_cloud(oriented["cloud"], oriented["normals"], parameters)
     optional = {"normals": mesh.normals, "camera": mesh.camera, "filled": mesh.filled}
     cut = {"cut_mm": np.array(float(mesh.metadata["cut_mm"]))} if "cut_mm" in mesh.metadata else {}
-    doubts = np.array(mesh.metadata.get("tip_doubts_mm", "0.0 0.0").split(), np.float64)
     attributes = {name: values for name, values in optional.items() if values is not None}
-    return pack(vertices=mesh.vertices, faces=mesh.faces, tip_doubts=doubts, **attributes, **cut)
+    return pack(vertices=mesh.vertices, faces=mesh.faces, tip_doubts=np.array(tip_doubts_mm(mesh)), **attributes, **cut)
