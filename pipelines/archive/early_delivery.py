@@ -35,9 +35,9 @@ class EarlyDelivery:
         self._workspace = workspace
         self._folders = {scan: folder for scan, folder in folders.items() if not folder.exists()}
         self._waiting = {scan: dict(known[scan]) for scan in self._folders}
-        self._measured: set[str] = set()
+        self._measured = {scan for scan in self._folders if MEASURES in known[scan]}
         self._lock = threading.Lock()
-        for scan in self._folders:
+        for scan in self._measured:
             self._deliver(scan)
 
     def on_step_end(self, end: StepEnd) -> None:
@@ -46,15 +46,14 @@ class EarlyDelivery:
             made = [file for file, kind in DELIVERED.items() if kind == end.step.kind]
             with self._lock:
                 self._waiting[end.step.scan] |= dict.fromkeys(made, end.outcome.digest)
+                if MEASURES in made:
+                    self._measured.add(end.step.scan)
                 self._deliver(end.step.scan)
 
     def _deliver(self, scan: str) -> None:
-        waiting = self._waiting[scan]
-        if MEASURES in waiting:
-            self._measured.add(scan)
-        if waiting and scan in self._measured:
-            problem = self._workspace.deliver(waiting, self._folders[scan])
-            waiting.clear()
+        if scan in self._measured:
+            problem = self._workspace.deliver(self._waiting[scan], self._folders[scan])
+            self._waiting[scan].clear()
             if problem is not None:  # reported at the end of the scan, if it still is one
                 log.debug("%s", problem)
 

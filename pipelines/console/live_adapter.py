@@ -138,8 +138,9 @@ class LiveAdapter:
         order = ScanOrder(name, self._archive, self._results, light=self._light, keep_partial=keep_partial)
 
         def write_known(place: Path) -> None:
-            if self._glass is not None:  # when all is measured: nothing can read it before
-                self._glass.write_known(place / KNOWN_FILE)
+            file = place / KNOWN_FILE
+            if self._glass is not None and not file.exists():  # when all is measured: nothing can read it before
+                self._glass.write_known(file)
 
         def shown(filmed: FilmedScan) -> None:
             write_known(filmed.place)
