@@ -22,14 +22,12 @@ from footscan.recordings.scans import read_scan
 from pipelines.cli.live.options import StateTeller, opened_rig
 from pipelines.live.measuring import measure_scan
 from pipelines.live.scan_order import ScanOrder
-from pipelines.live.scanner import LiveScanner
+from pipelines.live.scanner import CHECKING, LiveScanner
 from pipelines.live.state import ScannerState
 from pipelines.live.storing import ScanName, next_scan_name
 from pipelines.live.virtual.world import World
 
 ROUNDS = 5
-CHECKING = "checking that the heads lost no steps"
-"""What the scanner says while its heads return, and the foot is measured ahead."""
 
 
 def main() -> None:

@@ -50,7 +50,7 @@ def _measure(scan: RecordedScan, calibration: Path, results: Path, ending: threa
         for kind in KINDS:
             if ending.is_set():
                 return
-            turn = steps_to(steps, lambda step: step.kind == kind)  # noqa: B023
+            turn = steps_to(steps, [step.name for step in steps if step.kind == kind])
             outcomes = workspace.run(turn, Threads(job.threads), lambda _: None)
             if any(isinstance(outcome, Failure) for outcome in outcomes.values()):
                 return

@@ -39,6 +39,7 @@ UNDER_WAY = ("moving", "jogging", "homing", "held", "door")
 """States of the board in which a stop is always sent to it: heads move or are held."""
 ANSWERING = (*UNDER_WAY, "ready", "not homed", "alarm", "restarting")
 """States of the board in which a stop is sent to it during an activity of the scanner."""
+CHECKING = "checking that the heads lost no steps"
 STOPPED = "stopped; nothing of this scan is kept"
 
 
@@ -357,7 +358,7 @@ class LiveScanner:
 
     def _check_steps(self) -> tuple[float, ...]:
         """Check that the heads lost no steps: films with wrong positions are worthless. Returns the errors, mm."""
-        self._board.tell("filming", "checking that the heads lost no steps")
+        self._board.tell("filming", CHECKING)
         lost_mm = self.heads.lost_steps_mm()
         self._refuse_stopped()
         return lost_mm

@@ -99,7 +99,7 @@ class WorldGraph:
 
     def to_last(self) -> list[Step]:
         """Return the last step and those that it needs."""
-        return steps_to(self.steps, lambda step: step is self.steps[-1])
+        return steps_to(self.steps, [self.steps[-1].name])
 
 
 def calibration_steps(world: World, body: Body, film: tuple[RecordedScan, FileDigests] | None = None) -> list[Step]:

@@ -144,7 +144,7 @@ def _beyond_ends(points: NDArray[np.void], ends: Floats, planes: Floats) -> Mask
     beyond = np.maximum(ends[0] - points["x"], points["x"] - ends[1])
     way = np.nan_to_num(np.abs(planes - points["plane"]))
     doubt = np.where(way < FARTHEST_MM, way, 0.0).max(axis=0)
-    return np.asarray((beyond > 0.0) & (doubt > np.maximum(LEAST_MM, EXTRAPOLATED * np.maximum(beyond, 0.0))))
+    return np.asarray((beyond > 0.0) & (doubt > np.maximum(LEAST_MM, EXTRAPOLATED * beyond)))
 
 
 def _met_other_laser(

@@ -1,6 +1,6 @@
 """Steps as the engine runs them: their inputs and outcomes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -75,16 +75,16 @@ class Step(NamedTuple):
         return f"{self.scan}/{self.kind}" + (f"-{self.camera}" if self.camera is not None else "")
 
 
-def steps_to(steps: Sequence[Step], is_last: Callable[[Step], bool]) -> list[Step]:
-    """Select those of `steps`, in topological order, for which `is_last` holds, and all that they need.
+def steps_to(steps: Sequence[Step], names: Collection[str]) -> list[Step]:
+    """Select those of `steps`, in topological order, that have one of the `names`, and all that they need.
 
     Of several of one name, the last one counts.
     """
-    needed: set[str] = set()
+    needed = set(names)
     seen: set[str] = set()
     kept = []
     for step in reversed(steps):
-        if step.name not in seen and (step.name in needed or is_last(step)):
+        if step.name in needed and step.name not in seen:
             kept.append(step)
             needed |= {source.step for source in step.inputs.values() if isinstance(source, Output)}
         seen.add(step.name)

@@ -34,7 +34,8 @@ def test_stl_and_measures_are_there_before_the_report_is_made(archive: Any) -> N
 def test_files_that_are_known_are_there_at_once(archive: Any) -> None:
     """As after a scan that was measured ahead."""
     planned = plan_job(job_of_workflow(archive.workflow))
-    steps = steps_to(draw_steps(planned.scans[0].scan, planned), lambda step: step.kind == "measure")
+    scan = planned.scans[0].scan
+    steps = steps_to(draw_steps(scan, planned), [f"{scan.name}/measure"])
     with planned.workspace as workspace:
         workspace.run(steps, Threads(1), lambda _: None)
     seen = run(archive.workflow, archive.results)
