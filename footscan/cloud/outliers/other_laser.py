@@ -88,14 +88,21 @@ def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mappin
     confirmed = decided & ~strange
     ends = _confirmed_ends(points, own, confirmed)
     strange |= ~decided & _beyond_ends(points, ends, planes)
-    return strange | _met_other_laser(points, np.flatnonzero(~decided & ~strange), confirmed, places, planes, ends)
+    doubtful = np.flatnonzero(~decided & ~strange)
+    strange |= _met_other_laser(points, doubtful, confirmed, linked, places, planes, ends)
+    return strange
 
 
 def _vote(strange: Mask, decided: Mask, linked: Mask) -> Mask:
     """What most of the points (N,) that are decided say of the stripe of each point; false where none says anything."""
-    stripe = np.concatenate([[0], np.cumsum(~linked[:-1])])
+    stripe = _stripes(linked)
     most = 2 * np.bincount(stripe, strange & decided) > np.bincount(stripe, decided)
     return np.asarray(most[stripe])
+
+
+def _stripes(linked: Mask) -> Ints:
+    """The number of the stripe of each point, (N,)."""
+    return np.concatenate([[0], np.cumsum(~linked[:-1])])
 
 
 def _not_yet_met(points: NDArray[np.void], head: Ints, confirmed: Mask, certain: Mask) -> Mask:
@@ -151,17 +158,21 @@ def _met_other_laser(
     points: NDArray[np.void],
     doubtful: NDArray[np.intp],
     confirmed: Mask,
+    linked: Mask,
     places: Floats,
     planes: Floats,
     ends: Floats,
 ) -> Mask:
     """Select those of the `doubtful` points that lie on the skin if they are of another laser, and off it if not.
 
-    Beyond the ends there is no skin to lie on: the stripe of another laser on the cap of a heel, which cameras of this
-    head alone may see, is selected if it is not on the skin in its own plane.
+    Where there is no skin to lie on, the rest of the stripe says it. Of stripes without any confirmed point, 1340
+    points were off by more than 0.5 mm and 11 by less than 0.2 mm, of others none and 4712 (`draw_assembled`, seeds
+    2060, 2106, 2129, 2143 and 2144). Beyond the ends there is neither: the stripe of another laser on the cap of a
+    heel, which cameras of this head alone may see, is selected if it is not on the skin in its own plane.
 
-    confirmed : (N,) points that make the skin. places, planes : of each point in the plane of each head. ends : (2, N)
-    X of the first and the last confirmed place
+    confirmed : (N,) points that make the skin. linked : (N,) whether the point and the next one are of one stripe.
+    places, planes : of each point in the plane of each head. ends : (2, N) X of the first and the last confirmed place;
+    infinite for heads whose stripes are hardly ever confirmed
     """
     strange = np.zeros(len(points), np.bool_)
     if not confirmed.any() or not doubtful.size:
@@ -169,7 +180,9 @@ def _met_other_laser(
     xyz = coordinates(points)
     skin = KDTree(xyz[confirmed])
     own = _heights(skin, xyz[doubtful])
-    is_between = ~_is_beyond(xyz[doubtful, 0], ends[:, doubtful])
+    is_between = np.isfinite(ends[0, doubtful]) & ~_is_beyond(xyz[doubtful, 0], ends[:, doubtful])
+    stripe = _stripes(linked)
+    is_alone = (np.bincount(stripe, confirmed) == 0.0)[stripe[doubtful]]
     for head_places, plane in zip(places, planes, strict=True):
         x = xyz[doubtful, 0] + plane[doubtful] - points["plane"][doubtful]
         there = np.column_stack([x, head_places[doubtful]])
@@ -178,7 +191,8 @@ def _met_other_laser(
         height = np.full(len(doubtful), np.inf)
         height[known] = _heights(skin, there[known])
         strange[doubtful] |= (height < CLOSE * way) & (height < own)
-        strange[doubtful] |= known & is_between & _is_beyond(x, ends[:, doubtful]) & (own > CLOSE * way)
+        is_off = (own > CLOSE * way) & _is_beyond(x, ends[:, doubtful])
+        strange[doubtful] |= known & is_between & (is_off | (is_alone & np.isinf(own)))
     return strange
 
 

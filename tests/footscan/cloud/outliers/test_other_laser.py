@@ -46,7 +46,7 @@ def scene(
         eye = VIEWS[3].centre + np.array([own_plane + late[3], 0.0, 0.0])
         share = (own_plane + late[3] - x) / (eye[0] - x)
         seen = there + share[:, None] * (eye - there)
-        parts.append(make_points(seen, 3, frame, plane=np.full(len(y), own_plane)))
+        parts.append(make_points(seen, 3, frame, source=1, plane=np.full(len(y), own_plane)))
         strange.append(np.ones(len(y), np.bool_))
     return np.concatenate(parts), np.concatenate(strange)
 
@@ -144,8 +144,20 @@ def test_cameras_of_one_head_do_not_confirm_each_other_in_the_stripe_of_another_
 def test_the_stripe_of_another_laser_on_a_cap_that_nobody_else_sees_is_found() -> None:
     """It comes to lie within the foot, 1 mm behind the last confirmed place; the other plane is 3 mm ahead of it."""
     points, _ = scene(LOWER_PAIR)
-    for frame, dropped in ((20, True), (11, False)):
-        x = np.full(20, 2.0 * frame + LOWER.offset_mm)
-        seen = np.column_stack([x, np.linspace(-3.0, 3.0, 20), np.full(20, 60.0)])  # no skin is there
-        found = is_of_other_laser(np.concatenate([points, make_points(seen, 3, frame, plane=x)]), LOWER_PAIR)
-        np.testing.assert_array_equal(found[len(points) :], dropped)
+    np.testing.assert_array_equal(found_in(points, alone(20, y=(-3.0, 3.0), z=(60.0, 60.0))), True)
+
+
+def test_a_stripe_that_nobody_else_sees_counts_where_it_continues_one_that_others_see() -> None:
+    points, _ = scene(LOWER_PAIR)
+    np.testing.assert_array_equal(found_in(points, alone(11, y=(-3.0, 3.0), z=(60.0, 60.0))), True)
+    np.testing.assert_array_equal(found_in(points, alone(11, y=(30.0, 36.0), z=(24.2, 28.0))), False)
+
+
+def alone(frame: int, y: tuple[float, float], z: tuple[float, float]) -> np.ndarray:
+    """A straight piece of stripe that camera 3 sees; the slope ends at Y 30 mm, where it is 24.2 mm high in frame 11."""
+    x = np.full(20, 2.0 * frame + LOWER.offset_mm)
+    return make_points(np.column_stack([x, np.linspace(*y, 20), np.linspace(*z, 20)]), 3, frame, plane=x)
+
+
+def found_in(points: np.ndarray, more: np.ndarray) -> np.ndarray:
+    return is_of_other_laser(np.concatenate([points, more]), LOWER_PAIR)[len(points) :]
