@@ -154,7 +154,7 @@ def test_a_stripe_that_nobody_else_sees_counts_where_it_continues_one_that_other
 
 
 def alone(frame: int, y: tuple[float, float], z: tuple[float, float]) -> np.ndarray:
-    """A straight piece of stripe that camera 3 sees; the slope ends at Y 30 mm, where it is 24.2 mm high in frame 11."""
+    """A straight stripe that camera 3 sees; the slope ends at Y 30 mm, where it is 24.2 mm high in frame 11."""
     x = np.full(20, 2.0 * frame + LOWER.offset_mm)
     return make_points(np.column_stack([x, np.linspace(*y, 20), np.linspace(*z, 20)]), 3, frame, plane=x)
 
