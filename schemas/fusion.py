@@ -158,6 +158,29 @@ class FusionReport(Document):
             _root_mean_square((mm, places[heads]) for heads, mm in self.heads_apart.items()),
         )
 
+    def systematic_of(self, camera: Camera) -> float:
+        """Systematic disagreement of a camera with those of other heads, mm; of all cameras, if that is more.
+
+        It is taken after the corrections, root mean square over the places: hardly any other head may have seen the
+        skin for which one camera stands alone.
+
+        >>> alike, apart = (
+        ...     Disagreement(median_mm=0.0, deviation_mm=0.1, rms_mm=0.1, systematic_mm=mm) for mm in (0.02, 0.4)
+        ... )
+        >>> pairs = [PairDisagreement(cameras=(3, 4), points=2000, before=alike, after=alike)]
+        >>> pairs += [PairDisagreement(cameras=(2, 4), points=100, before=alike, after=apart)]
+        >>> report = FusionReport(pairs=pairs, heads={2: 1, 3: 2, 4: 2})
+        >>> print([round(report.systematic_of(camera), 3) for camera in (3, 4)])
+        [0.028, 0.4]
+        """
+        of_camera = [
+            (_systematic(pair.after), pair.points)
+            for pair in self.pairs
+            if camera in pair.cameras and len({self.heads.get(each, 0) for each in pair.cameras} - {0}) == 2
+        ]
+        enough = sum(points for _, points in of_camera) >= FEWEST_COMPARED
+        return max(self.systematic_mm, _root_mean_square(of_camera) if enough else 0.0)
+
 
 def _systematic(disagreement: Disagreement) -> float:
     return abs(disagreement.median_mm) if disagreement.systematic_mm is None else disagreement.systematic_mm

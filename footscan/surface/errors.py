@@ -193,7 +193,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
 
     `mesh` : mm, scanner frame; without `filled`, all vertices count as measured
     """
-    vertices, cloud, agreement = mesh.vertices, evidence.cloud, evidence.agreement
+    vertices, cloud = mesh.vertices, evidence.cloud
     normals = vertex_normals(vertices, mesh.faces)
     seen = np.ones(len(vertices), bool) if mesh.filled is None else ~mesh.filled
     step_mm = USUAL_STEP_MM if cloud is None else stripe_step(cloud) or USUAL_STEP_MM
@@ -201,19 +201,19 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     gap_mm = np.maximum(beyond_mm, 0.0)
     inside = ~seen & (beyond_mm <= 0)
     gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside])[0]
-    apart_mm = 0.0 if agreement is None else agreement.systematic_mm
+    nearest, everywhere = _nearest(vertices, cloud), np.ones(len(vertices))
     sway_mm = (evidence.movement and evidence.movement.sway_by_axis_mm) or (SWAY_MM, SWAY_MM)
     ends = _ends(vertices, evidence)
     shift_mm = np.max([np.zeros(len(vertices)), *(end.shift_at(vertices[:, 0], step_mm) for end in ends)], axis=0)
     fields = [
-        *_broad_and_narrow("noise", _noise(vertices, cloud, step_mm)),
-        ErrorField("noise", np.full(len(vertices), COMMON_MM), WIDE_MM),
+        *_broad_and_narrow("noise", everywhere * _noise(cloud, nearest, step_mm)),
+        ErrorField("noise", everywhere * COMMON_MM, WIDE_MM),
         ErrorField("filling", np.where(inside, ERROR_GROWS * gap_mm, 0.0), REACH_MM),
         *_broad_and_narrow("filling", np.where(inside, FACING_GROWS * gap_mm * np.abs(normals[:, 0]), 0.0)),
         *_broad_and_narrow("ends", END_GROWS * np.maximum(beyond_mm, 0.0)),
         ErrorField("ends", shift_mm * normals[:, 0], WIDE_MM, is_of_section=True),
         ErrorField("ends", ASIDE * shift_mm, NARROW_MM),
-        ErrorField("cameras", np.full(len(vertices), OF_DISAGREEMENT * apart_mm), WIDE_MM),
+        ErrorField("cameras", everywhere * OF_DISAGREEMENT * _apart(cloud, nearest, evidence.agreement), WIDE_MM),
         ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, is_of_section=True),
         *(
             ErrorField("sway", sway_mm[axis] * normals[:, axis], SWAY_STEPS * step_mm, is_of_section=True)
@@ -289,13 +289,34 @@ def _ends(vertices: Floats, evidence: Evidence) -> list[_End]:
     return ends
 
 
-def _noise(vertices: NDArray[np.float64], cloud: NDArray[np.void] | None, step_mm: float) -> NDArray[np.float64]:
-    """Return (V,) the standard deviations of vertices through the points of a cloud, mm."""
-    noise = np.full(len(vertices), ERROR_MM * max(1.0, (step_mm / USUAL_STEP_MM) ** 2))
+def _nearest(vertices: Floats, cloud: NDArray[np.void] | None) -> NDArray[np.intp] | None:
+    """Return (V, NEAREST) the points of a cloud nearest to each vertex; None without enough of them."""
     if cloud is None or len(cloud) < NEAREST:
-        return noise
-    nearest = KDTree(coordinates(cloud)).query(vertices, NEAREST)[1]
-    return np.asarray(np.maximum(noise, SHARED * cloud["sigma"][nearest].mean(axis=1)))
+        return None
+    return np.asarray(KDTree(coordinates(cloud)).query(vertices, NEAREST)[1])
+
+
+def _noise(cloud: NDArray[np.void] | None, nearest: NDArray[np.intp] | None, step_mm: float) -> Floats | float:
+    """Return (V,) the standard deviations of vertices from the points around them, mm; one for all without points."""
+    least = ERROR_MM * max(1.0, (step_mm / USUAL_STEP_MM) ** 2)
+    if cloud is None or nearest is None:
+        return least
+    return np.asarray(np.maximum(least, SHARED * cloud["sigma"][nearest].mean(axis=1)))
+
+
+def _apart(
+    cloud: NDArray[np.void] | None, nearest: NDArray[np.intp] | None, agreement: FusionReport | None
+) -> Floats | float:
+    """Return (V,) the systematic disagreement of the cameras of the points around each vertex, mm; one for all without
+    points."""
+    if agreement is None:
+        return 0.0
+    if cloud is None or nearest is None:
+        return agreement.systematic_mm
+    of_camera = np.zeros(int(cloud["camera"].max()) + 1)
+    for camera in np.unique(cloud["camera"]):
+        of_camera[camera] = agreement.systematic_of(int(camera))
+    return np.asarray(of_camera[cloud["camera"][nearest]].mean(axis=1))
 
 
 def _moved_mm(movement: MovementReport | None) -> float:
