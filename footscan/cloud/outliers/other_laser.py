@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from footscan.cloud.lasers.moments import renumbered
 from footscan.cloud.lasers.seen import BETTER, FARTHEST_MM, LEAST_MM, lasers_seen
-from footscan.cloud.points import coordinates
+from footscan.cloud.points import coordinates, stripe_step
 from footscan.cloud.views import View
 from footscan.side_by_side import together
 from schemas.calibration import LaserPlane, laser_of_view, view_number
@@ -183,6 +183,7 @@ def _met_other_laser(
     is_between = np.isfinite(ends[0, doubtful]) & ~_is_beyond(xyz[doubtful, 0], ends[:, doubtful])
     stripe = _stripes(linked)
     is_alone = (np.bincount(stripe, confirmed) == 0.0)[stripe[doubtful]]
+    is_alone &= stripe_step(points) < AROUND_MM  # otherwise a stripe without confirmed points has no skin around it
     for head_places, plane in zip(places, planes, strict=True):
         x = xyz[doubtful, 0] + plane[doubtful] - points["plane"][doubtful]
         there = np.column_stack([x, head_places[doubtful]])

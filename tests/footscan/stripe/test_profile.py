@@ -218,3 +218,11 @@ def test_ridges_at_the_very_border_read_nothing_outside(ridge, degrees):
     normal = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
     profile = measure(image, *ridge, *normal)
     assert profile is None or np.isfinite(profile).all()
+
+
+def test_two_cores_in_saturated_red_are_two_stripes():
+    levels = np.where(np.abs(np.arange(41) - 20) <= 4, 255, 20)
+    for apart, is_stripe in ((3.6, False), (0.8, True), (0.0, True)):  # speckle makes as deep a valley as the second
+        image = red(levels)
+        image[..., 1] = image[..., 2] = np.maximum(*(triangle(20 + sign * apart / 2, height=150.0) for sign in (-1, 1)))
+        assert (measure(image, 20.0, 14.5, 1.0, 0.0) is not None) is is_stripe
