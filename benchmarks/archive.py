@@ -1,6 +1,7 @@
-"""Archives of small scans as the command runs them: when all is done, how much memory they take, on how many workers.
+"""Archives of small scans as the command runs them: when all is done, as they arrive, how much memory they take, on how
+many workers.
 
-    .venv/bin/python -m benchmarks.archive [SCAN] [warm | memory | workers]
+    .venv/bin/python -m benchmarks.archive [SCAN] [warm | watch | memory | workers]
 
 SCAN is the scan of a folder that `footscan demo` made; of its films every fifth frame makes the small scans.
 """
@@ -15,6 +16,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import psutil
 
 from benchmarks.compare import interleave, print_ratios, python, ratio_text, spread
 from footscan.frames.film import open_film
@@ -25,6 +27,8 @@ DEFAULT = Path("demo/archive/P0001/demo-R")
 EVERY = 5
 """Of the frames."""
 ROUNDS = 5
+QUIET_S = 60.0
+"""For so long the processor time of a watch is counted."""
 
 WORKFLOW = "format: footscan.workflow/1\narchive: archive\ncalibration: calibration.json\nresults: results\n"
 COMMAND = "from pipelines.cli.main import main; main()"
@@ -54,6 +58,22 @@ def time_warm(scan: Path) -> None:
             _time_warm(scan, Path(place), cameras, scans)
 
 
+def measure_watch(scan: Path) -> None:
+    """`footscan run --watch` over 1000 scans that are done: processor time while nothing arrives."""
+    with tempfile.TemporaryDirectory() as place:
+        workflow = _done_archive(scan, Path(place), 8, 1000)
+        line = [sys.executable, "-c", COMMAND, "run", str(workflow), "--watch"]
+        with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            watching = psutil.Process(process.pid)
+            before = _processor_s(watching)
+            while (settled := _processor_s(watching, QUIET_S / 6) - before) > QUIET_S / 60:
+                before += settled
+            before = _processor_s(watching)
+            used = _processor_s(watching, QUIET_S) - before
+            process.terminate()
+    print(f"\nWatching 1000 scans: {used / QUIET_S:.2%} of a core over {QUIET_S:.0f} s")
+
+
 def measure_memory(scan: Path) -> None:
     """Peak memory of cold archives of 10 and of 300 scans of two cameras, no two films alike, in turn."""
     peaks: dict[int, list[float]] = {10: [], 300: []}
@@ -79,19 +99,11 @@ def time_workers(scan: Path) -> None:
         print_ratios("A cold archive of 8 scans of 8 cameras", interleave(runs, 3), 8, "scan")
 
 
-PARTS = {"warm": time_warm, "memory": measure_memory, "workers": time_workers}
+PARTS = {"warm": time_warm, "watch": measure_watch, "memory": measure_memory, "workers": time_workers}
 
 
 def _time_warm(scan: Path, place: Path, cameras: int, scans: int) -> None:
-    """As copies of one small scan, all of which is done."""
-    workflow, first = _workflow(scan, place), place / "archive/P0001/S0001"
-    _thin_out(scan, first, cameras)
-    python("-c", COMMAND, "run", str(workflow))
-    for number in range(2, scans + 1):
-        _link_scan(first, number)
-    # A thousand reports take minutes to draw, and what is in them makes no difference to a warm run.
-    python("-c", BLANK_REPORTS + COMMAND, "run", str(workflow))
-    time.sleep(2)  # what is younger than that is read again
+    workflow = _done_archive(scan, place, cameras, scans)
     runs = {"python -c pass": lambda: python("-c", "pass")}
     for task in ("plan", "run"):
         runs[f"footscan {task}"] = partial(python, "-c", COMMAND, task, str(workflow))
@@ -107,6 +119,19 @@ def _time_warm(scan: Path, place: Path, cameras: int, scans: int) -> None:
     times |= {"of this, imports": list(rows[:, 0]), "planning": list(rows[:, 1])}
     for name, each in times.items():
         print(f"  {name:<44}{spread(each, 2)}", flush=True)
+
+
+def _done_archive(scan: Path, place: Path, cameras: int, scans: int) -> Path:
+    """Copies of one small scan, all of which is done; returns their workflow."""
+    workflow, first = _workflow(scan, place), place / "archive/P0001/S0001"
+    _thin_out(scan, first, cameras)
+    python("-c", COMMAND, "run", str(workflow))
+    for number in range(2, scans + 1):
+        _link_scan(first, number)
+    # A thousand reports take minutes to draw, and what is in them makes no difference to a warm run.
+    python("-c", BLANK_REPORTS + COMMAND, "run", str(workflow))
+    time.sleep(2)  # what is younger than that is read again
+    return workflow
 
 
 def _draw_archive(scan: Path, place: Path, cameras: int, scans: int) -> Path:
@@ -160,6 +185,13 @@ def _run_cold(workflow: Path, *options: str) -> None:
     for frames in (workflow.parent / "archive").rglob("*.zarr"):
         shutil.rmtree(frames)
     python("-c", COMMAND, "run", str(workflow), *options)
+
+
+def _processor_s(process: psutil.Process, after_s: float = 0.0) -> float:
+    """Seconds of processor time of a process and its children, in so many seconds from now."""
+    time.sleep(after_s)
+    times = [each.cpu_times() for each in [process, *process.children(recursive=True)]]
+    return sum(each.user + each.system for each in times)
 
 
 def _peak_mb(*arguments: str) -> float:

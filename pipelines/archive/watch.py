@@ -1,8 +1,10 @@
 """Detection of complete scans among those that arrive while footscan runs."""
 
+import os
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from stat import S_ISDIR
 from typing import NamedTuple
 
 from footscan.frames.film import film_files
@@ -65,8 +67,7 @@ class Arrivals:
         document = folder / SCAN_FILE
         try:
             paths = self._named_files(document, archive)
-            files = [document, *(file for path in paths for file in (film_files(path) if path.is_dir() else [path]))]
-            states = [(str(file), file.stat()) for file in files]
+            states = [pair for path in (document, *paths) for pair in _files_of(path)]
         except (OSError, FootscanError):  # also a folder of frames that is still empty
             return None
         return tuple((name, status.st_size, status.st_mtime_ns) for name, status in states)
@@ -85,6 +86,14 @@ class Arrivals:
         if abs(time.time() - status.st_mtime) >= QUIET_S:
             self._read[document] = _Read(version, files)
         return files
+
+
+def _files_of(path: Path) -> list[tuple[str, os.stat_result]]:
+    """A file, or the files of a film that is a folder of frames; looked at once, since an archive has thousands."""
+    status = path.stat()
+    if S_ISDIR(status.st_mode):
+        return [(str(file), file.stat()) for file in film_files(path)]
+    return [(str(path), status)]
 
 
 def _read_named_files(document: Path, archive: Path) -> tuple[Path, ...]:

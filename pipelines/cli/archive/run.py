@@ -1,5 +1,6 @@
 """`footscan run` and `footscan plan`."""
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -52,7 +53,8 @@ Settings = Annotated[
         "--set", metavar="NAME=VALUE", help="Parameter, for example extraction.red_threshold=22; may be repeated."
     ),
 ]
-POLL_S = 2.0
+POLL_S, LONGEST_POLL_S, WATCHED_SHARE = 2.0, 20.0, 0.01
+"""Least and most time between two looks at the archives of a watch, and the share of a core that looking may take."""
 MANY_STEPS = 20
 """Steps to run from which all loops of a scan are compiled beforehand: fewer may call but a few."""
 
@@ -171,11 +173,15 @@ def _watch(job: "Job", pool: "Pool", log: TextIO | None) -> int:
     folders: dict[str, Path] = {}
     ends: dict[Path, ScanEnd] = {}
     message(f"watching {', '.join(map(str, job.archives))}")
+    looked_s = math.inf
     while True:
-        if complete := arrivals.complete():
+        started_s = time.process_time()
+        complete = arrivals.complete()
+        looked_s = min(looked_s, time.process_time() - started_s)  # the first look also reads each scan.yaml
+        if complete:
             ends |= {end.source: end for end in _run(replace(job, folders=complete), pool, log, folders=folders)}
             _write_table([end for source, end in ends.items() if source.is_dir()], job.results)
-        time.sleep(POLL_S)
+        time.sleep(min(max(POLL_S, looked_s / WATCHED_SHARE), LONGEST_POLL_S))
 
 
 @contextmanager
