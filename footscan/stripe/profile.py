@@ -361,7 +361,8 @@ def _saturation(
 def _are_two(light: NDArray[np.float64], start: int, stop: int) -> bool:
     """True if the light has two peaks and a valley between them, which red that is saturated does not show.
 
-    Where the lasers of two heads are a millimetre apart, their stripes touch, and what lies between is neither.
+    Where the lasers of two heads are a millimetre apart, their stripes touch, and what lies between is neither. Speckle
+    in the broad spot of a sheet that grazes a heel makes shallower valleys.
     """
     top = start
     for k in range(start, stop):
@@ -373,7 +374,7 @@ def _are_two(light: NDArray[np.float64], start: int, stop: int) -> bool:
         k = top + direction
         while start <= k < stop:
             lowest = min(lowest, light[k])
-            if light[k] > least and light[k] - lowest > BETWEEN * (light[k] - base):
+            if light[k] > least and light[k] - lowest > max(BETWEEN * (light[k] - base), WHITE_RISE):
                 return True
             k += direction
     return False
