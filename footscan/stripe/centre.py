@@ -37,6 +37,12 @@ SINGULAR = 1e-9
 """Determinant of the normal equations of that fit, relative to the product of their diagonal, that counts as zero."""
 FIR_REACH = 2
 """How far from the middle of the stripe `fir` searches for a zero crossing, in samples. Chosen by hand."""
+WHITE_RISE = 60.0
+"""Levels of R + 3 G + B (12 grey levels) by which a white core exceeds rim and feet at least. Chosen by hand."""
+BETWEEN = 0.15
+"""Depth of the valley between two stripes, relative to the lower one, from which they count as two. Chosen by hand."""
+LEAST_PEAK = 0.3
+"""Height of the lower one, relative to the other. Chosen by hand."""
 
 
 @compiled
@@ -230,3 +236,26 @@ def _boxes(samples: NDArray[np.float64], k: int, order: int) -> float:
     for n in range(1, order + 1):
         total += samples[k - n] - samples[k + n]
     return total
+
+
+@compiled
+def are_two(light: NDArray[np.float64], start: int, stop: int) -> bool:
+    """True if the light has two peaks and a valley between them, which red that is saturated does not show.
+
+    Where the lasers of two heads are a millimetre apart, their stripes touch, and what lies between is neither. Speckle
+    in the broad spot of a sheet that grazes a heel makes shallower valleys.
+    """
+    top = start
+    for k in range(start, stop):
+        top = k if light[k] > light[top] else top
+    base = min(light[start], light[stop - 1])
+    least = base + LEAST_PEAK * (light[top] - base)
+    for direction in (-1, 1):
+        lowest = light[top]
+        k = top + direction
+        while start <= k < stop:
+            lowest = min(lowest, light[k])
+            if light[k] > least and light[k] - lowest > max(BETWEEN * (light[k] - base), WHITE_RISE):
+                return True
+            k += direction
+    return False

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
-from footscan.stripe.centre import centre_of
+from footscan.stripe.centre import WHITE_RISE, are_two, centre_of
 from footscan.stripe.loop_parameters import LoopParameters
 from footscan.stripe.redness import SIGNAL_SCALE, WHITE_SCALE, light_of, lights_of, red_of, redness_of
 from footscan.stripe.ridge import NORMAL_I, NORMAL_J, SHARPNESS, I, J
@@ -36,12 +36,6 @@ EDGE = 0.25
 """Difference of the feet, relative to the height of the stripe, from which an edge runs along it. Chosen by hand."""
 NEARLY = 40
 """Grey levels below saturation within which red has no range left to tell a laser from a lamp. Chosen by hand."""
-WHITE_RISE = 60.0
-"""Levels of R + 3 G + B (12 grey levels) by which a white core exceeds rim and feet at least. Chosen by hand."""
-BETWEEN = 0.15
-"""Depth of the valley between two stripes, relative to the lower one, from which they count as two. Chosen by hand."""
-LEAST_PEAK = 0.3
-"""Height of the lower one, relative to the other. Chosen by hand."""
 BESIDE = 1.5
 """Samples beyond half height that still count as stripe when redness is compared with the feet. Chosen by hand."""
 FOOT_SAMPLES = 4
@@ -241,7 +235,7 @@ def _measure(
         return math.nan
     centre = math.nan
     if saturation > 0:
-        if _are_two(white, *_stripe_samples(first, last, left, right)):
+        if are_two(white, *_stripe_samples(first, last, left, right)):
             return math.nan
         centre = _white_centre(white, clipped, first, last, left, right, is_even, limits)
     if math.isnan(centre):
@@ -355,29 +349,6 @@ def _saturation(
             inside += 1
             saturated += clipped[k]
     return saturated / max(inside, 1)
-
-
-@compiled
-def _are_two(light: NDArray[np.float64], start: int, stop: int) -> bool:
-    """True if the light has two peaks and a valley between them, which red that is saturated does not show.
-
-    Where the lasers of two heads are a millimetre apart, their stripes touch, and what lies between is neither. Speckle
-    in the broad spot of a sheet that grazes a heel makes shallower valleys.
-    """
-    top = start
-    for k in range(start, stop):
-        top = k if light[k] > light[top] else top
-    base = min(light[start], light[stop - 1])
-    least = base + LEAST_PEAK * (light[top] - base)
-    for direction in (-1, 1):
-        lowest = light[top]
-        k = top + direction
-        while start <= k < stop:
-            lowest = min(lowest, light[k])
-            if light[k] > least and light[k] - lowest > max(BETWEEN * (light[k] - base), WHITE_RISE):
-                return True
-            k += direction
-    return False
 
 
 @compiled
