@@ -65,11 +65,9 @@ def measure_watch(scan: Path) -> None:
         line = [sys.executable, "-c", COMMAND, "run", str(workflow), "--watch"]
         with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
             watching = psutil.Process(process.pid)
-            before = _processor_s(watching)
-            while (settled := _processor_s(watching, QUIET_S / 6) - before) > QUIET_S / 60:
-                before += settled
-            before = _processor_s(watching)
-            used = _processor_s(watching, QUIET_S) - before
+            while _processor_s(watching, QUIET_S / 6) > QUIET_S / 60:
+                pass
+            used = _processor_s(watching, QUIET_S)
             process.terminate()
     print(f"\nWatching 1000 scans: {used / QUIET_S:.2%} of a core over {QUIET_S:.0f} s")
 
@@ -187,11 +185,16 @@ def _run_cold(workflow: Path, *options: str) -> None:
     python("-c", COMMAND, "run", str(workflow), *options)
 
 
-def _processor_s(process: psutil.Process, after_s: float = 0.0) -> float:
-    """Seconds of processor time of a process and its children, in so many seconds from now."""
-    time.sleep(after_s)
-    times = [each.cpu_times() for each in [process, *process.children(recursive=True)]]
-    return sum(each.user + each.system for each in times)
+def _processor_s(process: psutil.Process, over_s: float) -> float:
+    """Seconds of processor time that a process and its children take in so many seconds from now."""
+
+    def taken_s() -> float:
+        times = [each.cpu_times() for each in [process, *process.children(recursive=True)]]
+        return sum(each.user + each.system for each in times)
+
+    before = taken_s()
+    time.sleep(over_s)
+    return taken_s() - before
 
 
 def _peak_mb(*arguments: str) -> float:

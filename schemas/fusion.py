@@ -128,7 +128,7 @@ class FusionReport(Document):
         """Pairs of heads -> disagreement, mm, and number of places, for each pair of their cameras."""
         found: dict[tuple[int, int], list[tuple[float, int]]] = {}
         for pair in self.pairs:
-            one, other = sorted(self.heads.get(camera, 0) for camera in pair.cameras)
+            one, other = self._heads_of(pair)
             if 0 < one < other and pair.points >= FEWEST_COMPARED:
                 found.setdefault((one, other), []).append((_systematic(pair.before), pair.points))
         return found
@@ -161,8 +161,8 @@ class FusionReport(Document):
     def systematic_of(self, camera: Camera) -> float:
         """Systematic disagreement of a camera with those of other heads, mm; of all cameras, if that is more.
 
-        It is taken after the corrections, root mean square over the places: hardly any other head may have seen the
-        skin for which one camera stands alone.
+        It is taken after the corrections, root mean square over the places. The heads may agree in most places, and
+        hardly in those that this camera alone sees.
 
         >>> alike, apart = (
         ...     Disagreement(median_mm=0.0, deviation_mm=0.1, rms_mm=0.1, systematic_mm=mm) for mm in (0.02, 0.4)
@@ -176,10 +176,15 @@ class FusionReport(Document):
         of_camera = [
             (_systematic(pair.after), pair.points)
             for pair in self.pairs
-            if camera in pair.cameras and len({self.heads.get(each, 0) for each in pair.cameras} - {0}) == 2
+            if camera in pair.cameras and 0 < min(heads := self._heads_of(pair)) < max(heads)
         ]
         enough = sum(points for _, points in of_camera) >= FEWEST_COMPARED
         return max(self.systematic_mm, _root_mean_square(of_camera) if enough else 0.0)
+
+    def _heads_of(self, pair: PairDisagreement) -> tuple[int, int]:
+        """The heads of both cameras in ascending order; 0 where it is not known."""
+        one, other = sorted(self.heads.get(camera, 0) for camera in pair.cameras)
+        return one, other
 
 
 def _systematic(disagreement: Disagreement) -> float:

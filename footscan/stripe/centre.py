@@ -245,17 +245,13 @@ def are_two(light: NDArray[np.float64], start: int, stop: int) -> bool:
     Where the lasers of two heads are a millimetre apart, their stripes touch, and what lies between is neither. Speckle
     in the broad spot of a sheet that grazes a heel makes shallower valleys.
     """
-    top = start
-    for k in range(start, stop):
-        top = k if light[k] > light[top] else top
+    top = start + np.argmax(light[start:stop])
     base = min(light[start], light[stop - 1])
     least = base + LEAST_PEAK * (light[top] - base)
-    for direction in (-1, 1):
+    for direction, end in ((-1, start - 1), (1, stop)):
         lowest = light[top]
-        k = top + direction
-        while start <= k < stop:
+        for k in range(top, end, direction):
             lowest = min(lowest, light[k])
             if light[k] > least and light[k] - lowest > max(BETWEEN * (light[k] - base), WHITE_RISE):
                 return True
-            k += direction
     return False

@@ -201,19 +201,19 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     gap_mm = np.maximum(beyond_mm, 0.0)
     inside = ~seen & (beyond_mm <= 0)
     gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside])[0]
-    nearest, everywhere = _nearest(vertices, cloud), np.ones(len(vertices))
+    around, everywhere = _around(vertices, cloud), np.ones(len(vertices))
     sway_mm = (evidence.movement and evidence.movement.sway_by_axis_mm) or (SWAY_MM, SWAY_MM)
     ends = _ends(vertices, evidence)
     shift_mm = np.max([np.zeros(len(vertices)), *(end.shift_at(vertices[:, 0], step_mm) for end in ends)], axis=0)
     fields = [
-        *_broad_and_narrow("noise", everywhere * _noise(cloud, nearest, step_mm)),
+        *_broad_and_narrow("noise", everywhere * _noise(around, step_mm)),
         ErrorField("noise", everywhere * COMMON_MM, WIDE_MM),
         ErrorField("filling", np.where(inside, ERROR_GROWS * gap_mm, 0.0), REACH_MM),
         *_broad_and_narrow("filling", np.where(inside, FACING_GROWS * gap_mm * np.abs(normals[:, 0]), 0.0)),
         *_broad_and_narrow("ends", END_GROWS * np.maximum(beyond_mm, 0.0)),
         ErrorField("ends", shift_mm * normals[:, 0], WIDE_MM, is_of_section=True),
         ErrorField("ends", ASIDE * shift_mm, NARROW_MM),
-        ErrorField("cameras", everywhere * OF_DISAGREEMENT * _apart(cloud, nearest, evidence.agreement), WIDE_MM),
+        ErrorField("cameras", everywhere * OF_DISAGREEMENT * _apart(around, evidence.agreement), WIDE_MM),
         ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, is_of_section=True),
         *(
             ErrorField("sway", sway_mm[axis] * normals[:, axis], SWAY_STEPS * step_mm, is_of_section=True)
@@ -289,34 +289,29 @@ def _ends(vertices: Floats, evidence: Evidence) -> list[_End]:
     return ends
 
 
-def _nearest(vertices: Floats, cloud: NDArray[np.void] | None) -> NDArray[np.intp] | None:
+def _around(vertices: Floats, cloud: NDArray[np.void] | None) -> NDArray[np.void] | None:
     """Return (V, NEAREST) the points of a cloud nearest to each vertex; None without enough of them."""
     if cloud is None or len(cloud) < NEAREST:
         return None
-    return np.asarray(KDTree(coordinates(cloud)).query(vertices, NEAREST)[1])
+    return cloud[KDTree(coordinates(cloud)).query(vertices, NEAREST)[1]]
 
 
-def _noise(cloud: NDArray[np.void] | None, nearest: NDArray[np.intp] | None, step_mm: float) -> Floats | float:
+def _noise(around: NDArray[np.void] | None, step_mm: float) -> Floats | float:
     """Return (V,) the standard deviations of vertices from the points around them, mm; one for all without points."""
     least = ERROR_MM * max(1.0, (step_mm / USUAL_STEP_MM) ** 2)
-    if cloud is None or nearest is None:
-        return least
-    return np.asarray(np.maximum(least, SHARED * cloud["sigma"][nearest].mean(axis=1)))
+    return least if around is None else np.asarray(np.maximum(least, SHARED * around["sigma"].mean(axis=1)))
 
 
-def _apart(
-    cloud: NDArray[np.void] | None, nearest: NDArray[np.intp] | None, agreement: FusionReport | None
-) -> Floats | float:
+def _apart(around: NDArray[np.void] | None, agreement: FusionReport | None) -> Floats | float:
     """Return (V,) the systematic disagreement of the cameras of the points around each vertex, mm; one for all without
     points."""
     if agreement is None:
         return 0.0
-    if cloud is None or nearest is None:
+    if around is None:
         return agreement.systematic_mm
-    of_camera = np.zeros(int(cloud["camera"].max()) + 1)
-    for camera in np.unique(cloud["camera"]):
-        of_camera[camera] = agreement.systematic_of(int(camera))
-    return np.asarray(of_camera[cloud["camera"][nearest]].mean(axis=1))
+    cameras, number = np.unique(around["camera"], return_inverse=True)
+    apart = np.array([agreement.systematic_of(int(camera)) for camera in cameras])
+    return np.asarray(apart[number.reshape(around.shape)].mean(axis=1))
 
 
 def _moved_mm(movement: MovementReport | None) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.cell_cameras import cameras_around
-from footscan.cloud.lasers.seen import LINKED_MM, smoothed
+from footscan.cloud.lasers.seen import LINKED_MM, smoothed, stripe_numbers
 from footscan.cloud.points import camera_numbers, coordinates, stripe_step
 from footscan.mesh.voxels import voxelise
 
@@ -98,7 +98,7 @@ def _linked(points: NDArray[np.void], first: Ints, second: Ints) -> Mask:
 def _decided(evidence: Floats, linked: Mask) -> NDArray[np.int8]:
     """The laser of each stripe point (P,): 1 the first one, -1 the second one, 0 unknown."""
     sure = np.abs(evidence) > BETTER
-    piece = np.concatenate([[0], np.cumsum(~linked[:-1])])
+    piece = stripe_numbers(linked)
     of_piece = np.bincount(piece, np.where(sure, np.sign(evidence), 0.0))[piece]
     return np.sign(np.where(sure, evidence, of_piece)).astype(np.int8)
 

@@ -157,11 +157,16 @@ def _linked(points: NDArray[np.void]) -> Mask:
     return np.append(same & (gap < LINKED_MM), False)
 
 
+def stripe_numbers(linked: Mask) -> Ints:
+    """The number of the stripe of each point, (N,)."""
+    return np.concatenate([[0], np.cumsum(~linked[:-1])])
+
+
 def smoothed(support: Floats, linked: Mask) -> Floats:
     """The mean (N,) over neighbours along the stripe."""
     number = np.arange(len(support))
     ends = np.append(np.flatnonzero(~linked[:-1]), len(support) - 1)  # the last point of each stripe
-    stripe = np.searchsorted(ends, number)
+    stripe = stripe_numbers(linked)
     first = np.maximum(number - SMOOTHED, np.append(0, ends + 1)[stripe])
     beyond = np.minimum(number + SMOOTHED, ends[stripe]) + 1
     total = np.append(0.0, np.cumsum(support))

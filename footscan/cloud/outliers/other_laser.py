@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from footscan.cloud.lasers.moments import renumbered
-from footscan.cloud.lasers.seen import BETTER, FARTHEST_MM, LEAST_MM, lasers_seen
+from footscan.cloud.lasers.seen import BETTER, FARTHEST_MM, LEAST_MM, lasers_seen, stripe_numbers
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.cloud.views import View
 from footscan.side_by_side import together
@@ -95,14 +95,9 @@ def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mappin
 
 def _vote(strange: Mask, decided: Mask, linked: Mask) -> Mask:
     """What most of the points (N,) that are decided say of the stripe of each point; false where none says anything."""
-    stripe = _stripes(linked)
+    stripe = stripe_numbers(linked)
     most = 2 * np.bincount(stripe, strange & decided) > np.bincount(stripe, decided)
     return np.asarray(most[stripe])
-
-
-def _stripes(linked: Mask) -> Ints:
-    """The number of the stripe of each point, (N,)."""
-    return np.concatenate([[0], np.cumsum(~linked[:-1])])
 
 
 def _not_yet_met(points: NDArray[np.void], head: Ints, confirmed: Mask, certain: Mask) -> Mask:
@@ -181,7 +176,7 @@ def _met_other_laser(
     skin = KDTree(xyz[confirmed])
     own = _heights(skin, xyz[doubtful])
     is_between = np.isfinite(ends[0, doubtful]) & ~_is_beyond(xyz[doubtful, 0], ends[:, doubtful])
-    stripe = _stripes(linked)
+    stripe = stripe_numbers(linked)
     is_alone = (np.bincount(stripe, confirmed) == 0.0)[stripe[doubtful]]
     is_alone &= stripe_step(points) < AROUND_MM  # otherwise a stripe without confirmed points has no skin around it
     for head_places, plane in zip(places, planes, strict=True):
