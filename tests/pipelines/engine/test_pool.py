@@ -1,6 +1,9 @@
 """Threads, processes and a cluster give the same results; a dying worker costs only its own task."""
 
+import platform
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -9,7 +12,7 @@ import pytest
 
 from pipelines.engine.actions.step import Failure, Output, Step, Success, Value
 from pipelines.engine.plan import make_plan
-from pipelines.engine.pool import Cluster, StepEnd, Threads, joined_cluster, local_cluster
+from pipelines.engine.pool import ARENAS, Cluster, StepEnd, Threads, joined_cluster, local_cluster
 from pipelines.engine.run import run_plan
 from pipelines.engine.store.store import Store, open_store
 from schemas.base.errors import RefusedInput
@@ -27,8 +30,22 @@ def run(inputs, parameters, places):
 FAILS = (
     "from schemas.base.errors import Finding\ndef run(inputs, parameters, places):\n    raise Finding('no stripe')\n"
 )
-
-
+HEAPS_OF_THREADS = """
+import ctypes, sys, threading
+from pipelines.engine.pool import Threads
+Threads(2).run({}, None, None)
+def hold():
+    held = [bytes(10_000) for _ in range(100)]
+    met.wait()
+met = threading.Barrier(9)
+for _ in range(8):
+    threading.Thread(target=hold).start()
+libc = ctypes.CDLL(None)
+libc.fdopen.restype = ctypes.c_void_p
+libc.malloc_info(0, ctypes.c_void_p(libc.fdopen(1, b"w")))
+met.wait()
+libc.fflush(None)
+"""
 MODULES = {"join": JOIN, "killer": KILLS, "frail": KILLS_ONCE, "failing": FAILS}
 
 
@@ -73,6 +90,13 @@ def test_processes_give_what_threads_give(store: Store, tmp_path: Any, cluster: 
     files = [{name: data.files.read(name) for name, _ in data.files.sizes("")} for data in (store, elsewhere)]
     assert files[0] == files[1]
     assert run(steps, elsewhere, cluster) == (expected, [])
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="heaps of glibc's malloc")
+def test_threads_share_their_heaps() -> None:
+    report = subprocess.run([sys.executable, "-c", HEAPS_OF_THREADS], capture_output=True, text=True, check=True).stdout
+
+    assert 1 <= report.count("<heap nr=") <= ARENAS
 
 
 def test_failures_travel(store: Store, cluster: Cluster) -> None:
