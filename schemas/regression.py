@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, AwareDatetime, BeforeValidator, Field, model_validator
 
 from schemas.base.model import Document, Pseudonym, RelativePath
+from schemas.parameters.presets import Preset
 from schemas.parameters.scan import ScanParameters
 from schemas.parameters.simulation import Seed
 from schemas.parameters.virtual_scan import VirtualScan
@@ -25,8 +26,10 @@ class DataSet(Document):
     virtual: VirtualScan | None = None
     calibration: Name | None = None
     """File for a recorded scan; default: the one that it names. A virtual scanner is calibrated by its own."""
+    preset: Preset | None = None
+    """As in `ScanParameters`, in place of the suite's parameters."""
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    """In place of those of the suite, by section and name."""
+    """In place of those of the suite and of the preset, by section and name."""
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:

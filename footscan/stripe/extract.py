@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from footscan.compiled import compiled
 from footscan.stripe.crossings import CHAIN, CROSSING_COLUMNS, find_stripe
+from footscan.stripe.finding.skeleton import skeleton_stripe
 from footscan.stripe.laser import adapted_to
 from footscan.stripe.points import STRIPE_DTYPE, StripePoints
 from schemas.parameters.extraction import ExtractionParameters
@@ -47,6 +48,8 @@ def extract_stripe(
     """
     if parameters.laser == "auto":
         parameters = adapted_to([image], parameters, [background])
+    if parameters.stripe == "skeleton":
+        return skeleton_stripe(image, parameters, background)
     crossings = find_stripe(image, parameters, background)
     return as_points(crossings, np.zeros(len(crossings), np.int32))
 

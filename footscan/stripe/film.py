@@ -12,7 +12,8 @@ from footscan.stripe.blur import is_laser_light
 from footscan.stripe.clutter import is_moving_stripe, number_pieces
 from footscan.stripe.crossings import MEASURED, PIECE, find_stripe
 from footscan.stripe.extract import as_points
-from footscan.stripe.points import StripePoints
+from footscan.stripe.finding.skeleton import skeleton_stripe
+from footscan.stripe.points import STRIPE_DTYPE, StripePoints
 from schemas.parameters.extraction import ExtractionParameters
 
 CSV_COLUMNS = ["frame", "i", "j", "width", "peak", "score"]
@@ -51,6 +52,8 @@ def extract_film(
     >>> print(np.unique(points["frame"]))
     [0 2 3]
     """
+    if parameters.stripe == "skeleton":
+        return _skeletons(zip(frames, backgrounds or repeat(None), strict=False), parameters)
     crossings_by_frame = [np.empty((0, MEASURED))]
     read: list[int] = []
     for number, (frame, background) in enumerate(zip(frames, backgrounds or repeat(None), strict=False)):
@@ -67,6 +70,15 @@ def extract_film(
     if read != list(range(len(read))):
         points["frame"] = np.array(read, np.int32)[points["frame"]]
     return points
+
+
+def _skeletons(pairs: Iterable[tuple[Rgb | None, Rgb | None]], parameters: ExtractionParameters) -> StripePoints:
+    found = [np.empty(0, STRIPE_DTYPE)]
+    for number, (frame, background) in enumerate(pairs):
+        if frame is not None:
+            found.append(skeleton_stripe(frame, parameters, background))
+            found[-1]["frame"] = number
+    return np.concatenate(found)
 
 
 def points_csv(points: StripePoints) -> str:

@@ -54,7 +54,8 @@ def adapted(
     Returns
     -------
     `parameters`, with `laser` unchanged if they name one, or if no colour shows a stripe; with lower thresholds if the
-    stripe of the film is fainter than `full_redness`, and for a faint line (`stripe`) if there is hardly any other.
+    stripe of the film is fainter than `full_redness`, and for a faint line (`stripe`) if there is hardly any other. For
+    a `skeleton` only the laser is found.
     """
     numbers = np.unique(np.linspace(0, film.count - 1, min(SAMPLED + 2, film.count)).round().astype(int)).tolist()
     if len(numbers) > SAMPLED:
@@ -92,6 +93,8 @@ def adapted_to(
     if parameters.laser == "auto":
         sensitive = _scaled(parameters, SENSITIVE / parameters.red_threshold)
         clear = parameters.with_laser(_laser(pairs, parameters) or _laser(pairs, sensitive))
+    if parameters.stripe == "skeleton":
+        return clear
     if pairs and parameters.stripe == "auto":
         line = _faint_line(pairs, parameters, clear)
         if line is not None:

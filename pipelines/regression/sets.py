@@ -4,7 +4,6 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from footscan.recordings.scans import SCAN_FILE
 from pipelines.archive.job import Job
@@ -18,6 +17,7 @@ from pipelines.simulate import filmed_calibration_steps
 from schemas.base.errors import Fault, RefusedInput
 from schemas.base.json_files import validate
 from schemas.base.model import canonical_json
+from schemas.parameters.presets import overlaid, preset_sections
 from schemas.parameters.scan import ScanParameters
 from schemas.parameters.simulation import SimulationSettings
 from schemas.parameters.virtual_scan import VirtualScan
@@ -65,9 +65,9 @@ def prepare(name: str, suite: Suite, base: Path, out: Path, on_step_end: OnStepE
 
 def parameters_of(name: str, suite: Suite) -> ScanParameters:
     """The parameters of the suite, overridden by those of the set; RefusedInput if they break a model."""
-    values: dict[str, Any] = suite.parameters.model_dump(mode="json")
-    for section, changed in suite.sets[name].parameters.items():
-        values[section] = {**values.get(section, {}), **changed}
+    data_set = suite.sets[name]
+    below = {} if data_set.preset is None else preset_sections(data_set.preset)
+    values = overlaid(overlaid(suite.parameters.model_dump(mode="json"), below), data_set.parameters)
     try:
         return validate("parameters", ScanParameters, values)
     except RefusedInput as error:

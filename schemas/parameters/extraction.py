@@ -16,10 +16,11 @@ class ExtractionParameters(Document):
         description="colour of the laser in the pictures, `mono` for a camera without colours; `auto` finds it in the "
         "film. Where others say red, the colour of the laser is meant",
     )
-    stripe: Literal["auto", "clear", "faint"] = Field(
+    stripe: Literal["auto", "clear", "faint", "skeleton"] = Field(
         default="auto",
         description="`faint` for a narrow line a few grey levels above a bright surface, whose single pixels do not "
-        "stand out, `clear` for any other stripe; `auto` finds out in the film",
+        "stand out, `clear` for any other stripe; `auto` finds out in the film. `skeleton` is the method of the "
+        "thesis, for comparison: the thinned largest part that is redder than `red_threshold`",
     )
     red_threshold: int = Field(
         default=18,

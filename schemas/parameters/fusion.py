@@ -1,6 +1,6 @@
 """Parameters of the fusion of the cameras."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -10,6 +10,9 @@ from schemas.base.model import Document
 class FusionParameters(Document):
     """Parameters that turn the points of several cameras into one cloud."""
 
+    method: Literal["merge", "concatenate"] = "merge"
+    """`merge` averages what several cameras saw, and settles contradictions; `concatenate` keeps all points of all
+    cameras as they are, as the thesis does, for comparison."""
     spacing_mm: Annotated[float, Field(ge=0, le=5)] = 0.4
     """Points of one stripe plane are no closer to each other; 0 keeps all."""
     contradiction_mm: Annotated[float, Field(gt=0, le=10)] = 1.0

@@ -66,6 +66,8 @@ def fuse(
     stripes = sort_stripes([points] if isinstance(points, np.ndarray) else points)
     overlaps = find_overlaps(stripes, stripes.yz, parameters.overlap_mm)
     before = disagreements(stripes, overlaps)
+    if parameters.method == "concatenate":
+        return _concatenated(stripes, before, heads or {})
     corrected = correct(stripes, overlaps, parameters)
     after = before
     if corrected.yz is not stripes.yz:
@@ -81,10 +83,7 @@ def fuse(
     off = is_off_shared_surface(merged.points) | is_off_alone(merged.points)
     lonely = np.bincount(merged.points["camera"][off], minlength=256)
     report = FusionReport(
-        pairs=[
-            PairDisagreement(cameras=pair, points=count, before=disagreement, after=after.get(pair, before[pair])[1])
-            for pair, (count, disagreement) in before.items()
-        ],
+        pairs=_pairs(before, after),
         corrections=corrected.corrections,
         distrusted=sorted(corrected.too_far),
         contradicted={camera: count + int(lonely[camera]) for camera, count in merged.contradicted.items()},
@@ -95,9 +94,27 @@ def fuse(
             for camera, away in sorted(corrected.too_far.items())
         ]
         + [*_worse(before, after)],
-        heads={camera: head for camera, head in (heads or {}).items() if camera in stripes.cameras},
+        heads=_present(heads or {}, stripes),
     )
     return Fusion(merged.points[~off], report)
+
+
+def _concatenated(stripes: Stripes, pairs: Pairs, heads: Mapping[int, int]) -> Fusion:
+    """All points of all cameras as they are."""
+    order = np.lexsort([stripes.yz[:, 1], stripes.yz[:, 0], stripes.plane])
+    report = FusionReport(pairs=_pairs(pairs, pairs), heads=_present(heads, stripes))
+    return Fusion(stripes.points[order], report)
+
+
+def _present(heads: Mapping[int, int], stripes: Stripes) -> dict[int, int]:
+    return {camera: head for camera, head in heads.items() if camera in stripes.cameras}
+
+
+def _pairs(before: Pairs, after: Pairs) -> list[PairDisagreement]:
+    return [
+        PairDisagreement(cameras=pair, points=count, before=disagreement, after=after.get(pair, before[pair])[1])
+        for pair, (count, disagreement) in before.items()
+    ]
 
 
 def _worse(before: Pairs, after: Pairs) -> Iterator[str]:

@@ -19,15 +19,13 @@ config = typer.Typer(help="Check a workflow and show its parameters.", no_args_i
 @config.command("show")
 def show(workflow: WorkflowFile = None, settings: Settings = None, as_json: AsJson = False) -> None:
     """Show every value in force and its origin: a line of the file, --set, or the default."""
+    from pipelines.archive.settings import changed_parameters, set_names
     from pipelines.archive.workflow_file import read_workflow
     from schemas.base.json_files import read_text
-    from schemas.base.overrides import overridden, parse_settings
-    from schemas.parameters.scan import ScanParameters
 
     path = workflow or WORKFLOW
     document, text = read_workflow(path), read_text(path, "yaml_bytes")
-    given = parse_settings(settings or [])
-    changed = overridden(ScanParameters, document.parameters.model_dump(mode="json"), settings or [])
+    changed, given = changed_parameters(document.parameters, settings or []), set_names(settings or [])
     rows = []
     for names, value in _values(document.model_copy(update={"parameters": changed})):
         name = ".".join(names)
@@ -61,7 +59,9 @@ def _values(document: "BaseModel", above: tuple[str, ...] = ()) -> Iterator[tupl
     """Every value of a document with its path of names."""
     from pydantic import BaseModel
 
-    for name in type(document).model_fields:
+    for name, field in type(document).model_fields.items():
+        if field.exclude:
+            continue
         value = getattr(document, name)
         if isinstance(value, BaseModel):
             yield from _values(value, (*above, name))

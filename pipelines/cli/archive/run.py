@@ -50,7 +50,9 @@ WatchArchive = Annotated[
 Settings = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="NAME=VALUE", help="Parameter, for example extraction.red_threshold=22; may be repeated."
+        "--set",
+        metavar="NAME=VALUE",
+        help="Parameter, for example extraction.red_threshold=22, or preset=thesis; may be repeated.",
     ),
 ]
 POLL_S, LONGEST_POLL_S, WATCHED_SHARE = 2.0, 20.0, 0.01
@@ -227,12 +229,9 @@ def plan(
 
 def with_settings(job: "Job", settings: list[str] | None) -> "Job":
     """`job` with what `--set` says of its parameters."""
-    from schemas.base.overrides import overridden
-    from schemas.parameters.scan import ScanParameters
+    from pipelines.archive.settings import changed_parameters
 
-    if not settings:
-        return job
-    return replace(job, parameters=overridden(ScanParameters, job.parameters.model_dump(mode="json"), settings))
+    return replace(job, parameters=changed_parameters(job.parameters, settings)) if settings else job
 
 
 def job_of(

@@ -99,6 +99,13 @@ def test_the_parameters_of_a_set_stand_in_place_of_the_suites(filming: Filming) 
     assert parameters_of("ambient", Suite.model_validate(SUITE)).extraction.ridge_px == 2.0
 
 
+def test_a_set_may_have_a_preset() -> None:
+    sets = {"ours": SUITE["sets"]["ambient"], "theirs": {**SUITE["sets"]["ambient"], "preset": "thesis:surface"}}
+    suite = Suite.model_validate({**SUITE, "sets": sets})
+    assert [parameters_of(name, suite).surface.method for name in sets] == ["closed", "ball_pivoting"]
+    assert parameters_of("theirs", suite).extraction == parameters_of("ours", suite).extraction
+
+
 def test_what_cannot_be_filmed_is_a_fault(filming: Filming, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> bytes:
         raise ValueError("no laser")

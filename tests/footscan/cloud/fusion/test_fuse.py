@@ -46,6 +46,22 @@ def test_fused_points_are_better_than_those_they_are_made_of() -> None:
     assert report.warnings == []
 
 
+def test_concatenated_points_are_all_there_as_they_were() -> None:
+    clouds = arch()
+    cloud, report = fuse(clouds, FusionParameters(method="concatenate"), {1: 1, 2: 1, 3: 2, 9: 3})
+
+    raw = np.concatenate(clouds)
+    assert len(cloud) == len(raw)
+    assert np.array_equal(
+        np.sort(cloud, order=["frame", "camera", "source"]), np.sort(raw, order=["frame", "camera", "source"])
+    )
+    assert np.all(np.diff(cloud["plane"]) >= 0)
+    assert not report.corrections
+    assert report.heads == {1: 1, 2: 1, 3: 2}
+    assert all(pair.before == pair.after for pair in report.pairs)
+    assert report.pairs
+
+
 def test_a_camera_that_stands_off_is_corrected_and_told() -> None:
     clean, _ = fuse(arch(), PARAMETERS)
     cloud, report = fuse(arch(shift=(0.15, -0.15)), PARAMETERS)

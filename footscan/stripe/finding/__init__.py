@@ -1,0 +1,1 @@
+"""Other ways to find a stripe than by its ridges."""
