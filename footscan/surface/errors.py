@@ -36,7 +36,7 @@ two stripes does."""
 NEAREST, SHARED = 4, 0.25
 """Points nearest to a vertex, and the part of their standard deviation that all points around it share. Tuned on
 scanners without pictures whose planes a body has shown: `draw_assembled`, seeds 801 to 810."""
-SCATTERED, OF_SCATTER = 16, 1.5
+SCATTERED, OF_SCATTER = 16, 2.5
 """Points nearest to a vertex whose scatter off the surface is judged, and errors of the surface relative to it: where a
 camera takes two lasers for one, its points contradict each other, and the surface follows them half the way. Tuned on
 films of `draw_assembled`, seeds 2503 and 2513: their root mean square is 0.04 mm where points are off by less than
