@@ -41,13 +41,14 @@ class WorldGraph:
     whole : the calibration.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, calibration: CalibrationParameters | None = None) -> None:
         """Begin with the steps that compute the world's truth and its chart, and calibrate from it."""
         self.world = world
         self.name = f"{PATIENT}/{world.seed}"
         self.steps: list[Step] = []
         self.drawn = self.add("world", "world_points", {}, world)
-        self.whole: Input = self.add("calibration", "world_calibration", {"world": self.drawn}, CalibrationParameters())
+        fitted = calibration or CalibrationParameters()
+        self.whole: Input = self.add("calibration", "world_calibration", {"world": self.drawn}, fitted)
 
     def add(
         self,
@@ -161,12 +162,14 @@ def filmed_steps(
     parameters: ScanParameters,
     digests: FileDigests,
     body: tuple[RecordedScan, Body] | None = None,
+    calibration: CalibrationParameters | None = None,
 ) -> list[Step]:
     """Build the steps from the films of a world to what came of it, in topological order.
 
     body : film of a body, and the body, to calibrate after the chart.
+    calibration : of the chart; None for the defaults.
     """
-    graph = WorldGraph(world)
+    graph = WorldGraph(world, calibration)
     if body is not None:
         graph.read_body(*body, digests)
     made = scan_steps(scan, graph, parameters, digests)

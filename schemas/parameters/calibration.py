@@ -26,6 +26,11 @@ class CalibrationParameters(Document):
         description="order of the polynomial; default: the order with the least held-out error",
     )
 
+    points: Annotated[int, Field(ge=4, le=2000)] | None = Field(
+        default=None,
+        description="control points of each camera that are used, the most spread ones; default: all (charts only)",
+    )
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if self.order is not None and self.model != "polynomial":
@@ -55,6 +60,8 @@ class CaptureCalibrationParameters(CalibrationParameters, PlacementParameters):
     def _has_enough_data(self) -> Self:
         if self.model == "quadratic":
             raise ValueError("quadratic is for charts, expected polynomial with order 2")
+        if self.points is not None:
+            raise ValueError("points is for charts, expected none")
         return self
 
     @property

@@ -9,11 +9,11 @@ from subprocess import CompletedProcess
 
 import pytest
 
+from footscan.thesis.printed import CHARTS_FILE, COEFFICIENTS_FILE
 from schemas.calibration import read_calibration
 
 Footscan = Callable[..., CompletedProcess[str]]
-DATA = Path(__file__).parents[1] / "footscan" / "calibration" / "chart" / "data"
-CHART = DATA / "calibration_charts.csv"
+CHART = CHARTS_FILE
 
 
 def test_quadratic_calibration_of_a_chart_in_centimetres(footscan: Footscan) -> None:
@@ -26,7 +26,7 @@ def test_quadratic_calibration_of_a_chart_in_centimetres(footscan: Footscan) -> 
         assert {"camera", "model", "alpha_y", "alpha_z", "r2_y", "r2_z"} <= set(camera)
         assert camera["model"] == "quadratic"
         assert len(camera["alpha_y"]) == len(camera["alpha_z"]) == 6
-    with (DATA / "printed_coefficients.csv").open(newline="") as file:
+    with COEFFICIENTS_FILE.open(newline="") as file:
         printed = list(csv.DictReader(file))
     terms = ["1", "i", "j", "i^2", "ij", "j^2"]
     assert len(printed) == 43

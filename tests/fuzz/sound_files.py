@@ -10,6 +10,7 @@ from footscan.frames.film import open_film
 from footscan.frames.image import decode_image, encode_png
 from footscan.mesh.formats.files import mesh_bytes
 from footscan.mesh.mesh import Mesh
+from footscan.thesis.printed import CHARTS_FILE
 from pipelines.cli.main import run_command
 
 SCAN = "archive/P0001/S1"
@@ -67,7 +68,7 @@ def make_sound_files(pristine: Path, folder: Path) -> None:
     assert isinstance(frame, bytes)
     (folder / "frame.jpg").write_bytes(frame)
     (folder / "frame.png").write_bytes(encode_png(decode_image(frame)))
-    thesis = Path(__file__).parents[1] / "footscan" / "calibration" / "chart" / "data" / "calibration_charts.csv"
+    thesis = CHARTS_FILE
     shutil.copyfile(thesis, folder / "chart.csv")
     shutil.copyfile(Path(__file__).parents[2] / "footscan" / "sizing" / "sizes.yaml", folder / "sizes.yaml")
     (folder / "pixels.csv").write_text("i,j\n" + "".join(f"{300 + k}.5,{200 + k}\n" for k in range(20)))

@@ -28,6 +28,7 @@ from damage_captures import damage_capture
 from damage_charts import damage_chart
 
 from footscan.calibration.models.maps import is_supported, to_world
+from footscan.thesis.printed import CHARTS_FILE
 from pipelines.cli.main import run_command
 from schemas.calibration import Calibration, read_calibration
 
@@ -37,7 +38,7 @@ CHARTS, CAPTURES = (24, 6) if ASKED is None else (int(ASKED) - int(ASKED) // 2, 
 RECORD = os.environ.get("FOOTSCAN_FUZZ_RECORD")
 LONGEST_S = 60
 
-THESIS = Path(__file__).parents[1] / "footscan" / "calibration" / "chart" / "data" / "calibration_charts.csv"
+THESIS = CHARTS_FILE
 CHART_OPTIONS = (
     *([] for _ in range(6)),
     ["--json"],

@@ -1,7 +1,7 @@
 """Calibration charts: control points with known world position and pixel, in one CSV file for all cameras."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +57,27 @@ class Chart:
     def name(self) -> str:
         """The camera and, if it is not the first one, the laser."""
         return name_of(self.camera, self.laser)
+
+
+def most_spread(chart: Chart, count: int) -> Chart:
+    """The `count` control points that a person would click who clicks few: corners that are far from each other.
+
+    The first one is the farthest from the middle of the picture's points, each further one the farthest from those
+    before it. The points keep their order.
+
+    >>> grid = np.array([[i, j] for i in range(5) for j in range(5)], np.float64)
+    >>> chart = Chart(1, tuple(map(str, range(25))), np.column_stack([0 * grid[:, 0], grid]), "mm", grid)
+    >>> most_spread(chart, 5).pixels.tolist()
+    [[0.0, 0.0], [0.0, 4.0], [2.0, 2.0], [4.0, 0.0], [4.0, 4.0]]
+    """
+    pixels = chart.pixels
+    chosen = [int(np.argmax(np.linalg.norm(pixels - pixels.mean(axis=0), axis=1)))]
+    while len(chosen) < min(count, len(pixels)):
+        away = np.linalg.norm(pixels[:, None] - pixels[chosen], axis=2).min(axis=1)
+        chosen.append(int(np.argmax(away)))
+    kept = np.sort(chosen)
+    points = tuple(chart.points[k] for k in kept)
+    return replace(chart, points=points, world=chart.world[kept], pixels=pixels[kept])
 
 
 @dataclass(frozen=True)

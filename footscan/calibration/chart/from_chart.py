@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.chart.chart import Chart
+from footscan.calibration.chart.chart import Chart, most_spread
 from footscan.calibration.chart.quadratic import ORDER as QUADRATIC
 from footscan.calibration.chart.quadratic import QuadraticFit, fit_quadratic
 from footscan.calibration.models.fit import ModelFit
@@ -52,6 +52,8 @@ def calibrate_chart(
     RefusedInput
         A camera has too few control points, or they lie on one line, or do not determine the requested model.
     """
+    if parameters.points is not None:
+        charts = {view: most_spread(chart, parameters.points) for view, chart in charts.items()}
     cameras: list[CameraCalibration] = []
     trials: list[ModelTrial] = []
     for view in sorted(charts):

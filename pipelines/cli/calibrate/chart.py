@@ -32,11 +32,16 @@ def chart(
     order: Annotated[
         int | None, typer.Option(min=1, max=5, help="Order of the polynomial; default: chosen on held-out data.")
     ] = None,
+    points: Annotated[
+        int | None,
+        typer.Option(min=4, max=2000, help="Control points of each camera to use, the most spread ones; default: all."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Calibration file to write.")] = None,
     keep_going: KeepGoing = False,
     as_json: AsJson = False,
 ) -> None:
     """Calibrate from a chart of control points with known pixels."""
+    from footscan.calibration.chart.chart import most_spread
     from footscan.calibration.chart.from_chart import calibrate_chart
     from pipelines.cli.calibrate.model_table import print_trials
     from pipelines.engine.files.digest import sha256
@@ -48,6 +53,8 @@ def chart(
         raise RefusedInput("--order", "goes with --model polynomial alone")
     keep_inputs([out], file)
     charts, warnings = _checked(file, keep_going=keep_going)
+    if points is not None:
+        charts = {view: most_spread(own, points) for view, own in charts.items()}
     try:
         calibration, trials = calibrate_chart(
             charts,

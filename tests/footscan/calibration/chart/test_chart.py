@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from footscan.calibration.chart.chart import read_chart
+from footscan.thesis.printed import printed_charts
 from schemas.base.errors import RefusedInput
 
 DATA = Path(__file__).parent / "data"
@@ -19,7 +20,7 @@ def write(folder: Path, text: str | bytes) -> Path:
 
 
 def test_thesis_chart() -> None:
-    charts = read_chart(DATA / "calibration_charts.csv")
+    charts = printed_charts()
     assert list(charts) == [1, 2, 3, 4, 5, 6, 7, 8]
     assert all(chart.unit == "cm" and chart.points == ("P1", "P2", "P3", "P4", "P5") for chart in charts.values())
     np.testing.assert_array_equal(charts[8].world[3], [0, -5, 3])

@@ -2,21 +2,21 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from footscan.calibration.chart.chart import Chart, read_chart
+from footscan.calibration.chart.chart import Chart
 from footscan.calibration.chart.checks import CERTAIN, ChartWarning, check_charts, refuse_mistakes
 from footscan.calibration.chart.plane_fit import fit_homographies, project
+from footscan.thesis.printed import printed_charts
 from footscan.virtual.optics.scanner import standard_scanner
 from footscan.virtual.stage.reference import standard_reference
 from schemas.base.errors import RefusedInput
 
-THESIS = read_chart(Path(__file__).parent / "data" / "calibration_charts.csv")
+THESIS = printed_charts()
 Spoil = Callable[[Chart], Chart]
 
 

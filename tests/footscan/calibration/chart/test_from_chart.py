@@ -8,11 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from footscan.calibration.chart.chart import Chart, read_chart
+from footscan.calibration.chart.chart import Chart
 from footscan.calibration.chart.from_chart import calibrate_chart, compare_models, observe
 from footscan.calibration.chart.quadratic import fit_quadratic
 from footscan.calibration.models.maps import is_supported, prediction_covariance, to_world
 from footscan.calibration.models.selection import ModelTrial
+from footscan.thesis.printed import printed_charts
 from schemas.base.errors import RefusedInput
 from schemas.calibration import Calibration, CameraCalibration, HomographyMap, PolynomialMap, Source
 from schemas.parameters.calibration import CalibrationParameters
@@ -214,7 +215,7 @@ def test_too_few_points_or_a_line_are_refused() -> None:
 
 
 def test_thesis_chart_as_the_thesis_has_it() -> None:
-    charts = read_chart(DATA / "calibration_charts.csv")
+    charts = printed_charts()
     calibration, trials = calibrate(*charts.values(), model="quadratic")
     assert [camera.camera for camera in calibration.cameras] == [1, 2, 3, 4, 5, 6, 7, 8]
     assert all(trial.status == "chosen" and "says nothing" in trial.remark for trial in trials)
@@ -230,7 +231,7 @@ def test_thesis_chart_as_the_thesis_has_it() -> None:
 
 def test_thesis_chart_by_models() -> None:
     """Each camera gets one of the models that five points can judge; the second order is not among them."""
-    for chart in read_chart(DATA / "calibration_charts.csv").values():
+    for chart in printed_charts().values():
         trials = {trial.model: trial for trial in compare_models(chart)}
         assert trials["polynomial 2"].status == "refused"
         assert trials["polynomial 2"].remark == "10 observations for 12 unknowns"

@@ -1,19 +1,18 @@
 """The thesis's own figures, read as data: its chart of eight cameras and the coefficients that it prints."""
 
 import csv
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from footscan.calibration.chart.chart import Chart, read_chart
+from footscan.calibration.chart.chart import Chart
 from footscan.calibration.chart.quadratic import fit_quadratic, r_squared
 from footscan.calibration.models.polynomial import design_matrix
+from footscan.thesis.printed import COEFFICIENTS_FILE, printed_charts
 
-DATA = Path(__file__).parent / "data"
 TERMS = ["1", "i", "j", "i^2", "ij", "j^2"]
-CHARTS = read_chart(DATA / "calibration_charts.csv")
-with (DATA / "printed_coefficients.csv").open(newline="") as file:
+CHARTS = printed_charts()
+with COEFFICIENTS_FILE.open(newline="") as file:
     PRINTED = list(csv.DictReader(file))
 
 
