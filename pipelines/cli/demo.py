@@ -27,7 +27,7 @@ def demo(
     from schemas.quality import Quality
 
     foot = FilmedFoot(scan=f"demo-{side[0].upper()}", side=side, settings=SimulationSettings(ambient=light))
-    result = run_demo(folder, foot, _watch)
+    result = run_demo(folder, foot, watch)
 
     for part, seconds in result.seconds.items():
         message(f"{part}: {seconds:.1f} s")
@@ -44,7 +44,8 @@ def demo(
 
 
 @contextmanager
-def _watch(part: str, to_run: int, steps: int) -> "Iterator[OnStepEnd]":
+def watch(part: str, to_run: int, steps: int) -> "Iterator[OnStepEnd]":
+    """Show the progress of a part; see `pipelines.demo.Watch`."""
     from pipelines.cli.terminal.progress import StepProgress
 
     message(f"{part}: {to_run} of {steps} steps to run")

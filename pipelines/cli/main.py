@@ -8,7 +8,7 @@ import sys
 import typer
 
 from footscan.capture.board.termination import EndedBySignal
-from pipelines.cli import compare, demo, export, extract, films, regress, tune, verify
+from pipelines.cli import compare, demo, export, extract, films, regress, thesis, tune, verify
 from pipelines.cli.archive import cache, config, forget, run, trace, upgrade, why
 from pipelines.cli.calibrate import app as calibration
 from pipelines.cli.foot import lasts, measure, pairs, sizes
@@ -59,6 +59,7 @@ app.command("change")(pairs.change)
 app.command("lasts")(lasts.lasts)
 app.command("compare")(compare.compare)
 app.command("export")(export.export)
+app.command("thesis")(thesis.thesis)
 app.add_typer(verify.verify, name="verify")
 app.command("devices")(devices.devices)
 app.command("home")(scan.home)

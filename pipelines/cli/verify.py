@@ -9,17 +9,8 @@ from pipelines.cli.terminal.output import AsJson, figure, print_json, print_line
 from schemas.base.errors import Finding, RefusedInput, one_line
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from footscan.verify.shapes.stripe_ends import Sights
     from schemas.fits import CuboidDimension, CuboidFit, SphereFit
 
-THESIS_NOMINAL = (150.0, 100.0, 50.0)
-THESIS_FOUND = (151.2, 102.0, 51.4)
-"""Table 6-1 of the thesis: the true block and the scanned one."""
-SAMPLES = 100_000
-"""Number of points sampled on a mesh."""
 BASES = {"faces": "face", "stripes": "stripes", "floor": "floor", None: "not seen"}
 
 verify = typer.Typer(help="Compare a scan of a body of known shape with that shape.", no_args_is_help=True)
@@ -47,22 +38,18 @@ def block(
     as_json: AsJson = False,
 ) -> None:
     """Fit a cuboid: dimensions, angles and flatness, compared with Table 6-1 of the thesis."""
-    from footscan.verify.shapes.cuboid import fit_cuboid
+    from pipelines.block import beside_nominal, cloud_of, error_mm, fit_block
     from schemas.fits import CuboidParameters
 
     true = _dimensions(nominal)
     if not 0 <= sheet_mm[0] <= sheet_mm[1] <= 5:
         raise RefusedInput("--sheet-mm", f"{sheet_mm[0]:g} {sheet_mm[1]:g}, expected two mm from 0 to 5, ascending")
-    source = _cloud_of(scan)
-    parameters = CuboidParameters(edge_mm=edge_mm, floor_mm=floor_mm, sheet_mm=sheet_mm)
-    try:
-        fit = fit_cuboid(_points(source), parameters, _sights_of(source))
-    except Finding as error:
-        raise Finding(f"{source}: {error}") from None
-    compared = _beside_nominal(fit, true)
+    source = cloud_of(scan)
+    fit = fit_block(source, CuboidParameters(edge_mm=edge_mm, floor_mm=floor_mm, sheet_mm=sheet_mm))
+    compared = beside_nominal(fit, true)
     if as_json:
         rows = [
-            {"nominal_mm": true_mm, "thesis_mm": thesis_mm, "error_mm": _error(found, true_mm)}
+            {"nominal_mm": true_mm, "thesis_mm": thesis_mm, "error_mm": error_mm(found, true_mm)}
             | found.model_dump(mode="json")
             for true_mm, thesis_mm, found in compared
         ]
@@ -79,12 +66,13 @@ def sphere(
 ) -> None:
     """Fit spheres of one calibrated diameter at several places of the volume, as in ISO 20685-2."""
     from footscan.verify.shapes.sphere import find_spheres
+    from pipelines.block import cloud_of, points_of
 
     found: list[tuple[Path, SphereFit]] = []
     for file in files:
-        source = _cloud_of(file)
+        source = cloud_of(file)
         try:
-            found += [(source, fit) for fit in find_spheres(_points(source), diameter)]
+            found += [(source, fit) for fit in find_spheres(points_of(source), diameter)]
         except Finding as error:
             raise Finding(f"{source}: {error}") from None
     if as_json:
@@ -103,74 +91,9 @@ def _dimensions(text: str) -> tuple[float, float, float]:
     return a, b, c
 
 
-def _cloud_of(scan: Path) -> Path:
-    """The file to read. Of a folder of results this is the cloud, which was measured; the mesh is derived from it."""
-    if not scan.is_dir():
-        return scan
-    for name in ("cloud.ply", "foot.stl"):
-        if (scan / name).exists():
-            return scan / name
-    raise RefusedInput(scan, "holds neither cloud.ply nor foot.stl, expected the results of a scan")
-
-
-def _points(file: Path) -> "NDArray[np.float64]":
-    """The points of a cloud, or points sampled on a mesh."""
-    from footscan.mesh.formats.files import read_shape
-    from footscan.mesh.sampling import sample_surface
-
-    vertices, faces = read_shape(file)
-    return sample_surface(vertices, faces, SAMPLES) if len(faces) else vertices
-
-
-def _sights_of(cloud: Path) -> "Sights | None":
-    """The points of each camera before fusion, from the store above a cloud; None if they are not there."""
-    from footscan.calibration.models.pose import camera_centres
-    from footscan.cloud.points import coordinates
-    from footscan.verify.shapes.stripe_ends import Sights
-    from pipelines.archive.job import CACHE
-    from pipelines.arrays import unpack
-    from pipelines.cli.archive.cache import open_place
-    from pipelines.engine.explain import inputs_of
-    from pipelines.engine.files.digest import sha256
-    from schemas.calibration import Calibration
-
-    folder = cloud.resolve().parent
-    place = next((above / CACHE for above in folder.parents if (above / CACHE / "actions").is_dir()), None)
-    if place is None or not cloud.exists():
-        return None
-    store = open_place(place)
-    steps = {step: store.latest(f"{folder.parent.name}/{folder.name}/{step}") for step in ("clean", "cloud.ply")}
-    rows = {step: store.row(latest.key) for step, latest in steps.items() if latest}
-    clean, made = rows.get("clean"), rows.get("cloud.ply")
-    if not (clean and clean.digest and made and made.digest == sha256(cloud.read_bytes())):
-        return None
-    cleaned, calibration = store.get(clean.digest), store.get(inputs_of(clean.image)["calibration"][1])
-    if cleaned is None or calibration is None:
-        return None
-    points = unpack(cleaned)["points"]
-    centres = camera_centres(Calibration.model_validate_json(calibration).cameras)
-    return Sights(coordinates(points), points["camera"], centres)
-
-
-def _beside_nominal(
-    fit: "CuboidFit", nominal: tuple[float, float, float]
-) -> list[tuple[float, float | None, "CuboidDimension"]]:
-    """Each nominal dimension with the thesis's and the fitted one; the block may lie on any face."""
-    from itertools import permutations
-
-    def misfit(dimensions: "tuple[CuboidDimension, ...]") -> float:
-        return sum(abs(_error(found, true) or 0.0) for found, true in zip(dimensions, nominal, strict=True))
-
-    best = min(permutations(fit.dimensions), key=misfit)
-    thesis = THESIS_FOUND if nominal == THESIS_NOMINAL else (None, None, None)
-    return list(zip(nominal, thesis, best, strict=True))
-
-
-def _error(found: "CuboidDimension", nominal: float) -> float | None:
-    return None if found.value_mm is None else found.value_mm - nominal
-
-
 def _print_block(fit: "CuboidFit", compared: list[tuple[float, float | None, "CuboidDimension"]], source: Path) -> None:
+    from pipelines.block import error_mm
+
     rows = []
     for nominal, thesis, found in compared:
         lower, upper = (BASES[end] for end in found.ends)
@@ -180,7 +103,7 @@ def _print_block(fit: "CuboidFit", compared: list[tuple[float, float | None, "Cu
                 figure(thesis, ".1f"),
                 figure(found.value_mm),
                 figure(found.uncertainty_mm),
-                figure(_error(found, nominal), "+.3f"),
+                figure(error_mm(found, nominal), "+.3f"),
                 figure(found.free_mm),
                 lower if lower == upper else f"{lower}, {upper}",
             ]

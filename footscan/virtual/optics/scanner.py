@@ -114,7 +114,8 @@ def standard_scanner(seed: int = 1, distortion: float = 1.0) -> VirtualScanner:
 
     `distortion` scales the distortion of the lenses. The spreads are chosen by hand.
     """
-    return VirtualScanner(seed, _lasers(), tuple(_camera(seed, camera_id, distortion) for camera_id in range(1, 9)))
+    cameras = tuple(standing_camera(seed, number, usual_stand(number), distortion) for number in range(1, 9))
+    return VirtualScanner(seed, usual_lasers(), cameras)
 
 
 _UPPER_ELEVATION = 27.0
@@ -123,7 +124,9 @@ _LOWER_ELEVATION = -60.0
 reference object there; high ones see the lit instep better."""
 
 
-def _lasers() -> tuple[Laser, ...]:
+def usual_lasers() -> tuple[Laser, ...]:
+    """The lasers of the three heads: above on both sides, and below."""
+
     def laser(y: float, z: float, target_z: float) -> Laser:
         length = sqrt(y * y + (target_z - z) ** 2)
         return Laser((0.0, y, z), (0.0, -y / length, (target_z - z) / length))
@@ -145,28 +148,32 @@ class Stand(NamedTuple):
     """Angle between the camera's axis and the laser plane."""
 
 
-def _camera(seed: int, camera_id: int, distortion: float) -> Camera:
+def nominal_place(stand: Stand) -> tuple[Floats, Floats]:
+    """Where a camera is meant to stand, and the point of the laser plane at which it looks; both (3,) mm."""
+    elevation, angle = radians(stand.elevation_degrees), radians(stand.angle_degrees)
+    distance, side = 250.0 if stand.below else 300.0, 1.0 if stand.left else -1.0
+    target = np.array([0.0, side * 4.0, 16.0]) if stand.below else np.array([0.0, side * 20.0, 50.0])
+    outward = np.array(
+        [(1.0 if stand.front else -1.0) * sin(angle), side * cos(angle) * cos(elevation), cos(angle) * sin(elevation)]
+    )
+    return target + distance * outward, target
+
+
+def usual_stand(camera_id: int) -> Stand:
+    """The stand of camera 1 to 8."""
     below = camera_id > 4
     elevation = _LOWER_ELEVATION if below else _UPPER_ELEVATION
-    return standing_camera(
-        seed, camera_id, Stand(below, camera_id in (1, 2, 5, 6), camera_id % 2 == 1, elevation), distortion
-    )
+    return Stand(below, camera_id in (1, 2, 5, 6), camera_id % 2 == 1, elevation)
 
 
 def standing_camera(seed: int, camera_id: int, stand: Stand, distortion: float = 1.0) -> Camera:
     """The camera of a scanner's `seed` that stands as `stand` says, but for the errors of its mounting."""
-    below, left, front = stand.below, stand.left, stand.front
     elevation = radians(stand.elevation_degrees)
-    distance, focal = (250.0, 1010.0) if below else (300.0, 1150.0)
-
-    angle = radians(stand.angle_degrees)
-    side = 1.0 if left else -1.0
-    target = np.array([0.0, side * 4.0, 16.0]) if below else np.array([0.0, side * 20.0, 50.0])
-    outward = np.array(
-        [(1.0 if front else -1.0) * sin(angle), side * cos(angle) * cos(elevation), cos(angle) * sin(elevation)]
-    )
+    below, side = stand.below, 1.0 if stand.left else -1.0
+    focal = 1010.0 if below else 1150.0
     random = np.random.default_rng([seed, camera_id, 1])
-    position = target + distance * outward + random.normal(0.0, 1.5, 3)
+    place, target = nominal_place(stand)
+    position = place + random.normal(0.0, 1.5, 3)
     target = target + np.array([0.0, *random.normal(0.0, 1.5, 2)])
     axis = target - position
     axis /= np.sqrt((axis**2).sum())

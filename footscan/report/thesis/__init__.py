@@ -1,0 +1,1 @@
+"""The page that puts the thesis beside footscan."""
