@@ -47,15 +47,15 @@ from schemas.campaign import WorldOutcome
 from schemas.fits import CuboidParameters
 from schemas.measures import Measures
 from schemas.parameters.calibration import CalibrationParameters, CaptureCalibrationParameters
-from schemas.parameters.demo import FilmedFoot as FootFilm
+from schemas.parameters.demo import FilmedFoot
 from schemas.parameters.scan import ScanParameters
 from schemas.parameters.simulation import SimulationSettings
 from schemas.thesis import (
     BlockDimension,
     ClickedCorners,
-    FilmedFoot,
     FootMeasure,
     Method,
+    ReconstructedFoot,
     Stage,
     StageOutcome,
     ThesisResult,
@@ -63,7 +63,7 @@ from schemas.thesis import (
 
 Watch = Callable[[str, int, int], AbstractContextManager[OnStepEnd]]
 """As of `pipelines.demo`."""
-FOOT, BLOCK = FootFilm(patient="virtual", scan="foot"), FootFilm(patient="virtual", scan="block")
+FOOT, BLOCK = FilmedFoot(patient="virtual", scan="foot"), FilmedFoot(patient="virtual", scan="block")
 FIVE, ALL = CalibrationParameters(model="quadratic", points=5), CalibrationParameters(model="quadratic")
 """The calibration of the thesis, the quadratic (4.10, 4.11) through five clicked corners; and through all of them."""
 CALIBRATIONS: dict[Stage, CalibrationParameters] = {"calibration": FIVE, "all-corners": ALL}
@@ -119,12 +119,12 @@ def calibration_file(folder: Path, method: Method) -> Path:
     return folder / f"calibration-{method}.json"
 
 
-def scan_folder(folder: Path, film: FootFilm) -> Path:
+def scan_folder(folder: Path, film: FilmedFoot) -> Path:
     """The folder of a film."""
     return folder / "archive" / film.patient / film.scan
 
 
-def results_folder(folder: Path, method: Method, film: FootFilm = FOOT) -> Path:
+def results_folder(folder: Path, method: Method, film: FilmedFoot = FOOT) -> Path:
     """The results of a film by one method."""
     return folder / method / film.patient / film.scan
 
@@ -215,14 +215,14 @@ def _block(folder: Path) -> list[BlockDimension]:
     ]
 
 
-def _foot(folder: Path, method: Method, known: Mapping[str, float]) -> FilmedFoot:
+def _foot(folder: Path, method: Method, known: Mapping[str, float]) -> ReconstructedFoot:
     """Table 6-2: the foot by one method beside the truth."""
     results = results_folder(folder, method)
     measures = results / "measures.json"
     found = Measures.model_validate_json(measures.read_bytes()) if measures.exists() else None
     if not (results / "foot.stl").exists():
         problem = "no surface" if found is None else found.finding
-        return FilmedFoot(method=method, problem=problem)
+        return ReconstructedFoot(method=method, problem=problem)
     vertices, faces = read_mesh(results / "foot.stl")
     truth = read_mesh(scan_folder(folder, FOOT) / "truth.stl")
     shape = vertices, faces
@@ -231,7 +231,7 @@ def _foot(folder: Path, method: Method, known: Mapping[str, float]) -> FilmedFoo
     few = compare(shape, truth, classes=CLASSES[1], searched_b=searched)
     away = np.abs(searched.signed_distances(sample_surface(vertices, faces, SAMPLES)))
     cloud = read_file(results / "cloud.ply")
-    return FilmedFoot(
+    return ReconstructedFoot(
         method=method,
         comparison=comparison.model_copy(update={"histograms": [*comparison.histograms, *few.histograms]}),
         within_share=float(np.mean(away <= WITHIN_MM)),

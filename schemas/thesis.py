@@ -33,7 +33,7 @@ class FootMeasure(Document):
     status: str
 
 
-class FilmedFoot(Document):
+class ReconstructedFoot(Document):
     """A foot, filmed by the virtual scanner and reconstructed by one method."""
 
     method: Method
@@ -83,6 +83,6 @@ class ThesisResult(Document):
     agreeing: int
     """Of them, those that the fit to Table 4-2 rounds to."""
     block: list[BlockDimension]
-    feet: list[FilmedFoot]
+    feet: list[ReconstructedFoot]
     corners: list[ClickedCorners]
     stages: list[StageOutcome]

@@ -147,6 +147,8 @@ def _fields() -> dict[str, tuple[Any, TypeAdapter[Any]]]:
     """Type and value check of each parameter, by `section.name`."""
     found: dict[str, tuple[Any, TypeAdapter[Any]]] = {}
     for section, model in ScanParameters.model_fields.items():
+        if model.exclude:  # a preset, which is no parameter itself
+            continue
         assert isinstance(model.annotation, type)
         assert issubclass(model.annotation, BaseModel)
         for name, field in model.annotation.model_fields.items():

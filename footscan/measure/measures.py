@@ -35,6 +35,7 @@ FILLED_SHARE = 0.05
 LARGEST_SD_MM, LARGEST_GIRTH_SD_MM = 1.0, 2.0
 """Standard deviations from which a length and a girth are uncertain: half of what ISO 20685-1:2018 allows a scanner to
 be off, 2 mm for the foot and 4 mm for small circumferences."""
+NO_SECOND_TOE = "the axis runs through the ball, since the second toe was not found"
 HEIGHT = "_height"
 """Ending of the names of measures that count from the glass."""
 ROUGH_MM = 0.05
@@ -51,6 +52,11 @@ class Definition(NamedTuple):
     unit: Unit
     text: str
     compute: Callable[[FootSurface], Quantity]
+
+    @property
+    def is_on_axis(self) -> bool:
+        """True if it is taken along or across the foot axis."""
+        return "axis" in self.text
 
 
 def _definitions() -> dict[str, Definition]:
@@ -260,6 +266,7 @@ def measure_foot(
             filled=filled,
             calibration=calibration,
             doubt="; ".join([*reasons, *things]) or None,
+            axis_doubt=NO_SECOND_TOE if axis == "toe2" != foot.axis else None,
             glass_sd_mm=glass_sd_mm,
         ),
         landmarks=_in_mesh(landmarks, foot.transform),
@@ -275,12 +282,14 @@ def take_measures(
     filled: NDArray[np.bool_] | None = None,
     calibration: Mapping[str, tuple[float, float]] | None = None,
     doubt: str | None = None,
+    axis_doubt: str | None = None,
     glass_sd_mm: float = 0.0,
 ) -> dict[str, Measure]:
     """Compute all measures of a foot in its own frame.
 
     Parameters are those of `measure_foot`; arrays (V,) are by the vertices of `foot`. `doubt` is a reason for which all
-    measures are uncertain, `glass_sd_mm` the standard deviation of the floor from which heights count.
+    measures are uncertain, `axis_doubt` one for those on the foot axis, `glass_sd_mm` the standard deviation of the
+    floor from which heights count.
     """
     surface = FootSurface(foot, landmarks)
     known = SurfaceErrors(foot.vertices, [ErrorField("noise", surface.errors)] if errors is None else errors)
@@ -288,7 +297,6 @@ def take_measures(
         count = REPLICATES if errors is None and np.median(surface.errors) > ROUGH_MM else 0
     values = of_replicates(foot, known, count, partial(_values, rough=surface.roughness))
     scatter = scatter_of(values, count)
-    calibrations = calibration or {}
     to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
     measures = {
         name: _measure(
@@ -296,16 +304,14 @@ def take_measures(
             surface,
             (known, scatter.get(name), glass_sd_mm if name.endswith(HEIGHT) else 0.0),
             filled,
-            calibrations.get(name),
+            (calibration or {}).get(name),
             to_mesh,
-            doubt,
+            [reason for reason in (doubt, axis_doubt if definition.is_on_axis else None) if reason is not None],
         )
         for name, definition in _definitions().items()
     }
-    return {
-        name: measure.model_copy(update={"convention": CONVENTIONS.get(name, OWN)})
-        for name, measure in measures.items()
-    }
+    conventions = {name: {"convention": CONVENTIONS.get(name, OWN)} for name in measures}
+    return {name: measure.model_copy(update=conventions[name]) for name, measure in measures.items()}
 
 
 def _values(replicate: FootFrame, rough: Roughness) -> dict[str, float]:
@@ -329,7 +335,7 @@ def _measure(
     filled: NDArray[np.bool_] | None,
     calibration: tuple[float, float] | None,
     to_mesh: Floats,
-    doubt: str | None,
+    reasons: list[str],
 ) -> Measure:
     try:
         quantity = definition.compute(surface)
@@ -340,7 +346,7 @@ def _measure(
     offset, factor = calibration or (0.0, 1.0)
     digits = DIGITS[definition.unit]
     share = None if filled is None else round(quantity.share(filled), 3)
-    doubts = [reason for reason in (quantity.doubt, doubt) if reason is not None]
+    doubts = [*reasons] if quantity.doubt is None else [quantity.doubt, *reasons]
     if share is not None and share > FILLED_SHARE:
         doubts.append(f"{100 * share:.0f} % of it rests on surface that was filled, or that one camera alone saw")
     surface_errors, scatter, glass_sd_mm = errors

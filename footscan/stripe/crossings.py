@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from footscan.compiled import compiled
 from footscan.stripe.chain import in_order, is_sharpest, neighbours, pieces_of, place
-from footscan.stripe.finding.faint import find_line
+from footscan.stripe.faint import find_line
 from footscan.stripe.loop_parameters import LoopParameters, loop_parameters_of
 from footscan.stripe.pieces import keep_stripe
 from footscan.stripe.profile import COLUMNS, CONTRAST, REDNESS, SATURATION, SYMMETRY, WIDTH, measure_profiles

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from footscan.compiled import compiled
 from footscan.stripe.crossings import CHAIN, CROSSING_COLUMNS, find_stripe
-from footscan.stripe.finding.skeleton import skeleton_stripe
 from footscan.stripe.laser import adapted_to
+from footscan.stripe.plain.skeleton import skeleton_stripe
 from footscan.stripe.points import STRIPE_DTYPE, StripePoints
 from schemas.parameters.extraction import ExtractionParameters
 
@@ -49,7 +49,8 @@ def extract_stripe(
     if parameters.laser == "auto":
         parameters = adapted_to([image], parameters, [background])
     if parameters.stripe == "skeleton":
-        return skeleton_stripe(image, parameters, background)
+        rows = skeleton_stripe(image, parameters, background)
+        return points_of_rows(rows, np.zeros(len(rows), np.int32))
     crossings = find_stripe(image, parameters, background)
     return as_points(crossings, np.zeros(len(crossings), np.int32))
 
@@ -69,11 +70,15 @@ def as_points(crossings: NDArray[np.float64], frame: NDArray[np.int32]) -> Strip
     -------
     (M,) of `STRIPE_DTYPE`.
     """
-    filled, frames = _on_lines(crossings, frame)
-    points = np.empty(len(filled), STRIPE_DTYPE)
-    points["frame"] = frames
+    return points_of_rows(*_on_lines(crossings, frame))
+
+
+def points_of_rows(rows: NDArray[np.float64], frame: NDArray[np.int32]) -> StripePoints:
+    """Stripe points from rows (N, 7) of `CROSSING_COLUMNS`, and the frame of each."""
+    points = np.empty(len(rows), STRIPE_DTYPE)
+    points["frame"] = frame
     for column, name in enumerate(CROSSING_COLUMNS):
-        points[name] = filled[:, column]
+        points[name] = rows[:, column]
     return points
 
 

@@ -10,10 +10,10 @@ import numpy as np
 from footscan.frames.image import Rgb
 from footscan.stripe.blur import is_laser_light
 from footscan.stripe.clutter import is_moving_stripe, number_pieces
-from footscan.stripe.crossings import MEASURED, PIECE, find_stripe
-from footscan.stripe.extract import as_points
-from footscan.stripe.finding.skeleton import skeleton_stripe
-from footscan.stripe.points import STRIPE_DTYPE, StripePoints
+from footscan.stripe.crossings import CROSSING_COLUMNS, MEASURED, PIECE, find_stripe
+from footscan.stripe.extract import as_points, points_of_rows
+from footscan.stripe.plain.skeleton import skeleton_stripe
+from footscan.stripe.points import StripePoints
 from schemas.parameters.extraction import ExtractionParameters
 
 CSV_COLUMNS = ["frame", "i", "j", "width", "peak", "score"]
@@ -73,12 +73,13 @@ def extract_film(
 
 
 def _skeletons(pairs: Iterable[tuple[Rgb | None, Rgb | None]], parameters: ExtractionParameters) -> StripePoints:
-    found = [np.empty(0, STRIPE_DTYPE)]
-    for number, (frame, background) in enumerate(pairs):
-        if frame is not None:
-            found.append(skeleton_stripe(frame, parameters, background))
-            found[-1]["frame"] = number
-    return np.concatenate(found)
+    found = [
+        np.empty((0, len(CROSSING_COLUMNS))) if frame is None else skeleton_stripe(frame, parameters, background)
+        for frame, background in pairs
+    ]
+    counts = [len(rows) for rows in found]
+    frames = np.repeat(np.arange(len(found), dtype=np.int32), counts)
+    return points_of_rows(np.concatenate([np.empty((0, len(CROSSING_COLUMNS))), *found]), frames)
 
 
 def points_csv(points: StripePoints) -> str:

@@ -36,11 +36,12 @@ two stripes does."""
 NEAREST, SHARED = 4, 0.25
 """Points nearest to a vertex, and the part of their standard deviation that all points around it share. Tuned on
 scanners without pictures whose planes a body has shown: `draw_assembled`, seeds 801 to 810."""
-SCATTERED, OF_SCATTER = 16, 2.5
-"""Points nearest to a vertex whose scatter off the surface is judged, and errors of the surface relative to it: where a
-camera takes two lasers for one, its points contradict each other, and the surface follows them half the way. Tuned on
-films of `draw_assembled`, seeds 2503 and 2513: their root mean square is 0.04 mm where points are off by less than
-0.01 mm, 0.12 to 0.18 by 0.05, and 0.16 to 0.22 by 0.12."""
+SCATTERED, OF_SCATTER, SCATTER_STEP_MM = 16, 2.5, 4.0
+"""Points nearest to a vertex whose scatter off the surface is judged; errors of the surface relative to what exceeds
+the scatter of all vertices; and the distance of stripes beyond which the mesh is too coarse to follow its points, which
+then say nothing. Where a camera takes two lasers for one, its points contradict each other, and the surface follows
+them half the way. Tuned on films of `draw_assembled`, seeds 2503, 2513 and 2604. In the first two the root mean square
+of the errors is 0.04 mm where points are off by less than 0.01 mm, 0.12 to 0.18 by 0.05, and 0.16 to 0.22 by 0.12."""
 FACING_GROWS = 0.15
 """Growth of the standard deviation per mm into filled surface that faces the travel, as the tips of the shorter toes
 do: root mean square 0.16 per mm on 16 calibrated scanners (`draw_assembled`, seeds 1001 to 1016)."""
@@ -212,7 +213,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     ends = _ends(vertices, evidence)
     shift_mm = np.max([np.zeros(len(vertices)), *(end.shift_at(vertices[:, 0], step_mm) for end in ends)], axis=0)
     fields = [
-        *_broad_and_narrow("noise", np.maximum(_noise(around, step_mm), OF_SCATTER * scatter_mm)),
+        *_broad_and_narrow("noise", np.maximum(_noise(around, step_mm), _scattered(scatter_mm, step_mm))),
         ErrorField("noise", everywhere * COMMON_MM, WIDE_MM),
         ErrorField("filling", np.where(inside, ERROR_GROWS * gap_mm, 0.0), REACH_MM),
         *_broad_and_narrow("filling", np.where(inside, FACING_GROWS * gap_mm * np.abs(normals[:, 0]), 0.0)),
@@ -309,9 +310,19 @@ def _around(
     return cloud[near[:, :NEAREST]], off_mm[near].mean(axis=1)
 
 
+def _scattered(scatter_mm: Floats, step_mm: float) -> Floats:
+    """(V,) standard deviations of vertices from the scatter of the points around them, mm."""
+    return OF_SCATTER * np.maximum(scatter_mm - _least(step_mm), 0.0) * (step_mm <= SCATTER_STEP_MM)
+
+
+def _least(step_mm: float) -> float:
+    """Standard deviation of any vertex, and scatter of the points off the coarse mesh of distant stripes, mm."""
+    return ERROR_MM * max(1.0, (step_mm / USUAL_STEP_MM) ** 2)
+
+
 def _noise(around: NDArray[np.void] | None, step_mm: float) -> Floats | float:
     """Return (V,) the standard deviations of vertices from the points around them, mm; one for all without points."""
-    least = ERROR_MM * max(1.0, (step_mm / USUAL_STEP_MM) ** 2)
+    least = _least(step_mm)
     return least if around is None else np.asarray(np.maximum(least, SHARED * around["sigma"].mean(axis=1)))
 
 

@@ -8,7 +8,7 @@ from footscan.report.page import page
 from footscan.thesis.mistakes import mistakes
 from footscan.thesis.printed import FOOT_MAX_MM, FOOT_MEAN_MM, RESOLUTION_MM, WITHIN_SHARE
 from footscan.thesis.reproduced import CameraFit, Coefficient, camera_fits, coefficients
-from schemas.thesis import ClickedCorners, FilmedFoot, Method, Stage, StageOutcome, ThesisResult
+from schemas.thesis import ClickedCorners, Method, ReconstructedFoot, Stage, StageOutcome, ThesisResult
 
 METHODS: Mapping[Method, str] = {
     "thesis": "Its method on our films",
@@ -84,7 +84,7 @@ def _block(result: ThesisResult) -> str:
     return table(["True, mm", "Thesis, print", *METHODS.values()], rows, numeric=range(5))
 
 
-def _foot(feet: Mapping[Method, FilmedFoot]) -> str:
+def _foot(feet: Mapping[Method, ReconstructedFoot]) -> str:
     def row(name: str, printed: str, value: object) -> list[str]:
         assert callable(value)
         return [name, printed, *(value(feet[method]) for method in METHODS)]
@@ -92,7 +92,7 @@ def _foot(feet: Mapping[Method, FilmedFoot]) -> str:
     def of(figure: str) -> object:
         return lambda foot: NONE if foot.comparison is None else number(getattr(foot.comparison, figure), 3)
 
-    def missing(foot: FilmedFoot) -> str:
+    def missing(foot: ReconstructedFoot) -> str:
         complete = None if foot.comparison is None else foot.comparison.completeness
         return (
             NONE if complete is None else f"{number(100 * complete.within_share, 1)} % within {complete.within_mm:g} mm"
@@ -111,22 +111,22 @@ def _foot(feet: Mapping[Method, FilmedFoot]) -> str:
     return table(["", "Thesis, print", *METHODS.values()], rows, numeric=range(1, 5))
 
 
-def _within(foot: FilmedFoot) -> str:
+def _within(foot: ReconstructedFoot) -> str:
     return NONE if foot.within_share is None else f"{number(100 * foot.within_share, 1)} %"
 
 
-def _holes(foot: FilmedFoot) -> str:
+def _holes(foot: ReconstructedFoot) -> str:
     return ", ".join(number(hole) for hole in foot.holes_mm[:5]) or "none"
 
 
-def _histograms(foot: FilmedFoot) -> str:
+def _histograms(foot: ReconstructedFoot) -> str:
     if foot.comparison is None:
         return f'<p class="note">{text(foot.problem or "no surface")}</p>'
     plots = [histogram_plot(one) for one in foot.comparison.histograms if not one.signed]
     return f"<h3>{METHODS[foot.method]}</h3>" + "".join(plots)
 
 
-def _measures(feet: Mapping[Method, FilmedFoot]) -> str:
+def _measures(feet: Mapping[Method, ReconstructedFoot]) -> str:
     names = list(dict.fromkeys(name for foot in feet.values() for name in foot.measures))
     rows = []
     for name in names:

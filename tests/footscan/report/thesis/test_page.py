@@ -6,7 +6,15 @@ from footscan.report.thesis.page import stage_rows, thesis_page
 from footscan.report.thesis.reference_figure import reference_figure
 from footscan.thesis.mistakes import mistakes
 from footscan.verify.compare import compare
-from schemas.thesis import BlockDimension, ClickedCorners, FilmedFoot, FootMeasure, Method, StageOutcome, ThesisResult
+from schemas.thesis import (
+    BlockDimension,
+    ClickedCorners,
+    FootMeasure,
+    Method,
+    ReconstructedFoot,
+    StageOutcome,
+    ThesisResult,
+)
 
 SQUARE = np.array([[0.0, 0, 0], [9, 0, 0], [9, 9, 0], [0, 9, 0]]), np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 METHODS: tuple[Method, ...] = ("thesis", "thesis-all-corners", "footscan")
@@ -20,7 +28,7 @@ STAGES = [
 
 def result() -> ThesisResult:
     shifted = SQUARE[0] + [0.0, 0.0, 0.25], SQUARE[1]
-    ours = FilmedFoot(
+    ours = ReconstructedFoot(
         method="footscan",
         comparison=compare(shifted, SQUARE, classes=8, both=True),
         within_share=1.0,
@@ -38,7 +46,7 @@ def result() -> ThesisResult:
                 found_mm={"thesis": None, "thesis-all-corners": 150.6, "footscan": 150.02},
             )
         ],
-        feet=[FilmedFoot(method=method, problem="no <surface>") for method in METHODS[:2]] + [ours],
+        feet=[ReconstructedFoot(method=method, problem="no <surface>") for method in METHODS[:2]] + [ours],
         corners=[
             ClickedCorners(points=5, median_mm=13.0, worst_mm=99.0),
             ClickedCorners(points=None, median_mm=0.3, worst_mm=1.0),

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from skimage.measure import label, regionprops
 from skimage.morphology import skeletonize
 
-from footscan.stripe.points import STRIPE_DTYPE, StripePoints
 from schemas.parameters.extraction import ExtractionParameters
 
 SIGMA_PX = 0.5
@@ -22,7 +21,7 @@ CONNECTED = 2
 
 def skeleton_stripe(
     image: NDArray[np.uint8], parameters: ExtractionParameters, background: NDArray[np.uint8] | None = None
-) -> StripePoints:
+) -> NDArray[np.float64]:
     """Find one centre in each column of the largest red part, or in each row if the part is higher than broad.
 
     Parameters
@@ -32,8 +31,8 @@ def skeleton_stripe(
 
     Returns
     -------
-    (N,) of `STRIPE_DTYPE`, frame 0, by column, or by row; empty if no pixel is red. `width` is the number of the part's
-    pixels across.
+    (N, 7) by column, or by row; empty if no pixel is red: i and j (px), the number of pixels of the part across, the
+    grey level of the laser, the score 1, the saturated share, and the standard deviation of the centre (px).
 
     Examples
     --------
@@ -41,7 +40,7 @@ def skeleton_stripe(
     >>> image[29:32, 10:50, 0] = 200
     >>> image[5:8, 5:8, 0] = 250  # a glint
     >>> points = skeleton_stripe(image, ExtractionParameters())
-    >>> print(len(points) >= 36, np.median(points["j"]), points["i"].min() >= 10)
+    >>> print(len(points) >= 36, np.median(points[:, 1]), points[:, 0].min() >= 10)
     True 30.0 True
     """
     picture = image.astype(np.int16)
@@ -50,7 +49,7 @@ def skeleton_stripe(
     excess, level = _redness(picture, parameters.searched_laser)
     parts = label(excess >= parameters.red_threshold, connectivity=CONNECTED)
     if not parts.any():
-        return np.empty(0, STRIPE_DTYPE)
+        return np.empty((0, 7))
     number = 1 + int(np.bincount(parts.ravel())[1:].argmax())
     top, left, bottom, right = regionprops((parts == number).astype(np.uint8))[0].bbox
     part, level = parts[top:bottom, left:right] == number, level[top:bottom, left:right]
@@ -59,18 +58,14 @@ def skeleton_stripe(
         part, level = part.T, level.T
     thin = skeletonize(part)
     columns = np.flatnonzero(thin.any(axis=0))
-    points = np.zeros(len(columns), STRIPE_DTYPE)
-    along, across = ("j", "i") if is_high else ("i", "j")
+    along = columns + (top if is_high else left)
     rows = np.array([np.median(np.flatnonzero(thin[:, column])) for column in columns])
-    points[along] = columns + (top if is_high else left)
-    points[across] = rows + (left if is_high else top)
-    points["width"] = part[:, columns].sum(axis=0)
-    points["peak"] = np.where(part, level, 0).max(axis=0)[columns]
-    points["score"] = 1.0
-    saturated = part & (level >= parameters.saturation)
-    points["saturation"] = saturated[:, columns].sum(axis=0) / points["width"]
-    points["sigma"] = SIGMA_PX
-    return points
+    across = rows + (left if is_high else top)
+    width = part[:, columns].sum(axis=0)
+    saturated = (part & (level >= parameters.saturation))[:, columns].sum(axis=0) / width
+    peak = np.where(part, level, 0).max(axis=0)[columns]
+    i, j = (across, along) if is_high else (along, across)
+    return np.column_stack([i, j, width, peak, np.ones(len(columns)), saturated, np.full(len(columns), SIGMA_PX)])
 
 
 def _redness(picture: NDArray[np.int16], laser: str) -> tuple[NDArray[np.int16], NDArray[np.int16]]:

@@ -1,1 +1,0 @@
-"""Other ways to find a stripe than by its ridges."""

@@ -1,0 +1,1 @@
+"""Plain ways to find a stripe, for comparison."""
