@@ -7,6 +7,7 @@ import typer
 
 from pipelines.cli.demo import watch
 from pipelines.cli.terminal.output import AsJson, message, print_json, print_line, print_table
+from schemas.base.errors import RefusedInput
 
 
 def thesis(
@@ -22,6 +23,8 @@ def thesis(
     from pipelines.engine.pool import cores, local_cluster
     from pipelines.thesis import reference_clouds, run_thesis
 
+    if folder.exists() and not folder.is_dir():
+        raise RefusedInput(folder, "is a file, expected a folder for films, results and the page", field="--folder")
     with local_cluster(cores()) as pool:
         result = run_thesis(folder, worlds, pool, watch)
     page, figures = folder / "thesis.html", folder / "thesis.json"
