@@ -22,7 +22,7 @@ def reference_figure(profile: Floats, clouds: Mapping[str, Sequence[Floats]]) ->
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11, 5.6), dpi=110, layout="constrained")
+    figure = Figure(figsize=(12, 4.4), dpi=110, layout="constrained")
     outline = np.vstack([profile, profile[:1]])
     for panel, (name, cameras) in zip(figure.subplots(1, len(clouds), squeeze=False)[0], clouds.items(), strict=True):
         panel.plot(outline[:, 0], outline[:, 1], color="black", linewidth=0.8)
