@@ -1,8 +1,7 @@
 """The thesis beside us: its method and footscan's on the same films, as a whole and stage by stage."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -31,10 +30,11 @@ from footscan.virtual.stage.reference import standard_reference
 from footscan.virtual.worlds.draw import draw_assembled
 from pipelines.archive.job import CACHE, Job, plan_job, run_job
 from pipelines.block import beside_nominal, fit_block
+from pipelines.demo import Watch
 from pipelines.engine.actions.step import Failure, Outcome, Step, Success
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import sha256
-from pipelines.engine.pool import OnStepEnd, Pool, Threads
+from pipelines.engine.pool import Pool, Threads
 from pipelines.engine.workspace import Workspace, digests_by_kind
 from pipelines.recordings.calibration_choice import CalibrationPlace
 from pipelines.scan import STEPS
@@ -61,8 +61,6 @@ from schemas.thesis import (
     ThesisResult,
 )
 
-Watch = Callable[[str, int, int], AbstractContextManager[OnStepEnd]]
-"""As of `pipelines.demo`."""
 FOOT, BLOCK = FilmedFoot(patient="virtual", scan="foot"), FilmedFoot(patient="virtual", scan="block")
 FIVE, ALL = CalibrationParameters(model="quadratic", points=5), CalibrationParameters(model="quadratic")
 """The calibration of the thesis, the quadratic (4.10, 4.11) through five clicked corners; and through all of them."""
@@ -92,7 +90,7 @@ FIRST_SEED = 3001
 
 
 def run_thesis(folder: Path, worlds: int, pool: Pool, watch: Watch) -> ThesisResult:
-    """Film block, foot and worlds into `folder`, and reconstruct them by both methods; finished parts are kept.
+    """Film block, foot and worlds into `folder`, and reconstruct them by each method; finished parts are kept.
 
     Raises
     ------
@@ -130,13 +128,12 @@ def results_folder(folder: Path, method: Method, film: FilmedFoot = FOOT) -> Pat
 
 
 def _film(folder: Path, watch: Watch) -> dict[str, float]:
-    """Film block, foot and reference object, calibrate by both methods; returns the true measures of the foot."""
+    """Film block, foot and reference object, calibrate by each method; returns the true measures of the foot."""
     steps = [
-        Step("thesis", kind, f"{STEPS}.{module}", film, places={"folder": place}, writes=place / SCAN_FILE)
-        for kind, module, film in (("film", "simulate_scan", FOOT), ("film-block", "simulate_block", BLOCK))
-        for place in [scan_folder(folder, film)]
+        _film_step("film", "simulate_scan", FOOT, folder),
+        _film_step("film-block", "simulate_block", BLOCK, folder),
+        *filmed_calibration_steps("thesis", folder / "capture", SimulationSettings()),
     ]
-    steps += filmed_calibration_steps("thesis", folder / "capture", SimulationSettings())
     with Workspace(folder / CACHE) as workspace:
         # The virtual scanner films on all cores by itself.
         digests = digests_by_kind(steps, _run(workspace, steps, Threads(1), watch, "films and calibration"))
@@ -148,6 +145,11 @@ def _film(folder: Path, watch: Watch) -> dict[str, float]:
         clicked = _clicked(read_chart(folder / CHART), parameters, sha256((folder / CHART).read_bytes()))
         write_atomically(calibration_file(folder, method), (clicked.model_dump_json(indent=2) + "\n").encode())
     return known
+
+
+def _film_step(kind: str, module: str, film: FilmedFoot, folder: Path) -> Step:
+    place = scan_folder(folder, film)
+    return Step("thesis", kind, f"{STEPS}.{module}", film, places={"folder": place}, writes=place / SCAN_FILE)
 
 
 def _clicked(charts: Mapping[int, Chart], parameters: CalibrationParameters, digest: str) -> Calibration:
@@ -198,7 +200,7 @@ def _reconstruct(folder: Path, method: Method, pool: Pool, watch: Watch) -> None
 
 
 def _block(folder: Path) -> list[BlockDimension]:
-    """Table 6-1: as it is printed, and by both methods."""
+    """Table 6-1: as it is printed, and by each method."""
     found: dict[Method, list[float | None]] = {}
     for method in METHODS:
         try:
@@ -227,7 +229,7 @@ def _foot(folder: Path, method: Method, known: Mapping[str, float]) -> Reconstru
     truth = read_mesh(scan_folder(folder, FOOT) / "truth.stl")
     shape = vertices, faces
     searched = SearchedMesh(truth)
-    comparison = compare(shape, truth, classes=CLASSES[0], both=True)
+    comparison = compare(shape, truth, classes=CLASSES[0], both=True, searched_b=searched)
     few = compare(shape, truth, classes=CLASSES[1], searched_b=searched)
     away = np.abs(searched.signed_distances(sample_surface(vertices, faces, SAMPLES)))
     cloud = read_file(results / "cloud.ply")
@@ -291,8 +293,8 @@ def _stage_outcome(seed: int, stages: tuple[Stage, ...], end: Outcome, workspace
     )
 
 
-def reference_clouds(folder: Path) -> bytes:
-    """Figures 4-7 and 4-8 as PNG: the reference object in its first placement, by both calibrations."""
+def reference_png(folder: Path) -> bytes:
+    """Figures 4-7 and 4-8 as PNG: the reference object in its first placement, by each calibration."""
     parameters = CaptureCalibrationParameters().extraction
     stripes = {}
     for camera in capture_document().cameras:

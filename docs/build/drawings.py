@@ -20,7 +20,7 @@ from matplotlib.patches import Polygon, Rectangle
 
 from footscan.mesh.formats.files import mesh_bytes
 from footscan.mesh.mesh import Mesh
-from footscan.virtual.filming.capture import HALF_LENGTH_MM
+from footscan.virtual.filming.capture import HALF_LENGTH_MM, prism
 from footscan.virtual.optics.glass import THICKNESS_MM
 from footscan.virtual.optics.scanner import FAN_DEGREES, VOLUME_MM, Stand, nominal_place, usual_lasers, usual_stand
 from footscan.virtual.stage.reference import standard_reference
@@ -62,39 +62,14 @@ def stand_of(camera: RigCamera) -> Stand:
 
 
 def reference_solid() -> Mesh:
-    """The reference object as a closed body with flat ends, mm."""
+    """The reference object as a closed body with flat ends, mm. All corners of its profile are seen from its middle."""
     profile = np.asarray(standard_reference().profile_mm)
-    count = len(profile)
-    front, back = (np.column_stack([np.full(count, x), profile]) for x in (HALF_LENGTH_MM, -HALF_LENGTH_MM))
+    sides, count = prism(profile), len(profile)
     here, there = np.arange(count), (np.arange(count) + 1) % count
-    sides = np.concatenate(
-        [np.column_stack([here, here + count, there]), np.column_stack([there, here + count, there + count])]
-    )
-    cap = np.array(_triangles(profile))
-    faces = np.concatenate([sides, cap, cap[:, ::-1] + count]).astype(np.int32)
-    return Mesh(np.vstack([front, back]), faces)
-
-
-def _triangles(profile: np.ndarray) -> list[tuple[int, int, int]]:
-    """Cut a simple polygon, counter-clockwise, into triangles, ear by ear."""
-    left, found = list(range(len(profile))), []
-    while len(left) > 2:
-        for k, here in enumerate(left):
-            a, b, c = profile[[left[k - 1], here, left[(k + 1) % len(left)]]]
-            others = [profile[n] for n in left if n not in (left[k - 1], here, left[(k + 1) % len(left)])]
-            if _cross(a, b, c) > 0 and not any(
-                min(_cross(a, b, p), _cross(b, c, p), _cross(c, a, p)) >= 0 for p in others
-            ):
-                found.append((left[k - 1], here, left[(k + 1) % len(left)]))
-                del left[k]
-                break
-        else:
-            raise ValueError("the profile crosses itself")
-    return found
-
-
-def _cross(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    middles = [[x, *profile.mean(axis=0)] for x in (HALF_LENGTH_MM, -HALF_LENGTH_MM)]
+    front = np.column_stack([here, there, np.full(count, 2 * count)])
+    back = np.column_stack([there + count, here + count, np.full(count, 2 * count + 1)])
+    return Mesh(np.vstack([sides.vertices, middles]), np.concatenate([sides.faces, front, back]).astype(np.int32))
 
 
 def _front(panel: Axes, rig: Rig, places: dict[int, Any]) -> None:

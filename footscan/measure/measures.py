@@ -310,8 +310,7 @@ def take_measures(
         )
         for name, definition in _definitions().items()
     }
-    conventions = {name: {"convention": CONVENTIONS.get(name, OWN)} for name in measures}
-    return {name: measure.model_copy(update=conventions[name]) for name, measure in measures.items()}
+    return {name: own.model_copy(update={"convention": CONVENTIONS.get(name, OWN)}) for name, own in measures.items()}
 
 
 def _values(replicate: FootFrame, rough: Roughness) -> dict[str, float]:

@@ -6,8 +6,10 @@ from typing import Annotated
 import typer
 
 from pipelines.cli.demo import watch
-from pipelines.cli.terminal.output import AsJson, message, print_json, print_line, print_table
+from pipelines.cli.terminal.output import AsJson, figure, message, print_json, print_line, print_table
 from schemas.base.errors import RefusedInput
+
+FIGURES = ("mean", "std", "p99", "max")
 
 
 def thesis(
@@ -21,23 +23,28 @@ def thesis(
     from footscan.report.thesis.page import stage_rows, thesis_page
     from pipelines.engine.files.atomic import write_atomically
     from pipelines.engine.pool import cores, local_cluster
-    from pipelines.thesis import reference_clouds, run_thesis
+    from pipelines.thesis import reference_png, run_thesis
 
     if folder.exists() and not folder.is_dir():
         raise RefusedInput(folder, "is a file, expected a folder for films, results and the page", field="--folder")
     with local_cluster(cores()) as pool:
         result = run_thesis(folder, worlds, pool, watch)
     page, figures = folder / "thesis.html", folder / "thesis.json"
-    write_atomically(page, thesis_page(result, reference_clouds(folder)).encode())
+    write_atomically(page, thesis_page(result, reference_png(folder)).encode())
     write_atomically(figures, (result.model_dump_json(indent=2) + "\n").encode())
     if as_json:
         print_json(result.model_dump(mode="json"))
         return
     print_line(f"Table 4-3: {result.agreeing} of {result.coefficients} rows as printed")
-    rows = [[f"{row.nominal_mm:g}", f"{row.printed_mm:.1f}", *map(_mm, row.found_mm.values())] for row in result.block]
+    rows = [
+        [f"{row.nominal_mm:g}", f"{row.printed_mm:.1f}", *map(figure, row.found_mm.values())] for row in result.block
+    ]
     print_table("Table 6-1: the block, mm", ["true", "print", *(foot.method for foot in result.feet)], rows)
     rows = [
-        [foot.method, *(_mm(None if foot.comparison is None else getattr(foot.comparison, name)) for name in FIGURES)]
+        [
+            foot.method,
+            *(figure(None if foot.comparison is None else getattr(foot.comparison, name)) for name in FIGURES),
+        ]
         for foot in result.feet
     ]
     print_table("Table 6-2: the foot, distance to the truth, mm", ["method", *FIGURES], rows)
@@ -52,10 +59,3 @@ def thesis(
         if foot.problem is not None:
             message(f"foot, method of {foot.method}: {foot.problem}")
     print_line(f"Page: {page}")
-
-
-FIGURES = ("mean", "std", "p99", "max")
-
-
-def _mm(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"

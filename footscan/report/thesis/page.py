@@ -1,6 +1,6 @@
 """The page of `footscan thesis`: what is printed, the thesis's method on our films, and footscan."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from footscan.report.comparison.figures import histogram_plot
 from footscan.report.markup import data_uri, number, section, table, text, words
@@ -8,7 +8,7 @@ from footscan.report.page import page
 from footscan.thesis.mistakes import mistakes
 from footscan.thesis.printed import FOOT_MAX_MM, FOOT_MEAN_MM, RESOLUTION_MM, WITHIN_SHARE
 from footscan.thesis.reproduced import CameraFit, Coefficient, camera_fits, coefficients
-from schemas.thesis import ClickedCorners, Method, ReconstructedFoot, Stage, StageOutcome, ThesisResult
+from schemas.thesis import ClickedCorners, FootMeasure, Method, ReconstructedFoot, Stage, StageOutcome, ThesisResult
 
 METHODS: Mapping[Method, str] = {
     "thesis": "Its method on our films",
@@ -85,11 +85,10 @@ def _block(result: ThesisResult) -> str:
 
 
 def _foot(feet: Mapping[Method, ReconstructedFoot]) -> str:
-    def row(name: str, printed: str, value: object) -> list[str]:
-        assert callable(value)
+    def row(name: str, printed: str, value: Callable[[ReconstructedFoot], str]) -> list[str]:
         return [name, printed, *(value(feet[method]) for method in METHODS)]
 
-    def of(figure: str) -> object:
+    def of(figure: str) -> Callable[[ReconstructedFoot], str]:
         return lambda foot: NONE if foot.comparison is None else number(getattr(foot.comparison, figure), 3)
 
     def missing(foot: ReconstructedFoot) -> str:
@@ -132,14 +131,14 @@ def _measures(feet: Mapping[Method, ReconstructedFoot]) -> str:
     for name in names:
         found = [feet[method].measures.get(name) for method in METHODS]
         true = next(measure.truth for measure in found if measure is not None)
-        cells = [
-            NONE
-            if one is None or one.value is None
-            else f"{number(one.value, 2)} {'' if one.status == 'ok' else one.status}"
-            for one in found
-        ]
-        rows.append([text(words(name)), number(true, 2), *cells])
+        rows.append([text(words(name)), number(true, 2), *map(_measure, found)])
     return table(["Measure", "True", *METHODS.values()], rows, numeric=range(1, 5))
+
+
+def _measure(measure: FootMeasure | None) -> str:
+    if measure is None or measure.value is None:
+        return NONE
+    return number(measure.value, 2) + ("" if measure.status == "ok" else f" {measure.status}")
 
 
 def _figure(png: bytes) -> str:
