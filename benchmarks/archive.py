@@ -37,7 +37,8 @@ PLANNING = """
 import sys, time
 start = time.perf_counter()
 from pathlib import Path
-from pipelines.archive.job import job_of_workflow, plan_job
+from pipelines.archive.job import job_of_workflow
+from pipelines.archive.planning import plan_job
 imported = time.perf_counter()
 planned = plan_job(job_of_workflow(Path(sys.argv[1])))
 print(imported - start, time.perf_counter() - imported, planned.steps, planned.to_run)

@@ -26,7 +26,8 @@ from footscan.surface.closed_surface import close_surface
 from footscan.surface.quality import mesh_quality
 from footscan.verify.compare import SAMPLES
 from footscan.verify.distances import distances_to_mesh
-from pipelines.archive.job import draw_steps, job_of_scan, plan_job
+from pipelines.archive.job import job_of_scan
+from pipelines.archive.planning import draw_steps, plan_job
 from pipelines.arrays import unpack
 from pipelines.engine.actions.step import Output, Step, Success
 from pipelines.engine.plan import make_plan

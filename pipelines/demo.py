@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from footscan.recordings.scans import SCAN_FILE, scan_folders
-from pipelines.archive.job import CACHE, Job, plan_job, run_job
+from pipelines.archive.job import CACHE, Job
+from pipelines.archive.planning import plan_job
+from pipelines.archive.running import run_job
 from pipelines.engine.actions.step import Step
 from pipelines.engine.pool import OnStepEnd, Threads, cores
 from pipelines.engine.workspace import Workspace, digests_by_kind

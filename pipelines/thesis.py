@@ -28,7 +28,9 @@ from footscan.verify.distances import SearchedMesh
 from footscan.virtual.filming.capture import capture_document
 from footscan.virtual.stage.reference import standard_reference
 from footscan.virtual.worlds.draw import draw_assembled
-from pipelines.archive.job import CACHE, Job, plan_job, run_job
+from pipelines.archive.job import CACHE, Job
+from pipelines.archive.planning import plan_job
+from pipelines.archive.running import run_job
 from pipelines.block import beside_nominal, fit_block
 from pipelines.demo import Watch
 from pipelines.engine.actions.step import Failure, Outcome, Step, Success

@@ -7,6 +7,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, mod
 
 from schemas.base.model import Document, Pseudonym
 from schemas.parameters.scan import ScanParameters
+from schemas.profile import Profile, ProfileName
 from schemas.tuning import Tuning
 
 
@@ -84,6 +85,8 @@ class Workflow(Document):
     workers: Annotated[int, Field(ge=1, le=256)] | None = None
     """Number of steps that run at once; default: the number of cores."""
     parameters: Annotated[ScanParameters, BeforeValidator(_without_empty)] = ScanParameters()
+    profiles: dict[ProfileName, Profile] = Field(default_factory=dict)
+    """Options of a run by name, for `--profile`."""
     tune: Tuning | None = None
     """The search of `footscan tune`."""
 

@@ -23,6 +23,8 @@ class RecordedScan:
     archive: Path
     """No path in scan.yaml may leave it."""
     document: Scan
+    frames: Path | None = None
+    """Folder for the frames of its films; default: beside the films."""
     _found: dict[str, Path] = field(default_factory=dict, compare=False, repr=False)
     """Where the paths in scan.yaml lead: each is followed once."""
     _films: dict[str, Path] = field(default_factory=dict, compare=False, repr=False)
@@ -44,11 +46,11 @@ class RecordedScan:
 
     def arrays(self) -> Path:
         """The Zarr group of all cameras' frames, which may not be there yet."""
-        return self._film(GROUP, "frames")
+        return self._film(GROUP, "frames") if self.frames is None else self.frames / GROUP
 
     def array(self, camera: CameraFilm) -> Path:
         """The Zarr array of a camera's frames, which may not be there yet."""
-        return self._film(f"{GROUP}/cam{camera.id}", f"frames of camera {camera.id}")
+        return self._array(f"cam{camera.id}", camera.file, f"frames of camera {camera.id}")
 
     def background(self, camera: CameraFilm) -> Path | None:
         """The film of a camera with the laser off, which may be missing."""
@@ -57,7 +59,8 @@ class RecordedScan:
 
     def background_array(self, camera: CameraFilm) -> Path:
         """The Zarr array of a camera's laser-off frames, which may not be there yet."""
-        return self._film(f"{GROUP}/cam{camera.id}-background", f"background frames of camera {camera.id}")
+        name = f"cam{camera.id}-background"
+        return self._array(name, camera.background, f"background frames of camera {camera.id}")
 
     def positions(self, camera: CameraFilm) -> Path | None:
         """The file with the positions of a camera's frames."""
@@ -86,6 +89,11 @@ class RecordedScan:
 
     def _optional(self, named: str | None, field: str) -> Path | None:
         return None if named is None else self._inside(named, field)
+
+    def _array(self, name: str, film: str | None, field: str) -> Path:
+        """The array of a film; a scan that was filmed into its arrays has them nowhere else."""
+        named = f"{GROUP}/{name}"
+        return self._film(named, field) if self.frames is None or film == named else self.frames / named
 
     def _film(self, named: str, field: str) -> Path:
         """As `_inside`; what lies in a folder of frames is looked at, too."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from pipelines.archive.job import ScanEnd
+from pipelines.archive.running import ScanEnd
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.digest import sha256
 from pipelines.version import SOFTWARE

@@ -1,13 +1,15 @@
 """The results of an archive as one table with a row for each scan, as CSV and Parquet; also writes the page."""
 
+import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
-from pipelines.archive.job import ScanEnd
+from footscan.recordings.scans import RecordedScan
 from pipelines.archive.page import write_archive_page
+from pipelines.archive.running import ScanEnd
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.scan import DELIVERED
 from pipelines.version import SOFTWARE
@@ -53,6 +55,35 @@ def write_results_table(ends: Sequence[ScanEnd], folder: Path) -> None:
         return
     write_atomically(folder / PARQUET, _as_parquet(columns, rows))
     write_atomically(folder / CSV, table)
+
+
+def earlier_ends(results: Path, scans: Mapping[str, RecordedScan]) -> list[ScanEnd]:
+    """The ends of scans as the table in `results` has them, in its order; empty without a table.
+
+    `scans` : the scans that the archive still holds, by name, for what their scan.yaml says.
+    """
+    try:
+        with (results / CSV).open(encoding="utf-8", newline="") as file:
+            return [_earlier_end(row, results, scans) for row in csv.DictReader(file)]
+    except (OSError, ValueError, csv.Error):
+        return []
+
+
+def _earlier_end(row: dict[str, str], results: Path, scans: Mapping[str, RecordedScan]) -> ScanEnd:
+    name, status = row.get("scan") or "", row.get("status") or "done"
+    scan = scans.get(name)
+    is_there = bool(name) and not Path(name).is_absolute() and (results / name).is_dir()
+    return ScanEnd(
+        name,
+        Path(name) if scan is None else scan.folder,
+        results / name if is_there and status in {"done", "finding"} else None,
+        row.get("problem") or None,
+        None if status == "done" else status,
+        {file: row[f"{file}_sha256"] for file in DELIVERED if row.get(f"{file}_sha256")},
+        was_cached=True,
+        document=None if scan is None else scan.document,
+        parameters_sha256=row.get("parameters_sha256") or None,
+    )
 
 
 def _row(end: ScanEnd) -> tuple[dict[str, Cell], dict[str, Cell]]:

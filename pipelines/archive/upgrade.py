@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
-from pipelines.archive.job import PlannedJob, draw_steps
+from pipelines.archive.planning import PlannedJob, draw_steps
 from pipelines.difference import difference_in_words
 from pipelines.engine.audit import Difference, repeat
 from pipelines.engine.store.store import Acceptance

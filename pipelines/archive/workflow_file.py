@@ -1,6 +1,6 @@
 """Reading workflow.yaml: all its mistakes are reported at once, each with line and column."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,14 +36,15 @@ def read_workflow(path: Path) -> Workflow:
     text, value = _parsed(path)
     document = _validated(text, value)
     if isinstance(document, list):
-        raise _refusal(path, document)
+        raise _refusal(path, _in_order([*document, *_missing_files(path, text, value)]))
     return document
 
 
 def check_archives(path: Path, document: Workflow) -> None:
     """Raise RefusedInput if an archive of the workflow in `path` is missing; it names all missing files."""
     if not all((path.resolve().parent / archive).is_dir() for archive in document.archive):
-        raise _refusal(path, _missing_files(path, read_text(path, "yaml_bytes"), document))
+        text, value = _parsed(path)
+        raise _refusal(path, _missing_files(path, text, value))
 
 
 def workflow_mistakes(path: Path) -> list[PlacedMistake]:
@@ -53,7 +54,8 @@ def workflow_mistakes(path: Path) -> list[PlacedMistake]:
     """
     text, value = _parsed(path)
     document = _validated(text, value)
-    return document if isinstance(document, list) else _missing_files(path, text, document)
+    missing = _missing_files(path, text, value)
+    return _in_order([*document, *missing]) if isinstance(document, list) else missing
 
 
 def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
@@ -71,28 +73,31 @@ def _validated(text: str, value: dict[str, Any]) -> Workflow | list[PlacedMistak
         return _placed(text, mistakes(Workflow, error))
 
 
-def _missing_files(path: Path, text: str, document: Workflow) -> list[PlacedMistake]:
-    return _placed(text, [Mistake(names, problem, is_name=False) for names, problem in _missing(path, document)])
+def _missing_files(path: Path, text: str, value: dict[str, Any]) -> list[PlacedMistake]:
+    """A mistake for each file or folder that the workflow names and that is missing; other mistakes may be in it."""
+    found: list[Mistake] = []
+
+    def check(names: tuple[str | int, ...], named: Any, kind: str) -> None:
+        what, is_there = _EXPECTED[kind]
+        if isinstance(named, str) and named and "\0" not in named and not is_there(path.resolve().parent / named):
+            found.append(Mistake(names, f"no such {what}, found {named[:80]!r}", is_name=False))
+
+    archives = value.get("archive")
+    for number, archive in enumerate(archives if isinstance(archives, list) else [archives]):
+        check(("archive", number), archive, "archive")
+    check(("calibration",), value.get("calibration"), "file")
+    calibrations = value.get("calibrations")
+    for number, chosen in enumerate(calibrations if isinstance(calibrations, list) else []):
+        for kind in ("file", "capture") if isinstance(chosen, dict) else ():
+            check(("calibrations", number, kind), chosen.get(kind), kind)
+    return _placed(text, found)
 
 
-def _missing(path: Path, document: Workflow) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """Path of the field and problem for each file or folder that the workflow names and that is missing."""
-    base = path.resolve().parent
-    for number, archive in enumerate(document.archive):
-        if not (base / archive).is_dir():
-            yield ("archive", number), f"no such folder, expected one with scans, found {archive[:80]!r}"
-    files: list[tuple[tuple[str | int, ...], str]] = [
-        (("calibrations", n, "file"), c.file) for n, c in enumerate(document.calibrations) if c.file is not None
-    ]
-    if document.calibration is not None:
-        files.append((("calibration",), document.calibration))
-    for names, file in files:
-        if not (base / file).is_file():
-            yield names, f"no such file, expected a calibration, found {file[:80]!r}"
-    for number, calibration in enumerate(document.calibrations):
-        if calibration.capture is not None and not (base / calibration.capture).is_dir():
-            problem = f"no such folder, expected a capture, found {calibration.capture[:80]!r}"
-            yield ("calibrations", number, "capture"), problem
+_EXPECTED: dict[str, tuple[str, Callable[[Path], bool]]] = {
+    "archive": ("folder, expected one with scans", Path.is_dir),
+    "file": ("file, expected a calibration", Path.is_file),
+    "capture": ("folder, expected a capture", Path.is_dir),
+}
 
 
 def _placed(text: str, unplaced: Sequence[Mistake]) -> list[PlacedMistake]:
@@ -105,6 +110,11 @@ def _placed(text: str, unplaced: Sequence[Mistake]) -> list[PlacedMistake]:
         )
         for mistake in unplaced
     ]
+    return _in_order(placed)
+
+
+def _in_order(placed: Sequence[PlacedMistake]) -> list[PlacedMistake]:
+    """The mistakes in the order of the file."""
     return sorted(placed, key=lambda mistake: (mistake.line, mistake.column))
 
 
@@ -113,5 +123,7 @@ def _refusal(path: Path, placed: Sequence[PlacedMistake]) -> RefusedInput:
         RefusedInput(path, f"{problem} (line {line}, column {column})" if field else problem, field=field or None)
         for line, column, field, problem in placed
     ]
+    if len(refusals) > 1:
+        refusals.append(RefusedInput(path, f"{len(placed)} mistakes, see 'footscan config check {path}'"))
     refusals[0].others = tuple(refusals[1:])
     return refusals[0]

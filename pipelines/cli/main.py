@@ -9,7 +9,7 @@ import typer
 
 from footscan.capture.board.termination import EndedBySignal
 from pipelines.cli import compare, demo, export, extract, films, regress, thesis, tune, verify
-from pipelines.cli.archive import cache, config, forget, run, trace, upgrade, why
+from pipelines.cli.archive import cache, config, forget, plan, run, trace, upgrade, why
 from pipelines.cli.calibrate import app as calibration
 from pipelines.cli.foot import lasts, measure, pairs, sizes
 from pipelines.cli.live import console, devices, scan
@@ -43,7 +43,7 @@ app.command("extract")(extract.extract)
 app.add_typer(calibration.calibrate, name="calibrate")
 app.command("map")(calibration.map_pixels)
 app.command("run")(run.run)
-app.command("plan")(run.plan)
+app.command("plan")(plan.plan)
 app.add_typer(config.config, name="config")
 app.command("tune")(tune.tune)
 app.command("why")(why.why)

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.cli.archive.run import WORKFLOW, Settings, WorkflowFile, with_settings
+from pipelines.cli.archive.selecting import WORKFLOW, Chosen, Settings, WorkflowFile
 from pipelines.cli.archive.workers import (
     ClusterAddress,
     Dashboard,
@@ -39,7 +39,6 @@ def tune(
 
     What has been computed before is not computed again; a search that was interrupted goes on where it was.
     """
-    from pipelines.archive.job import job_of_workflow
     from pipelines.archive.workflow_file import read_workflow
     from pipelines.cli.terminal.progress import StepProgress
     from pipelines.tuning.files import write_files
@@ -51,7 +50,7 @@ def tune(
     document = read_workflow(path)
     if document.tune is None:
         raise RefusedInput(path, "is missing, expected what is sought", field="tune")
-    job = with_settings(job_of_workflow(path, threads), settings)
+    job = Chosen(settings=settings).job(path, threads)
     folder = job.results / FOLDER
     with chosen_pool(job.threads, placement) as pool, StepProgress(0) as progress:
         tuned = tune(job, document.tune, pool, progress.on_step_end, _tell_trial)

@@ -2,7 +2,7 @@
 
 import gc
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import Enum
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from pipelines.engine.actions.key import image_text, key_of
-from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
+from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success, is_named
 from pipelines.engine.explain import changes, reason
 from pipelines.engine.files.packs import State as FileState
 from pipelines.engine.store.store import Store
@@ -19,6 +19,8 @@ from pipelines.engine.store.verified_index import VerifiedRow
 MANY = 1000
 """Steps from which the store is listed, rather than asked for each row and blob. Chosen by hand: a listing gives 1000
 files at once."""
+FORCED = "forced"
+"""Reason of a step that runs because the user asked for it."""
 NO_SEAL = "its row bears no seal of the store's owner"
 
 
@@ -54,19 +56,22 @@ class Plan:
         return [planned for planned in self.steps if planned.state is not State.HIT]
 
 
-def make_plan(steps: Sequence[Step], store: Store) -> Plan:
+def make_plan(steps: Sequence[Step], store: Store, forced: Collection[str] = ()) -> Plan:
     """Look each step up in the action cache.
 
     Parameters
     ----------
     steps : sequence of Step
         In topological order: each step after the steps whose results it takes.
+    forced : collection of str
+        Steps that run even if the cache has their results, each as `is_named` takes it.
     """
     planned: dict[str, PlannedStep] = {}
     with _without_garbage_collection(), nullcontext() if store.verified is None else store.verified.reading():
         state = store.files.snapshot() if len(steps) >= MANY else store.files.state
         for step in steps:
-            planned[step.name] = _plan_step(step, planned, store, state)
+            is_forced = bool(forced) and any(is_named(step, name) for name in forced)
+            planned[step.name] = _plan_step(step, planned, store, state, is_forced=is_forced)
     return Plan(list(planned.values()))
 
 
@@ -112,7 +117,9 @@ def with_places(problem: str, places: Mapping[str, Path]) -> str:
     return problem
 
 
-def _plan_step(step: Step, planned: dict[str, PlannedStep], store: Store, state: FileState) -> PlannedStep:
+def _plan_step(
+    step: Step, planned: dict[str, PlannedStep], store: Store, state: FileState, *, is_forced: bool
+) -> PlannedStep:
     digests: dict[str, str] = {}
     for name, source in step.inputs.items():
         if not isinstance(source, Output):
@@ -124,6 +131,8 @@ def _plan_step(step: Step, planned: dict[str, PlannedStep], store: Store, state:
         if producer.outcome is None:
             return PlannedStep(step, State.WAITS, None, f"waits for {_label(producer.step)}")
         digests[name] = producer.outcome.digest
+    if is_forced:
+        return PlannedStep(step, State.MISS, None, FORCED)
     image = image_text(step, digests)
     outcome = cached_outcome(step, store.lookup(key_of(image), state))
     if outcome is not None:

@@ -51,6 +51,8 @@ class StepEnd:
     """Unix time of its start, by the clock of its machine; 0 if it is not known."""
     worker: str = ""
     """Machine, process and thread that ran it."""
+    size: int = 0
+    """Bytes of the result, if it ran."""
 
 
 OnStepEnd = Callable[[StepEnd], None]
@@ -67,6 +69,8 @@ class Task:
     """Outcomes of steps that are not tasks themselves."""
     waits_for: tuple[str, ...]
     """Names of the tasks that must end before this one starts."""
+    is_forced: bool = False
+    """True if it runs even if the cache has its result."""
 
 
 RunTask = Callable[[Task, Mapping[str, StepEnd]], StepEnd]

@@ -19,7 +19,7 @@ from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Failure, Input, Outcome, Output, SourceFile, Step, Success, Value
 from pipelines.engine.files.digest import file_state
 from pipelines.engine.files.packs import PackedFiles
-from pipelines.engine.plan import Plan, cached_outcome, without_places
+from pipelines.engine.plan import FORCED, Plan, cached_outcome, without_places
 from pipelines.engine.pool import OnStepEnd, Pool, StepEnd, Task
 from pipelines.engine.store.store import Acceptance, Row, Store
 from schemas.base.errors import DamagedError, Fault, Finding, RefusedInput, one_line
@@ -53,7 +53,8 @@ def run_plan(plan: Plan, store: Store, *, pool: Pool, on_step_end: OnStepEnd) ->
         outcomes_before = {name: outcomes[name] for name in producers if name not in tasks}
         code = code_identity(planned.step.module).digest
         waits_for = tuple(name for name in producers if name in tasks)
-        tasks[planned.step.name] = Task(planned.step, code, outcomes_before, waits_for)
+        is_forced = planned.reason == FORCED
+        tasks[planned.step.name] = Task(planned.step, code, outcomes_before, waits_for, is_forced)
     return outcomes | pool.run(tasks, partial(run_step, store), on_end) if tasks else outcomes
 
 
@@ -79,25 +80,25 @@ def _run_task(store: Store, task: Task, ended: Mapping[str, StepEnd]) -> StepEnd
         if isinstance(result, Failure):
             return StepEnd(step, result, False, time.perf_counter() - start)
         digests[name] = result.digest
-    return execute(step, digests, store)
+    return execute(step, digests, store, is_forced=task.is_forced)
 
 
-def execute(step: Step, inputs: Mapping[str, str], store: Store) -> StepEnd:
-    """The outcome of a step with inputs of these digests, from the cache or by running the step."""
+def execute(step: Step, inputs: Mapping[str, str], store: Store, *, is_forced: bool = False) -> StepEnd:
+    """The outcome of a step with inputs of these digests, from the cache unless `is_forced`, or by running the step."""
     start = time.perf_counter()
     image = image_text(step, inputs)
     key = key_of(image)
     with _exclusive(key):
         try:
-            outcome = cached_outcome(step, store.lookup(key))
+            outcome = None if is_forced else cached_outcome(step, store.lookup(key))
         except Fault as error:  # the store is unreachable: this scan fails; the next plan reports a lasting failure
             return StepEnd(step, Failure(str(error), "fault", step.name), False, time.perf_counter() - start)
-        ran, earlier = outcome is None, None
+        ran, earlier, size = outcome is None, None, 0
         if outcome is None:
-            outcome, earlier = _run_safely(step, image, inputs, store)
+            outcome, earlier, size = _run_safely(step, image, inputs, store)
         else:
             _note_latest(step, key, store)
-    return StepEnd(step, outcome, ran, time.perf_counter() - start, earlier)
+    return StepEnd(step, outcome, ran, time.perf_counter() - start, earlier, size=size)
 
 
 @contextmanager
@@ -114,21 +115,24 @@ _ACTION_LOCKS: WeakValueDictionary[str, threading.Lock] = WeakValueDictionary()
 """Lock of each action by its key; a lock exists as long as a thread holds it or waits for it."""
 
 
-def _run_safely(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, str | None]:
+def _run_safely(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, str | None, int]:
     """Run a step as `_run` does, and return an error as a failure."""
     try:
         return _run(step, image, inputs, store)
     except Fault as error:
-        return Failure(str(error), "damaged" if isinstance(error, DamagedError) else "fault", step.name), None
+        return Failure(str(error), "damaged" if isinstance(error, DamagedError) else "fault", step.name), None, 0
     except Exception as error:  # a defect in our code or in a library must not stop the other scans
         log.debug("%s", step.name, exc_info=True)
         problem = one_line(f"{step.name}: {type(error).__name__}: {error}")
         is_defect = not isinstance(error, OSError | MemoryError)
-        return Failure(problem, "fault", step.name, is_defect), None
+        return Failure(problem, "fault", step.name, is_defect), None, 0
 
 
-def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, str | None]:
-    """Run a step and record its outcome, unless its files changed meanwhile; also returns a differing earlier one."""
+def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tuple[Outcome, str | None, int]:
+    """Run a step and record its outcome, unless its files changed meanwhile.
+
+    Also returns a differing earlier outcome, and the size of the result in bytes.
+    """
     contents = {name: content_of(step, source, inputs[name], store) for name, source in step.inputs.items()}
     try:
         result = importlib.import_module(step.module).run(contents, step.parameters, step.places)
@@ -136,12 +140,12 @@ def _run(step: Step, image: str, inputs: Mapping[str, str], store: Store) -> tup
         _check_sources(step)
         kind, problem = "finding" if isinstance(error, Finding) else "refused", str(error)
         if isinstance(error, BeyondLimitError):  # not cached: the limit is no input of the step
-            return Failure(problem, kind, step.name), None
+            return Failure(problem, kind, step.name), None, 0
         failure = kind, without_places(problem, step.places)
-        return Failure(problem, kind, step.name), record_outcome(step, image, (None, failure), store)
+        return Failure(problem, kind, step.name), record_outcome(step, image, (None, failure), store), 0
     _check_sources(step)
     digest = store.put(result)
-    return Success(digest), record_outcome(step, image, (digest, None), store)
+    return Success(digest), record_outcome(step, image, (digest, None), store), len(result)
 
 
 def record_outcome(

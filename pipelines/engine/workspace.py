@@ -4,7 +4,7 @@ Archives, the demo, the live scanner, regression runs and parameter searches run
 """
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from types import TracebackType
@@ -14,6 +14,7 @@ from pipelines.engine.actions.step import Failure, Outcome, Step
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.files.file_digests import FileDigests
 from pipelines.engine.files.packs import MANY
+from pipelines.engine.history import History
 from pipelines.engine.plan import Plan, make_plan
 from pipelines.engine.pool import OnStepEnd, Pool, StepEnd
 from pipelines.engine.run import run_plan
@@ -44,13 +45,21 @@ class Workspace:
         self.local = local or Path(cache)
         self.store: Store = open_store(cache, self.local / "known.sqlite")
         self.digests = FileDigests.load(self.local / "files.json", self.store.secret)
+        self.history = History.load(self.local / "history.json")
 
-    def plan(self, steps: Sequence[Step]) -> Plan:
-        """Plan which steps would run, and why."""
-        return make_plan(steps, self.store)
+    @property
+    def frames(self) -> Path:
+        """Folder for the frames of scans whose own folders cannot be written."""
+        return self.local / "frames"
 
-    def run(self, steps: Sequence[Step], pool: Pool, on_step_end: OnStepEnd) -> dict[str, Outcome]:
-        """Run steps; returns the outcome of each by its name.
+    def plan(self, steps: Sequence[Step], forced: Collection[str] = ()) -> Plan:
+        """Plan which steps would run, and why; `forced` as in `make_plan`."""
+        return make_plan(steps, self.store, forced)
+
+    def run(
+        self, steps: Sequence[Step], pool: Pool, on_step_end: OnStepEnd, forced: Collection[str] = ()
+    ) -> dict[str, Outcome]:
+        """Run steps; returns the outcome of each by its name. `forced` as in `make_plan`.
 
         A run removes a damaged result when it notices it; a further run makes that result again.
         """
@@ -60,12 +69,14 @@ class Workspace:
         def on_end(end: StepEnd) -> None:
             nonlocal ran
             ran += end.ran
+            self.history.add(end)
             if end.ran and ran % MANY == 0:
                 self._pack()
             on_step_end(end)
 
         while True:  # steps after a damaged result may find more damage
-            outcomes = run_plan(self.plan(steps), self.store, pool=pool, on_step_end=on_end)
+            outcomes = run_plan(self.plan(steps, forced), self.store, pool=pool, on_step_end=on_end)
+            forced = ()  # they have run
             failures = [outcome for outcome in outcomes.values() if isinstance(outcome, Failure)]
             damaged = {failure.problem for failure in failures if failure.kind == "damaged"}
             if not damaged - reported:
@@ -118,8 +129,9 @@ class Workspace:
         return problem
 
     def close(self) -> None:
-        """Save the digests of files, and close the index of verified results."""
+        """Save the digests of files and the history, and close the index of verified results."""
         self.digests.save()
+        self.history.save()
         if self.store.verified is not None:
             self.store.verified.close()
 

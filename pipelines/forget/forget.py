@@ -6,7 +6,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.archive.job import Job, workspace_of
+from pipelines.archive.job import Job
+from pipelines.archive.planning import workspace_of
 from pipelines.engine.files.packs import in_batches
 from pipelines.engine.store.erasure_notes import FOLDER, note_name
 from pipelines.engine.store.lease import Lease, lease, live_leases

@@ -1,19 +1,16 @@
 """Removal of a subject from the tables, the page and the logs of an archive."""
 
-import csv
+import contextlib
 import json
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from footscan.recordings.scans import read_scan, scan_folders
-from pipelines.archive.job import ScanEnd
+from footscan.recordings.scans import RecordedScan, read_scan, scan_folders
 from pipelines.archive.page import FILES, PAGE
-from pipelines.archive.table import CSV, PARQUET, write_results_table
+from pipelines.archive.table import CSV, PARQUET, earlier_ends, write_results_table
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.forget.subject import Subject
-from pipelines.scan import DELIVERED
 from schemas.base.errors import FootscanError, RefusedInput
-from schemas.scan import Scan
 
 TUNE = "tune"
 """Folder of the files of tuning."""
@@ -26,8 +23,11 @@ def rewrite_tables(subject: Subject, archives: tuple[Path, ...], results: Path) 
     existing = [name for name in (CSV, PARQUET, PAGE, FILES) if (results / name).exists()]
     if not existing:
         return []
-    documents = _documents(archives)
-    ends = [_end(row, results, documents) for row in _rows(results) if not _belongs_to(subject, row)]
+    ends = [
+        end
+        for end in earlier_ends(results, {scan.name: scan for scan in _scans(archives)})
+        if not (subject.has(end.scan) or subject.pattern.search(end.scan.encode()))
+    ]
     (results / PARQUET).unlink(missing_ok=True)  # a missing file is always written
     write_results_table(ends, results)
     return [str(results / name) for name in existing]
@@ -60,40 +60,12 @@ def erase_from_text(subject: Subject, file: Path) -> None:
         file.unlink()
 
 
-def _rows(results: Path) -> list[dict[str, str]]:
-    try:
-        with (results / CSV).open(encoding="utf-8", newline="") as file:
-            return list(csv.DictReader(file))
-    except OSError:
-        return []
-
-
-def _belongs_to(subject: Subject, row: dict[str, str]) -> bool:
-    scan = row.get("scan", "")
-    return subject.has(scan) or subject.pattern.search(scan.encode()) is not None
-
-
-def _end(row: dict[str, str], results: Path, documents: dict[str, tuple[Path, Scan]]) -> ScanEnd:
-    scan, status = row.get("scan", ""), row.get("status", "done")
-    folder = results / scan if not Path(scan).is_absolute() and (results / scan).is_dir() else None
-    source, document = documents.get(scan, (Path(scan), None))
-    digests = {file: row[f"{file}_sha256"] for file in DELIVERED if row.get(f"{file}_sha256")}
-    results_folder = folder if status in {"done", "finding"} else None
-    kind = None if status == "done" else status
-    parameters = row.get("parameters_sha256") or None
-    return ScanEnd(scan, source, results_folder, row.get("problem") or None, kind, digests, True, document, parameters)
-
-
-def _documents(archives: tuple[Path, ...]) -> dict[str, tuple[Path, Scan]]:
-    documents = {}
+def _scans(archives: tuple[Path, ...]) -> Iterator[RecordedScan]:
+    """All scans that can be read."""
     for archive in archives:
         for folder in scan_folders(archive) if archive.is_dir() else ():
-            try:
-                scan = read_scan(folder, archive)
-            except FootscanError:
-                continue
-            documents[scan.name] = (folder, scan.document)
-    return documents
+            with contextlib.suppress(FootscanError):
+                yield read_scan(folder, archive)
 
 
 def _is_file(file: Path) -> bool:

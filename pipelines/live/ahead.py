@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from footscan.recordings.scans import RecordedScan
-from pipelines.archive.job import PlannedJob, draw_steps, job_of_scan, workspace_of
+from pipelines.archive.job import job_of_scan
+from pipelines.archive.planning import PlannedJob, draw_steps, workspace_of
 from pipelines.engine.actions.step import Failure, steps_to
 from pipelines.engine.pool import Threads
 from schemas.base.errors import FootscanError

@@ -5,7 +5,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipelines.archive.job import job_of_scan, plan_job, run_job
+from pipelines.archive.job import job_of_scan
+from pipelines.archive.planning import plan_job
+from pipelines.archive.running import run_job
 from pipelines.engine.actions.step import Success
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.scan import DELIVERED, SHOWN

@@ -4,7 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from footscan.recordings.scans import read_scan
-from pipelines.archive.job import Job, PlannedJob, ScanEnd, draw_steps, plan_job, run_job
+from pipelines.archive.job import Job
+from pipelines.archive.planning import PlannedJob, draw_steps, plan_job
+from pipelines.archive.running import ScanEnd, run_job
 from pipelines.engine.actions.step import Outcome, Step, Success
 from pipelines.engine.pool import OnStepEnd, Threads
 from pipelines.engine.store.store import Store

@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from footscan.recordings.scans import RecordedScan
-from pipelines.archive.job import WINDOW, PlannedJob, draw_steps
+from pipelines.archive.planning import PlannedJob, draw_steps
+from pipelines.archive.running import WINDOW
 from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success
 from pipelines.engine.pool import OnStepEnd, Pool, StepEnd
 from pipelines.scan import source_files

@@ -4,7 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from footscan.recordings.scans import RecordedScan
-from pipelines.archive.job import Job, PlannedJob, plan_job, share_written
+from pipelines.archive.job import Job
+from pipelines.archive.planning import PlannedJob, plan_job
+from pipelines.archive.running import share_written
 from pipelines.engine.pool import OnStepEnd, Pool
 from pipelines.engine.store.permissions import warn_if_others_can_write
 from pipelines.tuning.bench import Bench

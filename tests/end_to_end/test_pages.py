@@ -15,7 +15,7 @@ from chromium import needs_chromium
 
 from footscan.report.comparison.page import comparison_page
 from footscan.report.deviation import Deviation
-from pipelines.archive.job import ScanEnd
+from pipelines.archive.running import ScanEnd
 from pipelines.archive.page import FILES, PAGE, write_archive_page
 from pipelines.cli.main import run_command
 from pipelines.regression.report.page import regress_page

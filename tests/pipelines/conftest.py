@@ -8,7 +8,9 @@ import yaml
 
 from footscan.virtual.filming.capture import record_capture
 from footscan.virtual.stage.reference import standard_reference
-from pipelines.archive.job import Job, ScanEnd, job_of_workflow, plan_job, run_job
+from pipelines.archive.job import Job, job_of_workflow
+from pipelines.archive.planning import plan_job
+from pipelines.archive.running import ScanEnd, run_job
 from pipelines.engine.pool import StepEnd, Threads
 from schemas.parameters.simulation import SimulationSettings
 

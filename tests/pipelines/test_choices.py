@@ -13,7 +13,9 @@ import pytest
 from pydantic import BaseModel
 
 from footscan.calibration.models.maps import to_world
-from pipelines.archive.job import job_of_workflow, plan_job, run_job
+from pipelines.archive.job import job_of_workflow
+from pipelines.archive.planning import plan_job
+from pipelines.archive.running import run_job
 from pipelines.cli.main import run_command
 from pipelines.engine.pool import Threads
 from pipelines.recordings.calibration_choice import CalibrationPlace

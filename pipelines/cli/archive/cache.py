@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.cli.archive.leases import TakeOver, lease_in_words, lease_json, take_over_leases
-from pipelines.cli.archive.run import WORKFLOW, WorkflowFile
+from pipelines.cli.archive.selecting import WORKFLOW, WorkflowFile
 from pipelines.cli.archive.why import plan_of_scan
 from pipelines.cli.terminal.output import AsJson, message, print_json, print_line, print_table
 from schemas.base.errors import Fault, RefusedInput, one_line
@@ -230,7 +230,8 @@ def _garbage(
 ) -> "tuple[Garbage, list[str]]":
     """What of a store can go, and the scans that are no more; a workflow's present results, and what they came from,
     stay."""
-    from pipelines.archive.job import CACHE, job_of_workflow, plan_job
+    from pipelines.archive.job import CACHE, job_of_workflow
+    from pipelines.archive.planning import plan_job
     from pipelines.archive.vanished import vanished_scans
     from pipelines.engine.audit import repeatable
     from pipelines.engine.garbage_collection import find_garbage
@@ -288,7 +289,8 @@ def _share(text: str) -> float:
 
 def _recompute(workflow: Path, share: float, seed: int) -> "tuple[int, list[Difference], list[str]]":
     """Repeat a sample of the actions of a workflow; returns their number, the differences and the failures."""
-    from pipelines.archive.job import job_of_workflow, plan_job
+    from pipelines.archive.job import job_of_workflow
+    from pipelines.archive.planning import plan_job
     from pipelines.engine import audit
 
     planned = plan_job(job_of_workflow(workflow))

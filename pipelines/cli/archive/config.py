@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from pipelines.cli.archive.run import WORKFLOW, Settings, WorkflowFile
+from pipelines.cli.archive.selecting import WORKFLOW, Settings, WorkflowFile
 from pipelines.cli.terminal.output import AsJson, print_json, print_line, print_table
 from schemas.base.errors import RefusedInput
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.cli.archive.leases import TakeOver, lease_in_words, take_over_leases
-from pipelines.cli.archive.run import WORKFLOW
+from pipelines.cli.archive.selecting import WORKFLOW
 from pipelines.cli.terminal.output import AsJson, message, print_json, print_line
 from schemas.base.errors import RefusedInput, one_line
 

@@ -1,8 +1,8 @@
-"""`footscan run` and `footscan plan`."""
+"""`footscan run`."""
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
+from pipelines.cli.archive.printing import print_failure, print_left_out, steps_to_run
+from pipelines.cli.archive.selecting import Chosen, Force, Only, Settings, Since, Until, WorkflowFile
 from pipelines.cli.archive.workers import (
     ClusterAddress,
     Dashboard,
@@ -22,38 +24,37 @@ from pipelines.cli.archive.workers import (
     chosen_pool,
 )
 from pipelines.cli.terminal.compiling import compile_loops
-from pipelines.cli.terminal.output import AsJson, message, print_json, print_line, print_table
+from pipelines.cli.terminal.output import AsJson, message, print_json, print_line
 from schemas.base.errors import Fault, FootscanError, RefusedInput
 
 if TYPE_CHECKING:
-    from pipelines.archive.job import Job, PlannedJob, ScanEnd
+    from footscan.recordings.scans import RecordedScan
+    from pipelines.archive.job import Job
+    from pipelines.archive.planning import PlannedJob
     from pipelines.archive.profile import Profile
+    from pipelines.archive.running import ScanEnd
     from pipelines.engine.pool import Pool, StepEnd
 
-WORKFLOW = Path("workflow.yaml")
-
-WorkflowFile = Annotated[
-    Path | None, typer.Argument(help="The workflow; default: workflow.yaml.", metavar="[WORKFLOW]")
-]
 ScanFolder = Annotated[Path | None, typer.Option("--scan", help="Folder of one scan, instead of a workflow.")]
 CalibrationFile = Annotated[
     Path | None, typer.Option("--calibration", help="Calibration for --scan; default: the one named in scan.yaml.")
 ]
 ResultsFolder = Annotated[Path | None, typer.Option("--out", help="Folder for the results of --scan.")]
 JsonLog = Annotated[Path | None, typer.Option("--log-json", help="Log file to write, one JSON object per line.")]
-ProfilePage = Annotated[
-    Path | None, typer.Option("--profile", help="Page to write: which step ran when and where.", metavar="FILE.html")
+Profiles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--profile",
+        metavar="NAME|FILE.html",
+        help="Take the options of this profile of the workflow; or write a page: which step ran when and where.",
+    ),
+]
+FailFast = Annotated[
+    bool | None,
+    typer.Option("--fail-fast/--keep-going", help="End at the first failed scan; default: the others go on."),
 ]
 WatchArchive = Annotated[
     bool, typer.Option("--watch", help="Keep running and process scans as they arrive in the archive, until Ctrl-C.")
-]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        help="Parameter, for example extraction.red_threshold=22, or preset=thesis; may be repeated.",
-    ),
 ]
 POLL_S, LONGEST_POLL_S, WATCHED_SHARE = 2.0, 20.0, 0.01
 """Least and most time between two looks at the archives of a watch, and the share of a core that looking may take."""
@@ -63,6 +64,11 @@ MANY_STEPS = 20
 
 def run(
     workflow: WorkflowFile = None,
+    only: Only = None,
+    since: Since = None,
+    until: Until = None,
+    force: Force = None,
+    fail_fast: FailFast = None,
     scan: ScanFolder = None,
     calibration: CalibrationFile = None,
     out: ResultsFolder = None,
@@ -76,7 +82,7 @@ def run(
     tls_key: TlsKey = None,
     watch: WatchArchive = False,
     log_json: JsonLog = None,
-    profile: ProfilePage = None,
+    profile: Profiles = None,
     as_json: AsJson = False,
 ) -> int:
     """Reconstruct and measure: all scans of a workflow, or one scan folder.
@@ -87,19 +93,23 @@ def run(
     placement.check()
     if watch and (scan is not None or as_json):
         raise RefusedInput("--watch", "goes with a workflow alone, not with --scan or --json")
-    profiled = _profile(profile, watch=watch)
+    named, page = _profiles(profile)
+    profiled = _profile(page, watch=watch)
+    chosen = Chosen(only, since, until, force, settings, named)
     with ExitStack() as stack:
         log = None if log_json is None else stack.enter_context(_log(log_json))
-        job = job_of(workflow, scan, calibration, out, threads, settings, may_be_empty=watch)
+        job = job_of(chosen, workflow, scan, calibration, out, threads, may_be_empty=watch)
+        job = job if fail_fast is None else replace(job, fail_fast=fail_fast)
         pool = stack.enter_context(chosen_pool(job.threads, placement))
         if watch:
             return _watch(job, pool, log)
-        ends = _run(job, pool, log, as_json=as_json, profile=profiled)
-    if profile is not None and profiled is not None:
-        profiled.write(profile)
+        planned, ends = _run(job, pool, log, as_json=as_json, profile=profiled)
+    if page is not None and profiled is not None:
+        profiled.write(page)
     if scan is not None:
         return _status(ends, single=True)
-    return max(_status(ends, single=False), _write_table(ends, job.results))
+    written = 0 if job.selection.until is not None else _write_table(ends, _not_run(planned), job)
+    return max(_status(ends, single=False), written)
 
 
 def _run(
@@ -110,18 +120,20 @@ def _run(
     as_json: bool = False,
     folders: dict[str, Path] | None = None,
     profile: "Profile | None" = None,
-) -> "list[ScanEnd]":
-    """Run a job and print the result of each scan; `folders` as in `plan_job`."""
-    from pipelines.archive.job import plan_job, run_job
+) -> "tuple[PlannedJob, list[ScanEnd]]":
+    """Plan and run a job, and print the result of each scan; `folders` as in `plan_job`."""
+    from pipelines.archive.planning import plan_job
+    from pipelines.archive.running import run_job
     from pipelines.cli.terminal.progress import StepProgress
 
     planned = plan_job(job, folders=folders)
+    print_left_out(planned)
     if planned.steps:
-        message(_summary(planned))
+        message(steps_to_run(planned))
     if planned.to_run >= MANY_STEPS:
         compile_loops()
     ends = []
-    with StepProgress(planned.to_run, len(job.folders), log) as progress:
+    with StepProgress(planned.to_run, len(planned.scans) + len(planned.refused), log) as progress:
 
         def on_step_end(ended: "StepEnd") -> None:
             progress.on_step_end(ended)
@@ -135,12 +147,24 @@ def _run(
         print_json(_ends_json(planned, ends, progress.ran))
     for end in ends:
         if end.problem is not None:
-            _tell(end.scan, end.problem)
+            print_failure(end.scan, end.problem)
         elif not as_json:
-            print_line(f"{end.scan}: {end.folder}")
+            print_line(f"{end.scan}: {end.folder or f'done until {end.until}'}")
             for warning in end.warnings:
                 message(f"{end.scan}: {warning}")
-    return ends
+    if len(ends) < (count := len(planned.scans) + len(planned.refused)):
+        message(f"footscan: ended at the first failed scan; {count - len(ends)} of {count} scans are not done")
+    return planned, ends
+
+
+def _profiles(values: list[str] | None) -> tuple[str | None, Path | None]:
+    """The name of a profile and the page to write, one of each at most, as `--profile` has them."""
+    pages = [value for value in values or () if value.endswith(".html")]
+    names = [value for value in values or () if not value.endswith(".html")]
+    for many in (pages, names):
+        if len(many) > 1:
+            raise RefusedInput("--profile", f"expected one profile and one page, found {many[0]!r} and {many[1]!r}")
+    return next(iter(names), None), Path(pages[0]) if pages else None
 
 
 def _profile(path: Path | None, *, watch: bool) -> "Profile | None":
@@ -155,16 +179,27 @@ def _profile(path: Path | None, *, watch: bool) -> "Profile | None":
     return Profile()
 
 
-def _write_table(ends: "list[ScanEnd]", results: Path) -> int:
-    """Write the table of all results; a failure is printed and gives the exit status of a fault."""
-    from pipelines.archive.table import write_results_table
+def _write_table(ends: "list[ScanEnd]", not_run: "Sequence[RecordedScan]", job: "Job") -> int:
+    """Write the table of all results, with the rows of scans that were not run as they are in it.
 
+    A failure is printed and gives the exit status of a fault.
+    """
+    from pipelines.archive.table import earlier_ends, write_results_table
+
+    others = {scan.name: scan for scan in not_run if scan.name not in {end.scan for end in ends}}
+    kept = [end for end in earlier_ends(job.results, others) if end.scan in others] if others else []
+    place = {folder.resolve(): number for number, folder in enumerate(job.folders)} if kept else {}
     try:
-        write_results_table(ends, results)
+        write_results_table(sorted([*ends, *kept], key=lambda end: place.get(end.source, len(place))), job.results)
     except Fault as error:
         message(f"footscan: {error}")
         return error.exit_status
     return 0
+
+
+def _not_run(planned: "PlannedJob") -> "list[RecordedScan]":
+    """Scans that the job leaves out, or left where it ended early."""
+    return [*planned.left_out, *(one.scan for one in planned.scans)]
 
 
 def _watch(job: "Job", pool: "Pool", log: TextIO | None) -> int:
@@ -174,6 +209,7 @@ def _watch(job: "Job", pool: "Pool", log: TextIO | None) -> int:
     arrivals = Arrivals(job.archives)
     folders: dict[str, Path] = {}
     ends: dict[Path, ScanEnd] = {}
+    not_run: dict[Path, RecordedScan] = {}
     message(f"watching {', '.join(map(str, job.archives))}")
     looked_s = math.inf
     while True:
@@ -181,8 +217,11 @@ def _watch(job: "Job", pool: "Pool", log: TextIO | None) -> int:
         complete = arrivals.complete()
         looked_s = min(looked_s, time.process_time() - started_s)  # the first look also reads each scan.yaml
         if complete:
-            ends |= {end.source: end for end in _run(replace(job, folders=complete), pool, log, folders=folders)}
-            _write_table([end for source, end in ends.items() if source.is_dir()], job.results)
+            planned, ended = _run(replace(job, folders=complete), pool, log, folders=folders)
+            ends |= {end.source: end for end in ended}
+            not_run |= {scan.folder: scan for scan in _not_run(planned)}
+            present = [scan for source, scan in not_run.items() if source.is_dir()]
+            _write_table([end for source, end in ends.items() if source.is_dir()], present, job)
         time.sleep(min(max(POLL_S, looked_s / WATCHED_SHARE), LONGEST_POLL_S))
 
 
@@ -197,87 +236,27 @@ def _log(path: Path) -> Iterator[TextIO]:
         raise Fault(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
-def plan(
-    workflow: WorkflowFile = None,
-    scan: ScanFolder = None,
-    calibration: CalibrationFile = None,
-    out: ResultsFolder = None,
-    settings: Settings = None,
-    as_json: AsJson = False,
-) -> int:
-    """Show what `run` would do, and why, without running it."""
-    from pipelines.archive.job import plan_job
-
-    planned = plan_job(job_of(workflow, scan, calibration, out, None, settings), reasons=True)
-    if as_json:
-        print_json(_plan_json(planned))
-    else:
-        rows = [[w.scan, w.kind, "" if w.camera is None else str(w.camera), w.reason] for w in planned.waiting]
-        if rows:
-            print_table("", ["scan", "step", "camera", "reason"], rows)
-        if planned.steps:
-            print_line(_summary(planned))
-    for refused in planned.refused:
-        _tell(refused.scan, str(refused.error))
-    for planned_scan in planned.scans:
-        if planned_scan.failure is not None:
-            _tell(planned_scan.scan.name, planned_scan.failure.problem)
-    if planned.refused:
-        return RefusedInput.exit_status if scan is not None else 1
-    return 0
-
-
-def with_settings(job: "Job", settings: list[str] | None) -> "Job":
-    """`job` with what `--set` says of its parameters."""
-    from pipelines.archive.settings import changed_parameters
-
-    return replace(job, parameters=changed_parameters(job.parameters, settings)) if settings else job
-
-
 def job_of(
+    chosen: Chosen,
     workflow: Path | None,
     scan: Path | None,
     calibration: Path | None,
     out: Path | None,
     threads: int | None,
-    settings: list[str] | None,
     *,
     may_be_empty: bool = False,
 ) -> "Job":
     """The job described by the options of a command; `may_be_empty` accepts an archive without scans."""
-    from pipelines.archive.job import job_of_scan, job_of_workflow
-
     if scan is None:
         for name, value in (("--calibration", calibration), ("--out", out)):
             if value is not None:
                 raise RefusedInput(name, "goes with --scan, expected it in the workflow")
-        read = job_of_workflow(workflow or WORKFLOW, threads, may_be_empty=may_be_empty)
-        return with_settings(read, settings)
+        return chosen.job(workflow, threads, may_be_empty=may_be_empty)
     if workflow is not None:
         raise RefusedInput(workflow, "a workflow and --scan exclude each other, expected one of them")
     if out is None:
         raise RefusedInput("--out", "is missing, expected a folder for the results of --scan")
-    return with_settings(job_of_scan(scan, calibration, out, threads), settings)
-
-
-def _tell(scan: str, problem: str) -> None:
-    """One line for a failed scan; most problems name a file of the scan and thereby the scan."""
-    message(f"footscan: {problem}" if scan in problem else f"footscan: {scan}: {problem}")
-
-
-def _summary(planned: "PlannedJob") -> str:
-    return f"{planned.to_run} of {planned.steps} steps to run"
-
-
-def _plan_json(planned: "PlannedJob") -> dict[str, object]:
-    failures = [(scan.scan.name, scan.failure) for scan in planned.scans]
-    return {
-        "steps": planned.steps,
-        "hits": planned.steps - planned.to_run,
-        "misses": [{"scan": w.scan, "step": w.kind, "camera": w.camera, "reason": w.reason} for w in planned.waiting],
-        "refused": [{"scan": refused.scan, "problem": str(refused.error)} for refused in planned.refused],
-        "failed": [{"scan": name, "problem": failure.problem} for name, failure in failures if failure is not None],
-    }
+    return chosen.of_scan(scan, calibration, out, threads)
 
 
 def _ends_json(planned: "PlannedJob", ends: "list[ScanEnd]", ran: int) -> dict[str, object]:

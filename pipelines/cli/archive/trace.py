@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.archive.run import WORKFLOW
+from pipelines.cli.archive.selecting import WORKFLOW
 from pipelines.cli.terminal.output import AsJson, message, print_json
 from schemas.base.errors import RefusedInput, printable
 

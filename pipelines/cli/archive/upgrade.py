@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.archive.run import WORKFLOW, WorkflowFile
+from pipelines.cli.archive.selecting import WORKFLOW, WorkflowFile
 from pipelines.cli.terminal.output import AsJson, message, print_json, print_line, print_table
 from schemas.base.errors import RefusedInput, one_line
 
@@ -33,7 +33,8 @@ def upgrade(
     A step is stale when its inputs and parameters are those of its last result, and only its code or the version of a
     library that it computes with is new. The exit status is 1 if a step of the sample differs or fails.
     """
-    from pipelines.archive.job import job_of_workflow, plan_job
+    from pipelines.archive.job import job_of_workflow
+    from pipelines.archive.planning import plan_job
     from pipelines.archive.upgrade import accept_upgrade, try_upgrade
 
     if accept is not None and not accept.strip():

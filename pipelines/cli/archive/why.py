@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.archive.run import WORKFLOW, Settings, with_settings
+from pipelines.cli.archive.selecting import Chosen, Force, Only, ProfileName, Settings, Since, Until
 from pipelines.cli.terminal.output import AsJson, print_json, print_line, print_table
 from schemas.base.errors import RefusedInput
 
 if TYPE_CHECKING:
-    from pipelines.archive.job import Job, PlannedJob, PlannedScan
+    from pipelines.archive.job import Job
+    from pipelines.archive.planning import PlannedJob, PlannedScan
     from pipelines.engine.actions.step import Step
     from pipelines.engine.explain import Change
     from pipelines.engine.plan import Plan, PlannedStep
@@ -41,7 +42,9 @@ class Explanation:
 
 
 def why(
-    scan: Annotated[str, typer.Argument(help="Folder of a scan, or patient/scan.")],
+    scan: Annotated[
+        str | None, typer.Argument(help="Folder of a scan, or patient/scan; default: all scans of the workflow.")
+    ] = None,
     step: Annotated[
         str | None, typer.Argument(help="A step, such as extract or extract-3; default: all steps that would run.")
     ] = None,
@@ -50,33 +53,50 @@ def why(
     out: Annotated[
         Path | None, typer.Option(help="Folder of the results, for a scan folder without a workflow.")
     ] = None,
+    only: Only = None,
+    since: Since = None,
+    until: Until = None,
+    force: Force = None,
+    profile: ProfileName = None,
     settings: Settings = None,
     as_json: AsJson = False,
 ) -> None:
     """Show what changed since the last result of each step that would run, old and new side by side."""
-    from pipelines.archive.job import plan_job
+    from pipelines.archive.planning import plan_job
 
-    planned = plan_job(with_settings(_job(scan, workflow, calibration, out), settings))
+    options = Chosen(only, since, until, force, settings, profile)
+    planned = plan_job(_job(scan, options, workflow, calibration, out))
     for refused in planned.refused:
         raise refused.error
-    [found] = planned.scans
+    if scan is not None and not planned.scans:
+        raise RefusedInput(scan, "is left out by --only, --since or the profile, expected a scan that they take")
+    documents = [_why_of_scan(found, planned, step, as_json=as_json) for found in planned.scans]
+    if as_json:
+        print_json(documents if scan is None else documents[0])
+
+
+def _why_of_scan(found: "PlannedScan", planned: "PlannedJob", step: str | None, *, as_json: bool) -> dict[str, Any]:
+    """Explain the steps of one scan, as a table or as the document that is returned."""
     plan = plan_of_scan(found, planned)
     every = [_explain(one, plan, planned.workspace.store) for one in plan.steps]
     chosen = _named(step, every) if step is not None else [one for one in every if one.state != "hit"]
     if as_json:
-        print_json(_json(found.scan.name, every, chosen))
-    elif chosen:
+        return _json(found.scan.name, every, chosen)
+    if chosen:
+        if len(planned.scans) > 1:
+            print_line(f"{found.scan.name}:")
         _show(chosen)
     else:
         newest = _newest(every)
         print_line(f"{found.scan.name}: nothing would run; last result: {_short(newest.step)}, {_came_to(newest)}")
+    return {}
 
 
 def plan_of_scan(found: "PlannedScan", planned: "PlannedJob") -> "Plan":
-    """The plan of one scan of a job, with all its steps."""
-    from pipelines.archive.job import draw_steps
+    """The plan of one scan of a job, with all its selected steps."""
+    from pipelines.archive.planning import draw_steps
 
-    return planned.workspace.plan(draw_steps(found.scan, planned))
+    return planned.workspace.plan(draw_steps(found.scan, planned), planned.job.selection.force)
 
 
 def local_time(seconds: float | None) -> str:
@@ -89,18 +109,18 @@ def json_time(seconds: float | None) -> str | None:
     return None if seconds is None else datetime.fromtimestamp(seconds, UTC).isoformat(timespec="seconds")
 
 
-def _job(scan: str, workflow: Path | None, calibration: Path | None, out: Path | None) -> "Job":
-    """The job of the one scan."""
-    from pipelines.archive.job import job_of_scan, job_of_workflow
-
+def _job(scan: str | None, options: Chosen, workflow: Path | None, calibration: Path | None, out: Path | None) -> "Job":
+    """The job of the one scan, or of the workflow."""
     if out is not None:
         if workflow is not None:
             raise RefusedInput("--workflow", "and --out exclude each other, expected one of them")
-        return job_of_scan(Path(scan), calibration, out)
+        if scan is None:
+            raise RefusedInput("SCAN", "is missing, expected the folder of a scan with --out")
+        return options.of_scan(Path(scan), calibration, out)
     if calibration is not None:
         raise RefusedInput("--calibration", "goes with --out, expected it in the workflow")
-    job = job_of_workflow(workflow or WORKFLOW)
-    return replace(job, folders=[_folder(scan, job)])
+    job = options.job(workflow)
+    return job if scan is None else replace(job, folders=[_folder(scan, job)])
 
 
 def _folder(scan: str, job: "Job") -> Path:

@@ -23,7 +23,7 @@ from pipelines.engine.actions.step import Failure
 from pipelines.engine.pool import StepEnd
 
 if TYPE_CHECKING:
-    from pipelines.archive.job import ScanEnd
+    from pipelines.archive.running import ScanEnd
 
 
 @contextmanager

@@ -75,6 +75,11 @@ class Step(NamedTuple):
         return f"{self.scan}/{self.kind}" + (f"-{self.camera}" if self.camera is not None else "")
 
 
+def is_named(step: Step, name: str) -> bool:
+    """Return True if `name` is a step's kind, such as `extract`, or its kind and camera, such as `extract-3`."""
+    return name in (step.kind, step.name.rpartition("/")[2])
+
+
 def steps_to(steps: Sequence[Step], names: Collection[str]) -> list[Step]:
     """Select those of `steps`, in topological order, that have one of the `names`, and all that they need.
 

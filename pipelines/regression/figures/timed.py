@@ -20,7 +20,8 @@ from tempfile import TemporaryDirectory
 
 from footscan.child_process import end_with_parent
 from footscan.recordings.scans import RecordedScan, read_scan
-from pipelines.archive.job import Job, PlannedJob, draw_steps
+from pipelines.archive.job import Job
+from pipelines.archive.planning import PlannedJob, draw_steps
 from pipelines.engine.actions.step import Success
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.engine.workspace import Workspace

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import yaml
 
-from pipelines.archive.job import ScanEnd
+from pipelines.archive.running import ScanEnd
 from pipelines.capture_job import calibrate_capture
 from pipelines.recordings.captures import read_capture
 from schemas.base.errors import RefusedInput

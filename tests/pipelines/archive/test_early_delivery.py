@@ -6,7 +6,9 @@ from typing import Any
 
 import pytest
 
-from pipelines.archive.job import draw_steps, job_of_workflow, plan_job, run_job
+from pipelines.archive.job import job_of_workflow
+from pipelines.archive.planning import draw_steps, plan_job
+from pipelines.archive.running import run_job
 from pipelines.engine.actions.step import steps_to
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.steps import report

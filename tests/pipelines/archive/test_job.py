@@ -13,7 +13,9 @@ from typing import Any
 import pytest
 from fsspec.implementations.memory import MemoryFileSystem
 
-from pipelines.archive.job import job_of_scan, job_of_workflow, plan_job, run_job
+from pipelines.archive.job import job_of_scan, job_of_workflow
+from pipelines.archive.planning import plan_job
+from pipelines.archive.running import run_job
 from pipelines.engine import run as engine_run
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.steps import measure

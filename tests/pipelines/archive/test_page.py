@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.archive.job import ScanEnd
+from pipelines.archive.running import ScanEnd
 from pipelines.archive.page import FILES, PAGE, write_archive_page
 from schemas.base.errors import Fault
 

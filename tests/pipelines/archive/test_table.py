@@ -11,7 +11,7 @@ import pyarrow.csv
 import pytest
 from pyarrow import parquet
 
-from pipelines.archive.job import ScanEnd
+from pipelines.archive.running import ScanEnd
 from pipelines.archive.table import CSV, PARQUET, write_results_table
 from pipelines.engine.files.digest import sha256
 from pipelines.version import SOFTWARE

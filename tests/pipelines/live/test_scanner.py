@@ -19,7 +19,8 @@ from footscan.frames.film import open_film
 from footscan.frames.travel import read_positions
 from footscan.recordings.calibration_checks import check_of_scan, checks_of
 from footscan.recordings.scans import read_scan
-from pipelines.archive.job import Job, PlannedJob, Waiting, plan_job
+from pipelines.archive.job import Job
+from pipelines.archive.planning import PlannedJob, Waiting, plan_job
 from pipelines.calibration_check import store_check
 from pipelines.live import measuring, storing
 from pipelines.live.calibrating.body_film import film_body

@@ -19,7 +19,9 @@ from pathlib import Path
 from numba.core import event
 from numba.core.registry import CPUDispatcher
 from footscan.ahead_of_time import spec_of
-from pipelines.archive.job import job_of_workflow, plan_job, run_job
+from pipelines.archive.job import job_of_workflow
+from pipelines.archive.planning import plan_job
+from pipelines.archive.running import run_job
 from pipelines.engine.pool import Threads
 
 class Timer(event.Listener):

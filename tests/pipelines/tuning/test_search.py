@@ -11,7 +11,8 @@ import pytest
 import trimesh
 from pyarrow import parquet
 
-from pipelines.archive.job import job_of_workflow, plan_job
+from pipelines.archive.job import job_of_workflow
+from pipelines.archive.planning import plan_job
 from pipelines.engine.pool import StepEnd, Threads
 from pipelines.tuning.files import write_files
 from pipelines.tuning.report.result import Trial
