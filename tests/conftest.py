@@ -73,16 +73,28 @@ def films(request: pytest.FixtureRequest) -> MadeOnce:
 def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Before its first run. To be read only."""
     root = tmp_path_factory.mktemp("pristine") / "home"
-    scan = root / "archive/P0001/S1"
-    scan.mkdir(parents=True)
+    root.mkdir()
     (root / "workflow.yaml").write_text(WORKFLOW)
     (root / "calibration.json").write_text(_calibration().model_dump_json())
-    (scan / "scan.yaml").write_text(SCAN)
-    along = np.linspace(0.0, 1.0, FRAMES)
-    sections = np.column_stack([np.interp(along, STATIONS, of) for of in (HALF_BREADTHS_MM, HEIGHTS_MM, DEPTHS_MM)])
-    for camera in CAMERAS:
-        write_film(scan / f"cam{camera}.avi", [_frame(camera, *section) for section in sections.tolist()], 640, 480, 18)
+    _write_scan(root / "archive/P0001/S1", SCAN, 1.0)
     return root
+
+
+@pytest.fixture(scope="session")
+def write_scan() -> Callable[[Path, str, float], None]:
+    """Write a scan folder: where, its scan.yaml, and how much broader its foot is."""
+    return _write_scan
+
+
+def _write_scan(folder: Path, document: str, broader: float) -> None:
+    folder.mkdir(parents=True)
+    (folder / "scan.yaml").write_text(document)
+    along = np.linspace(0.0, 1.0, FRAMES)
+    half_breadths = broader * np.array(HALF_BREADTHS_MM)
+    sections = np.column_stack([np.interp(along, STATIONS, of) for of in (half_breadths, HEIGHTS_MM, DEPTHS_MM)])
+    for camera in CAMERAS:
+        film = [_frame(camera, *section) for section in sections.tolist()]
+        write_film(folder / f"cam{camera}.avi", film, 640, 480, 18)
 
 
 @pytest.fixture(scope="session")

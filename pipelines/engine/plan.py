@@ -129,7 +129,8 @@ def _plan_step(
         if isinstance(producer.outcome, Failure):
             return PlannedStep(step, State.HIT, producer.outcome, "")
         if producer.outcome is None:
-            return PlannedStep(step, State.WAITS, None, f"waits for {_label(producer.step)}")
+            text = FORCED if is_forced else f"waits for {_label(producer.step)}"
+            return PlannedStep(step, State.WAITS, None, text)
         digests[name] = producer.outcome.digest
     if is_forced:
         return PlannedStep(step, State.MISS, None, FORCED)

@@ -15,8 +15,8 @@ from chromium import needs_chromium
 
 from footscan.report.comparison.page import comparison_page
 from footscan.report.deviation import Deviation
-from pipelines.archive.running import ScanEnd
 from pipelines.archive.page import FILES, PAGE, write_archive_page
+from pipelines.archive.running import ScanEnd
 from pipelines.cli.main import run_command
 from pipelines.regression.report.page import regress_page
 from pipelines.regression.report.result import Accepted, JudgedFigure, JudgedSet, NightResult

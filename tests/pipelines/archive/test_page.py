@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from pipelines.archive.running import ScanEnd
 from pipelines.archive.page import FILES, PAGE, write_archive_page
+from pipelines.archive.running import ScanEnd
 from schemas.base.errors import Fault
 
 

@@ -68,7 +68,7 @@ def test_an_input_that_is_a_result_names_its_step(done: Any, why: Why, monkeypat
     done.set_parameters("{outliers: {z_mm: [-1, 30]}}")
     original = engine_run.execute
 
-    def interrupted(step: Any, *others: Any, **options: Any) -> Any:
+    def interrupted(step: Any, *others: Any, **_: Any) -> Any:
         if step.kind == "orient":
             raise KeyboardInterrupt
         return original(step, *others)
