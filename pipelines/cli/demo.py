@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from pipelines.cli.foot.measure import print_measures
-from pipelines.cli.terminal.output import message, print_line, print_table
+from pipelines.cli.terminal.output import message, note, print_line, print_table
 
 if TYPE_CHECKING:
     from pipelines.engine.pool import OnStepEnd
@@ -30,7 +30,7 @@ def demo(
     result = run_demo(folder, foot, watch)
 
     for part, seconds in result.seconds.items():
-        message(f"{part}: {seconds:.1f} s")
+        note(f"{part}: {seconds:.1f} s")
     measures = Measures.model_validate_json((result.results / "measures.json").read_bytes())
     print_measures(measures, result.true_measures)
     quality = Quality.model_validate_json((result.results / "quality.json").read_bytes())
@@ -48,6 +48,6 @@ def watch(part: str, to_run: int, steps: int) -> "Iterator[OnStepEnd]":
     """Show the progress of a part; see `pipelines.demo.Watch`."""
     from pipelines.cli.terminal.progress import StepProgress
 
-    message(f"{part}: {to_run} of {steps} steps to run")
+    note(f"{part}: {to_run} of {steps} steps to run")
     with StepProgress(to_run) as progress:
         yield progress.on_step_end

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.terminal.output import AsJson, keep_inputs, message, print_json
+from pipelines.cli.terminal.output import AsJson, keep_inputs, note, print_json
 from schemas.base.errors import RefusedInput
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def extract(
                 "overlay": None if overlay is None else str(overlay),
             }
         )
-    message(_summary(film, points, seen, used.laser))
+    note(_summary(film, points, seen, used.laser))
 
 
 def _check_outputs(out: Path | None, overlay: Path | None, sources: Sequence[Path]) -> None:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pipelines.cli.terminal.output import AsJson, message, print_json, print_table
+from pipelines.cli.terminal.output import AsJson, message, note, print_json, print_table
 from schemas.base.errors import Fault, RefusedInput
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def simulate_scan(
             extras=ScanExtras(calibration, stripe_truth=stripe_truth, laser_off=laser_off),
             progress=progress,
         )
-    message(f"{out}: filmed {settings.frames} frames by each of 8 cameras")
+    note(f"{out}: filmed {settings.frames} frames by each of 8 cameras")
 
 
 @simulate.command("capture")
@@ -109,7 +109,7 @@ def simulate_capture(
         )
     count = len(filmed.placements_mm)
     placed = f"{count} placement{'s' * (count != 1)}"
-    message(f"{out}: filmed the reference object in {placed}, chart in {out / 'chart.csv'}")
+    note(f"{out}: filmed the reference object in {placed}, chart in {out / 'chart.csv'}")
 
 
 @simulate.command("chessboard")
@@ -126,7 +126,7 @@ def simulate_chessboard(
     _check_empty(out)
     with frame_progress("poses") as progress:
         record_chessboard(out, settings=_settings(light, seed, scanner_seed), progress=progress)
-    message(f"{out}: pictures of a chessboard by 8 cameras")
+    note(f"{out}: pictures of a chessboard by 8 cameras")
 
 
 @simulate.command("world")
@@ -170,7 +170,7 @@ def simulate_world(
     else:
         with frame_progress("filming") as progress:
             write_films(whole, out, progress, shape)
-    message(f"{out}: world {whole.seed}")
+    note(f"{out}: world {whole.seed}")
 
 
 def ingest(

@@ -4,6 +4,7 @@ import errno
 import logging
 import os
 import sys
+from typing import Annotated
 
 import typer
 
@@ -13,7 +14,8 @@ from pipelines.cli.archive import cache, config, forget, plan, run, trace, upgra
 from pipelines.cli.calibrate import app as calibration
 from pipelines.cli.foot import lasts, measure, pairs, sizes
 from pipelines.cli.live import console, devices, scan
-from pipelines.cli.terminal.output import LogFormatter, drop_unwritten, message
+from pipelines.cli.terminal.norms import print_version, with_norms
+from pipelines.cli.terminal.output import LogFormatter, be_quiet, drop_unwritten, message
 from pipelines.engine.files.access import keep_private
 from schemas.base.errors import Fault, FootscanError, RefusedInput, one_line
 from schemas.base.limits import check_limits
@@ -26,6 +28,9 @@ INTERRUPTED = 130
 MOST_OTHERS = 19
 """Mistakes printed after the first one. Bound: what a terminal shows at once."""
 
+SCAN, RESULTS, CALIBRATION, ARCHIVE, VERIFICATION = "Scan", "Results", "Calibration", "Archive", "Verification"
+"""Groups of commands in the help."""
+
 app = typer.Typer(
     name="footscan",
     help="Turn the films of a laser-stripe foot scanner into a measured 3D foot.",
@@ -33,39 +38,73 @@ app = typer.Typer(
     "cache; 2 wrong use or refused input; 3 fault of the machine; 128 and the signal's number when ended by one "
     "(130 Ctrl-C, 143 SIGTERM, 129 SIGHUP, 131 SIGQUIT).",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.command("demo")(demo.demo)
-app.add_typer(films.simulate, name="simulate")
-app.command("ingest")(films.ingest)
-app.command("extract")(extract.extract)
-app.add_typer(calibration.calibrate, name="calibrate")
-app.command("map")(calibration.map_pixels)
-app.command("run")(run.run)
-app.command("plan")(plan.plan)
-app.add_typer(config.config, name="config")
-app.command("tune")(tune.tune)
-app.command("why")(why.why)
-app.command("trace")(trace.trace)
+
+
+@app.callback()
+def _of_all(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and exit.", is_eager=True, callback=print_version)
+    ] = False,
+) -> None:
+    del version
+
+
+app.command("devices", rich_help_panel=SCAN)(devices.devices)
+app.command("home", rich_help_panel=SCAN)(scan.home)
+app.command("jog", rich_help_panel=SCAN)(scan.jog)
+app.command("scan", rich_help_panel=SCAN)(scan.scan)
+app.command("console", rich_help_panel=SCAN)(console.console)
+app.add_typer(films.simulate, name="simulate", rich_help_panel=SCAN)
+
+app.command("measure", rich_help_panel=RESULTS)(measure.measure)
+app.command("sizes", rich_help_panel=RESULTS)(sizes.sizes)
+app.command("pair", rich_help_panel=RESULTS)(pairs.pair)
+app.command("change", rich_help_panel=RESULTS)(pairs.change)
+app.command("lasts", rich_help_panel=RESULTS)(lasts.lasts)
+app.command("export", rich_help_panel=RESULTS)(export.export)
+
+app.add_typer(calibration.calibrate, name="calibrate", rich_help_panel=CALIBRATION)
+app.command("map", rich_help_panel=CALIBRATION)(calibration.map_pixels)
+
+app.command("run", rich_help_panel=ARCHIVE)(run.run)
+app.command("plan", rich_help_panel=ARCHIVE)(plan.plan)
+app.command("why", rich_help_panel=ARCHIVE)(why.why)
+app.command("trace", rich_help_panel=ARCHIVE)(trace.trace)
+app.add_typer(config.config, name="config", rich_help_panel=ARCHIVE)
+app.command("tune", rich_help_panel=ARCHIVE)(tune.tune)
 cache.cache.command("upgrade")(upgrade.upgrade)
-app.add_typer(cache.cache, name="cache")
-app.command("forget")(forget.forget)
-app.command("regress")(regress.regress)
-app.command("measure")(measure.measure)
-app.command("sizes")(sizes.sizes)
-app.command("pair")(pairs.pair)
-app.command("change")(pairs.change)
-app.command("lasts")(lasts.lasts)
-app.command("compare")(compare.compare)
-app.command("export")(export.export)
-app.command("thesis")(thesis.thesis)
-app.add_typer(verify.verify, name="verify")
-app.command("devices")(devices.devices)
-app.command("home")(scan.home)
-app.command("jog")(scan.jog)
-app.command("scan")(scan.scan)
-app.command("console")(console.console)
+app.add_typer(cache.cache, name="cache", rich_help_panel=ARCHIVE)
+app.command("ingest", rich_help_panel=ARCHIVE)(films.ingest)
+app.command("extract", rich_help_panel=ARCHIVE)(extract.extract)
+app.command("forget", rich_help_panel=ARCHIVE)(forget.forget)
+
+app.command("demo", rich_help_panel=VERIFICATION)(demo.demo)
+app.add_typer(verify.verify, name="verify", rich_help_panel=VERIFICATION)
+app.command("compare", rich_help_panel=VERIFICATION)(compare.compare)
+app.command("regress", rich_help_panel=VERIFICATION)(regress.regress)
+app.command("thesis", rich_help_panel=VERIFICATION)(thesis.thesis)
+
+STATUS_1 = {
+    "calibrate check": "a camera has drifted",
+    "calibrate compare": "calibrations differ by more than the tolerance",
+    "calibrate film": "a placement is wrong",
+    "calibrate latency": "a camera's latency is not known",
+    "calibrate morning": "a camera has moved",
+    "cache gc": "another command uses the store",
+    "cache upgrade": "a result differs",
+    "cache verify": "something is damaged",
+    "forget": "something remains",
+    "ingest": "a film was refused",
+    "plan": "a scan was refused",
+    "regress": "a figure is beyond its tolerance",
+    "run": "a scan failed",
+    "scan": "the foot could not be measured",
+    "trace": "no step made the file",
+    "tune": "a scan was refused",
+}
+"""Meaning of exit status 1, by command."""
 
 
 def main() -> None:
@@ -84,9 +123,11 @@ def main() -> None:
 def run_command(arguments: list[str]) -> int:
     """Run `footscan ARGUMENTS` and return the exit status. Each mistake is one line on standard error."""
     try:
+        be_quiet(is_asked=False)
         check_limits()
         _check_arguments(arguments)
-        status = int(app(arguments, standalone_mode=False, prog_name="footscan") or 0)
+        command = with_norms(typer.main.get_command(app), STATUS_1)
+        status = int(command(arguments, standalone_mode=False, prog_name="footscan") or 0)
         if status == INTERRUPTED:  # which is what Typer makes of it
             raise KeyboardInterrupt
         return status

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.terminal.output import AsJson, keep_inputs, message, print_json, print_line, print_table
+from pipelines.cli.terminal.output import AsJson, keep_inputs, note, print_json, print_line, print_table
 from schemas.base.errors import RefusedInput, one_line
 
 if TYPE_CHECKING:
@@ -115,13 +115,13 @@ def _tell(one: "JudgedSet") -> None:
     from pipelines.regression.report.result import VERDICTS
 
     counts = ", ".join(f"{one.count(verdict)} {verdict}" for verdict in VERDICTS if one.count(verdict))
-    message(f"{one.name}: {counts or 'no figures'}" + (f"; {one_line(one.problem)}" if one.problem else ""))
+    note(f"{one.name}: {counts or 'no figures'}" + (f"; {one_line(one.problem)}" if one.problem else ""))
 
 
 def _tell_world(done: int, total: int) -> None:
     """Print a line for every tenth of the worlds."""
     if done * 10 // total > (done - 1) * 10 // total:
-        message(f"worlds: {done} of {total}")
+        note(f"worlds: {done} of {total}")
 
 
 def _show(night: "Night") -> None:

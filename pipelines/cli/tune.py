@@ -15,7 +15,7 @@ from pipelines.cli.archive.workers import (
     Workers,
     chosen_pool,
 )
-from pipelines.cli.terminal.output import AsJson, figure, message, print_json, print_line, print_table
+from pipelines.cli.terminal.output import AsJson, figure, message, note, print_json, print_line, print_table
 from schemas.base.errors import Fault, RefusedInput
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def _tell_trial(trial: "Trial") -> None:
     name = f"trial {trial.number}" if trial.number else "present"
     values = ", ".join(f"{goal} {value:.4g}" for goal, value in trial.values.items())
     failed = f"; {len(trial.problems)} scans failed: {next(iter(trial.problems.values()))}" if trial.problems else ""
-    message(f"{name}: {values}{failed}")
+    note(f"{name}: {values}{failed}")
 
 
 def _print(tuned: "Tuned", folder: Path) -> None:

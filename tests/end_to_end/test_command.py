@@ -1,11 +1,14 @@
 """How the command itself behaves: help, what its start waits for, JSON for programs."""
 
 import json
+import os
+import re
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from subprocess import CompletedProcess
+from typing import Any
 
 import pytest
 
@@ -98,3 +101,74 @@ def test_names_in_a_table_are_no_markup(footscan: Footscan, bench: Path) -> None
     (bench / "results/P0001/small/foot.stl").rename(strange)
     done = footscan("compare", strange, bench / "archive/P0001/small/truth.stl")
     assert "[red]foot.stl to truth.stl, mm" in done.stdout
+
+
+def test_version_and_groups(footscan: Footscan) -> None:
+    done = footscan("--version")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("footscan ")
+    shown = footscan("--help").stdout
+    groups = ["Scan", "Results", "Calibration", "Archive", "Verification"]
+    assert [group for group in groups if f"─ {group} ─" in shown] == groups
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_commands_are_completed(shell: str) -> None:
+    """As the scripts ask that `--install-completion` writes."""
+    asked = {
+        "bash": {"COMP_WORDS": "footscan cal", "COMP_CWORD": "1"},
+        "zsh": {"_TYPER_COMPLETE_ARGS": "footscan cal"},
+        "fish": {"_TYPER_COMPLETE_ARGS": "footscan cal", "_TYPER_COMPLETE_FISH_ACTION": "get-args"},
+    }[shell]
+    done = subprocess.run(
+        [Path(sys.executable).with_name("footscan")],
+        env={**os.environ, "_FOOTSCAN_COMPLETE": f"complete_{shell}", **asked},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "calibrate" in done.stdout
+    assert "regress" not in done.stdout
+
+
+def test_every_help_says_what_its_exit_status_means() -> None:
+    import typer
+
+    from pipelines.cli.main import STATUS_1, app
+    from pipelines.cli.terminal.norms import with_norms
+
+    def leaves(command: Any, *path: str) -> Iterator[tuple[str, Any]]:
+        for name, below in getattr(command, "commands", {}).items():
+            yield from leaves(below, *path, name)
+        if not hasattr(command, "commands"):
+            yield " ".join(path), command
+
+    found = dict(leaves(with_norms(typer.main.get_command(app), STATUS_1)))
+    assert STATUS_1.keys() <= found.keys()
+    for name, command in found.items():
+        assert "Exit status: 0 done" in command.epilog, name
+        assert any("--quiet" in parameter.opts for parameter in command.params), name
+
+
+def test_quiet_leaves_results_and_problems(footscan: Footscan, bench: Path, tmp_path: Path) -> None:
+    frame = tmp_path / "cam1.jpg"
+    frame.write_bytes(frame_bytes(bench / "archive/P0001/small/frames.zarr/cam1", 40))
+    loud = footscan("extract", frame, "--out", tmp_path / "points.csv")
+    quiet = footscan("extract", frame, "--out", tmp_path / "points.csv", "-q")
+    refused = footscan("extract", tmp_path / "cam2.jpg", "--out", tmp_path / "points.csv", "--quiet")
+    again = footscan("extract", frame, "--out", tmp_path / "points.csv")
+    assert (loud.returncode, quiet.returncode, refused.returncode) == (0, 0, 2)
+    assert (quiet.stderr, again.stderr) == ("", loud.stderr)
+    assert "cam1.jpg" in loud.stderr
+    assert "cam2.jpg: no such file" in refused.stderr
+
+
+def test_no_colour_where_none_is_wanted() -> None:
+    def shown(**environment: str) -> str:
+        command = [Path(sys.executable).with_name("footscan"), "--help"]
+        inherited = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "FORCE_COLOR")}
+        return subprocess.run(command, env=inherited | environment, capture_output=True, text=True, check=True).stdout
+
+    colours = r"\x1b\[[0-9;]*3[0-7]m"
+    assert re.search(colours, shown(FORCE_COLOR="1"))
+    assert not re.search(colours, shown(FORCE_COLOR="1", NO_COLOR="1"))

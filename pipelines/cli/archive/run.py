@@ -24,7 +24,7 @@ from pipelines.cli.archive.workers import (
     chosen_pool,
 )
 from pipelines.cli.terminal.compiling import compile_loops
-from pipelines.cli.terminal.output import AsJson, message, print_json, print_line
+from pipelines.cli.terminal.output import AsJson, message, note, print_json, print_line
 from schemas.base.errors import Fault, FootscanError, RefusedInput
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def _run(
     planned = plan_job(job, folders=folders)
     print_left_out(planned)
     if planned.steps:
-        message(steps_to_run(planned))
+        note(steps_to_run(planned))
     if planned.to_run >= MANY_STEPS:
         compile_loops()
     ends = []
@@ -210,7 +210,7 @@ def _watch(job: "Job", pool: "Pool", log: TextIO | None) -> int:
     folders: dict[str, Path] = {}
     ends: dict[Path, ScanEnd] = {}
     not_run: dict[Path, RecordedScan] = {}
-    message(f"watching {', '.join(map(str, job.archives))}")
+    note(f"watching {', '.join(map(str, job.archives))}")
     looked_s = math.inf
     while True:
         started_s = time.process_time()

@@ -8,7 +8,7 @@ import typer
 
 from pipelines.cli.calibrate.file import print_pairs, tell_calibration, write_calibration
 from pipelines.cli.calibrate.refused_picture import Picture, drawn
-from pipelines.cli.terminal.output import AsJson, keep_inputs, message, print_json
+from pipelines.cli.terminal.output import AsJson, keep_inputs, message, note, print_json
 from schemas.base.errors import RefusedInput
 
 if TYPE_CHECKING:
@@ -93,4 +93,4 @@ def _write_chart(file: Path, made: "CaptureCalibration") -> None:
         place = f"{made.x_mm + seen.ahead_mm:g},{y:.4f},{z:.4f},{i:.3f},{j:.3f}"
         lines.append(f"{seen.camera},{number},{place}" + f",{seen.laser}" * has_lasers + "\n")
     write_atomically(file, "".join(lines).encode())
-    message(f"{file}: {len(made.corners)} corners")
+    note(f"{file}: {len(made.corners)} corners")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.cli.calibrate.refused_picture import Picture, drawn
-from pipelines.cli.terminal.output import AsJson, figure, keep_inputs, message, print_json, print_table
+from pipelines.cli.terminal.output import AsJson, figure, keep_inputs, message, note, print_json, print_table
 
 if TYPE_CHECKING:
     from footscan.calibration.checks.drift import Drift
@@ -63,7 +63,7 @@ def check(
         _print_drifts(drifts)
     _tell_verdict(calibration, drifts, tolerance_mm)
     if record:
-        message(f"{store_check(calibration, document)}: the verdict, which scans carry from now on")
+        note(f"{store_check(calibration, document)}: the verdict, which scans carry from now on")
     return 0 if document.verdict == "steady" else 1
 
 
@@ -72,7 +72,7 @@ def _tell_verdict(calibration: Path, drifts: "list[Drift]", tolerance_mm: float)
 
     moved = [drift for drift in drifts if drift.verdict != "steady"]
     if not moved:
-        message(f"{calibration}: holds; every camera is within {tolerance_mm:g} mm")
+        note(f"{calibration}: holds; every camera is within {tolerance_mm:g} mm")
         return
     if (alike := common_shift(drifts)) is not None:
         y, z = alike

@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.cli.terminal.output import message, print_table
+from pipelines.cli.terminal.output import message, note, print_table
 
 if TYPE_CHECKING:
     from schemas.calibration import Calibration, PairAgreement
@@ -25,7 +25,7 @@ def tell_calibration(calibration: "Calibration", out: Path | None) -> None:
         message("nothing was written; --out FILE writes the calibration")
     else:
         count = len(calibration.cameras)
-        message(f"{out}: calibration of {count} camera{'s' * (count != 1)}")
+        note(f"{out}: calibration of {count} camera{'s' * (count != 1)}")
 
 
 def print_pairs(pairs: "list[PairAgreement]") -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from pipelines.cli.calibrate.file import print_pairs
-from pipelines.cli.terminal.output import AsJson, figure, keep_inputs, message, print_json, print_line, print_table
+from pipelines.cli.terminal.output import AsJson, figure, keep_inputs, note, print_json, print_line, print_table
 
 
 def show(
@@ -52,4 +52,4 @@ def show(
         for source in known.sources:
             print_line(f"  {source.name}  {source.sha256[:16]}")
     write_atomically(picture, calibration_figure(known))
-    message(f"{picture}: residuals and coverage")
+    note(f"{picture}: residuals and coverage")

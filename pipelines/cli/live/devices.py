@@ -3,7 +3,7 @@
 from typing import Any
 
 from pipelines.cli.live.options import RIG, VIRTUAL_FOLDER, RigFile, Virtual, VirtualFolder, opened_rig, plain_world
-from pipelines.cli.terminal.output import AsJson, message, print_json, print_line, print_table
+from pipelines.cli.terminal.output import AsJson, note, print_json, print_line, print_table
 
 
 def devices(
@@ -34,7 +34,7 @@ def _print(found: dict[str, Any]) -> None:
         "No camera on this computer."
     )
     if "rig" not in found:
-        message("no rig.yaml here: nothing is expected")
+        note("no rig.yaml here: nothing is expected")
         return
     there = {None: "on the network", True: "there", False: "missing"}
     rows = [

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pipelines.cli.terminal.output import message
+from pipelines.cli.terminal.output import note
 from schemas.base.errors import RefusedInput
 
 if TYPE_CHECKING:
@@ -91,9 +91,9 @@ class StateTeller:
         tenth = 0 if state.left_s is None or state.progress is None else int(10 * state.progress)
         told, self._told = self._told, (state.name, state.words, tenth)
         if tenth and tenth != told[2]:
-            message(str(state))
+            note(str(state))
         elif (state.name, state.words) != told[:2]:
-            message(f"{state.name}: {state.words}" if state.words else state.name)
+            note(f"{state.name}: {state.words}" if state.words else state.name)
 
 
 class _Told:
@@ -106,4 +106,4 @@ class _Told:
         share = 10 * done // max(total, 1)
         if (what, share) != self._told:
             self._told = (what, share)
-            message(f"preparing the virtual scanner: {what} {done} of {total}")
+            note(f"preparing the virtual scanner: {what} {done} of {total}")

@@ -1,6 +1,6 @@
 """Compiling, with a message, before a command that measures."""
 
-from pipelines.cli.terminal.output import message
+from pipelines.cli.terminal.output import note
 
 
 def compile_loops() -> None:
@@ -8,5 +8,5 @@ def compile_loops() -> None:
     from footscan.ahead_of_time import compile_ahead, is_compiled
 
     if not is_compiled():
-        message("compiling for this machine, once; on two cores that takes about half a minute")
+        note("compiling for this machine, once; on two cores that takes about half a minute")
         compile_ahead()

@@ -26,6 +26,25 @@ def message(text: str) -> None:
         print(printable(text), file=sys.stderr)
 
 
+def note(text: str) -> None:
+    """Print a line on standard error that says what happens or was done, unless the user asked for quiet."""
+    if not _quiet:
+        message(text)
+
+
+def be_quiet(*, is_asked: bool = True) -> None:
+    """Print no notes and no progress from now on; or print them again."""
+    _quiet[:] = [True] if is_asked else []
+
+
+def is_quiet() -> bool:
+    """Return True if the user asked for quiet."""
+    return bool(_quiet)
+
+
+_quiet: list[bool] = []
+
+
 def drop_unwritten() -> None:
     """Discard output that a closed terminal or pipe did not take, so that it does not change the exit status."""
     for stream in (sys.stdout, sys.stderr):

@@ -18,7 +18,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from pipelines.cli.terminal.output import json_text
+from pipelines.cli.terminal.output import is_quiet, json_text
 from pipelines.engine.actions.step import Failure
 from pipelines.engine.pool import StepEnd
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 def frame_progress(what: str) -> Iterator[Callable[[int, int], None]]:
     """A progress bar of frames, for work that is not a run of steps."""
     console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(console=console, transient=True, disable=is_quiet() or not console.is_terminal) as bar:
         task = bar.add_task(what)
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
@@ -57,7 +57,7 @@ class StepProgress:
             TimeRemainingColumn(),
             console=console,
             transient=True,
-            disable=not to_run or not console.is_terminal,
+            disable=is_quiet() or not to_run or not console.is_terminal,
         )
         self._task = self._bar.add_task("", total=to_run)
 
