@@ -160,7 +160,7 @@ def test_quiet_leaves_results_and_problems(footscan: Footscan, bench: Path, tmp_
     assert (loud.returncode, quiet.returncode, refused.returncode) == (0, 0, 2)
     assert (quiet.stderr, again.stderr) == ("", loud.stderr)
     assert "cam1.jpg" in loud.stderr
-    assert "cam2.jpg: no such file" in refused.stderr
+    assert "cam2.jpg: no such film" in refused.stderr
 
 
 def test_no_colour_where_none_is_wanted() -> None:
