@@ -4,14 +4,16 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import NamedTuple, Protocol, Self
+from typing import NamedTuple, Protocol, Self, get_args
 
 from footscan.frames.film import film_files
 from footscan.frames.travel import read_positions
 from footscan.recordings.calibration_checks import checks_of
+from footscan.recordings.decisions import Decisions, decisions_of
 from footscan.recordings.scans import RecordedScan
+from footscan.sizing.table import read_table
 from pipelines.engine.actions.key import parameters_text
 from pipelines.engine.actions.step import Input, Output, SourceFile, Step, Value
 from pipelines.engine.files.digest import sha256
@@ -20,6 +22,8 @@ from schemas.base.json_files import read_text
 from schemas.base.model import Document, canonical_json
 from schemas.calibration import Calibration, calibration_from_json, maps_to_json
 from schemas.calibration_check import CalibrationCheck, ScanCheck
+from schemas.choices import ExportFormat
+from schemas.parameters.delivery import ExportParameters, SizesParameters
 from schemas.parameters.foot import FootParameters, MeasureParameters
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm
@@ -32,11 +36,15 @@ DELIVERED = {
     "foot.stl": "foot.stl",
     "foot.ply": "foot.ply",
     "measures.json": "measure",
+    "sizes.json": "sizes.json",
     "quality.json": "quality.json",
     "report.html": "report",
 }
 """The files of a scan's results, and the kind of step that makes each."""
-SHOWN = ("measures.json", "quality.json", "foot.ply")
+EXPORTED = {name: name for name in (f"foot.{suffix}" for suffix in get_args(ExportFormat))}
+"""Likewise, of files in further formats, which are made where they are asked for."""
+DELIVERABLE = DELIVERED | EXPORTED
+SHOWN = ("measures.json", "sizes.json", "quality.json", "foot.ply")
 """Files that the operator's page of a foot is made from."""
 
 
@@ -100,12 +108,31 @@ class CalibrationFile:
         return self._parts[part]
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """What a workflow wants of each scan beyond its results."""
+
+    exports: tuple[ExportFormat, ...] = ()
+    """Formats in which the mesh is delivered as well."""
+    size_table: Path | None = None
+    """Table of sizes; default: the built-in one."""
+
+    @cached_property
+    def sizes(self) -> Value:
+        """The table of sizes as the input of a step; RefusedInput if it breaks its format."""
+        return Value(_text(read_table(self.size_table)).encode(), self.size_table)
+
+
+ORDINARY = Wanted()
+
+
 def scan_steps(
     scan: RecordedScan,
     calibration: ScanCalibration,
     parameters: ScanParameters,
     digests: FileDigests,
     check: ScanCheck | None = None,
+    wanted: Wanted = ORDINARY,
 ) -> list[Step]:
     """Build the steps from a scan's films to its results, in topological order.
 
@@ -114,9 +141,12 @@ def scan_steps(
     Raises
     ------
     RefusedInput
-        A film, a background, a file of positions or the truth is missing, or the calibration lacks a camera.
+        A film, a background, a file of positions or the truth is missing, the calibration lacks a camera, or what was
+        decided for the scan breaks its format.
     """
     steps: list[Step] = []
+    decided = decisions_of(scan)
+    choices = decided.choices
 
     def add(step: Step) -> Output:
         steps.append(step)
@@ -129,9 +159,10 @@ def scan_steps(
     colours = {f"colours-{camera.id}": camera.colours for camera in cameras if camera.colours is not None}
     maps = calibration.cameras(frozenset(camera.id for camera in scan.document.cameras))
     foot = FootParameters(side=scan.document.side)
-    measured = MeasureParameters(side=scan.document.side, posture=scan.document.posture)
+    posture = choices.posture or scan.document.posture
+    measured = MeasureParameters(side=scan.document.side, posture=posture, axis=choices.axis or "toe2")
     doubt = None if check is None else check.doubt
-    made = reconstruction_steps(scan.name, points, maps, parameters, measured, steps, doubt)
+    made = reconstruction_steps(scan.name, points, maps, parameters, measured, steps, doubt, _landmarks(decided))
     heads, cleaned, fused, oriented, mesh, measures = made
     verified: dict[str, Output] = {}
     if (truth := scan.truth) is not None:
@@ -145,6 +176,9 @@ def scan_steps(
     if check is not None:
         quality_inputs["calibration-check"] = _document(check, scan.file)
     figures = add(Step(scan.name, "quality", f"{STEPS}.quality", None, quality_inputs))
+    shoes = SizesParameters(people=choices.people, systems=choices.systems)
+    found_sizes: dict[str, Input] = {"measures": measures, "table": wanted.sizes}
+    sizes = add(Step(scan.name, "sizes.json", f"{STEPS}.sizes_json", shoes, found_sizes))
     warned: dict[str, Input] = {"quality": figures, "measures": measures}
     recorded = {} if scan.recording is None else {"recording": scan.recording}
     warned |= {name: source_files(file, digests) for name, file in recorded.items()}
@@ -157,11 +191,17 @@ def scan_steps(
             "surface": mesh, "calibration": maps, "heads": heads, **points, **colours
         }  # fmt: skip
         ply_inputs["texture"] = add(Step(scan.name, "texture", f"{STEPS}.texture", None, texture_inputs))
-    add(Step(scan.name, "foot.ply", f"{STEPS}.foot_ply", foot, ply_inputs))
+    ply = add(Step(scan.name, "foot.ply", f"{STEPS}.foot_ply", foot, ply_inputs))
+    for suffix in sorted({*wanted.exports, *choices.exports}):
+        export = ExportParameters(side=scan.document.side, export_format=suffix)
+        add(Step(scan.name, f"foot.{suffix}", f"{STEPS}.exported", export, {"foot.ply": ply}))
     report_inputs: dict[str, Input] = {
         "clean": cleaned, "fused": fused, "oriented": oriented, "surface": mesh, "measures": measures,
-        "quality": quality, "calibration": maps, "about": _about(scan, parameters), **points, **of_cameras,
+        "quality": quality, "sizes": sizes, "calibration": maps, "about": _about(scan, parameters), **points,
+        **of_cameras,
     }  # fmt: skip
+    if choices.notes:
+        report_inputs["notes"] = Value(canonical_json(choices.notes).encode(), decided.choices_file)
     add(
         Step(
             scan.name,
@@ -194,11 +234,12 @@ def reconstruction_steps(
     foot: MeasureParameters,
     steps: list[Step],
     calibration_doubt: str | None = None,
+    landmarks: Value | None = None,
 ) -> Reconstruction:
     """Add to `steps` those from the world points of all cameras, `points-N`, to measures.
 
     `name` is the name of the graph's scan, `maps` the calibration of its cameras, `calibration_doubt` a reason not to
-    rely on it.
+    rely on it, `landmarks` those that a person has set.
     """
 
     def add(kind: str, own: Document, inputs: Mapping[str, Input]) -> Output:
@@ -213,6 +254,8 @@ def reconstruction_steps(
     measure_inputs: dict[str, Input] = {"surface": surface, "fused": fused, "clean": cleaned, "heads": heads}
     if calibration_doubt is not None:
         measure_inputs["calibration-doubt"] = Value(canonical_json(calibration_doubt).encode())
+    if landmarks is not None:
+        measure_inputs["landmarks"] = landmarks
     measures = add("measure", foot, measure_inputs)
     return Reconstruction(heads, cleaned, fused, oriented, surface, measures)
 
@@ -292,6 +335,12 @@ def _travel(scan: RecordedScan, camera: CameraFilm) -> dict[str, Value]:
     travel = camera.travel or scan.document.travel
     assert travel is not None, "the format of scan.yaml requires it"
     return {"travel": _document(travel, scan.file)}
+
+
+def _landmarks(decided: Decisions) -> Value | None:
+    """Landmarks that a person has set; who set them, and when, changes no measure."""
+    points = decided.landmarks.points()
+    return Value(canonical_json(points).encode(), decided.landmarks_file) if points else None
 
 
 def _document(document: Document, path: Path) -> Value:

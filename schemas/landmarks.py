@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from schemas.base.model import Document
+from schemas.choices import Decided
 
 Coordinate = Annotated[float, Field(ge=-1e4, le=1e4)]
 LandmarkPosition = tuple[Coordinate, Coordinate, Coordinate]
@@ -45,6 +46,8 @@ class ManualLandmarks(Document):
     unit: Literal["mm"] = "mm"
     landmarks: Places
     """In the frame of the mesh, as its file has it; in mm, whatever the unit of that file."""
+    decided: dict[str, Decided] = Field(default_factory=dict)
+    """Who set each landmark, and when."""
 
     def points(self) -> dict[str, LandmarkPosition]:
         """Those that were set, by their names."""

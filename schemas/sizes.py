@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from schemas.base.model import Document
+from schemas.base.model import Document, Side
 from schemas.lasts import LastRules
 
 People = Literal["men", "women", "children"]
@@ -181,3 +181,12 @@ class Sizes(Document):
     sizes: list[FoundSize]
     widths: list[FoundWidth]
     caution: str = "for reference only: makers deviate from these scales by up to a size"
+
+
+class FootSizes(Sizes):
+    """The content of sizes.json."""
+
+    format: Literal["footscan.foot_sizes/1"]
+    side: Side
+    people: People | None
+    """Whose scales these are; None for all."""

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
 from schemas.base.model import Document, Pseudonym
+from schemas.choices import ExportFormat
 from schemas.parameters.scan import ScanParameters
 from schemas.profile import Profile, ProfileName
 from schemas.tuning import Tuning
@@ -80,6 +81,10 @@ class Workflow(Document):
     """Folder for `<patient>/<scan>/`."""
     cache: Annotated[str, AfterValidator(_place)] | None = None
     """Folder of the content store, or its URL for fsspec; default: `.footscan` in the results."""
+    exports: list[ExportFormat] = Field(default_factory=list)
+    """Formats in which the mesh of each scan is delivered beside foot.stl and foot.ply."""
+    size_table: AnyPath | None = None
+    """Table of sizes and widths (YAML); default: the built-in one."""
     group: Annotated[str, Field(min_length=1, max_length=64)] | None = None
     """Group of users of this machine who share the files that are written; default: only their owner reads them."""
     workers: Annotated[int, Field(ge=1, le=256)] | None = None

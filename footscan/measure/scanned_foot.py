@@ -1,6 +1,9 @@
 """Measures of a foot from this scanner, whose errors and filled parts are known."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from footscan.measure.measures import measure_foot
 from footscan.measure.replicates import REPLICATES
@@ -9,7 +12,7 @@ from footscan.mesh.topology import vertex_normals
 from footscan.surface.errors import NO_EVIDENCE, Evidence, scan_errors
 from schemas.base.model import Side
 from schemas.glass import GlassPlane
-from schemas.measures import Measures
+from schemas.measures import Axis, Measures
 
 DOWN, SOLE_MM = -0.7, 20.0
 """The sole is what looks down, by the Z of its normal, up to this height above the lowest point. Chosen by hand."""
@@ -24,6 +27,8 @@ def measure_scanned_foot(
     glass: GlassPlane,
     doubts: Sequence[str] = (),
     evidence: Evidence = NO_EVIDENCE,
+    axis: Axis = "toe2",
+    manual: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> Measures:
     """Measure a scanned surface; the uncertainties follow from the errors of the scanner.
 
@@ -34,6 +39,7 @@ def measure_scanned_foot(
     glass : on which the foot stands
     doubts : as of `measure_foot`
     evidence : what the scan shows of its errors; default: nothing speaks against it
+    axis, manual : as of `measure_foot`
 
     Raises
     ------
@@ -45,6 +51,8 @@ def measure_scanned_foot(
         mesh.vertices,
         mesh.faces,
         side,
+        axis=axis,
+        manual=manual,
         errors=errors.fields,
         count=REPLICATES,
         filled=errors.is_unseen,

@@ -8,7 +8,7 @@ from pathlib import Path
 from pipelines.engine.actions.step import Success
 from pipelines.engine.pool import StepEnd
 from pipelines.engine.workspace import Workspace
-from pipelines.scan import DELIVERED
+from pipelines.scan import DELIVERABLE
 
 log = logging.getLogger("footscan.archive")
 
@@ -43,7 +43,7 @@ class EarlyDelivery:
     def on_step_end(self, end: StepEnd) -> None:
         """Deliver the file that the step made, if any; from any thread."""
         if end.step.scan in self._folders and isinstance(end.outcome, Success):
-            made = [file for file, kind in DELIVERED.items() if kind == end.step.kind]
+            made = [file for file, kind in DELIVERABLE.items() if kind == end.step.kind]
             with self._lock:
                 self._waiting[end.step.scan] |= dict.fromkeys(made, end.outcome.digest)
                 if MEASURES in made:

@@ -10,6 +10,7 @@ from pipelines.engine.files.access import group_number
 from pipelines.engine.files.places import open_files
 from pipelines.engine.pool import cores
 from pipelines.recordings.calibration_choice import CalibrationPlace, calibration_places
+from pipelines.scan import ORDINARY, Wanted
 from schemas.base.errors import RefusedInput
 from schemas.parameters.presets import overlaid
 from schemas.parameters.scan import ScanParameters
@@ -39,6 +40,8 @@ class Job:
     """Number of steps that run at once in the default pool."""
     group: int | None = None
     """Number of the group that may access the written files as well as their owner."""
+    wanted: Wanted = ORDINARY
+    """What is made of each scan beyond its results."""
     selection: Selection = field(default_factory=Selection)
     """The scans and steps that are meant."""
     fail_fast: bool = False
@@ -80,6 +83,7 @@ def job_of_workflow(
         parameters=_parameters(workflow.parameters, options.parameters),
         threads=threads or options.workers or workflow.workers or cores(),
         group=None if workflow.group is None else group_number(workflow.group, path),
+        wanted=Wanted(tuple(workflow.exports), None if workflow.size_table is None else base / workflow.size_table),
         selection=selection_of(options.only, options.since, options.until, options.force),
         fail_fast=options.fail_fast,
     )

@@ -18,7 +18,7 @@ from pipelines.engine.plan import Plan
 from pipelines.engine.workspace import Workspace
 from pipelines.recordings.calibration_choice import CalibrationPlace, choose_calibration
 from pipelines.recordings.captures import read_capture
-from pipelines.scan import DELIVERED, CalibrationFile, scan_steps
+from pipelines.scan import DELIVERABLE, CalibrationFile, scan_steps
 from schemas.base.errors import RefusedInput
 
 
@@ -161,10 +161,10 @@ def _all_steps(scan: RecordedScan, planned: PlannedJob) -> list[Step]:
     calibration = _calibration(scan, planned)
     parameters, digests = planned.job.parameters, planned.workspace.digests
     if isinstance(calibration, CaptureOfScan):
-        steps = scan_steps(scan, calibration, parameters, digests)
+        steps = scan_steps(scan, calibration, parameters, digests, wanted=planned.job.wanted)
         return [*calibration.steps, *steps]
     check = check_of_scan(scan, calibration.digest, calibration.checks)
-    return scan_steps(scan, calibration, parameters, digests, check)
+    return scan_steps(scan, calibration, parameters, digests, check, planned.job.wanted)
 
 
 def _read_scan(folder: Path, archive: Path | None, workspace: Workspace) -> RecordedScan:
@@ -210,7 +210,7 @@ def _sum_up(scan: RecordedScan, plan: Plan) -> PlannedScan:
     outcomes = {p.step.kind: p.outcome for p in plan.steps if p.step.camera is None}
     failures = [p.outcome for p in plan.steps if isinstance(p.outcome, Failure)]
     delivered = {
-        file: outcome.digest for file, kind in DELIVERED.items() if isinstance(outcome := outcomes.get(kind), Success)
+        file: outcome.digest for file, kind in DELIVERABLE.items() if isinstance(outcome := outcomes.get(kind), Success)
     }
     return PlannedScan(scan, len(plan.steps), len(plan.to_run), failures[0] if failures else None, delivered)
 

@@ -15,7 +15,7 @@ from pipelines.engine.files.access import share
 from pipelines.engine.pool import OnStepEnd, Pool, StepEnd
 from pipelines.engine.store.erasure_notes import interrupted_erasures
 from pipelines.engine.store.permissions import warn_if_others_can_write
-from pipelines.scan import DELIVERED
+from pipelines.scan import DELIVERABLE
 from schemas.measures import Measures
 from schemas.quality import Quality
 from schemas.scan import Scan
@@ -154,7 +154,7 @@ def _end_scan(planned_scan: PlannedScan, outcomes: Mapping[str, Outcome], planne
     failure = planned_scan.failure or next((outcome for outcome in own if isinstance(outcome, Failure)), None)
     if failure is not None:
         return replace(ended, problem=failure.problem + older_results(target), kind=failure.kind)
-    made = {file: outcomes.get(f"{scan.name}/{kind}") for file, kind in DELIVERED.items()}
+    made = {file: outcomes.get(f"{scan.name}/{kind}") for file, kind in DELIVERABLE.items()}
     digests = {**planned_scan.delivered, **{f: one.digest for f, one in made.items() if isinstance(one, Success)}}
     until = planned.job.selection.until
     if until is not None and (target / LAST).exists():

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from pipelines.archive.planning import PlannedJob, Waiting
-from pipelines.scan import DELIVERED
+from pipelines.scan import DELIVERABLE
 
 
 class Line(NamedTuple):
@@ -42,5 +42,5 @@ def _line(kind: str, reason: str, planned: PlannedJob, steps: Sequence[Waiting])
     cost, frames = planned.workspace.history.of(kind), sum(step.frame_bytes for step in steps)
     if cost is None:
         return Line(kind, reason, len(steps), None, frames or None)
-    copies = 2 if kind in DELIVERED.values() else 1
+    copies = 2 if kind in DELIVERABLE.values() else 1
     return Line(kind, reason, len(steps), cost.seconds * len(steps), cost.size * len(steps) * copies + frames)

@@ -11,7 +11,7 @@ from footscan.recordings.scans import RecordedScan
 from pipelines.archive.page import write_archive_page
 from pipelines.archive.running import ScanEnd
 from pipelines.engine.files.atomic import write_atomically
-from pipelines.scan import DELIVERED
+from pipelines.scan import DELIVERABLE
 from pipelines.version import SOFTWARE
 from schemas.measures import Unit
 from schemas.quality import MeshQuality
@@ -23,10 +23,12 @@ CSV, PARQUET = "results.csv", "results.parquet"
 TEXTS = {
     "scan", "status", "problem", "side", "software", "calibration_sha256", "scanner", "date", "posture",
     "calibration_file", "calibration_created", "calibration_software", "parameters_sha256", "warnings",
-} | {f"{file}_sha256" for file in DELIVERED}  # fmt: skip
+} | {f"{file}_sha256" for file in DELIVERABLE}  # fmt: skip
 """Names of the columns with text, beside those of the measures' status."""
 UNITS = {*get_args(Unit)}
 """Units at the end of a column's name."""
+SIZE, WIDTH, UNROUNDED = "size_", "width_", "_unrounded"
+"""Columns of sizes and widths: `size_eu`, `size_eu_unrounded`, `width_eu`."""
 BETWEEN = " | "
 """Between two warnings of a scan."""
 _CALIBRATION = {"file": "name", "created": "created", "software": "software"}
@@ -79,7 +81,7 @@ def _earlier_end(row: dict[str, str], results: Path, scans: Mapping[str, Recorde
         results / name if is_there and status in {"done", "finding"} else None,
         row.get("problem") or None,
         None if status == "done" else status,
-        {file: row[f"{file}_sha256"] for file in DELIVERED if row.get(f"{file}_sha256")},
+        {file: row[f"{file}_sha256"] for file in DELIVERABLE if row.get(f"{file}_sha256")},
         was_cached=True,
         document=None if scan is None else scan.document,
         parameters_sha256=row.get("parameters_sha256") or None,
@@ -106,6 +108,12 @@ def _row(end: ScanEnd) -> tuple[dict[str, Cell], dict[str, Cell]]:
         suffix = "" if measure["unit"] == "1" else f"_{measure['unit']}"
         row[f"{name}{suffix}"] = measure["value"]
         trust |= {f"{name}_status": measure["status"], f"{name}_sd{suffix}": measure.get("uncertainty")}
+    sizes = _read(end.folder / "sizes.json")
+    for size in sizes.get("sizes", []):
+        name = f"{SIZE}{size['system']}"
+        trust |= {name: size["size"], f"{name}{UNROUNDED}": size["unrounded"]}
+    for width in sizes.get("widths", []):
+        trust |= {f"{WIDTH}{width['system']}": width["width"]}
     cameras = quality.get("cameras", [])
     row["cameras"] = len(cameras)
     row["frames_lost"] = sum(camera["frames_lost"] for camera in cameras)
@@ -153,7 +161,8 @@ def _field(column: str) -> Any:
     """Name, type and unit of a column: the same in every table, so that tables of several archives can be joined."""
     import pyarrow
 
-    if column in TEXTS or column.endswith("_status"):
+    is_size = column.startswith((SIZE, WIDTH)) and not column.endswith(UNROUNDED)
+    if column in TEXTS or is_size or column.endswith("_status"):
         return pyarrow.field(column, pyarrow.string())
     kind = pyarrow.int64() if column in COUNTS else pyarrow.float64()
     unit = column.rpartition("_")[2]

@@ -86,6 +86,7 @@ def _missing_files(path: Path, text: str, value: dict[str, Any]) -> list[PlacedM
     for number, archive in enumerate(archives if isinstance(archives, list) else [archives]):
         check(("archive", number), archive, "archive")
     check(("calibration",), value.get("calibration"), "file")
+    check(("size_table",), value.get("size_table"), "table")
     calibrations = value.get("calibrations")
     for number, chosen in enumerate(calibrations if isinstance(calibrations, list) else []):
         for kind in ("file", "capture") if isinstance(chosen, dict) else ():
@@ -96,6 +97,7 @@ def _missing_files(path: Path, text: str, value: dict[str, Any]) -> list[PlacedM
 _EXPECTED: dict[str, tuple[str, Callable[[Path], bool]]] = {
     "archive": ("folder, expected one with scans", Path.is_dir),
     "file": ("file, expected a calibration", Path.is_file),
+    "table": ("file, expected a table of sizes", Path.is_file),
     "capture": ("folder, expected a capture", Path.is_dir),
 }
 

@@ -19,7 +19,7 @@ from pipelines.forget.shares import Shares, find_shares
 from pipelines.forget.subject import Belongings, Subject, find_belongings
 from pipelines.forget.tables import erase_from_text, rewrite_tables, texts_that_name
 from pipelines.regression.night import Regression
-from pipelines.scan import DELIVERED
+from pipelines.scan import DELIVERABLE
 from schemas.base.errors import Fault
 from schemas.base.json_files import parse_json
 from schemas.base.model import canonical_json
@@ -80,7 +80,7 @@ def find_erasure(
     workspace = workspace_of(job)
     store = workspace.store
     belongings = find_belongings(subject, job.archives, job.results)
-    files = (file for name in DELIVERED for file in job.results.glob(f"*/*/{name}") if file.is_file())
+    files = (file for name in DELIVERABLE for file in job.results.glob(f"*/*/{name}") if file.is_file())
     delivered = {workspace.digests.of(file)[0] for file in files if not subject.has("/".join(file.parts[-3:-1]))}
     shares = find_shares(subject, store, delivered)
     was_interrupted = store.files.state(note_name(subject.name)) is not None

@@ -21,7 +21,8 @@ def run(inputs: Mapping[str, bytes], parameters: MeasureParameters, places: Mapp
     """Measure the foot, as measures.json.
 
     `inputs`: `surface`, `clean` for the glass and how the foot moved, `heads`, where they were, `fused` for how cameras
-    agree, and `calibration-doubt`, a sentence, if a check of the calibration gave reason for one. A foot that cannot be
+    agree; `calibration-doubt`, a sentence, if a check of the calibration gave reason for one; and `landmarks`, those
+    that a person has set, x, y and z by name, in mm in the scanner's frame. A foot that cannot be
     measured gives a document with the finding.
     """
     del places
@@ -29,9 +30,12 @@ def run(inputs: Mapping[str, bytes], parameters: MeasureParameters, places: Mapp
     glass = GlassPlane.model_validate_json(unpack(inputs["clean"])["glass"].tobytes())
     checked = json.loads(inputs["calibration-doubt"]) if "calibration-doubt" in inputs else None
     doubts = [*filter(None, [checked, HeadsReport.model_validate_json(inputs["heads"]).doubt])]
+    manual = {name: np.array(point) for name, point in json.loads(inputs.get("landmarks", b"{}")).items()}
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface["filled"])
     try:
-        measures = measure_scanned_foot(mesh, parameters.side, glass, doubts, evidence_of(inputs))
+        measures = measure_scanned_foot(
+            mesh, parameters.side, glass, doubts, evidence_of(inputs), parameters.axis, manual
+        )
     except Finding as finding:  # the other results are still of use
         unmoved = np.eye(4).tolist()
         measures = Measures(

@@ -26,6 +26,7 @@ from schemas.frames import FrameManifest
 from schemas.measures import Measures
 from schemas.parameters.foot import FootParameters
 from schemas.quality import Quality
+from schemas.sizes import FootSizes
 
 FRAMES_SHOWN = 12
 """Frames of each camera along the travel that the page shows; chosen by hand."""
@@ -34,9 +35,9 @@ FRAMES_SHOWN = 12
 def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
     """Make the page of a scan, as HTML.
 
-    `inputs`: `calibration`, `clean`, `fused`, `oriented`, `surface`, `measures`, `quality`, `about`, and `verified` if
-    the scan has a truth; for each camera `manifest-N`, `stripe-N` and `points-N`; `places`: each camera's array of
-    frames, `array-N`.
+    `inputs`: `calibration`, `clean`, `fused`, `oriented`, `surface`, `measures`, `quality`, `sizes`, `about`, `notes`
+    of a person if there are any, and `verified` if the scan has a truth; for each camera `manifest-N`, `stripe-N` and
+    `points-N`; `places`: each camera's array of frames, `array-N`.
     """
     surface = unpack(inputs["surface"])
     about = json.loads(inputs["about"])
@@ -64,6 +65,8 @@ def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping
         calibration=Calibration.model_validate_json(inputs["calibration"]),
         samples=_samples(ids, inputs, places),
         provenance=about["provenance"],
+        sizes=FootSizes.model_validate_json(inputs["sizes"]),
+        notes=json.loads(inputs.get("notes", b'""')),
     )
     return page.encode()
 

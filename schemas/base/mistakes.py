@@ -39,7 +39,8 @@ def nearest_name(model: type[BaseModel], path: Path) -> str | None:
     here = sorted({field for section in _sections(model, path[:-1]) for field in _fields(section)})
     if near := difflib.get_close_matches(name, here, n=1):
         return near[0]
-    places = {name: ".".join((*place, name)) for place, name in _all_fields(model)}
+    by_depth = sorted(_all_fields(model), key=lambda found: -len(found[0]))  # of several places the shallowest
+    places = {name: ".".join((*place, name)) for place, name in by_depth}
     near = difflib.get_close_matches(name, sorted(places), n=1)
     return places[near[0]] if near else None
 

@@ -1,6 +1,7 @@
 """Parameters of a foot that are known before it is measured."""
 
 from schemas.base.model import Document, Posture, Side
+from schemas.measures import Axis
 
 
 class FootParameters(Document):
@@ -10,6 +11,7 @@ class FootParameters(Document):
 
 
 class MeasureParameters(FootParameters):
-    """The side of the foot, and how the person stood."""
+    """The side of the foot, how the person stood, and the axis that is wanted."""
 
     posture: Posture = "unknown"
+    axis: Axis = "toe2"

@@ -86,7 +86,8 @@ def bench(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_every_choice_runs_from_films_to_measures(bench: Path, tmp_path: Path, name: str, value: object) -> None:
     results = run(bench, tmp_path, f"{name}={value}")
     assert {file.name for file in results.iterdir()} == {
-        "cloud.ply", "foot.stl", "foot.ply", "measures.json", "quality.json", "report.html"
+        "cloud.ply", "foot.stl", "foot.ply", "measures.json", "sizes.json", "quality.json",
+        "report.html"
     }  # fmt: skip
     measures = Measures.model_validate_json((results / "measures.json").read_bytes())
     assert measures.finding is None

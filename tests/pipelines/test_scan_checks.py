@@ -17,7 +17,7 @@ def dated(done: Any) -> Any:
     """A run archive whose scan has a date."""
     document = done.scan / "scan.yaml"
     document.write_text(document.read_text().replace("cameras:", "date: 2026-11-24\ncameras:"))
-    assert done.plan() == (18, {})
+    assert done.plan() == (19, {})
     return done
 
 
@@ -52,21 +52,21 @@ def test_a_steady_check_is_reported_and_leaves_the_measures_alone(dated: Any) ->
     }  # fmt: skip
     summary = "checked on 2026-11-22, 2 days before the scan: every camera was within 0.03 mm"
     assert summary in (dated.results / "report.html").read_text()
-    assert dated.plan() == (18, {})
+    assert dated.plan() == (19, {})
 
 
 def test_a_drifted_check_makes_the_measures_uncertain(dated: Any) -> None:
     store(dated, "2026-11-24T08:00:00+01:00", DRIFTED)
-    assert to_run(dated) == {"measure", "quality", "quality.json", "report"}
+    assert to_run(dated) == {"measure", "quality", "quality.json", "sizes.json", "report"}
     [scan], ran = dated.run()
-    assert (scan.problem, ran) == (None, {"measure", "quality", "quality.json", "report"})
+    assert (scan.problem, ran) == (None, {"measure", "quality", "quality.json", "sizes.json", "report"})
     measures = result(dated, "measures.json")
     assert measures["doubts"] == [SENTENCE]
     statuses = {measure["status"] for measure in measures["measures"].values()}
     assert statuses <= {"uncertain", "incomplete"}
     assert "uncertain" in statuses
     assert SENTENCE.capitalize() in (dated.results / "report.html").read_text()
-    assert dated.plan() == (18, {})
+    assert dated.plan() == (19, {})
 
 
 def test_keys_do_not_change_with_what_does_not_matter(dated: Any) -> None:
@@ -74,9 +74,9 @@ def test_keys_do_not_change_with_what_does_not_matter(dated: Any) -> None:
     store(dated, "2026-11-24T08:00:00+01:00", DRIFTED)
     dated.run()
     store(dated, "2026-11-24T09:30:00+01:00", {1: 0.1, 5: 0.4149, 7: 0.9, 8: None})
-    assert dated.plan() == (18, {})
+    assert dated.plan() == (19, {})
     store(dated, "2026-11-25T08:00:00+01:00", STEADY)
-    assert dated.plan() == (18, {})
+    assert dated.plan() == (19, {})
 
 
 def test_keys_change_with_the_verdict_and_come_back_with_it(dated: Any) -> None:
@@ -89,10 +89,10 @@ def test_keys_change_with_the_verdict_and_come_back_with_it(dated: Any) -> None:
     dated.run()
     assert (dated.results / "measures.json").read_bytes() == never_checked
     store(dated, "2026-11-24T13:00:00+01:00", {1: 0.03, 5: None})
-    assert to_run(dated) == {"measure", "quality", "quality.json", "report"}
+    assert to_run(dated) == {"measure", "quality", "quality.json", "sizes.json", "report"}
     for path in dated.root.glob("calibration.check*"):
         path.unlink()
-    assert dated.plan() == (18, {})
+    assert dated.plan() == (19, {})
 
 
 def test_another_calibration_is_not_judged_by_the_check_of_the_former(dated: Any) -> None:

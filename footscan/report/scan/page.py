@@ -21,6 +21,7 @@ from footscan.report.scan.measure_drawings import landmark_place, measure_drawin
 from footscan.report.scan.mesh_facts import mesh_facts
 from footscan.report.scan.removed import removed_pictures, removed_table
 from footscan.report.scan_warnings import warnings_of
+from footscan.report.size_table import size_table
 from footscan.report.surface_views import surface_views, upright
 from footscan.report.viewer import Drawing, viewer
 from footscan.report.viewer_script import SCRIPT
@@ -28,6 +29,7 @@ from footscan.side_by_side import together
 from schemas.calibration import Calibration
 from schemas.measures import Measure, Measures
 from schemas.quality import Comparison, Quality
+from schemas.sizes import Sizes
 
 _FIRST = (
     "foot_length",
@@ -75,6 +77,8 @@ def scan_page(
     calibration: Calibration,
     samples: Sequence[FrameSample],
     provenance: Mapping[str, str],
+    sizes: Sizes | None = None,
+    notes: str = "",
 ) -> str:
     """Return a self-contained HTML page of one scan; the same input gives the same page.
 
@@ -84,6 +88,8 @@ def scan_page(
     calibration : the calibration that mapped the pixels
     samples : frames of each camera, in the order shown
     provenance : name and value of each source of the result, in the order shown
+    sizes : of shoes for the foot
+    notes : remarks of a person
     """
     faces, cloud, distance = surface.faces, points.cloud, surface.truth_distance
     seen = upright(surface.vertices, measures.transform)
@@ -102,6 +108,8 @@ def scan_page(
     parts = [
         section("Warnings", _warnings(warnings_of(measures, quality))),
         section("Measures", _tiles(measures), _measures(measures, drawings, turned)),
+        section("Notes", *(f"<p>{text(line)}</p>" for line in notes.splitlines() if line.strip())) if notes else "",
+        section("Shoe sizes", size_table(sizes)) if sizes is not None and measures.finding is None else "",
         section("Surface", _GRID_NOTE, filled_key(quality.mesh), views),
         distances,
         section("Stripe over the frames", _FRAMES_NOTE, frames) if samples else "",

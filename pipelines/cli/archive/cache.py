@@ -257,10 +257,10 @@ def _delivered(results: Path, secret: bytes | None, without: Collection[str] = (
     """Digests of the delivered files in a folder of results, except those of some scans."""
     from pipelines.archive.job import CACHE
     from pipelines.engine.files.file_digests import FileDigests
-    from pipelines.scan import DELIVERED
+    from pipelines.scan import DELIVERABLE
 
     digests = FileDigests.load(results / CACHE / "files.json", secret)
-    files = (file for name in DELIVERED for file in results.glob(f"*/*/{name}") if file.is_file())
+    files = (file for name in DELIVERABLE for file in results.glob(f"*/*/{name}") if file.is_file())
     return {digests.of(file)[0] for file in files if "/".join(file.parts[-3:-1]) not in without}
 
 

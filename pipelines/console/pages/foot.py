@@ -13,6 +13,7 @@ from footscan.report.quality_lights import Level, TrafficLight, quality_lights, 
 from footscan.report.scan.foot_colours import CAMERAS
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
 from footscan.report.scan_warnings import warnings_of
+from footscan.report.size_table import size_table
 from footscan.report.surface_views import upright
 from footscan.report.viewer import Colouring, Drawing, viewer
 from pipelines.console.pages.results import read_known, read_measures, read_quality, read_result
@@ -22,6 +23,7 @@ from schemas.base.limits import BeyondLimitError
 from schemas.known_measures import KnownMeasures
 from schemas.measures import Measures
 from schemas.quality import Quality
+from schemas.sizes import FootSizes
 
 VERDICTS = {
     "good": "A good scan",
@@ -63,8 +65,17 @@ def foot_page(archive: Path, results: Path, patient: str, scan: str) -> str:
         _verdict(level, lights, warnings_of(measures, quality)),
         _next(measures.side, patient, scan),
         section("Measures", f'<div class="foot">{turned}<div class="list">{listed}</div></div>'),
+        section("Shoe sizes", size_table(sizes)) if (sizes := _sizes(results, patient, scan)) is not None else "",
     ]
     return shell(title=f"{heading} {patient} {scan}", parts=parts, scripts=["viewer.js", "foot.js"])
+
+
+def _sizes(results: Path, patient: str, scan: str) -> FootSizes | None:
+    """Sizes of shoes for the foot; None for results of an earlier version."""
+    try:
+        return FootSizes.model_validate_json(read_result(results, patient, scan, "sizes.json"))
+    except (RefusedInput, ValueError):
+        return None
 
 
 def _mesh(results: Path, patient: str, scan: str) -> Mesh:

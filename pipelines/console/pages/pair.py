@@ -3,13 +3,13 @@
 from pathlib import Path
 
 from footscan.report.markup import UNITS, number, section, table, text, words
+from footscan.report.size_table import size_table
 from footscan.sizing.pairs import compare_pair
 from footscan.sizing.table import read_table
 from pipelines.console.pages.results import read_measures
 from pipelines.console.pages.shell import shell
 from schemas.feet import Foot
 from schemas.pairs import Pair, PairRow
-from schemas.sizes import Sizes
 
 
 def pair_page(results: Path, patient: str, left: str, right: str) -> str:
@@ -44,19 +44,7 @@ def _foot(results: Path, patient: str, scan: str) -> Foot:
 def _sizes(pair: Pair) -> list[str]:
     sides = ", ".join(f"{words(name).lower()}: {side}" for name, side in pair.decided_by.items() if side)
     decided = [_note(f"The larger foot decides ({sides}).")] if sides else []
-    return [_size_table(pair.sizes), *decided, _note(f"{pair.sizes.caution[:1].upper()}{pair.sizes.caution[1:]}.")]
-
-
-def _size_table(sizes: Sizes) -> str:
-    rows = [
-        [text(size.label), text(", ".join(size.people)), f"<b>{text(size.size or '–')}</b>", text(size.note or "")]
-        for size in sizes.sizes
-    ]
-    rows += [
-        [text(width.label), text(", ".join(width.people)), f"<b>{text(width.width or '–')}</b>", text(width.note or "")]
-        for width in sizes.widths
-    ]
-    return table(["System", "For", "Size", ""], rows)
+    return [*decided, size_table(pair.sizes)]
 
 
 def _row(row: PairRow) -> list[str]:

@@ -11,7 +11,7 @@ from typing import BinaryIO, TypeVar
 import numpy as np
 from pydantic import ValidationError
 
-from pipelines.scan import DELIVERED
+from pipelines.scan import DELIVERABLE
 from schemas.base.errors import FootscanError, RefusedInput
 from schemas.base.limits import limit, refuse_beyond
 from schemas.base.model import pseudonym
@@ -46,7 +46,7 @@ def open_result(results: Path, patient: str, scan: str, name: str) -> BinaryIO:
     RefusedInput
         No such result.
     """
-    if name not in DELIVERED:
+    if name not in DELIVERABLE:
         raise RefusedInput(name[:80], "is not a result of a scan")
     file = _open_inside(results, patient, scan, name)
     if os.fstat(file.fileno()).st_size > LARGEST_BYTES:
@@ -57,7 +57,7 @@ def open_result(results: Path, patient: str, scan: str, name: str) -> BinaryIO:
 
 def read_result(results: Path, patient: str, scan: str, name: str) -> bytes:
     """Read a result as a whole; errors as in `open_result`, and BeyondLimitError."""
-    if name not in DELIVERED:
+    if name not in DELIVERABLE:
         raise RefusedInput(name[:80], "is not a result of a scan")
     return _read_inside(results, patient, scan, name)
 

@@ -116,7 +116,7 @@ def test_finding_fails_its_scan_and_is_remembered(archive: Any, monkeypatch: pyt
     [scan], ran = archive.run()
     assert (scan.problem, scan.kind, scan.folder) == ("no foot in the surface", "finding", None)
     assert "measure" in ran
-    assert archive.plan() == (18, {})
+    assert archive.plan() == (19, {})
     assert archive.run() == ([scan], set())
     assert not archive.results.exists()
 
@@ -130,7 +130,7 @@ def test_defect_costs_its_scan_and_is_tried_again(done: Any, monkeypatch: pytest
         assert scans[1].problem == "P0001/S2/measure: ZeroDivisionError: integer division or modulo by zero"
     scans, ran = done.run()
     assert [scan.problem for scan in scans] == [None, None]
-    assert ran == {"P0001/S2/measure", "P0001/S2/quality.json", "P0001/S2/report"}
+    assert ran == {"P0001/S2/measure", "P0001/S2/sizes.json", "P0001/S2/quality.json", "P0001/S2/report"}
 
 
 def test_equal_films_of_two_scans_that_start_together_are_gone_through_once(archive: Any) -> None:
@@ -142,7 +142,18 @@ def test_equal_films_of_two_scans_that_start_together_are_gone_through_once(arch
     once = ["clean", "cloud.ply", "extract", "extract", "foot.stl", "fuse", "map", "map"]
     twice = 2 * ["foot.ply", "report"]  # which name their scan
     assert ran == sorted(
-        [*once, *twice, "heads", *4 * ["ingest"], "measure", "orient", "quality", "quality.json", "surface"]
+        [
+            *once,
+            *twice,
+            "heads",
+            *4 * ["ingest"],
+            "measure",
+            "orient",
+            "quality",
+            "quality.json",
+            "sizes.json",
+            "surface",
+        ]
     )
 
 
@@ -207,7 +218,7 @@ def test_one_scan_without_a_workflow(done: Any, tmp_path: Path) -> None:
         read_yaml(tmp_path / "scan.yaml", Scan)
 
 
-LAST = ("surface", "foot.stl", "quality", "quality.json", "measure", "report")
+LAST = ("surface", "foot.stl", "quality", "quality.json", "measure", "sizes.json", "report")
 """The steps of a scan that nothing but each other takes results of."""
 
 
@@ -256,7 +267,7 @@ def test_store_at_a_url_is_used_and_gives_the_same(remote: Any, finished: Path) 
     for file in scan.digests:
         assert (remote.results / file).read_bytes() == (finished / "results/P0001/S1" / file).read_bytes()
     (remote.root / "results/.footscan/known.sqlite").unlink()
-    assert remote.plan() == (18, {})
+    assert remote.plan() == (19, {})
     assert remote.run()[1] == set()
 
 

@@ -41,16 +41,19 @@ def test_cached_steps_are_left_out() -> None:
 
 def test_the_command_writes_it(archive: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "profile.html"
-    assert run(archive.workflow, profile=page) == 0
+    assert run(archive.workflow, profile=[str(page)]) == 0
     text = page.read_text()
     assert all(f">{name}</text>" in text for name in ("ingest-1", "extract-1", "surface", "measure", "report"))
     capsys.readouterr()
 
 
-@pytest.mark.parametrize(("place", "watch"), [("", False), ("missing/profile.html", False), ("profile.html", True)])
+@pytest.mark.parametrize(
+    ("place", "watch"), [("folder.html", False), ("missing/profile.html", False), ("profile.html", True)]
+)
 def test_what_cannot_be_written_is_refused_before_anything_runs(
     archive: Any, tmp_path: Path, place: str, watch: bool
 ) -> None:
+    (tmp_path / "folder.html").mkdir()
     with pytest.raises(RefusedInput, match="--profile"):
-        run(archive.workflow, profile=tmp_path / place, watch=watch)
+        run(archive.workflow, profile=[str(tmp_path / place)], watch=watch)
     assert not archive.results.exists()

@@ -29,8 +29,10 @@ INPUTS = {
     "ingest": [], "extract": ["ingest"], "map": ["extract", "ingest"], "heads": ["map"], "clean": ["map", "heads"],
     "fuse": ["clean"], "orient": ["fuse"], "surface": ["orient"], "measure": ["surface", "fuse", "clean", "heads"],
     "quality": ["heads", "clean", "fuse", "surface", "extract", "ingest"], "quality.json": ["quality", "measure"],
+    "sizes.json": ["measure"],
     "cloud.ply": ["orient"], "foot.stl": ["surface"], "foot.ply": ["surface"],
-    "report": ["clean", "fuse", "orient", "surface", "measure", "quality.json", "map", "extract", "ingest"],
+    "report": ["clean", "fuse", "orient", "surface", "measure", "sizes.json", "quality.json", "map", "extract",
+               "ingest"],
 }  # fmt: skip
 """The steps of a scan without background and truth, and the steps whose results each takes, as docs/workflow.md has
 them."""
@@ -215,7 +217,7 @@ def test_a_part_of_the_steps_delivers_where_nothing_was(many: Path) -> None:
     assert [file.name for file in first.iterdir()] == ["foot.stl"]
     run(job_with(many, {"only": ["P0001/S1"]}))
     before = {file: file.read_bytes() for file in first.iterdir()}
-    assert len(before) == 6
+    assert len(before) == 7
     run(job_with(many, {"only": ["P0001/S1"], "until": "foot.stl", "set": ["surface.grid_steps=0.7"]}))
     assert {file: file.read_bytes() for file in first.iterdir()} == before
 
@@ -246,7 +248,7 @@ def test_frames_of_an_archive_that_cannot_be_written_lie_beside_the_store(
     monkeypatch.setattr(os, "access", lambda path, mode: access(path, mode) and archive not in Path(path).parents)
     before = sorted(archive.rglob("*"))
     job = job_with(many, {"only": ["P0001"]})
-    assert len(run(job)) == 2 * 18
+    assert len(run(job)) == 2 * 19
     assert sorted(archive.rglob("*")) == before
     assert (many / "results/.footscan/frames/P0001/S1/frames.zarr/cam1/zarr.json").exists()
     assert run(job) == set()

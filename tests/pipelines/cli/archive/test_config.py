@@ -126,6 +126,7 @@ def test_every_command_tells_all_mistakes_at_once(
         "'gaussian', 'ridge' or 'fir', found 'gravty', did you mean 'gravity'? (line 8, column 20)",
         "footscan: workflow.yaml: parameters.extraction.ridge: unknown field, did you mean 'ridge_px'? "
         "(line 9, column 5)",
+        "footscan: workflow.yaml: 3 mistakes, see 'footscan config check workflow.yaml'",
     ]
 
 
@@ -135,7 +136,9 @@ def test_all_that_is_not_there_is_told_with_a_missing_archive(
     workflow.write_text(RIGHT.replace("archive: archive", "archive: [archive, a, b]\ncalibration: no.json"))
     assert run_command(["run"]) == 2
     lines = [line.removeprefix("footscan: workflow.yaml: ") for line in capsys.readouterr().err.splitlines()]
-    assert [line.partition(":")[0] for line in lines] == ["archive.1", "archive.2", "calibration"]
+    assert [line.partition(":")[0] for line in lines] == [
+        "archive.1", "archive.2", "calibration", "3 mistakes, see 'footscan config check workflow.yaml'"
+    ]  # fmt: skip
     assert lines[2].endswith("found 'no.json' (line 3, column 14)")
 
 
