@@ -243,7 +243,8 @@ def reconstruction_steps(
     """
 
     def add(kind: str, own: Document, inputs: Mapping[str, Input]) -> Output:
-        steps.append(Step(name, kind, f"{STEPS}.{kind}", own, inputs))
+        files = {"landmarks": file} if kind == "measure" and landmarks and (file := landmarks.path) else {}
+        steps.append(Step(name, kind, f"{STEPS}.{kind}", own, inputs, places=files))
         return Output(steps[-1].name)
 
     heads = add("heads", parameters.heads, {**points, "calibration": maps})

@@ -81,6 +81,7 @@ def viewer(
     named = {name: scaled(place).astype(int).tolist() for name, place in (landmarks or {}).items()}
     data = " ".join(f'data-{name}="{base64.b64encode(array.tobytes()).decode()}"' for name, array in arrays.items())
     data += f' data-drawings="{_json(drawn)}" data-landmarks="{_json(named)}"'
+    data += f' data-middle="{_json(middle.tolist())}" data-unit="{radius / 32767!r}"'
     return (
         f'<figure id="viewer" hidden>{_choices(colourings)}<canvas id="canvas" tabindex="0" role="application" '
         'aria-label="The surface in 3D: drag or arrow keys turn it, two fingers or plus and minus change its size" '

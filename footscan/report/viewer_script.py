@@ -8,7 +8,7 @@ SCRIPT = """\
   const buffer = name => Uint8Array.from(atob(data[name]), c => c.charCodeAt(0)).buffer;
   const points = new Int16Array(buffer("points")), faces = new Uint16Array(buffer("faces"));
   const all = new Uint8Array(buffer("colours")), drawings = JSON.parse(data.drawings);
-  const places = JSON.parse(data.landmarks);
+  const places = JSON.parse(data.landmarks), near = 28;
   const light = [-0.35, 0.5, 0.79], inside = 0.45, most = Math.PI / 2, start = [-0.7, 0.5];
   const views = {above: [0, most], below: [0, -most], left: [Math.PI, 0], right: [0, 0],
     front: [-most, 0], back: [most, 0]};
@@ -16,6 +16,7 @@ SCRIPT = """\
   const normals = vertexNormals();
   const seen = new Float32Array(count * 3), outer = new Float32Array(count), inner = new Float32Array(count);
   const towards = new Float32Array(count), fingers = new Map();
+  let held = null, pressed = null;
   let [turn, tilt] = start, colours = all.subarray(0, count * 3), shown = null, pixels, depth, scale, waiting = false;
 
   function vertexNormals() {
@@ -152,6 +153,35 @@ SCRIPT = """\
     pen.globalAlpha = 1;
   }
 
+  function inCanvas(event) {
+    const box = canvas.getBoundingClientRect();
+    return [(event.clientX - box.left) * canvas.width / box.width,
+      (event.clientY - box.top) * canvas.height / box.height];
+  }
+
+  // The place of the surface under a pointer; null beside it. A rotation's inverse is its transpose.
+  function surfaceAt(event) {
+    const [x, y] = inCanvas(event).map(Math.round), m = rotation(), s = scale * zoom.value;
+    if (x < 0 || y < 0 || x >= canvas.width || y >= canvas.height) return null;
+    const [right, up, towards] = [(x - canvas.width / 2) / s, (canvas.height / 2 - y) / s, depth[y * canvas.width + x]];
+    if (towards === -Infinity) return null;
+    return [0, 1, 2].map(k => Math.round(m[k] * right + m[3 + k] * up + m[6 + k] * towards));
+  }
+
+  // A page with `data-movable` moves landmarks: by dragging one, or by a click for the one in `data-armed`.
+  function landmarkAt(event) {
+    if (data.movable === undefined) return null;
+    const m = rotation(), [x, y] = inCanvas(event);
+    const found = Object.entries(places).map(([name, place]) => [name, project(m, ...place)])
+      .filter(([, at]) => !hidden(at)).map(([name, at]) => [name, Math.hypot(at[0] - x, at[1] - y)])
+      .filter(([, apart]) => apart < near).sort((a, b) => a[1] - b[1]);
+    return found.length ? found[0][0] : null;
+  }
+
+  function moved(name) {
+    canvas.dispatchEvent(new CustomEvent("landmark", {detail: {name, place: places[name]}}));
+  }
+
   function redraw() {
     if (!waiting) requestAnimationFrame(draw);
     waiting = true;
@@ -179,11 +209,30 @@ SCRIPT = """\
 
   canvas.addEventListener("pointerdown", event => {
     canvas.setPointerCapture(event.pointerId);
+    pressed = [event.clientX, event.clientY];
+    held = landmarkAt(event);
+    if (held !== null) return;
     fingers.set(event.pointerId, [event.clientX, event.clientY]);
   });
+  canvas.addEventListener("pointerup", event => {
+    const stood = pressed !== null && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < 4;
+    const place = stood && data.armed ? surfaceAt(event) : null;
+    if (place !== null) { places[data.armed] = place; moved(data.armed); redraw(); }
+    else if (held !== null && !stood) moved(held);
+  });
+  canvas.addEventListener("place", event => {
+    if (event.detail.place === null) delete places[event.detail.name];
+    else places[event.detail.name] = event.detail.place;
+    redraw();
+  });
   for (const end of ["pointerup", "pointercancel"])
-    canvas.addEventListener(end, event => fingers.delete(event.pointerId));
+    canvas.addEventListener(end, event => { fingers.delete(event.pointerId); held = pressed = null; });
   canvas.addEventListener("pointermove", event => {
+    if (held !== null) {
+      const place = surfaceAt(event);
+      if (place !== null) { places[held] = place; redraw(); }
+      return;
+    }
     const before = fingers.get(event.pointerId);
     if (before === undefined) return;
     const other = [...fingers].find(([id]) => id !== event.pointerId);

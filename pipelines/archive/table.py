@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from footscan.recordings.scans import RecordedScan
+from pipelines.archive.job import Job
 from pipelines.archive.page import write_archive_page
 from pipelines.archive.running import ScanEnd
 from pipelines.engine.files.atomic import write_atomically
@@ -57,6 +58,21 @@ def write_results_table(ends: Sequence[ScanEnd], folder: Path) -> None:
         return
     write_atomically(folder / PARQUET, _as_parquet(columns, rows))
     write_atomically(folder / CSV, table)
+
+
+def update_results_table(ends: Sequence[ScanEnd], others: Sequence[RecordedScan], job: Job) -> None:
+    """Write the table of a job's results, as `write_results_table`, with the rows of other scans as they are in it.
+
+    Raises
+    ------
+    Fault
+        The folder of the results cannot be written.
+    """
+    others_by_name = {scan.name: scan for scan in others if scan.name not in {end.scan for end in ends}}
+    earlier = earlier_ends(job.results, others_by_name) if others_by_name else []
+    kept = [end for end in earlier if end.scan in others_by_name]
+    place = {folder.resolve(): number for number, folder in enumerate(job.folders)} if kept else {}
+    write_results_table(sorted([*ends, *kept], key=lambda end: place.get(end.source, len(place))), job.results)
 
 
 def earlier_ends(results: Path, scans: Mapping[str, RecordedScan]) -> list[ScanEnd]:

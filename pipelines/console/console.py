@@ -7,6 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
+from pipelines.archive.editing import ScanEditor
+from pipelines.archive.job import job_of_scan
 from pipelines.console.guidance import guidance
 from pipelines.console.operator_lock import OperatorLock
 from pipelines.console.presence import Presence
@@ -59,6 +61,13 @@ class Console:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def editor_of(self, patient: str, scan: str) -> ScanEditor:
+        """The editor of a scan; RefusedInput if the scanner is at work, which needs the processor, or there is none."""
+        if self._action is not None:
+            raise RefusedInput("the scanner", "is at work, expected it to be ready before landmarks are moved")
+        folder = self.archive / pseudonym(patient, "patient") / pseudonym(scan, "scan")
+        return ScanEditor(job_of_scan(folder, self.scanner.calibration, self.results), folder)
 
     def seen_by(self, page: str) -> dict[str, Any]:
         """The whole state, as it is sent to a page."""

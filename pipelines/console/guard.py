@@ -16,7 +16,7 @@ PAGE_HEADER = "x-footscan-page"
 PAGE = re.compile(r"[A-Za-z0-9]{8,64}")
 LARGEST_BODY = 4096
 """Bytes of the body of a request: a bound of memory, far above the largest order."""
-LINKED = ("/foot/", "/pair/")
+LINKED = ("/foot/", "/pair/", "/edit/")
 """Pages that other sites may link to, besides the first page."""
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "[::1]")
 

@@ -76,6 +76,12 @@ class LiveAdapter:
         scanner.listen(self._count_from_here)
 
     @property
+    def calibration(self) -> Path | None:
+        """As `Scanner.calibration`."""
+        named = self._scanner.rig.calibration
+        return None if named is None else Path(named)
+
+    @property
     def state(self) -> ScannerState:
         """As `Scanner.state`."""
         return self._scanner.state

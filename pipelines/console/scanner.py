@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal, Protocol
 
 from pipelines.live.state import OnState, ScannerState
@@ -53,6 +54,11 @@ class Scanner(Protocol):
 
     Failures are raised as `FootscanError`.
     """
+
+    @property
+    def calibration(self) -> Path | None:
+        """File of the calibration that scans are measured with; None if there is none."""
+        ...
 
     @property
     def state(self) -> ScannerState:

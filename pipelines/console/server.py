@@ -19,18 +19,17 @@ from pydantic import Field, ValidationError
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 from starlette.types import Receive, Scope, Send
 
 from footscan.capture.board.termination import ending_signals
-from footscan.report.style import STYLE
-from footscan.report.viewer_script import SCRIPT
 from pipelines.console.calibrating import calibrating_routes, order
 from pipelines.console.console import Console
+from pipelines.console.editing import editing_routes
 from pipelines.console.gate import LARGEST_HEAD, Gate, Stop, hand_over_to
-from pipelines.console.guard import LARGEST_BODY, PAGE, PAGE_HEADER, Guard, Rules
+from pipelines.console.guard import PAGE, PAGE_HEADER, Guard, Rules
 from pipelines.console.pages.foot import foot_page
 from pipelines.console.pages.live_picture import LivePictures
 from pipelines.console.pages.pair import pair_page
@@ -38,23 +37,20 @@ from pipelines.console.pages.results import KINDS, guarded, open_result, version
 from pipelines.console.pages.sitting import sitting_page
 from pipelines.console.scanner import Side
 from pipelines.console.stopping import stop_asked
+from pipelines.console.web import body_of, not_there, static_file
 from pipelines.scan import SHOWN
-from schemas.base.errors import Fault, FootscanError, RefusedInput
+from schemas.base.errors import Fault, RefusedInput
 from schemas.base.model import Document, Posture, Pseudonym
 from schemas.rig import HeadNumber
 
 _Made = TypeVar("_Made")
 
-STATIC = Path(__file__).with_name("static")
-SCRIPTS = ("link.js", "cameras.js", "sitting.js", "calibrating.js", "foot.js")
 ALIVE_SECONDS = 10.0
 """Interval of the signs of life to a page while the state does not change; chosen by hand."""
 PAGES_KEPT = 4
 """Pages of feet in the cache: a bound of memory."""
 PART_BYTES = 256 * 1024
 """Bytes that are read of a file at a time: a bound of memory."""
-BACKLOG = 4096
-"""Connections that may wait to be accepted; beyond, the system drops the first packet, which is repeated after 1 s."""
 WORKERS = 2
 """Threads that make pages and read results; few, so that Stop and the board keep the processor."""
 REPORT_POLICY = (
@@ -133,23 +129,6 @@ class ConsoleServer(uvicorn.Server):
         super().handle_exit(sig, frame)
 
 
-def listen(host: str, port: int) -> socket.socket:
-    """Open a socket for the server.
-
-    Raises
-    ------
-    RefusedInput
-        The address cannot be used.
-    """
-    try:
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        return socket.create_server((host, port), family=family, backlog=BACKLOG)
-    except OSError as error:
-        why = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror
-        problem = f"cannot be listened on ({why}), expected another --port or --host"
-        raise RefusedInput(f"{host}:{port}", problem) from None
-
-
 def server_of(console: Console, host: str, token: str | None, ports: tuple[int, int] | None = None) -> ConsoleServer:
     """Return the server of the console; `host`, `token` and `ports` as in `Rules`.
 
@@ -198,14 +177,15 @@ def _application(console: Console, rules: Rules, stop_port: int | None) -> Starl
             Route("/pair/{patient}/{left}/{right}", pages.pair),
             Route("/results/{patient}/{scan}/{name}", pages.result),
             *calibrating_routes(console),
-            Route("/static/{name}", _static),
+            *editing_routes(console.editor_of),
+            Route("/static/{name}", static_file),
             Route("/events", pages.events),
             Route("/here", pages.here, methods=["POST"]),
             Route("/cameras/{camera:int}.jpg", pages.picture),
             *(Route(f"/do/{name}", partial(_do, act), methods=["POST"], name=name) for name, act in actions.items()),
         ],
         middleware=[Middleware(Guard, rules=rules)],
-        exception_handlers={RefusedInput: _not_there},
+        exception_handlers={RefusedInput: not_there},
     )
 
 
@@ -325,7 +305,7 @@ class _FileResponse(StreamingResponse):
 async def _do(act: Callable[[str, bytes], None], request: Request) -> Response:
     """Carry out an order of a page; a problem is answered in one line."""
     try:
-        body = await _body(request)
+        body = await body_of(request)
         await run_in_threadpool(act, request.headers[PAGE_HEADER], body)
     except RefusedInput as error:
         return JSONResponse({"problem": str(error)}, 409)
@@ -336,19 +316,6 @@ async def _do(act: Callable[[str, bytes], None], request: Request) -> Response:
     return Response(status_code=204)
 
 
-async def _body(request: Request) -> bytes:
-    """Read the body of a request that the guard admitted by its content-length."""
-    body = b""
-    try:
-        async for part in request.stream():
-            body += part
-            if len(body) > LARGEST_BODY:
-                raise RefusedInput("request", f"is too long, expected up to {LARGEST_BODY} bytes")
-    except ClientDisconnect:
-        raise RefusedInput("request", "ended too early") from None
-    return body
-
-
 def _scan(console: Console, page: str, body: bytes) -> None:
     order = ScanRequest.model_validate_json(body)
     console.scan(page, order.patient, order.side, order.posture, order.keep_partial)
@@ -357,20 +324,3 @@ def _scan(console: Console, page: str, body: bytes) -> None:
 def _jog(console: Console, page: str, body: bytes) -> None:
     order = JogRequest.model_validate_json(body)
     console.jog(page, order.mm, order.head)
-
-
-async def _static(request: Request) -> Response:
-    name = request.path_params["name"]
-    if name == "console.css":
-        return Response(STYLE + (STATIC / name).read_text(encoding="utf-8"), media_type="text/css")
-    if name == "viewer.js":
-        return Response(SCRIPT, media_type="text/javascript")
-    if name in SCRIPTS:
-        return Response((STATIC / name).read_text(encoding="utf-8"), media_type="text/javascript")
-    return PlainTextResponse("footscan: no such file\n", 404)
-
-
-async def _not_there(_: Request, error: Exception) -> Response:
-    """Answer a request for results that are missing, or were changed by hand."""
-    assert isinstance(error, FootscanError)
-    return PlainTextResponse(f"footscan: {error}\n", 404)

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from footscan.measure.foot_landmarks import check_manual
 from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from pipelines.arrays import unpack
 from pipelines.scan_evidence import evidence_of
-from schemas.base.errors import Finding
+from schemas.base.errors import Finding, RefusedInput
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.measures import Measures
@@ -22,15 +23,18 @@ def run(inputs: Mapping[str, bytes], parameters: MeasureParameters, places: Mapp
 
     `inputs`: `surface`, `clean` for the glass and how the foot moved, `heads`, where they were, `fused` for how cameras
     agree; `calibration-doubt`, a sentence, if a check of the calibration gave reason for one; and `landmarks`, those
-    that a person has set, x, y and z by name, in mm in the scanner's frame. A foot that cannot be
+    that a person has set, x, y and z by name, in mm in the scanner's frame; `places`: their file. A foot that cannot be
     measured gives a document with the finding.
     """
-    del places
     surface = unpack(inputs["surface"])
     glass = GlassPlane.model_validate_json(unpack(inputs["clean"])["glass"].tobytes())
     checked = json.loads(inputs["calibration-doubt"]) if "calibration-doubt" in inputs else None
     doubts = [*filter(None, [checked, HeadsReport.model_validate_json(inputs["heads"]).doubt])]
     manual = {name: np.array(point) for name, point in json.loads(inputs.get("landmarks", b"{}")).items()}
+    try:
+        check_manual(manual, surface["vertices"])
+    except ValueError as error:
+        raise RefusedInput(places["landmarks"], str(error)) from None
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface["filled"])
     try:
         measures = measure_scanned_foot(

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.console.console import Console
-from pipelines.console.server import listen, server_of
+from pipelines.console.server import server_of
+from pipelines.console.web import listen
 
 STAND_IN = Path(__file__).parents[1] / "pipelines" / "console" / "stand_in.py"
 

@@ -180,17 +180,11 @@ def _profile(path: Path | None, *, watch: bool) -> "Profile | None":
 
 
 def _write_table(ends: "list[ScanEnd]", not_run: "Sequence[RecordedScan]", job: "Job") -> int:
-    """Write the table of all results, with the rows of scans that were not run as they are in it.
+    """Write the table of all results; a failure is printed and gives the exit status of a fault."""
+    from pipelines.archive.table import update_results_table
 
-    A failure is printed and gives the exit status of a fault.
-    """
-    from pipelines.archive.table import earlier_ends, write_results_table
-
-    others = {scan.name: scan for scan in not_run if scan.name not in {end.scan for end in ends}}
-    kept = [end for end in earlier_ends(job.results, others) if end.scan in others] if others else []
-    place = {folder.resolve(): number for number, folder in enumerate(job.folders)} if kept else {}
     try:
-        write_results_table(sorted([*ends, *kept], key=lambda end: place.get(end.source, len(place))), job.results)
+        update_results_table(ends, not_run, job)
     except Fault as error:
         message(f"footscan: {error}")
         return error.exit_status

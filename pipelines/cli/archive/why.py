@@ -65,7 +65,7 @@ def why(
     from pipelines.archive.planning import plan_job
 
     options = Chosen(only, since, until, force, settings, profile)
-    planned = plan_job(_job(scan, options, workflow, calibration, out))
+    planned = plan_job(job_of_one(scan, options, workflow, calibration, out))
     for refused in planned.refused:
         raise refused.error
     if scan is not None and not planned.scans:
@@ -109,8 +109,10 @@ def json_time(seconds: float | None) -> str | None:
     return None if seconds is None else datetime.fromtimestamp(seconds, UTC).isoformat(timespec="seconds")
 
 
-def _job(scan: str | None, options: Chosen, workflow: Path | None, calibration: Path | None, out: Path | None) -> "Job":
-    """The job of the one scan, or of the workflow."""
+def job_of_one(
+    scan: str | None, options: Chosen, workflow: Path | None, calibration: Path | None, out: Path | None
+) -> "Job":
+    """The job of the one scan, a folder or `patient/scan`; without it that of the workflow."""
     if out is not None:
         if workflow is not None:
             raise RefusedInput("--workflow", "and --out exclude each other, expected one of them")

@@ -65,7 +65,8 @@ def console(
     """Run the scanner from a web page. Ctrl-C ends it, with the lasers off."""
     from pipelines.console.console import Console
     from pipelines.console.guard import is_loopback
-    from pipelines.console.server import listen, server_of
+    from pipelines.console.server import server_of
+    from pipelines.console.web import listen
 
     if token is False and not is_loopback(host):
         raise RefusedInput("--no-token", "leaves the scanner open to the network, expected it with loopback alone")

@@ -33,7 +33,12 @@ VERDICTS = {
 }
 KNOWN = "The virtual foot’s measures are known from how it was made; no step of the scan reads them."
 FIRST = ("foot_length", "foot_breadth", "ball_girth", "instep_girth", "instep_height", "heel_breadth", "arch_index")
-FILES = {"report.html": "Whole report", "foot.stl": "Surface (STL)", "measures.json": "Measures (JSON)"}
+FILES = {
+    "report.html": "Whole report",
+    "foot.stl": "Surface (STL)",
+    "measures.json": "Measures (JSON)",
+    "sizes.json": "Sizes (JSON)",
+}
 
 
 def foot_page(archive: Path, results: Path, patient: str, scan: str) -> str:
@@ -120,6 +125,7 @@ def _next(side: str, patient: str, scan: str) -> str:
     return (
         f'<div class="row next"><a id="pair" class="button" hidden>Both feet</a>{one_more}'
         f'<button id="again" type="button">Scan this foot again</button><a class="button" href="/">Back</a>'
+        f'<a class="button" id="edit" href="/edit/{text(patient)}/{text(scan)}">Landmarks and choices</a>'
         f'<span class="files">{files}</span></div><p id="next-told" class="note" aria-live="polite"></p>'
     )
 

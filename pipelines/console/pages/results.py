@@ -38,6 +38,10 @@ BOUNDS = {".json": "json_bytes", ".ply": "mesh_bytes"}
 """Bound of the size of a file that is read as a whole, by suffix: names in `schemas.base.limits`."""
 
 
+LATER = ("sizes.json",)
+"""Results that earlier versions of this program did not make."""
+
+
 def open_result(results: Path, patient: str, scan: str, name: str) -> BinaryIO:
     """Open RESULTS/<patient>/<scan>/<name> for reading; the caller closes it.
 
@@ -63,9 +67,14 @@ def read_result(results: Path, patient: str, scan: str, name: str) -> bytes:
 
 
 def version_of(results: Path, patient: str, scan: str, *names: str) -> tuple[int, ...]:
-    """A fingerprint of files that changes if one is written or replaced; errors as in `open_result`."""
-    version = []
+    """A fingerprint of files that changes if one is written or replaced; errors as in `open_result`.
+
+    Results of an earlier version of this program have no file of `LATER`.
+    """
+    version: list[int] = []
     for name in names:
+        if name in LATER and not (results / patient / scan / name).exists():
+            continue
         with open_result(results, patient, scan, name) as file:
             status = os.fstat(file.fileno())
         version += [status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns]

@@ -28,6 +28,8 @@ class StandIn:
     In the activities in `pause` it waits for `go` to be set; `step_seconds` is the time of each of ten steps.
     """
 
+    calibration: Path | None = None
+
     def __init__(self, results: Path, deliver: "Deliver | None" = None, step_seconds: float = 0.0) -> None:
         self._results = results
         self._deliver = deliver or deliver_made_up

@@ -12,7 +12,8 @@ from starlette.testclient import TestClient
 
 from pipelines.console.console import Console
 from pipelines.console.guard import is_loopback
-from pipelines.console.server import application, listen
+from pipelines.console.server import application
+from pipelines.console.web import listen
 from schemas.base.errors import RefusedInput
 
 ADDRESS = "http://127.0.0.1:8760"

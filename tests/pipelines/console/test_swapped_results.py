@@ -16,7 +16,8 @@ from stand_in import deliver_made_up
 from starlette.testclient import TestClient
 
 from pipelines.console.console import Console
-from pipelines.console.server import listen, server_of
+from pipelines.console.server import server_of
+from pipelines.console.web import listen
 
 ADDRESS = "/foot/P1/R", "/pair/P1/L/R"
 SECRET = "a secret outside the results"
