@@ -57,6 +57,10 @@ class Scan(Document):
     """The scanner that filmed it: a workflow may have a calibration for each scanner."""
     posture: Posture = "unknown"
     """Posture of the person and load on the foot."""
+    sex: Literal["female", "male"] | None = None
+    """Sex of the person, for statistics."""
+    age: Annotated[int, Field(ge=0, le=130)] | None = None
+    """Age of the person at the scan, in whole years, for statistics."""
     laser: Laser | None = None
     """Colour of the laser in the pictures; default: found in the film of each camera."""
     date: datetime.date | None = None

@@ -23,10 +23,11 @@ CSV, PARQUET = "results.csv", "results.parquet"
 
 TEXTS = {
     "scan", "status", "problem", "side", "software", "calibration_sha256", "scanner", "date", "posture",
-    "calibration_file", "calibration_created", "calibration_software", "parameters_sha256", "warnings",
+    "patient", "sex", "calibration_file", "calibration_created", "calibration_software", "parameters_sha256",
+    "warnings",
 } | {f"{file}_sha256" for file in DELIVERABLE}  # fmt: skip
 """Names of the columns with text, beside those of the measures' status."""
-UNITS = {*get_args(Unit)}
+UNITS = get_args(Unit)
 """Units at the end of a column's name."""
 SIZE, WIDTH, UNROUNDED = "size_", "width_", "_unrounded"
 """Columns of sizes and widths: `size_eu`, `size_eu_unrounded`, `width_eu`."""
@@ -34,7 +35,7 @@ BETWEEN = " | "
 """Between two warnings of a scan."""
 _CALIBRATION = {"file": "name", "created": "created", "software": "software"}
 """Columns on the origin of the calibration, without `calibration_`, and the fields of quality.json."""
-COUNTS = {"cameras", "frames_lost", "stripe_points", "cloud_points"} | {
+COUNTS = {"age", "cameras", "frames_lost", "stripe_points", "cloud_points"} | {
     f"mesh_{name}"
     for name, field in MeshQuality.model_json_schema()["properties"].items()
     if {kind["type"] for kind in field.get("anyOf", [field])} <= {"integer", "null"}
@@ -107,10 +108,12 @@ def _earlier_end(row: dict[str, str], results: Path, scans: Mapping[str, Recorde
 def _row(end: ScanEnd) -> tuple[dict[str, Cell], dict[str, Cell]]:
     """The columns of a scan with what was found, and those that say how far to trust it, which stand after them."""
     row: dict[str, Cell] = {"scan": end.scan, "status": end.kind or "done", "problem": end.problem}
-    trust: dict[str, Cell] = {"scanner": None, "date": None, "posture": None}
+    trust: dict[str, Cell] = {"scanner": None, "date": None, "posture": None, "patient": None, "sex": None, "age": None}
     if end.document is not None:
         day = end.document.day
         trust |= {"scanner": end.document.scanner, "date": None if day is None else day.isoformat()}
+        row["side"], trust["posture"] = end.document.side, end.document.posture
+        trust |= {"patient": end.document.patient, "sex": end.document.sex, "age": end.document.age}
     trust["parameters_sha256"] = end.parameters_sha256
     if end.folder is None:
         return row, trust
@@ -159,15 +162,22 @@ def _has_content(path: Path, content: bytes) -> bool:
         return False
 
 
-def _as_csv(columns: Sequence[str], rows: Sequence[dict[str, Cell]]) -> str:
+def table_bytes(columns: Sequence[str], rows: Sequence[Mapping[str, Cell]], suffix: str) -> bytes:
+    """Rows as a file: `.csv`, or `.parquet` with the unit of each column."""
+    return _as_csv(columns, rows).encode() if suffix == ".csv" else _as_parquet(columns, rows)
+
+
+def _as_csv(columns: Sequence[str], rows: Sequence[Mapping[str, Cell]]) -> str:
     return csv_text([columns, *([row.get(column) for column in columns] for row in rows)])
 
 
-def _as_parquet(columns: Sequence[str], rows: Sequence[dict[str, Cell]]) -> bytes:
+def _as_parquet(columns: Sequence[str], rows: Sequence[Mapping[str, Cell]]) -> bytes:
     import pyarrow
     from pyarrow import parquet
 
-    table = pyarrow.Table.from_pylist(rows, pyarrow.schema([_field(column) for column in columns]))
+    table = pyarrow.Table.from_pylist(
+        [dict(row) for row in rows], pyarrow.schema([_field(column) for column in columns])
+    )
     out = io.BytesIO()
     parquet.write_table(table, out)
     return out.getvalue()
@@ -178,7 +188,7 @@ def _field(column: str) -> Any:
     import pyarrow
 
     is_size = column.startswith((SIZE, WIDTH)) and not column.endswith(UNROUNDED)
-    if column in TEXTS or is_size or column.endswith("_status"):
+    if column in TEXTS or column == "age_group" or is_size or column.endswith("_status"):
         return pyarrow.field(column, pyarrow.string())
     kind = pyarrow.int64() if column in COUNTS else pyarrow.float64()
     unit = column.rpartition("_")[2]

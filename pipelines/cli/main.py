@@ -10,7 +10,7 @@ import typer
 
 from footscan.capture.board.termination import EndedBySignal
 from pipelines.cli import compare, demo, export, extract, films, regress, thesis, tune, verify
-from pipelines.cli.archive import cache, config, edit, forget, plan, run, trace, upgrade, why
+from pipelines.cli.archive import cache, config, edit, forget, plan, results, run, trace, upgrade, why
 from pipelines.cli.calibrate import app as calibration
 from pipelines.cli.foot import lasts, measure, pairs, sizes
 from pipelines.cli.live import console, devices, scan
@@ -58,6 +58,7 @@ app.command("scan", rich_help_panel=SCAN)(scan.scan)
 app.command("console", rich_help_panel=SCAN)(console.console)
 app.add_typer(films.simulate, name="simulate", rich_help_panel=SCAN)
 
+app.command("results", rich_help_panel=RESULTS)(results.results)
 app.command("edit", rich_help_panel=RESULTS)(edit.edit)
 app.command("measure", rich_help_panel=RESULTS)(measure.measure)
 app.command("sizes", rich_help_panel=RESULTS)(sizes.sizes)

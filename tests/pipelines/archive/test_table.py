@@ -78,7 +78,7 @@ def test_what_says_how_far_to_trust_stands_after_the_columns_of_old(ends: list[S
     """Also where the first scan has none of them: others may read columns by their place."""
     write_results_table([ends[1], ends[0]], tmp_path)
     names = list(rows(tmp_path)[0])
-    added = {"scanner", "date", "posture", "parameters_sha256", "warnings"}
+    added = {"scanner", "date", "posture", "patient", "sex", "age", "parameters_sha256", "warnings"}
     added |= {f"calibration_{name}" for name in ("file", "created", "software")}
     added |= {name for name in names if name.startswith(("size_", "width_"))}
     added |= {name for name in names if name.endswith("_status") or "_sd_" in name or name.endswith("_sd")}
@@ -168,11 +168,23 @@ def test_a_columns_type_does_not_depend_on_what_is_in_it(ends: list[ScanEnd], tm
     good, bad = (parquet.read_schema(tmp_path / name / PARQUET) for name in ("good", "bad"))
     assert [good.field(name).type for name in bad.names] == bad.types
     types = {name: str(good.field(name).type) for name in good.names}
-    texts = {"scan", "status", "problem", "side", "software", "scanner", "date", "posture", "warnings"}
+    texts = {
+        "scan",
+        "status",
+        "problem",
+        "side",
+        "software",
+        "patient",
+        "sex",
+        "scanner",
+        "date",
+        "posture",
+        "warnings",
+    }
     texts |= {name for name in types if name.endswith(("_sha256", "_status"))}
     texts |= {name for name in types if name.startswith(("size_", "width_")) and not name.endswith("_unrounded")}
     texts |= {f"calibration_{name}" for name in ("file", "created", "software")}
-    counts = {"cameras", "frames_lost", "stripe_points", "cloud_points"}
+    counts = {"age", "cameras", "frames_lost", "stripe_points", "cloud_points"}
     counts |= {"mesh_vertices", "mesh_triangles", "mesh_open_edges", "mesh_non_manifold_edges", "mesh_components"}
     counts |= {"mesh_holes"}
     assert types.keys() >= {"mesh_largest_hole_mm", "mesh_filled_share", "mesh_worst_triangles"}
