@@ -10,7 +10,7 @@ import typer
 
 from footscan.capture.board.termination import EndedBySignal
 from pipelines.cli import compare, demo, export, extract, films, regress, thesis, tune, verify
-from pipelines.cli.archive import cache, config, edit, forget, plan, results, run, trace, upgrade, why
+from pipelines.cli.archive import cache, config, edit, forget, init, plan, results, run, trace, upgrade, why
 from pipelines.cli.calibrate import app as calibration
 from pipelines.cli.foot import lasts, measure, pairs, sizes
 from pipelines.cli.live import console, devices, scan
@@ -70,6 +70,7 @@ app.command("export", rich_help_panel=RESULTS)(export.export)
 app.add_typer(calibration.calibrate, name="calibrate", rich_help_panel=CALIBRATION)
 app.command("map", rich_help_panel=CALIBRATION)(calibration.map_pixels)
 
+app.command("init", rich_help_panel=ARCHIVE)(init.init)
 app.command("run", rich_help_panel=ARCHIVE)(run.run)
 app.command("plan", rich_help_panel=ARCHIVE)(plan.plan)
 app.command("why", rich_help_panel=ARCHIVE)(why.why)
@@ -98,6 +99,7 @@ STATUS_1 = {
     "cache upgrade": "a result differs",
     "cache verify": "something is damaged",
     "forget": "something remains",
+    "init": "a scan cannot be read",
     "ingest": "a film was refused",
     "plan": "a scan was refused",
     "regress": "a figure is beyond its tolerance",

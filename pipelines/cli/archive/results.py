@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pipelines.results.query import ResultsTable, Statistics
     from schemas.tables import Cell
 
-SHOWN = ("scan", "status", "side", "date", "foot_length_mm", "foot_breadth_mm", "ball_girth_mm", "instep_girth_mm")
+SHOWN = ("scan", "status", "side", "date", "foot_length_mm", "foot_breadth_mm", "ball_girth_mm")
 """Columns that are printed unless others are named."""
 SUMMED_UP = SHOWN[4:]
 """Measures of which statistics are printed unless others are named."""
