@@ -16,6 +16,10 @@ from schemas.scan import CameraFilm
 OnProgress = Callable[[int, int], None]
 
 
+def _unheard(done: int, total: int) -> None:
+    """Progress that nobody looks at."""
+
+
 @dataclass(frozen=True)
 class CameraIngest:
     """Result of the ingest of one camera's film and background, or of a scan that cannot be read."""
@@ -41,7 +45,7 @@ class CameraIngest:
         return dict(vars(self))
 
 
-def ingest_scans(folders: Sequence[Path], on_progress: OnProgress) -> list[CameraIngest]:
+def ingest_scans(folders: Sequence[Path], on_progress: OnProgress = _unheard) -> list[CameraIngest]:
     """Ingest the films of scan folders, and of all scans in archives; a failure affects its own camera only.
 
     `on_progress` is called with the scans that have ended and their number.
@@ -49,7 +53,7 @@ def ingest_scans(folders: Sequence[Path], on_progress: OnProgress) -> list[Camer
     return _each_camera(folders, _ingest, on_progress)
 
 
-def repack_scans(folders: Sequence[Path], on_progress: OnProgress) -> list[CameraIngest]:
+def repack_scans(folders: Sequence[Path], on_progress: OnProgress = _unheard) -> list[CameraIngest]:
     """Gather the frames of earlier versions' arrays, one file a frame, in one file a camera; no film is read.
 
     A failure affects its own camera only, and leaves its array as it was.
