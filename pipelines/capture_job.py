@@ -2,9 +2,10 @@
 
 import importlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -34,6 +35,11 @@ from schemas.calibration import Calibration, CameraCalibration
 from schemas.parameters.calibration import CaptureCalibrationParameters
 
 Floats = NDArray[np.float64]
+OnProgress = Callable[[int, int], None]
+
+
+def unheard(done: int, total: int) -> None:
+    """Progress that nobody looks at."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +63,12 @@ def calibrate_capture(
     cache: Path | None = None,
     *,
     keep_going: bool = False,
+    on_progress: OnProgress = unheard,
 ) -> CaptureCalibration:
     """Calibrate all cameras of a capture with `workers` threads; results in `cache` are not computed again.
 
     With `keep_going`, cameras that see the object from another side than they stand on are calibrated as well.
+    `on_progress` is called with the steps that have ended and their number.
 
     Raises
     ------
@@ -69,7 +77,7 @@ def calibrate_capture(
     Fault
         A step could not be run to its end.
     """
-    with _job(capture, workers, cache) as job:
+    with _job(capture, workers, cache, on_progress) as job:
         steps = calibration_steps(job.name, job.inputs, parameters, keep_going=keep_going)
         results = job.run(steps)
         fits = [json.loads(_fit(job, results, camera)["document"].tobytes()) for camera in sorted(job.cameras)]
@@ -90,6 +98,7 @@ def check_calibration(
     tolerance_mm: float,
     workers: int,
     cache: Path | None = None,
+    on_progress: OnProgress = unheard,
 ) -> list[Drift]:
     """Measure the drift of each camera of a scanner since its calibration, with a present capture.
 
@@ -102,7 +111,7 @@ def check_calibration(
     Fault
         A step could not be run to its end.
     """
-    with _job(capture, workers, cache) as job:
+    with _job(capture, workers, cache, on_progress) as job:
         steps = camera_steps(job.name, job.inputs, parameters)
         results = job.run([*steps, *fit_steps(job.name, job.inputs, parameters, "place")])
         drifts = []
@@ -134,6 +143,7 @@ class _Job:
     inputs: CaptureInputs
     workspace: Workspace
     workers: int
+    on_progress: OnProgress
 
     @property
     def cameras(self) -> list[int]:
@@ -142,8 +152,9 @@ class _Job:
 
     def run(self, steps: Sequence[Step]) -> dict[str, bytes]:
         """Run steps and return their results by name; raises the error of a failed step."""
+        total, ended = len(self.workspace.plan(steps).to_run), count(1)
         with self.workspace.lease():
-            outcomes = self.workspace.run(steps, Threads(self.workers), lambda _: None)
+            outcomes = self.workspace.run(steps, Threads(self.workers), lambda _: self.on_progress(next(ended), total))
             for step in steps:
                 if isinstance(failure := outcomes[step.name], Failure):
                     _raise(failure, {step.name: step for step in steps}, outcomes, self.workspace.store)
@@ -158,11 +169,11 @@ class _Job:
 
 
 @contextmanager
-def _job(capture: RecordedCapture, workers: int, cache: Path | None) -> Iterator[_Job]:
+def _job(capture: RecordedCapture, workers: int, cache: Path | None, on_progress: OnProgress) -> Iterator[_Job]:
     """The job of a capture; without a `cache` the store is temporary."""
     with TemporaryDirectory(prefix="footscan-") as temporary, Workspace(cache or Path(temporary)) as workspace:
         inputs = recorded_inputs(capture, workspace.digests)
-        yield _Job(f"capture/{capture.folder.name}", inputs, workspace, workers)
+        yield _Job(f"capture/{capture.folder.name}", inputs, workspace, workers, on_progress)
 
 
 def _raise(failure: Failure, steps: Mapping[str, Step], outcomes: Mapping[str, Outcome], store: Store) -> None:

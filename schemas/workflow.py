@@ -72,7 +72,7 @@ class Workflow(Document):
 
     format: Literal["footscan.workflow/1"]
     archive: Folders
-    """Folder that holds the scans, each a folder with a scan.yaml; or several such folders."""
+    """Folder that holds the scans, each a folder with a scan.yaml, or its URL for fsspec; or several of them."""
     calibration: AnyPath | None = None
     """Calibration of the scans that name none themselves."""
     calibrations: list[ChosenCalibration] = Field(default_factory=list)

@@ -26,7 +26,8 @@ bare() {
   # The root has this machine's names, mirrors and settings of pip, as a container has its host's network.
   cp /etc/resolv.conf /etc/hosts "$1/etc/"
   cp -rT /etc/apt "$1/etc/apt"
-  if [[ -f /etc/pip.conf ]]; then cp /etc/pip.conf "$1/etc/"; fi
+  # A machine behind a proxy trusts certificates of its own.
+  cp /etc/ssl/certs/ca-certificates.crt "$1/etc/host-certificates.crt"
   mount --bind /proc "$1/proc"
   trap 'umount "'"$1"'/proc"' EXIT
 }
@@ -39,6 +40,7 @@ copied() {
 inside() {
   echo "container: $3"
   chroot "$1" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive \
+    PIP_CERT=/etc/host-certificates.crt \
     sh -c "cd '$2' && $3"
 }
 

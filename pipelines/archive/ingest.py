@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,12 @@ from footscan.frames.repack import repack
 from footscan.recordings.scans import SCAN_FILE, RecordedScan, read_scan, scan_folders
 from schemas.base.errors import FootscanError, RefusedInput
 from schemas.scan import CameraFilm
+
+OnProgress = Callable[[int, int], None]
+
+
+def _unheard(done: int, total: int) -> None:
+    """Progress that nobody looks at."""
 
 
 @dataclass(frozen=True)
@@ -38,29 +45,34 @@ class CameraIngest:
         return dict(vars(self))
 
 
-def ingest_scans(folders: Sequence[Path]) -> list[CameraIngest]:
-    """Ingest the films of scan folders, and of all scans in archives; a failure affects its own camera only."""
-    return _each_camera(folders, _ingest)
+def ingest_scans(folders: Sequence[Path], on_progress: OnProgress = _unheard) -> list[CameraIngest]:
+    """Ingest the films of scan folders, and of all scans in archives; a failure affects its own camera only.
+
+    `on_progress` is called with the scans that have ended and their number.
+    """
+    return _each_camera(folders, _ingest, on_progress)
 
 
-def repack_scans(folders: Sequence[Path]) -> list[CameraIngest]:
+def repack_scans(folders: Sequence[Path], on_progress: OnProgress = _unheard) -> list[CameraIngest]:
     """Gather the frames of earlier versions' arrays, one file a frame, in one file a camera; no film is read.
 
     A failure affects its own camera only, and leaves its array as it was.
     """
-    return _each_camera(folders, _repack)
+    return _each_camera(folders, _repack, on_progress)
 
 
 def _each_camera(
-    folders: Sequence[Path], work: Callable[[RecordedScan, CameraFilm], CameraIngest]
+    folders: Sequence[Path], work: Callable[[RecordedScan, CameraFilm], CameraIngest], on_progress: OnProgress
 ) -> list[CameraIngest]:
     ends: list[CameraIngest] = []
-    for folder in folders:
-        count_before = len(ends)
-        is_scan = (folder / SCAN_FILE).exists() or not folder.is_dir()
-        for scan_folder in [folder] if is_scan else scan_folders(folder):
+    are_scans = [(folder / SCAN_FILE).exists() or not folder.is_dir() for folder in folders]
+    of_folder = [[f] if is_scan else list(scan_folders(f)) for f, is_scan in zip(folders, are_scans, strict=True)]
+    total, done = sum(map(len, of_folder)), count(1)
+    for folder, is_scan, scans in zip(folders, are_scans, of_folder, strict=True):
+        for scan_folder in scans:
             ends += _each_of_scan(scan_folder, None if is_scan else folder, work)
-        if len(ends) == count_before:
+            on_progress(next(done), total)
+        if not scans:
             problem = str(RefusedInput(folder, "holds no scan, expected folders with a scan.yaml"))
             ends.append(CameraIngest(str(folder), None, problem=problem, exit_status=RefusedInput.exit_status))
     return ends

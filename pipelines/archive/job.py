@@ -3,13 +3,14 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from footscan.recordings.scans import scan_folders
+from footscan.recordings.scans import RecordedScan, scan_folders
 from pipelines.archive.selection import Selection, selection_of
-from pipelines.archive.workflow_file import check_archives, read_workflow
+from pipelines.archive.workflow_file import check_archives, is_url, read_workflow
 from pipelines.engine.files.access import group_number
 from pipelines.engine.files.places import open_files
 from pipelines.engine.pool import cores
 from pipelines.recordings.calibration_choice import CalibrationPlace, calibration_places
+from pipelines.recordings.fetched import FetchedArchive
 from pipelines.scan import ORDINARY, Wanted
 from schemas.base.errors import RefusedInput
 from schemas.parameters.presets import overlaid
@@ -40,12 +41,20 @@ class Job:
     """Number of steps that run at once in the default pool."""
     group: int | None = None
     """Number of the group that may access the written files as well as their owner."""
+    fetched: tuple[FetchedArchive, ...] = ()
+    """Those of the archives that are in an object store."""
     wanted: Wanted = ORDINARY
     """What is made of each scan beyond its results."""
     selection: Selection = field(default_factory=Selection)
     """The scans and steps that are meant."""
     fail_fast: bool = False
     """True if the first failed scan ends the run. No further step starts then; what is complete is delivered."""
+
+    def fetch(self, scan: RecordedScan) -> None:
+        """Fetch the films of a scan whose archive is in an object store; Fault if that fails."""
+        for archive in self.fetched:
+            if scan.folder.is_relative_to(archive.folder.resolve()):
+                archive.fetch_films(scan)
 
     def archive_of(self, folder: Path) -> Path | None:
         """Return the archive that contains a scan; None without one."""
@@ -67,8 +76,11 @@ def job_of_workflow(
     check_archives(path, workflow)
     options = _profile(path, workflow, profile)
     base = path.resolve().parent
-    archives = tuple(base / archive for archive in workflow.archive)
     results = base / workflow.results
+    fetched = tuple(FetchedArchive(place, results / CACHE) for place in workflow.archive if is_url(place))
+    for one in fetched:
+        one.fetch_documents()
+    archives = (*(base / place for place in workflow.archive if not is_url(place)), *(one.folder for one in fetched))
     folders = [folder for archive in archives for folder in scan_folders(archive)]
     if not folders and not may_be_empty:
         below = ", ".join(map(str, archives))
@@ -76,6 +88,7 @@ def job_of_workflow(
     return Job(
         folders=folders,
         archives=archives,
+        fetched=fetched,
         calibrations=calibration_places(workflow, base),
         calibration_wins=False,
         results=results,
@@ -126,7 +139,7 @@ def _parameters(below: ScanParameters, above: ScanParameters) -> ScanParameters:
 
 def _cache(workflow: Path, place: str | None) -> Path | str | None:
     """Place of the store that a workflow names. A URL is opened here, so that a wrong one is reported only once."""
-    if place is None or "://" not in place:
+    if place is None or not is_url(place):
         return None if place is None else workflow.resolve().parent / place
     try:
         open_files(place)

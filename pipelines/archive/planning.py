@@ -123,6 +123,7 @@ def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None
             if not job.selection.takes(scan):
                 planned.left_out.append(scan)
                 continue
+            job.fetch(scan)
             steps = _all_steps(scan, planned)
             known_steps.update(name for step in steps for name in names_of(step))
             plan = planned.workspace.plan(job.selection.part_of(steps), job.selection.force)

@@ -40,9 +40,14 @@ def read_workflow(path: Path) -> Workflow:
     return document
 
 
+def is_url(place: str) -> bool:
+    """Return True for a place of fsspec, such as `s3://feet/archive`, and False for a path."""
+    return "://" in place
+
+
 def check_archives(path: Path, document: Workflow) -> None:
     """Raise RefusedInput if an archive of the workflow in `path` is missing; it names all missing files."""
-    if not all((path.resolve().parent / archive).is_dir() for archive in document.archive):
+    if not all(is_url(archive) or (path.resolve().parent / archive).is_dir() for archive in document.archive):
         text, value = _parsed(path)
         raise _refusal(path, _missing_files(path, text, value))
 
@@ -79,7 +84,9 @@ def _missing_files(path: Path, text: str, value: dict[str, Any]) -> list[PlacedM
 
     def check(names: tuple[str | int, ...], named: Any, kind: str) -> None:
         what, is_there = _EXPECTED[kind]
-        if isinstance(named, str) and named and "\0" not in named and not is_there(path.resolve().parent / named):
+        if not isinstance(named, str) or not named or "\0" in named or (kind == "archive" and is_url(named)):
+            return
+        if not is_there(path.resolve().parent / named):
             found.append(Mistake(names, f"no such {what}, found {named[:80]!r}", is_name=False))
 
     archives = value.get("archive")

@@ -182,8 +182,10 @@ def ingest(
 ) -> int:
     """Convert films to Zarr: one array per camera in frames.zarr beside the films, with the JPEG bytes unchanged."""
     from pipelines.archive.ingest import ingest_scans, repack_scans
+    from pipelines.cli.terminal.progress import frame_progress
 
-    ends = repack_scans(folders) if repack else ingest_scans(folders)
+    with frame_progress("scans") as progress:
+        ends = (repack_scans if repack else ingest_scans)(folders, progress)
     if as_json:
         print_json([end.to_json() for end in ends])
     elif repack:

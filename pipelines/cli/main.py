@@ -4,6 +4,7 @@ import errno
 import logging
 import os
 import sys
+from collections.abc import Callable
 from typing import Annotated
 
 import typer
@@ -28,9 +29,6 @@ INTERRUPTED = 130
 MOST_OTHERS = 19
 """Mistakes printed after the first one. Bound: what a terminal shows at once."""
 
-SCAN, RESULTS, CALIBRATION, ARCHIVE, VERIFICATION = "Scan", "Results", "Calibration", "Archive", "Verification"
-"""Groups of commands in the help."""
-
 app = typer.Typer(
     name="footscan",
     help="Turn the films of a laser-stripe foot scanner into a measured 3D foot.",
@@ -51,43 +49,55 @@ def _of_all(
     del version
 
 
-app.command("devices", rich_help_panel=SCAN)(devices.devices)
-app.command("home", rich_help_panel=SCAN)(scan.home)
-app.command("jog", rich_help_panel=SCAN)(scan.jog)
-app.command("scan", rich_help_panel=SCAN)(scan.scan)
-app.command("console", rich_help_panel=SCAN)(console.console)
-app.add_typer(films.simulate, name="simulate", rich_help_panel=SCAN)
-
-app.command("results", rich_help_panel=RESULTS)(results.results)
-app.command("edit", rich_help_panel=RESULTS)(edit.edit)
-app.command("measure", rich_help_panel=RESULTS)(measure.measure)
-app.command("sizes", rich_help_panel=RESULTS)(sizes.sizes)
-app.command("pair", rich_help_panel=RESULTS)(pairs.pair)
-app.command("change", rich_help_panel=RESULTS)(pairs.change)
-app.command("lasts", rich_help_panel=RESULTS)(lasts.lasts)
-app.command("export", rich_help_panel=RESULTS)(export.export)
-
-app.add_typer(calibration.calibrate, name="calibrate", rich_help_panel=CALIBRATION)
-app.command("map", rich_help_panel=CALIBRATION)(calibration.map_pixels)
-
-app.command("init", rich_help_panel=ARCHIVE)(init.init)
-app.command("run", rich_help_panel=ARCHIVE)(run.run)
-app.command("plan", rich_help_panel=ARCHIVE)(plan.plan)
-app.command("why", rich_help_panel=ARCHIVE)(why.why)
-app.command("trace", rich_help_panel=ARCHIVE)(trace.trace)
-app.add_typer(config.config, name="config", rich_help_panel=ARCHIVE)
-app.command("tune", rich_help_panel=ARCHIVE)(tune.tune)
 cache.cache.command("upgrade")(upgrade.upgrade)
-app.add_typer(cache.cache, name="cache", rich_help_panel=ARCHIVE)
-app.command("ingest", rich_help_panel=ARCHIVE)(films.ingest)
-app.command("extract", rich_help_panel=ARCHIVE)(extract.extract)
-app.command("forget", rich_help_panel=ARCHIVE)(forget.forget)
-
-app.command("demo", rich_help_panel=VERIFICATION)(demo.demo)
-app.add_typer(verify.verify, name="verify", rich_help_panel=VERIFICATION)
-app.command("compare", rich_help_panel=VERIFICATION)(compare.compare)
-app.command("regress", rich_help_panel=VERIFICATION)(regress.regress)
-app.command("thesis", rich_help_panel=VERIFICATION)(thesis.thesis)
+COMMANDS: dict[str, dict[str, typer.Typer | Callable[..., object]]] = {
+    "Scan": {
+        "devices": devices.devices,
+        "home": scan.home,
+        "jog": scan.jog,
+        "scan": scan.scan,
+        "console": console.console,
+        "simulate": films.simulate,
+    },
+    "Results": {
+        "results": results.results,
+        "edit": edit.edit,
+        "measure": measure.measure,
+        "sizes": sizes.sizes,
+        "pair": pairs.pair,
+        "change": pairs.change,
+        "lasts": lasts.lasts,
+        "export": export.export,
+    },
+    "Calibration": {"calibrate": calibration.calibrate, "map": calibration.map_pixels},
+    "Archive": {
+        "init": init.init,
+        "run": run.run,
+        "plan": plan.plan,
+        "why": why.why,
+        "trace": trace.trace,
+        "config": config.config,
+        "tune": tune.tune,
+        "cache": cache.cache,
+        "ingest": films.ingest,
+        "extract": extract.extract,
+        "forget": forget.forget,
+    },
+    "Verification": {
+        "demo": demo.demo,
+        "verify": verify.verify,
+        "compare": compare.compare,
+        "regress": regress.regress,
+        "thesis": thesis.thesis,
+    },
+}
+"""The commands and groups of commands, as the help shows them."""
+for panel, commands in COMMANDS.items():
+    for name, command in commands.items():
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name, rich_help_panel=panel)
+        else:
+            app.command(name, rich_help_panel=panel)(command)
 
 STATUS_1 = {
     "calibrate check": "a camera has drifted",
@@ -130,8 +140,8 @@ def run_command(arguments: list[str]) -> int:
         be_quiet(is_asked=False)
         check_limits()
         _check_arguments(arguments)
-        command = with_norms(typer.main.get_command(app), STATUS_1)
-        status = int(command(arguments, standalone_mode=False, prog_name="footscan") or 0)
+        whole = with_norms(typer.main.get_command(app), STATUS_1)
+        status = int(whole(arguments, standalone_mode=False, prog_name="footscan") or 0)
         if status == INTERRUPTED:  # which is what Typer makes of it
             raise KeyboardInterrupt
         return status

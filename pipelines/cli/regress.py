@@ -106,7 +106,7 @@ def _login() -> str:
 def _progress() -> "Iterator[OnStepEnd]":
     from pipelines.cli.terminal.progress import StepProgress
 
-    with StepProgress(0) as progress:
+    with StepProgress(None) as progress:
         yield progress.on_step_end
 
 

@@ -52,7 +52,7 @@ def tune(
         raise RefusedInput(path, "is missing, expected what is sought", field="tune")
     job = Chosen(settings=settings).job(path, threads)
     folder = job.results / FOLDER
-    with chosen_pool(job.threads, placement) as pool, StepProgress(0) as progress:
+    with chosen_pool(job.threads, placement) as pool, StepProgress(None) as progress:
         tuned = tune(job, document.tune, pool, progress.on_step_end, _tell_trial)
     write_files(folder, path, document, tuned.result, tuned.parameters)
     if as_json:

@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
 from footscan.report.markup import UNITS, number, words
@@ -54,14 +54,22 @@ def editing_routes(editor_of: Callable[[str, str], ScanEditor]) -> list[Route]:
 
     async def answer(work: Callable[[ScanEditor], Response], request: Request) -> Response:
         def run() -> Response:
+            def problem(text: str, status: int) -> Response:
+                is_page = request.method == "GET"
+                return (
+                    PlainTextResponse(f"footscan: {text}\n", status)
+                    if is_page
+                    else JSONResponse({"problem": text}, status)
+                )
+
             try:
                 return work(cached(request.path_params["patient"], request.path_params["scan"]))
             except ValidationError:
-                return JSONResponse({"problem": "the edit has unexpected fields or values"}, 400)
+                return problem("the edit has unexpected fields or values", 400)
             except Fault as error:
-                return JSONResponse({"problem": str(error)}, 502)
+                return problem(str(error), 502)
             except FootscanError as error:
-                return JSONResponse({"problem": str(error)}, 409)
+                return problem(str(error), 409)
 
         return await asyncio.get_running_loop().run_in_executor(worker, run)
 

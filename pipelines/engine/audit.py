@@ -69,8 +69,10 @@ class Difference:
     """Result of the repetition; None for a failure."""
 
 
-def verify(store: Store) -> Audit:
+def verify(store: Store, on_progress: Callable[[int, int], None] = lambda *_: None) -> Audit:
     """Read all blobs, rows, last actions, pins and leases, and log a warning for each damaged file.
+
+    `on_progress` is called with the files that were read and their number.
 
     Damaged files are removed and will be made again. A damaged pin stays: the user must learn what is no longer kept.
     """
@@ -78,9 +80,12 @@ def verify(store: Store) -> Audit:
     damaged = [store.files.path(name) for name in packs]
     files = len(damaged)
     store.files.remove_all(packs)
-    for folder in (*CHECKS, PINS):
-        for name in [name for name, _ in store.files.sizes(folder)]:
+    names = {folder: [name for name, _ in store.files.sizes(folder)] for folder in (*CHECKS, PINS)}
+    total = files + sum(map(len, names.values()))
+    for folder, in_folder in names.items():
+        for name in in_folder:
             files += 1
+            on_progress(files, total)
             if folder == PINS:
                 is_damaged = name.endswith(".json") and _is_damaged_pin(name, store)
             elif is_damaged := CHECKS[folder](name, store):

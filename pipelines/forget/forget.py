@@ -80,6 +80,10 @@ def find_erasure(
     workspace = workspace_of(job)
     store = workspace.store
     belongings = find_belongings(subject, job.archives, job.results)
+    belongings.out_of_reach += [
+        f"{archive.url} is not erased from, only what was fetched of it: erase {subject.name} there by hand"
+        for archive in job.fetched
+    ]
     files = (file for name in DELIVERABLE for file in job.results.glob(f"*/*/{name}") if file.is_file())
     delivered = {workspace.digests.of(file)[0] for file in files if not subject.has("/".join(file.parts[-3:-1]))}
     shares = find_shares(subject, store, delivered)

@@ -3,6 +3,8 @@
 import json
 import subprocess
 import sys
+import urllib.error
+import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +14,9 @@ from typing import Any
 import pytest
 import yaml
 
+from pipelines.console.console import Console
 from tests.helpers.chromium import Opened, needs_chromium
+from tests.helpers.served import console_stand_in, served
 
 SCAN = "P0001/small"
 BELOW_THE_SKIN_MM = 0.5
@@ -91,6 +95,17 @@ def test_a_landmark_moved_in_the_browser_holds(bench: Path, footscan: Any, brows
     assert "input landmarks changed" in footscan("why", SCAN, "measure", "--workflow", workflow).stdout
     traced = footscan("trace", bench / "results" / SCAN / "measures.json", "--json").stdout
     assert "landmarks.yaml" in traced
+
+
+def test_the_console_serves_the_page_of_its_scans(bench: Path) -> None:
+    stand_in = console_stand_in(bench / "results")
+    stand_in.calibration = bench / "calibration.json"
+    with Console(stand_in, bench / "archive", bench / "results") as console, served(console) as address:
+        with urllib.request.urlopen(f"{address}/edit/{SCAN}") as answer:
+            assert f'data-name="{SCAN}"' in answer.read().decode()
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(f"{address}/edit/P0001/nobody")
+        assert (refused.value.code, b"no such folder" in refused.value.read()) == (409, True)
 
 
 def test_results_of_other_parameters_are_not_edited(bench: Path, footscan: Any) -> None:

@@ -115,13 +115,15 @@ def verify(
     as_json: AsJson = False,
 ) -> int:
     """Check every file of the store against its digest or seal, and remove damaged ones."""
+    from pipelines.cli.terminal.progress import frame_progress
     from pipelines.engine import audit
 
     share = None if recompute is None else _share(recompute)
     if share is not None and place is not None:
         raise RefusedInput("--recompute", "needs the workflow that says what the steps are, not --cache")
     store = _store(workflow, place)
-    read = audit.verify(store)
+    with frame_progress("checking") as progress:
+        read = audit.verify(store, progress)
     facts: dict[str, Any] = {"store": _place(store), "files": read.files, "damaged": read.damaged}
     if not as_json:
         print_line(f"{_place(store)}: {read.files} files read, {len(read.damaged)} damaged")

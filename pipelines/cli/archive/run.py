@@ -99,6 +99,8 @@ def run(
     with ExitStack() as stack:
         log = None if log_json is None else stack.enter_context(_log(log_json))
         job = job_of(chosen, workflow, scan, calibration, out, threads, may_be_empty=watch)
+        if watch and job.fetched:
+            raise RefusedInput("--watch", f"does not look into {job.fetched[0].url}, expected an archive in a folder")
         job = job if fail_fast is None else replace(job, fail_fast=fail_fast)
         pool = stack.enter_context(chosen_pool(job.threads, placement))
         if watch:

@@ -44,6 +44,7 @@ def capture(
     """Calibrate from films of the stripe over the reference object, without clicking points."""
     from pipelines.capture_job import calibrate_capture
     from pipelines.cli.calibrate.model_table import print_trials
+    from pipelines.cli.terminal.progress import frame_progress
     from pipelines.engine.pool import cores
     from pipelines.recordings.captures import read_capture
     from schemas.parameters.calibration import CaptureCalibrationParameters
@@ -53,8 +54,8 @@ def capture(
     recorded = read_capture(folder)
     keep_inputs([out, chart, picture], *recorded.files)
     parameters = CaptureCalibrationParameters(model=model, order=order, placement_tolerance_mm=tolerance_mm)
-    with drawn(recorded, picture):
-        made = calibrate_capture(recorded, parameters, cores(), cache, keep_going=keep_going)
+    with drawn(recorded, picture), frame_progress("calibrating") as progress:
+        made = calibrate_capture(recorded, parameters, cores(), cache, keep_going=keep_going, on_progress=progress)
     calibration = made.calibration
     write_calibration(calibration, out)
     if chart is not None:

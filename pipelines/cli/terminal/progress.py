@@ -38,7 +38,8 @@ def frame_progress(what: str) -> Iterator[Callable[[int, int], None]]:
 class StepProgress:
     """Counts the steps and scans of a run as they end; draws a line where standard error is a terminal."""
 
-    def __init__(self, to_run: int, scans: int = 0, log: TextIO | None = None) -> None:
+    def __init__(self, to_run: int | None, scans: int = 0, log: TextIO | None = None) -> None:
+        """`to_run` : number of steps; None if it is not known, and the line then shows how many have ended."""
         self.ran = 0
         """Steps that ran, without those whose result was found in the store."""
         self.seconds: dict[str, float] = {}
@@ -57,7 +58,7 @@ class StepProgress:
             TimeRemainingColumn(),
             console=console,
             transient=True,
-            disable=is_quiet() or not to_run or not console.is_terminal,
+            disable=is_quiet() or to_run == 0 or not console.is_terminal,
         )
         self._task = self._bar.add_task("", total=to_run)
 
