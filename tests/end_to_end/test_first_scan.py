@@ -26,7 +26,7 @@ def folder(measured: Path) -> Path:
 
 def test_delivers_its_files(folder: Path) -> None:
     names = {file.name for file in folder.iterdir()}
-    assert names == {"cloud.ply", "foot.stl", "foot.ply", "measures.json", "quality.json", "report.html"}
+    assert names == {"cloud.ply", "foot.stl", "foot.ply", "measures.json", "sizes.json", "quality.json", "report.html"}
 
 
 def test_the_surface_is_the_foot_in_millimetres(folder: Path) -> None:

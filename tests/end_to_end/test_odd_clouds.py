@@ -14,16 +14,18 @@ from footscan.cloud.outliers.remove import KEPT
 from footscan.cloud.points import POINT_DTYPE, make_points
 from footscan.mesh.formats.ply import ply_of
 from footscan.mesh.mesh import Mesh
+from footscan.sizing.table import read_table
 from footscan.stripe.points import STRIPE_DTYPE
 from footscan.surface.quality import mesh_quality
 from pipelines.arrays import pack, unpack
-from pipelines.steps import fuse, measure, orient, quality, report, surface, verify
+from pipelines.steps import fuse, measure, orient, quality, report, sizes_json, surface, verify
 from schemas.base.errors import Finding
 from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
 from schemas.frames import FrameManifest
 from schemas.glass import GlassPlane
 from schemas.heads import HeadsReport
 from schemas.movement import MovementReport
+from schemas.parameters.delivery import SizesParameters
 from schemas.parameters.foot import MeasureParameters
 from schemas.parameters.fusion import FusionParameters
 from schemas.parameters.normals import NormalParameters
@@ -163,6 +165,8 @@ def test_a_surface_is_verified_and_reported(name: str, calibration: bytes, truth
     assert found.truth.mean < 0.2
     about = {"patient": "P0001", "scan": "egg", "provenance": {}}
     shown = {"measures": measures, "quality": qualities, "verified": verified, "about": json.dumps(about).encode()}
+    table = read_table().model_dump_json().encode()
+    shown["sizes"] = sizes_json.run({"measures": measures, "table": table}, SizesParameters(), {})
     page = report.run(done | of_cameras | shown | {"calibration": calibration}, side, {})
     assert b"Distance to the reference model" in page
     assert len(unpack(done["surface"])["vertices"]) == found.mesh.vertices

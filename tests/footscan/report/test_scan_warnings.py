@@ -130,7 +130,7 @@ def test_uncertain_measures_are_named_unless_all_are_for_one_reason() -> None:
     [line] = told(measures, quality_of())
     assert line == (
         "Uncertain: Foot breadth, Ball girth: ball by a fallback. Do not rely on them alone, or set the landmarks by "
-        "hand."
+        "hand (footscan edit)."
     )
     for measure in measures["measures"].values():
         measure |= {"status": "uncertain", "note": "a hand at the heel"}
