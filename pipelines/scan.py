@@ -19,14 +19,16 @@ from pipelines.engine.actions.step import Input, Output, SourceFile, Step, Value
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.file_digests import FileDigests
 from schemas.base.json_files import read_text
-from schemas.base.model import Document, canonical_json
+from schemas.base.model import Document, Posture, Side, canonical_json
 from schemas.calibration import Calibration, calibration_from_json, maps_to_json
 from schemas.calibration_check import CalibrationCheck, ScanCheck
 from schemas.choices import ExportFormat
+from schemas.measures import Axis
 from schemas.parameters.delivery import ExportParameters, SizesParameters
 from schemas.parameters.foot import FootParameters, MeasureParameters
 from schemas.parameters.scan import ScanParameters
 from schemas.scan import CameraFilm
+from schemas.sizes import People
 from schemas.used_calibration import UsedCalibration
 
 STEPS = "pipelines.steps"
@@ -158,9 +160,9 @@ def scan_steps(
     points: dict[str, Input] = {f"points-{camera.id}": camera.points for camera in cameras}
     colours = {f"colours-{camera.id}": camera.colours for camera in cameras if camera.colours is not None}
     maps = calibration.cameras(frozenset(camera.id for camera in scan.document.cameras))
-    foot = FootParameters(side=scan.document.side)
+    foot = _foot_parameters(scan.document.side)
     posture = choices.posture or scan.document.posture
-    measured = MeasureParameters(side=scan.document.side, posture=posture, axis=choices.axis or "toe2")
+    measured = _measure_parameters(scan.document.side, posture, choices.axis or "toe2")
     doubt = None if check is None else check.doubt
     made = reconstruction_steps(scan.name, points, maps, parameters, measured, steps, doubt, _landmarks(decided))
     heads, cleaned, fused, oriented, mesh, measures = made
@@ -176,7 +178,7 @@ def scan_steps(
     if check is not None:
         quality_inputs["calibration-check"] = _document(check, scan.file)
     figures = add(Step(scan.name, "quality", f"{STEPS}.quality", None, quality_inputs))
-    shoes = SizesParameters(people=choices.people, systems=choices.systems)
+    shoes = _sizes_parameters(choices.people, tuple(choices.systems))
     found_sizes: dict[str, Input] = {"measures": measures, "table": wanted.sizes}
     sizes = add(Step(scan.name, "sizes.json", f"{STEPS}.sizes_json", shoes, found_sizes))
     warned: dict[str, Input] = {"quality": figures, "measures": measures}
@@ -336,6 +338,22 @@ def _travel(scan: RecordedScan, camera: CameraFilm) -> dict[str, Value]:
     travel = camera.travel or scan.document.travel
     assert travel is not None, "the format of scan.yaml requires it"
     return {"travel": _document(travel, scan.file)}
+
+
+# The text of parameters is made once an object, so that scans share them.
+@lru_cache(maxsize=64)
+def _foot_parameters(side: Side) -> FootParameters:
+    return FootParameters(side=side)
+
+
+@lru_cache(maxsize=64)
+def _measure_parameters(side: Side, posture: Posture, axis: Axis) -> MeasureParameters:
+    return MeasureParameters(side=side, posture=posture, axis=axis)
+
+
+@lru_cache(maxsize=64)
+def _sizes_parameters(people: People | None, systems: tuple[str, ...]) -> SizesParameters:
+    return SizesParameters(people=people, systems=list(systems))
 
 
 def _landmarks(decided: Decisions) -> Value | None:

@@ -9,6 +9,8 @@ from schemas.choices import Choices
 from schemas.landmarks import ManualLandmarks, Places
 
 LANDMARKS_FILE, CHOICES_FILE = "landmarks.yaml", "choices.yaml"
+NONE_SET = ManualLandmarks(format="footscan.landmarks/1", landmarks=Places())
+NOTHING_CHOSEN = Choices(format="footscan.choices/1")
 
 
 class Decisions(NamedTuple):
@@ -24,10 +26,8 @@ def decisions_of(scan: RecordedScan) -> Decisions:
     """Read what was decided for a scan; RefusedInput if a file breaks its format."""
     landmarks, choices = scan.folder / LANDMARKS_FILE, scan.folder / CHOICES_FILE
     return Decisions(
-        read_yaml(landmarks, ManualLandmarks)
-        if landmarks.exists()
-        else ManualLandmarks(format="footscan.landmarks/1", landmarks=Places()),
+        read_yaml(landmarks, ManualLandmarks) if landmarks.exists() else NONE_SET,
         landmarks,
-        read_yaml(choices, Choices) if choices.exists() else Choices(format="footscan.choices/1"),
+        read_yaml(choices, Choices) if choices.exists() else NOTHING_CHOSEN,
         choices,
     )

@@ -138,7 +138,8 @@ def _uncertain(measures: Measures) -> Iterator[str]:
     own = {n: measures.own_note(n) for n, m in measures.measures.items() if m.status == "uncertain"}
     uncertain = {name: note for name, note in own.items() if note or not in_common}
     if uncertain:
-        yield f"Uncertain: {_named(uncertain)}. Do not rely on them alone, or set the landmarks by hand (footscan edit)."
+        todo = "Do not rely on them alone, or set the landmarks by hand (footscan edit)."
+        yield f"Uncertain: {_named(uncertain)}. {todo}"
 
 
 def _named(notes: dict[str, str | None]) -> str:

@@ -125,7 +125,8 @@ def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None
                 continue
             job.fetch(scan)
             steps = _all_steps(scan, planned)
-            known_steps.update(name for step in steps for name in names_of(step))
+            if job.selection.names_steps:
+                known_steps.update(name for step in steps for name in names_of(step))
             plan = planned.workspace.plan(job.selection.part_of(steps), job.selection.force)
         except RefusedInput as error:
             if name in folders or job.selection.takes_unreadable(folder):

@@ -25,6 +25,11 @@ class Selection:
     force: tuple[str, ...] = ()
     """Steps that run even if the cache has their results, likewise."""
 
+    @property
+    def names_steps(self) -> bool:
+        """True if `until` or `force` names a step."""
+        return self.until is not None or bool(self.force)
+
     def takes(self, scan: RecordedScan) -> bool:
         """Return True if the scan is taken."""
         day = scan.document.day
