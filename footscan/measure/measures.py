@@ -295,9 +295,11 @@ def take_measures(
     known = SurfaceErrors(foot.vertices, [ErrorField("noise", surface.errors)] if errors is None else errors)
     if count is None:
         count = REPLICATES if errors is None and np.median(surface.errors) > ROUGH_MM else 0
-    values = of_replicates(foot, known, count, partial(_values, rough=surface.roughness))
-    scatter = scatter_of(values, count)
     to_mesh = np.linalg.inv(foot.transform).astype(np.float64)
+    marked = {name: one.point for name, one in landmarks.items() if one.method == "manual"}
+    manual = {name: apply(to_mesh, point[None])[0] for name, point in marked.items()}
+    compute = partial(_values, rough=surface.roughness, manual=manual)
+    scatter = scatter_of(of_replicates(foot, known, count, compute, marked), count)
     measures = {
         name: _measure(
             definition,
@@ -313,11 +315,11 @@ def take_measures(
     return {name: own.model_copy(update={"convention": CONVENTIONS.get(name, OWN)}) for name, own in measures.items()}
 
 
-def _values(replicate: FootFrame, rough: Roughness) -> dict[str, float]:
+def _values(replicate: FootFrame, rough: Roughness, manual: Mapping[str, Floats]) -> dict[str, float]:
     """The lengths, angles and indices that can be taken of a replicate; areas and volumes hardly rest on landmarks."""
     values: dict[str, float] = {}
     try:
-        surface = FootSurface(replicate, find_landmarks(replicate), rough)
+        surface = FootSurface(replicate, find_landmarks(replicate, manual), rough)
     except Finding:  # it is no foot any more
         return values
     for name, definition in _definitions().items():

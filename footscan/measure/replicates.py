@@ -5,8 +5,9 @@ moves by hundredths. What that does to a measure is not linear, and is found by 
 101:2008.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
+from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
@@ -27,15 +28,21 @@ SEED = 101
 """Replicates of one foot are the same in every run."""
 
 Floats = NDArray[np.float64]
+NOTHING: Mapping[str, Floats] = MappingProxyType({})
 _Result = TypeVar("_Result")
 
 
 def of_replicates(
-    foot: FootFrame, errors: SurfaceErrors, count: int, compute: Callable[[FootFrame], _Result]
+    foot: FootFrame,
+    errors: SurfaceErrors,
+    count: int,
+    compute: Callable[[FootFrame], _Result],
+    marked: Mapping[str, Floats] = NOTHING,
 ) -> list[_Result]:
     """Displace a foot at random, `count` times, find its axis anew, and return what `compute` makes of each.
 
-    The floor stays where it is. A replicate that is no foot any more is left out.
+    The floor stays where it is, and so do the landmarks that a person has `marked`, (3,) mm in the frame of the foot. A
+    replicate that is no foot any more is left out.
     """
     normals = vertex_normals(foot.vertices, foot.faces)
     random = np.random.default_rng(SEED)
@@ -43,19 +50,19 @@ def of_replicates(
 
     def of_one(vertices: Floats) -> list[_Result]:
         try:
-            return [compute(_reframed(foot, vertices))]
+            return [compute(_reframed(foot, vertices, marked))]
         except Finding:
             return []
 
     return [result for results in together(partial(of_one, one) for one in displaced) for result in results]
 
 
-def _reframed(foot: FootFrame, vertices: Floats) -> FootFrame:
+def _reframed(foot: FootFrame, vertices: Floats, marked: Mapping[str, Floats]) -> FootFrame:
     """The foot with other vertices, in the frame of its axis."""
     samples = dense_points(vertices, foot.faces, SPACING_MM)
     low = samples[samples[:, 2] <= low_height(foot.length)]
     forefoot = forefoot_points(vertices, foot.faces, foot.length, foot.low)
-    turn, axis, length = along_axis(np.eye(4), low, forefoot, foot.length, foot.axis, {})
+    turn, axis, length = along_axis(np.eye(4), low, forefoot, foot.length, foot.axis, marked)
     return foot._replace(
         vertices=apply(turn, vertices),
         samples=apply(turn, samples),

@@ -97,7 +97,10 @@ class ScanEditor:
 
     def measures(self) -> Measures:
         """The measures that are delivered."""
-        return Measures.model_validate_json((self.results / "measures.json").read_bytes())
+        try:
+            return Measures.model_validate_json((self.results / "measures.json").read_bytes())
+        except (OSError, ValueError):
+            raise RefusedInput(self.results, "has no measures, expected 'footscan run' first") from None
 
     def on_surface(self, point: LandmarkPosition) -> LandmarkPosition:
         """The place of the surface that is nearest to a point, mm, scanner frame."""

@@ -110,7 +110,7 @@ def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None
     """
     planned = PlannedJob(job, workspace_of(job))
     is_whole, folders = folders is None, {} if folders is None else folders
-    known_steps: set[str] = set()
+    known_steps, taken_steps = set[str](), set[str]()
     for folder in job.folders:
         name = str(folder)
         try:
@@ -125,9 +125,11 @@ def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None
                 continue
             job.fetch(scan)
             steps = _all_steps(scan, planned)
+            part = job.selection.part_of(steps)
             if job.selection.names_steps:
                 known_steps.update(name for step in steps for name in names_of(step))
-            plan = planned.workspace.plan(job.selection.part_of(steps), job.selection.force)
+                taken_steps.update(name for step in part for name in names_of(step))
+            plan = planned.workspace.plan(part, job.selection.force)
         except RefusedInput as error:
             if name in folders or job.selection.takes_unreadable(folder):
                 planned.refused.append(Refused(name, folder.resolve(), error))
@@ -139,7 +141,7 @@ def plan_job(job: Job, *, reasons: bool = False, folders: dict[str, Path] | None
                 for p in plan.to_run
             ]
     if is_whole:
-        _check_selection(planned, known_steps)
+        _check_selection(planned, known_steps, taken_steps)
     return planned
 
 
@@ -177,7 +179,7 @@ def _read_scan(folder: Path, archive: Path | None, workspace: Workspace) -> Reco
     return replace(scan, frames=workspace.frames / scan.document.patient / scan.document.scan)
 
 
-def _check_selection(planned: PlannedJob, known_steps: set[str]) -> None:
+def _check_selection(planned: PlannedJob, known_steps: set[str], taken_steps: set[str]) -> None:
     """Raise RefusedInput if the job selects scans or steps that do not exist."""
     selection = planned.job.selection
     names = [scan.scan.name for scan in planned.scans] + [scan.name for scan in planned.left_out]
@@ -185,10 +187,11 @@ def _check_selection(planned: PlannedJob, known_steps: set[str]) -> None:
     for pattern in selection.only:
         if not any(Selection(only=(pattern,)).matches(name) for name in names):
             raise RefusedInput(
-                "--only", f"no scan matches {pattern[:80]!r}, expected patient/scan, for example P0042/*"
+                "--only",
+                f"no scan matches {pattern[:80]!r}, expected patient/scan, for example {min(names, default='P0042/*')}",
             )
     if known_steps:
-        selection.check_steps(known_steps)
+        selection.check_steps(known_steps, taken_steps)
 
 
 def _frame_bytes(step: Step) -> int:

@@ -1,6 +1,7 @@
 """A part of an archive: which scans a run takes, how far it goes, and which steps it runs in any case."""
 
 import datetime
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -53,8 +54,10 @@ class Selection:
             return list(steps)
         return steps_to(steps, [step.name for step in steps if is_named(step, self.until)])
 
-    def check_steps(self, known: Collection[str]) -> None:
-        """Refuse a name of a step that is in no graph; `known` holds all names, of kinds and with cameras.
+    def check_steps(self, known: Collection[str], taken: Collection[str]) -> None:
+        """Refuse a name of a step that is in no graph, or that a run does not reach.
+
+        `known` holds the names of all steps, of kinds and with cameras, `taken` those of the steps up to `until`.
 
         Raises
         ------
@@ -64,8 +67,12 @@ class Selection:
         for option, names in (("--until", [self.until] if self.until else []), ("--force", self.force)):
             for name in names:
                 if name not in known:
-                    kinds = ", ".join(sorted(known, key=lambda one: (one[-1].isdigit(), one))[:30])
-                    raise RefusedInput(option, f"no such step, expected one of {kinds}, found {name[:80]!r}")
+                    kinds = ", ".join(sorted(one for one in known if not re.search(r"-\d+$", one)))
+                    expected = f"expected one of {kinds}; one camera's as extract-3"
+                    raise RefusedInput(option, f"no such step, {expected}, found {name[:80]!r}")
+        for name in self.force:
+            if name not in taken:
+                raise RefusedInput("--force", f"{name} comes after {self.until}, at which --until ends the run")
 
 
 def _matches(name: str, pattern: str) -> bool:

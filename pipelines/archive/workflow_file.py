@@ -64,6 +64,8 @@ def workflow_mistakes(path: Path) -> list[PlacedMistake]:
 
 
 def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
+    if not path.exists():
+        raise RefusedInput(path, "no such file, expected a workflow, which 'footscan init' writes")
     text = read_text(path, "yaml_bytes")
     value = read_yaml_text(path, text)
     if not isinstance(value, dict):

@@ -89,10 +89,9 @@ def editing_routes(editor_of: Callable[[str, str], ScanEditor]) -> list[Route]:
 
 def _page(editor: ScanEditor) -> Response:
     scan = editor.scan
-    made = editing_page(
-        scan.name, scan.document.posture, editor.mesh, editor.measures(), editor.decisions, getpass.getuser()
-    )
-    return HTMLResponse(made)
+    exports, by = editor.job.wanted.exports, getpass.getuser()
+    mesh, measures = editor.mesh, editor.measures()
+    return HTMLResponse(editing_page(scan.name, scan.document.posture, mesh, measures, editor.decisions, by, exports))
 
 
 def _try(body: bytes, editor: ScanEditor) -> Response:
@@ -116,6 +115,7 @@ def _compared(name: str, saved: Measures, now: Measures) -> dict[str, str]:
         assert measure.value is not None
         assert before.value is not None
         change = f"{measure.value - before.value:+.{decimals + 1}f}"
+        change = change if float(change) else ""
     return {
         "label": words(name),
         "now": shown,

@@ -99,7 +99,7 @@ def find_scans(archive: Path, films: FilmPattern, backgrounds: FilmPattern | Non
             scan = scans.setdefault((found.patient, found.scan), found)
             _note(scan.films, int(fields["camera"]), archive / path, scan)
     if not scans:
-        examples = ", ".join(path for path in paths if path.endswith((".avi", ".AVI")))[:200] or "no films"
+        examples = ", ".join([path for path in paths if path.lower().endswith(".avi")][:SHOWN]) or "no films"
         raise RefusedInput("--films", f"no path in {archive} fits {films.text!r}; found {examples}")
     for path in paths if backgrounds is not None else ():
         assert backgrounds is not None

@@ -52,11 +52,12 @@ class Condition(NamedTuple):
         >>> Condition.parse("side=left", ResultsTable(["side"], {}, []))
         Condition(column='side', operator='=', value='left')
         """
-        match = re.fullmatch(r"\s*([A-Za-z0-9_.]+)\s*(>=|<=|!=|=|>|<|~)\s*(.*?)\s*", text)
+        match = re.fullmatch(r"\s*([A-Za-z0-9_.]+)\s*(>=|<=|!=|==?|>|<|~)\s*(.*?)\s*", text)
         if match is None:
             expected = "expected a column, one of = != < <= > >= ~ and a value, such as foot_length_mm>=260"
             raise RefusedInput("--where", f"{expected}, found {text[:80]!r}")
         column, operator, value = match.groups()
+        operator = "=" if operator == "==" else operator
         column = known_column(column, table, "--where")
         if column in table.units and operator != "~" and value and not _is_number(value):
             raise RefusedInput("--where", f"{column} holds numbers, expected one, found {value[:40]!r}")
@@ -80,10 +81,11 @@ class Statistics(NamedTuple):
     number: int
     left_out: int
     """Values that are not `ok`, and take no part."""
-    mean: float
+    mean: float | None
+    """None where no value takes part, as are the percentiles."""
     sd: float | None
     """Of the sample; None for a single value."""
-    percentiles: tuple[float, ...]
+    percentiles: tuple[float | None, ...]
     """At `PERCENTILES`, interpolated linearly."""
 
 
@@ -174,12 +176,14 @@ def statistics(
         for measure in measures:
             with_value = [row for row in rows if isinstance(row.get(measure), int | float)]
             used = [row for row in with_value if with_uncertain or is_trusted(row, measure, table)]
+            left_out = len(with_value) - len(used)
             if not used:
+                if with_value:
+                    found.append(Statistics(key, measure, 0, left_out, None, None, (None,) * len(PERCENTILES)))
                 continue
             values = np.array([row[measure] for row in used], np.float64)
             sd = float(values.std(ddof=1)) if len(values) > 1 else None
             percentiles = tuple(float(value) for value in np.percentile(values, PERCENTILES))
-            left_out = len(with_value) - len(used)
             found.append(Statistics(key, measure, len(used), left_out, float(values.mean()), sd, percentiles))
     return found
 

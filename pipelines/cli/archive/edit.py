@@ -42,7 +42,7 @@ def edit(
     secret = secrets.token_urlsafe(32) if token or not is_loopback(host) else None
     one = job_of_one(scan, Chosen(), workflow, calibration, out)
     editor = ScanEditor(one if out is not None else Chosen().job(workflow), one.folders[0])
-    editor.measures()
+    assert len(editor.mesh.faces), "a scan with measures has a surface"
     with listen(host, port) as socket:
         shown = f"[{host}]" if ":" in host else host
         print_line(f"http://{shown}:{socket.getsockname()[1]}/{f'?token={secret}' if secret else ''}")

@@ -13,6 +13,9 @@ from schemas.base.errors import RefusedInput
 if TYPE_CHECKING:
     from pipelines.init.survey import Survey
 
+SHOWN = 5
+"""Scans whose names are printed, so that one sees what a pattern made of the paths."""
+
 
 def init(
     archive: Annotated[Path, typer.Argument(help="Folder with scans or films, at any depth.")],
@@ -80,12 +83,20 @@ def _describe_films(archive: Path, films: str, backgrounds: str | None, step_mm:
         raise RefusedInput("--step-mm", "is missing, expected the travel from one frame to the next, in mm")
     scans = find_scans(archive, pattern, dark)
     written = write_scans(archive, scans, Travel(start_mm=start_mm, step_mm=step_mm))
+    for scan in scans[:SHOWN]:
+        note(f"{scan.patient}/{scan.scan}: {len(scan.films)} films, such as {next(iter(scan.films.values()))}")
+    if scans[SHOWN:]:
+        note(f"and {len(scans) - SHOWN} more")
     note(f"{archive}: {len(written)} scan.yaml written, {len(scans) - len(written)} were there")
 
 
 def _print(found: "Survey", out: Path, calibrations: list[str]) -> None:
     days = "" if found.first is None else f", from {found.first} to {found.last}"
-    print_line(f"{out}: {found.scans} scans of {found.patients} patients, up to {found.cameras} cameras{days}")
+    scans, patients = (
+        f"{found.scans} scan{'s' * (found.scans != 1)}",
+        f"{found.patients} patient{'s' * (found.patients != 1)}",
+    )
+    print_line(f"{out}: {scans} of {patients}, up to {found.cameras} cameras{days}")
     if found.with_calibration < found.scans:
         missing = found.scans - found.with_calibration
         if not calibrations:

@@ -85,7 +85,8 @@ def _print_summary(planned: "PlannedJob") -> None:
         unknown = [one.kind for one in lines if one.seconds is None]
         print_line(text + (f"; without {', '.join(dict.fromkeys(unknown))}, which never ran here" if unknown else ""))
     elif lines:
-        print_line("no such step ever ran here: time and bytes are not known")
+        frames = "" if size is None else f"; frames of {size / 1e6:.1f} MB"
+        print_line(f"no such step ever ran here: its time and the size of its result are not known{frames}")
 
 
 def _json(planned: "PlannedJob", *, with_summary: bool) -> dict[str, object]:

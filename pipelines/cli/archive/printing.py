@@ -22,6 +22,8 @@ def steps_to_run(planned: "PlannedJob") -> str:
 def print_left_out(planned: "PlannedJob") -> None:
     """Print how many scans have no day, which `--since` leaves out."""
     selection = planned.job.selection
+    if not planned.scans and not planned.refused and planned.left_out:
+        message(f"no scan is taken: {len(planned.left_out)} are left out by --only, --since or the profile")
     undated = [s for s in planned.left_out if s.document.day is None and selection.matches(s.name)]
     if selection.since is not None and undated:
         message(

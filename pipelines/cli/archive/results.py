@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.cli.archive.selecting import WORKFLOW, WorkflowFile
-from pipelines.cli.terminal.output import AsJson, figure, note, print_json, print_line, print_table
+from pipelines.cli.terminal.output import AsJson, figure, note, print_json, print_table
 from schemas.base.errors import RefusedInput
 
 if TYPE_CHECKING:
@@ -18,8 +18,10 @@ SHOWN = ("scan", "status", "side", "date", "foot_length_mm", "foot_breadth_mm", 
 """Columns that are printed unless others are named."""
 SUMMED_UP = SHOWN[4:]
 """Measures of which statistics are printed unless others are named."""
-MARKS = {"ok": "", "uncertain": " ?", "incomplete": " -"}
+MARKS = {"uncertain": " ?"}
 """What follows a value of each status."""
+MOST_COLUMNS = 10
+"""Columns of a printed table; of more, each scan has a table of its own."""
 
 
 def results(
@@ -79,12 +81,24 @@ def results(
         return
     if page is not None or out is not None:
         return
-    shown = list(whole.columns) if columns == "all" else named or [name for name in SHOWN if name in whole.columns]
+    shown = list(whole.columns) if columns == "all" else named or _usual(table)
     if as_json:
         print_json([{name: row.get(name) for name in shown} for row in table.rows])
         return
-    print_table("", shown, [[_cell(row, name, table) for name in shown] for row in table.rows])
-    print_line(f"{len(table.rows)} of {len(whole.rows)} scans; ? is uncertain, see its warnings")
+    cells = [[_cell(row, name, table) for name in shown] for row in table.rows]
+    if len(shown) > MOST_COLUMNS:
+        for row in cells:
+            print_table("", ["column", "value"], list(zip(shown, row, strict=True)))
+    else:
+        print_table("", shown, cells)
+    mark = "; ? is uncertain, see its warnings" if any(cell.endswith(" ?") for row in cells for cell in row) else ""
+    note(f"{len(table.rows)} of {len(whole.rows)} scans{mark}")
+
+
+def _usual(table: "ResultsTable") -> list[str]:
+    """The columns that are printed unless others are named; with the problems of scans that failed."""
+    failed = any(row.get("problem") is not None for row in table.rows)
+    return [name for name in (*SHOWN, *(["problem"] if failed else [])) if name in table.columns]
 
 
 def _results_of(workflow: Path | None) -> Path:
@@ -103,7 +117,7 @@ def _cell(row: "dict[str, Cell]", name: str, table: "ResultsTable") -> str:
 
     cell = row.get(name)
     if cell is None:
-        return ""
+        return "-" if row.get(f"{stem_of(name, table)}{STATUS}") == "incomplete" and name in table.units else ""
     mark = MARKS.get(str(row.get(f"{stem_of(name, table)}{STATUS}", "ok")), "") if name in table.units else ""
     return (f"{cell:.1f}" if isinstance(cell, float) and table.units.get(name) != "1" else str(cell)) + mark
 
@@ -137,7 +151,7 @@ def _print_statistics(found: "Sequence[Statistics]", groups: Sequence[str], as_j
         for one in found
     ]
     print_table("", [*groups, "measure", "n", "left out", "mean", "sd", *percentiles], rows)
-    print_line("left out: values that are not ok; --with-uncertain takes them")
+    note("left out: values that are not ok; --with-uncertain takes them")
 
 
 def _write_rows(table: "ResultsTable", named: list[str] | None, out: Path) -> None:
@@ -148,7 +162,7 @@ def _write_rows(table: "ResultsTable", named: list[str] | None, out: Path) -> No
         raise RefusedInput(out, f"expected a name that ends in .csv or .parquet, found {out.suffix!r}")
     columns = named or [name for name in table.columns if name != "age_group"]
     write_atomically(out, table_bytes(columns, table.rows, out.suffix))
-    note(f"{out}: {len(table.rows)} rows")
+    note(f"{out}: {len(table.rows)} row{'s' * (len(table.rows) != 1)}")
 
 
 def _write_page(table: "ResultsTable", results_folder: Path, page: Path, named: list[str] | None) -> None:
@@ -159,4 +173,4 @@ def _write_page(table: "ResultsTable", results_folder: Path, page: Path, named: 
         raise RefusedInput("--page", f"expected a name that ends in .html, found {page.name!r}")
     first = [name for name in named or SUMMED_UP if name in table.units]
     write_atomically(page, points_page(table, results_folder, page, first).encode())
-    note(f"{page}: {len(table.rows)} scans")
+    note(f"{page}: {len(table.rows)} scan{'s' * (len(table.rows) != 1)}")

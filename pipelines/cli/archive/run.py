@@ -108,6 +108,7 @@ def run(
         planned, ends = _run(job, pool, log, as_json=as_json, profile=profiled)
     if page is not None and profiled is not None:
         profiled.write(page)
+        note(f"{page}: which step ran when and where")
     if scan is not None:
         return _status(ends, single=True)
     written = 0 if job.selection.until is not None else _write_table(ends, _not_run(planned), job)

@@ -70,7 +70,7 @@ class Chosen:
         try:
             given = selection_of(self.only or (), self.since, self.until, self.force or ())
         except ValueError as error:
-            raise RefusedInput("--since", str(error)) from None
+            raise RefusedInput("--since", f"{error}, found {str(self.since)[:40]!r}") from None
         own = job.selection
         selection = replace(
             own,

@@ -9,6 +9,9 @@ from typer.core import TyperCommand, TyperGroup
 
 from pipelines.cli.terminal.output import be_quiet, print_line
 
+SERVERS = ("console", "edit")
+"""Commands that serve a page until Ctrl-C, which is no interruption."""
+
 
 def print_version(is_asked: bool) -> None:
     """Print name and version, and end."""
@@ -30,9 +33,10 @@ def with_norms(command: Any, status_1: Mapping[str, str], path: tuple[str, ...] 
     elif isinstance(command, TyperCommand):
         command.params.append(_quiet_option())
         failed = status_1.get(" ".join(path))
+        done, ended = ("0 ended by Ctrl-C", "") if path[-1] in SERVERS else ("0 done", "; 130 ended by Ctrl-C")
         command.epilog = (
-            f"Exit status: 0 done; {f'1 {failed}; ' if failed else ''}2 wrong use or refused input; "
-            "3 fault of the machine; 130 ended by Ctrl-C."
+            f"Exit status: {done}; {f'1 {failed}; ' if failed else ''}2 wrong use or refused input; "
+            f"3 fault of the machine{ended}."
         )
     return command
 

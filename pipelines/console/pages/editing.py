@@ -1,6 +1,6 @@
 """The page on which a person moves landmarks and makes choices for a scan."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import get_args
 
 import numpy as np
@@ -23,7 +23,15 @@ Floats = NDArray[np.float64]
 METHODS = {"geometric": "found by its definition", "fallback": "placed by proportion", "manual": "set by a person"}
 
 
-def editing_page(name: str, posture: Posture, mesh: Mesh, measures: Measures, decisions: Decisions, by: str) -> str:
+def editing_page(
+    name: str,
+    posture: Posture,
+    mesh: Mesh,
+    measures: Measures,
+    decisions: Decisions,
+    by: str,
+    exports: Sequence[ExportFormat] = (),
+) -> str:
     """Return the page of a scan.
 
     Parameters
@@ -33,13 +41,16 @@ def editing_page(name: str, posture: Posture, mesh: Mesh, measures: Measures, de
     mesh : mm, scanner frame
     measures : the delivered ones
     by : the name with which changes are signed
+    exports : formats that the workflow asks for anyway
     """
     seen = upright(mesh.vertices, measures.transform)
     landmarks = {words(one): landmark_place(measures, one) for one in measures.landmarks}
     canvas = viewer(seen, mesh.faces, [Colouring("", filled_colours(mesh.vertices, mesh.filled, None))], {}, landmarks)
     canvas = canvas.replace('<canvas id="canvas"', '<canvas id="canvas" data-movable=""', 1)
     canvas = canvas.replace('<input id="landmarks" type="checkbox">', '<input id="landmarks" type="checkbox" checked>')
-    listed = f"{_saving(by)}{_landmarks(measures, decisions)}{_choices(posture, decisions)}{_measures(measures)}"
+    listed = (
+        f"{_saving(by)}{_landmarks(measures, decisions)}{_choices(posture, decisions, exports)}{_measures(measures)}"
+    )
     return _PAGE.format(
         title=text(name),
         parts="\n".join(
@@ -83,12 +94,12 @@ def _landmarks(measures: Measures, decisions: Decisions) -> str:
     return f"<details open><summary>Landmarks</summary>{hint}{listed}</details>"
 
 
-def _choices(posture: Posture, decisions: Decisions) -> str:
+def _choices(posture: Posture, decisions: Decisions, of_workflow: Sequence[ExportFormat]) -> str:
     choices = decisions.choices
     selects: Mapping[str, tuple[str, tuple[str, ...], str | None, str]] = {
-        "axis": ("Axis of the foot", get_args(Axis), choices.axis, "toe2"),
+        "axis": ("Axis of the foot", get_args(Axis), choices.axis, "usual: toe2"),
         "posture": ("Posture and load", get_args(Posture), choices.posture, f"as recorded: {words(posture).lower()}"),
-        "people": ("Sizes for", get_args(People), choices.people, "all"),
+        "people": ("Sizes for", get_args(People), choices.people, "everybody"),
     }
     fields = "".join(
         f'<label>{label} <select id="{name}"><option value="">{text(usual)}</option>'
@@ -100,7 +111,7 @@ def _choices(posture: Posture, decisions: Decisions) -> str:
     )
     exports = "".join(
         f'<label><input type="checkbox" name="export" value="{one}"{" checked" if one in choices.exports else ""}> '
-        f".{one}</label>"
+        f".{one}{' (the workflow asks for it)' if one in of_workflow else ''}</label>"
         for one in get_args(ExportFormat)
     )
     return (

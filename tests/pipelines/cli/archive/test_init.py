@@ -44,9 +44,7 @@ PATTERN = "{patient}/{date}_{side}/kamera{camera}.avi"
 def test_from_films_to_the_table(films: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status, said, _ = initialised(capsys, films, "--films", PATTERN, "--step-mm", 10)
     assert status == 0
-    assert (
-        said.splitlines()[0] == "workflow.yaml: 2 scans of 1 patients, up to 2 cameras, from 2026-11-20 to 2026-11-20"
-    )
+    assert said.splitlines()[0] == "workflow.yaml: 2 scans of 1 patient, up to 2 cameras, from 2026-11-20 to 2026-11-20"
     document = yaml.safe_load((films / "Meier, A./20261120_R/scan.yaml").read_text())
     assert document == {
         "format": "footscan.scan/1", "patient": "Meier_A", "scan": "2026-11-20-R", "side": "right",
@@ -94,7 +92,7 @@ def test_scans_that_are_there(
     (archive.root / "archive/P0001/S2").mkdir()
     (archive.root / "archive/P0001/S2/scan.yaml").write_text("format: footscan.scan/1\n")
     status, said, problems = initialised(capsys, "archive", "--out", "new.yaml")
-    assert (status, said.splitlines()[0]) == (1, "new.yaml: 1 scans of 1 patients, up to 2 cameras")
+    assert (status, said.splitlines()[0]) == (1, "new.yaml: 1 scan of 1 patient, up to 2 cameras")
     assert "S2/scan.yaml: patient: is missing" in problems
     assert read_workflow(Path("new.yaml")).calibration == "calibration.json"
 
