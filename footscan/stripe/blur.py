@@ -5,7 +5,8 @@ does not reach has no stripe to compare the rim with. But the laser line is narr
 rim is wide, its place is uncertain (it follows the shading of the skin), and it is hardly redder than its surroundings.
 
 A white thing that saturates the sensor looks like the core of an over-exposed stripe. But a stripe has red flanks, at
-least where it is weaker.
+least where it is weaker. Where the room alone saturates the red of the skin, no stripe can be redder, and nothing is
+known of its colour.
 
 A lit ridge of warm skin is redder than its surroundings because it is brighter in all colours. The laser adds its own
 colour and hardly any other, unless it saturates the sensor.
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.stripe.clutter import FEWEST_FRAMES
-from footscan.stripe.crossings import BRIGHT, CROSSING_COLUMNS, RED
+from footscan.stripe.crossings import BRIGHT, CROSSING_COLUMNS, FOOT, RED
 from schemas.parameters.extraction import ExtractionParameters
 
 WIDTH, PEAK, SIGMA = (CROSSING_COLUMNS.index(name) for name in ("width", "peak", "sigma"))
@@ -28,6 +29,9 @@ RED_SHARE = 0.1
 """A piece is white if no more than this share of its crossings is redder than `red_threshold`. Chosen by hand. On films
 of a dozen drawn worlds, half of them in bright rooms, it cost less than 0.3 % of the stripe, except in two whose
 pictures were white all over (1.3 and 2 %)."""
+LEAST_ROOM = 0.5
+"""Share of the crossings of a piece beside which red is not saturated, from which its colour is judged: more than half.
+Chosen by hand, on the virtual scanner in a bright room, whose skin is saturated beside a third of the stripe."""
 PURITY_RANK, PURE, PURE_SHARE = 0.75, 0.5, 0.2
 """The purity of a crossing is the ratio of the grey levels by which it is redder than its surroundings to those by
 which it is brighter. It depends on the camera's white balance: in the dark, an automatic one makes the stripe itself
@@ -50,7 +54,7 @@ def is_laser_light(
 
     Parameters
     ----------
-    crossings : (N, 11) float64, the crossings of all `frames` frames, in the columns of `find_stripe`.
+    crossings : (N, 12) float64, the crossings of all `frames` frames, in the columns of `find_stripe`.
     piece : (N,) int32, the number of each crossing's piece in the film, from 0.
 
     Returns
@@ -64,7 +68,10 @@ def is_laser_light(
         blurred &= crossings[:, column] > parameters.largest_blur * np.median(crossings[:, column])
     points = np.bincount(piece)
     sharp = np.bincount(piece, blurred) <= BLURRED_SHARE * points
-    red = np.bincount(piece, crossings[:, RED] >= parameters.red_threshold) > RED_SHARE * points
+    has_room = crossings[:, FOOT] <= parameters.saturation - parameters.red_threshold
+    roomy = np.bincount(piece, has_room)
+    red = np.bincount(piece, has_room & (crossings[:, RED] >= parameters.red_threshold)) > RED_SHARE * roomy
+    red |= roomy <= LEAST_ROOM * points
     measured = crossings[:, PEAK] < parameters.saturation - SATURATES
     purity = crossings[:, RED] / np.maximum(crossings[:, BRIGHT], 1.0)
     usual = np.quantile(purity[measured], PURITY_RANK) if measured.any() else 0.0

@@ -20,11 +20,14 @@ from schemas.parameters.extraction import ExtractionParameters
 
 CROSSING_COLUMNS = ("i", "j", "width", "peak", "score", "saturation", "sigma")
 """The first columns of `find_stripe`, named as the fields of `STRIPE_DTYPE`."""
-PIECE, CHAIN, RED, BRIGHT = range(len(CROSSING_COLUMNS), len(CROSSING_COLUMNS) + 4)
+PIECE, CHAIN, RED, BRIGHT, FOOT = range(len(CROSSING_COLUMNS), len(CROSSING_COLUMNS) + 5)
 """The other columns of `find_stripe`: the numbers of the piece and of the chain, by how many grey levels the stripe
-is redder than its feet, and by how many it is brighter."""
-MEASURED = BRIGHT + 1
+is redder than its feet, by how many it is brighter, and the red of the darker one of the surroundings on both sides."""
+MEASURED = FOOT + 1
 """Number of columns of `find_stripe`."""
+BESIDE_WIDTHS = 1.5
+"""Distance from the centre at which the surroundings of a stripe are, in its widths: a Gaussian has faded there to
+0.2 %."""
 
 
 def find_stripe(
@@ -40,8 +43,8 @@ def find_stripe(
 
     Returns
     -------
-    (N, 11) float64, one crossing a row, in the columns of `CROSSING_COLUMNS`, `PIECE`, `CHAIN`, `RED` and `BRIGHT`.
-    Crossings of one chain follow each other along the stripe; chains of one piece lie close to each other.
+    (N, 12) float64, one crossing a row, in the columns of `CROSSING_COLUMNS`, `PIECE`, `CHAIN`, `RED`, `BRIGHT` and
+    `FOOT`. Crossings of one chain follow each other along the stripe; chains of one piece lie close to each other.
     """
     rows, columns, _ = image.shape
     if rows == 0 or columns == 0:
@@ -157,7 +160,7 @@ def _along(
     gap: float,
     smoothing_widths: float,
 ) -> NDArray[np.float64]:
-    """Order the profiles along the stripe and smooth their centres; (N, 11), see `find_stripe`."""
+    """Order the profiles along the stripe and smooth their centres; (N, 12), see `find_stripe`."""
     rows, columns = words.shape
     nearest = neighbours(profiles, gap, place(profiles, rows, columns))
     order, chain = in_order(profiles, nearest)
@@ -176,7 +179,7 @@ def _rows(
     chain: NDArray[np.int32],
     faintest: float,
 ) -> NDArray[np.float64]:
-    """(N, 11): the columns of `CROSSING_COLUMNS`, `PIECE`, `CHAIN`, `RED` and `BRIGHT`."""
+    """(N, 12): the columns of `CROSSING_COLUMNS`, `PIECE`, `CHAIN`, `RED`, `BRIGHT` and `FOOT`."""
     crossings = np.empty((len(profiles), MEASURED))
     rows, columns = words.shape
     for a in range(len(profiles)):
@@ -193,4 +196,11 @@ def _rows(
         crossings[a, CHAIN] = chain[a]
         crossings[a, RED] = profiles[a, REDNESS]
         crossings[a, BRIGHT] = profiles[a, CONTRAST] / SIGNAL_SCALE
+        beside = BESIDE_WIDTHS * profiles[a, WIDTH]
+        foot = 255
+        for side in (-beside, beside):
+            row = min(max(round(j + side * profiles[a, NORMAL_J]), 0), rows - 1)
+            column = min(max(round(i + side * profiles[a, NORMAL_I]), 0), columns - 1)
+            foot = min(foot, red_of(words[row, column]))
+        crossings[a, FOOT] = foot
     return crossings

@@ -63,7 +63,7 @@ def as_points(crossings: NDArray[np.float64], frame: NDArray[np.int32]) -> Strip
 
     Parameters
     ----------
-    crossings : (N, 11) float64, of one frame or several, in the columns of `find_stripe`.
+    crossings : (N, 12) float64, of one frame or several, in the columns of `find_stripe`.
     frame : (N,) int32, the frame of each crossing, ascending.
 
     Returns

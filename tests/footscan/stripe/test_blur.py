@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from footscan.stripe.blur import PEAK, SIGMA, WIDTH, is_laser_light
-from footscan.stripe.crossings import BRIGHT, MEASURED, RED
+from footscan.stripe.crossings import BRIGHT, FOOT, MEASURED, RED
 from schemas.parameters.extraction import ExtractionParameters
 
 FRAMES = 100
@@ -13,11 +13,11 @@ HARDLY_RED = 26.0
 """Less than one and a half times the threshold."""
 
 
-def crossings(count, width, sigma, red, bright=None, peak=100.0):
+def crossings(count, width, sigma, red, bright=None, peak=100.0, foot=0.0):
     """`count` of them, all alike; as pure as the stripe of the film unless they say how bright they are."""
     bright = red / 1.5 if bright is None else bright
     alike = np.zeros((count, MEASURED))
-    alike[:, [WIDTH, SIGMA, RED, BRIGHT, PEAK]] = width, sigma, red, bright, peak
+    alike[:, [WIDTH, SIGMA, RED, BRIGHT, PEAK, FOOT]] = width, sigma, red, bright, peak, foot
     return alike
 
 
@@ -54,6 +54,19 @@ def test_a_piece_goes_by_most_of_its_crossings():
     rim, line = (crossings(count, *like) for count, like in ((3, (9.0, 0.1, 20.0)), (3, (4.0, 0.04, 60.0))))
     assert kept(np.concatenate([rim, line])) == [True]
     assert kept(np.concatenate([rim, line[:2]])) == [False]
+
+
+@pytest.mark.parametrize(("foot", "is_kept"), [(0.0, False), (255.0 - 18.0, False), (255.0 - 17.0, True)])
+def test_a_stripe_on_skin_that_saturates_the_red_is_white(foot, is_kept):
+    """A white thing beside which red has room is none of the laser's; where it has none, nobody can tell."""
+    assert kept(crossings(8, 4.0, 0.04, 1.0, 15.0, 255.0, foot), saturation=255) == [is_kept]
+
+
+def test_the_colour_is_judged_where_red_has_room():
+    white, red = (crossings(count, 4.0, 0.04, *like) for count, like in ((5, (1.0, 15.0, 255.0, 250.0)), (5, (40.0,))))
+    assert kept(np.concatenate([white, red]), saturation=255) == [True]
+    dark = crossings(6, 4.0, 0.04, 1.0, 15.0, 255.0, 20.0)
+    assert kept(np.concatenate([white, dark]), saturation=255) == [False]
 
 
 def test_each_piece_is_held_against_the_whole_film():
