@@ -143,8 +143,13 @@ def _uncertain(measures: Measures) -> Iterator[str]:
 
 
 def _named(notes: dict[str, str | None]) -> str:
-    """The first names of measures, how many there are more, and the reasons."""
-    reasons = sorted({reason for note in notes.values() if note for reason in note.split("; ")})
-    named = ", ".join(words(name) for name in list(notes)[:MOST_MEASURES])
+    """The first names of measures, those of one reason together with it, and how many there are more."""
+    alike: dict[str, list[str]] = {}
+    for name in list(notes)[:MOST_MEASURES]:
+        alike.setdefault(notes[name] or "", []).append(words(name))
     more = f" and {len(notes) - MOST_MEASURES} more" if len(notes) > MOST_MEASURES else ""
-    return f"{named}{more}" + (f": {'; '.join(reasons[:MOST_MEASURES])}" if reasons else "")
+    if len(alike) == 1:
+        [(reason, names)] = alike.items()
+        return f"{', '.join(names)}{more}" + (f": {reason}" if reason else "")
+    parts = [", ".join(names) + (f" ({reason})" if reason else "") for reason, names in alike.items()]
+    return f"{'; '.join(parts)}{more}"

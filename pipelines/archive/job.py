@@ -74,7 +74,7 @@ def job_of_workflow(
     """
     workflow = read_workflow(path)
     check_archives(path, workflow)
-    options = _profile(path, workflow, profile)
+    options = profile_of(path, workflow, profile)
     base = path.resolve().parent
     results = base / workflow.results
     fetched = tuple(FetchedArchive(place, results / CACHE) for place in workflow.archive if is_url(place))
@@ -93,7 +93,7 @@ def job_of_workflow(
         calibration_wins=False,
         results=results,
         cache=_cache(path, workflow.cache) or results / CACHE,
-        parameters=_parameters(workflow.parameters, options.parameters),
+        parameters=overlaid_parameters(workflow.parameters, options.parameters),
         threads=threads or options.workers or workflow.workers or cores(),
         group=None if workflow.group is None else group_number(workflow.group, path),
         wanted=Wanted(tuple(workflow.exports), None if workflow.size_table is None else base / workflow.size_table),
@@ -118,8 +118,14 @@ def job_of_scan(folder: Path, calibration: Path | None, results: Path, threads: 
     )
 
 
-def _profile(path: Path, workflow: Workflow, name: str | None) -> Profile:
-    """A profile of the workflow; without a name one that changes nothing."""
+def profile_of(path: Path, workflow: Workflow, name: str | None) -> Profile:
+    """A profile of the workflow in `path`; without a name one that changes nothing.
+
+    Raises
+    ------
+    RefusedInput
+        The workflow has no profile of this name.
+    """
     if name is None:
         return Profile()
     if name not in workflow.profiles:
@@ -129,7 +135,7 @@ def _profile(path: Path, workflow: Workflow, name: str | None) -> Profile:
     return workflow.profiles[name]
 
 
-def _parameters(below: ScanParameters, above: ScanParameters) -> ScanParameters:
+def overlaid_parameters(below: ScanParameters, above: ScanParameters) -> ScanParameters:
     """Those of a workflow, with those in their place that a profile sets."""
     if not above.model_fields_set:
         return below

@@ -60,7 +60,8 @@ def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator
     """Run the steps of a planned job that are not hits, and deliver the results; yields the end of each scan."""
     fail_fast = planned.job.fail_fast
     for name, folder, error in planned.refused:
-        yield ScanEnd(name, folder, None, str(error), "refused", parameters_sha256=planned.parameters_sha256)
+        earlier = "" if Path(name).is_absolute() else older_results(planned.job.results / name)
+        yield ScanEnd(name, folder, None, f"{error}{earlier}", "refused", parameters_sha256=planned.parameters_sha256)
         if fail_fast:
             return
     # What is known to fail comes first where that ends the run.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from pipelines.cli.archive.selecting import WORKFLOW, Settings, WorkflowFile
+from pipelines.cli.archive.selecting import WORKFLOW, ProfileName, Settings, WorkflowFile
 from pipelines.cli.terminal.output import AsJson, print_json, print_line, print_table
 from schemas.base.errors import RefusedInput
 
@@ -17,19 +17,32 @@ config = typer.Typer(help="Check a workflow and show its parameters.", no_args_i
 
 
 @config.command("show")
-def show(workflow: WorkflowFile = None, settings: Settings = None, as_json: AsJson = False) -> None:
-    """Show every value in force and its origin: a line of the file, --set, or the default."""
+def show(
+    workflow: WorkflowFile = None, profile: ProfileName = None, settings: Settings = None, as_json: AsJson = False
+) -> None:
+    """Show every value in force and its origin: a line of the file, a profile, --set, or the default."""
+    from pipelines.archive.job import overlaid_parameters, profile_of
     from pipelines.archive.settings import changed_parameters, set_names
     from pipelines.archive.workflow_file import read_workflow
     from schemas.base.json_files import read_text
 
     path = workflow or WORKFLOW
     document, text = read_workflow(path), read_text(path, "yaml_bytes")
-    changed, given = changed_parameters(document.parameters, settings or []), set_names(settings or [])
+    options = profile_of(path, document, profile)
+    below = overlaid_parameters(document.parameters, options.parameters)
+    changed, given = changed_parameters(below, settings or []), set_names(settings or [])
+    sections = options.parameters.model_dump(exclude_unset=True)
+    of_profile = {f"{section}.{name}" for section, values in sections.items() for name in values}
     rows = []
     for names, value in _values(document.model_copy(update={"parameters": changed})):
         name = ".".join(names)
-        origin = "--set" if name.removeprefix("parameters.") in given else _origin(document, names, text, path)
+        parameter = name.removeprefix("parameters.")
+        if parameter in given:
+            origin = "--set"
+        elif parameter in of_profile and name != parameter:
+            origin = f"profile {profile}"
+        else:
+            origin = _origin(document, names, text, path)
         rows.append((name, value, origin))
     if as_json:
         print_json([{"name": name, "value": value, "from": origin} for name, value, origin in rows])

@@ -132,6 +132,9 @@ def test_uncertain_measures_are_named_unless_all_are_for_one_reason() -> None:
         "Uncertain: Foot breadth, Ball girth: ball by a fallback. Do not rely on them alone, or set the landmarks by "
         "hand (footscan edit)."
     )
+    measures["measures"]["ball_girth"]["note"] = "tilted by 9 degrees"
+    [line] = told(measures, quality_of())
+    assert line.startswith("Uncertain: Foot breadth (ball by a fallback); Ball girth (tilted by 9 degrees). Do not")
     for measure in measures["measures"].values():
         measure |= {"status": "uncertain", "note": "a hand at the heel"}
     [line] = told(measures | {"things": ["a hand at the heel"]}, quality_of())

@@ -187,6 +187,7 @@ def test_scan_without_calibration_is_refused(done: Any) -> None:
     [scan], _ = done.run()
     assert scan.problem == (
         f"{done.scan / 'scan.yaml'}: calibration: names no calibration, expected one here or in the workflow"
+        f" ({done.results} still holds the results of an earlier run)"
     )
 
 
@@ -206,7 +207,8 @@ def test_calibration_without_a_camera_is_refused(done: Any, calibration: Callabl
     path = done.root / "calibration.json"
     path.write_text(complete.model_copy(update={"cameras": [complete.camera(1)]}).model_dump_json())
     [scan], _ = done.run()
-    assert scan.problem == f"{path}: cameras: has no camera 5, expected one of 1"
+    earlier = f" ({done.results} still holds the results of an earlier run)"
+    assert scan.problem == f"{path}: cameras: has no camera 5, expected one of 1{earlier}"
 
 
 def test_one_scan_without_a_workflow(done: Any, tmp_path: Path) -> None:

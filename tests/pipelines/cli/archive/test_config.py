@@ -178,3 +178,14 @@ def test_every_value_says_where_it_is_from(capsys: pytest.CaptureFixture[str]) -
 def test_wrong_settings(capsys: pytest.CaptureFixture[str], setting: str, expected: str) -> None:
     assert run_command(["config", "show", "--set", setting]) == 2
     assert expected in capsys.readouterr().err
+
+
+def test_a_profile_is_an_origin(workflow: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    profile = "profiles: {night: {parameters: {extraction: {gap_px: 4.5}, surface: {grid_steps: 0.7}}}}"
+    workflow.write_text(f"{RIGHT}{profile}\n")
+    asked = ["config", "show", "--json", "--profile", "night", "--set", "surface.grid_steps=0.8"]
+    assert run_command(asked) == 0
+    values = {value["name"]: (value["value"], value["from"]) for value in json.loads(capsys.readouterr().out)}
+    assert values["parameters.extraction.gap_px"] == (4.5, "profile night")
+    assert values["parameters.surface.grid_steps"] == (0.8, "--set")
+    assert values["parameters.extraction.red_threshold"][1] == "workflow.yaml:7"
