@@ -55,6 +55,10 @@ class ScanEnd:
 class _FirstFailure(Exception):
     """A step has failed, and its run shall end."""
 
+    def __init__(self, scan: str, failure: Failure) -> None:
+        super().__init__(failure.problem)
+        self.scan, self.failure = scan, failure
+
 
 def run_job(planned: PlannedJob, pool: Pool, on_step_end: OnStepEnd) -> Iterator[ScanEnd]:
     """Run the steps of a planned job that are not hits, and deliver the results; yields the end of each scan."""
@@ -110,12 +114,12 @@ def _run_window(
         early.on_step_end(end)
         on_step_end(end)
         if fail_fast and isinstance(end.outcome, Failure) and end.outcome.kind != "damaged":
-            raise _FirstFailure
+            raise _FirstFailure(end.step.scan, end.outcome)
 
     try:
         outcomes = planned.workspace.run(steps, pool, on_end, forced)
-    except _FirstFailure:
-        yield from _ended_before(window, planned)
+    except _FirstFailure as first:
+        yield from _ended_before(first, window, planned)
         return
     for scan in window:
         end = _end_scan(scan, outcomes, planned)
@@ -126,17 +130,15 @@ def _run_window(
         yield end
 
 
-def _ended_before(window: Sequence[PlannedScan], planned: PlannedJob) -> Iterator[ScanEnd]:
-    """The ends of those scans of an interrupted run that are complete, then of those that have failed."""
-    failed = []
+def _ended_before(first: _FirstFailure, window: Sequence[PlannedScan], planned: PlannedJob) -> Iterator[ScanEnd]:
+    """The ends of those scans that were complete at the first failure, then of the scan that has failed."""
+    failed = next((scan for scan in window if scan.scan.name == first.scan), window[-1])
     for scan in window:
-        outcomes = {one.step.name: one.outcome for one in planned.workspace.plan(draw_steps(scan.scan, planned)).steps}
-        known = {name: outcome for name, outcome in outcomes.items() if outcome is not None}
-        if any(isinstance(outcome, Failure) for outcome in known.values()):
-            failed.append(_end_scan(scan, known, planned))
-        elif len(known) == len(outcomes):
-            yield _end_scan(scan, known, planned)
-    yield from failed
+        plan = planned.workspace.plan(draw_steps(scan.scan, planned))
+        outcomes = {one.step.name: one.outcome for one in plan.steps if isinstance(one.outcome, Success)}
+        if scan is not failed and len(outcomes) == len(plan.steps):
+            yield _end_scan(scan, outcomes, planned)
+    yield _end_scan(failed, {f"{failed.scan.name}/": first.failure}, planned)
 
 
 def _target(scan: RecordedScan, planned: PlannedJob) -> Path:

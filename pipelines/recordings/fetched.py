@@ -5,6 +5,7 @@ it has changed in the store.
 """
 
 import json
+from bisect import bisect_left
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -41,6 +42,10 @@ class FetchedArchive:
     _root: str = field(init=False)
     _states: dict[str, str] = field(init=False, default_factory=dict)
     """State of each file in the store, by its path relative to the archive."""
+    _names: list[str] = field(init=False, default_factory=list, repr=False)
+    """These paths, in order."""
+    _notes: dict[str, str] = field(init=False, default_factory=dict, repr=False)
+    """States of the fetched files when they were fetched."""
 
     def __post_init__(self) -> None:
         """Open the store and list the archive."""
@@ -51,6 +56,8 @@ class FetchedArchive:
         except (ValueError, ImportError, OSError) as error:
             raise RefusedInput(self.url, f"cannot be opened ({one_line(str(error))[:120]})", field="archive") from None
         self._states = self._listed()
+        self._names = sorted(self._states)
+        self._notes = self._noted()
 
     @property
     def folder(self) -> Path:
@@ -59,8 +66,7 @@ class FetchedArchive:
 
     def fetch_documents(self) -> None:
         """Fetch all documents that are new or changed, and remove what is gone in the store."""
-        notes = self._noted()
-        for gone in notes.keys() - self._states.keys():
+        for gone in self._notes.keys() - self._states.keys():
             (self.folder / gone).unlink(missing_ok=True)
         self._fetch(name for name in self._states if not _is_of_film(name))
 
@@ -70,10 +76,17 @@ class FetchedArchive:
             film for camera in scan.document.cameras for film in (scan.film(camera), scan.background(camera)) if film
         ]
         roots = [film.relative_to(self.folder.resolve()).as_posix() for film in named]
-        self._fetch(name for name in self._states if any(name == root or name.startswith(f"{root}/") for root in roots))
+        self._fetch(name for root in roots for name in self._at(root))
+
+    def _at(self, root: str) -> list[str]:
+        """The files at a path or below it."""
+        if root in self._states:
+            return [root]
+        first, last = (bisect_left(self._names, f"{root}{end}") for end in "/0")  # 0 comes after /
+        return self._names[first:last]
 
     def _fetch(self, names: Iterable[str]) -> None:
-        notes = self._noted()
+        notes = self._notes
         stale = [name for name in names if notes.get(name) != self._states[name] or not (self.folder / name).exists()]
         for name in stale:
             try:
@@ -83,8 +96,8 @@ class FetchedArchive:
             write_atomically(self.folder / name, content)
             notes[name] = self._states[name]
         if stale or notes.keys() - self._states.keys():
-            kept = {name: state for name, state in notes.items() if name in self._states}
-            write_atomically(self.folder / NOTES, json.dumps(kept, sort_keys=True).encode())
+            self._notes = {name: state for name, state in notes.items() if name in self._states}
+            write_atomically(self.folder / NOTES, json.dumps(self._notes, sort_keys=True).encode())
 
     def _listed(self) -> dict[str, str]:
         try:

@@ -22,6 +22,7 @@ from pipelines.archive.summary import summary_of
 from pipelines.cli.archive.run import run as run_command
 from pipelines.cli.archive.selecting import Chosen
 from pipelines.engine.pool import StepEnd, Threads
+from pipelines.steps import surface
 from schemas.base.errors import RefusedInput
 from schemas.profile import first_day
 
@@ -219,6 +220,19 @@ def test_the_first_failure_ends_a_run(many: Path) -> None:
         end.scan: end.kind for end in run_job(plan_job(replace(job, fail_fast=False)), Threads(1), ended.append)
     }
     assert kept_going == {"P0001/S1": None, "P0001/S2": "refused", "P0002/S1": None, "P0002/S2": None}
+
+
+def test_a_fault_ends_a_run_as_well(many: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is not recorded, as a refusal is: the scan that it struck is named all the same."""
+
+    def full(*_: object) -> bytes:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(surface, "run", full)
+    ends = list(run_job(plan_job(replace(job_with(many, {}), fail_fast=True, threads=1)), Threads(1), lambda _: None))
+    assert [end.kind for end in ends] == ["fault"]
+    assert str(ends[0].problem).startswith(f"{ends[0].scan}/surface: ")
+    assert "No space left on device" in str(ends[0].problem)
 
 
 def test_a_part_of_the_steps_delivers_where_nothing_was(many: Path) -> None:
