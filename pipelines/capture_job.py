@@ -2,7 +2,7 @@
 
 import importlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import count
@@ -26,6 +26,7 @@ from pipelines.arrays import unpack
 from pipelines.calibrate import CaptureInputs, calibration_steps, camera_steps, fit_steps, recorded_inputs
 from pipelines.engine.actions.step import Failure, Outcome, Output, Step
 from pipelines.engine.pool import Threads
+from pipelines.engine.progress import OnProgress, unheard
 from pipelines.engine.run import content_of
 from pipelines.engine.store.store import Store
 from pipelines.engine.workspace import Workspace
@@ -35,11 +36,6 @@ from schemas.calibration import Calibration, CameraCalibration
 from schemas.parameters.calibration import CaptureCalibrationParameters
 
 Floats = NDArray[np.float64]
-OnProgress = Callable[[int, int], None]
-
-
-def unheard(done: int, total: int) -> None:
-    """Progress that nobody looks at."""
 
 
 @dataclass(frozen=True)

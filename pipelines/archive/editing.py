@@ -12,7 +12,6 @@ from typing import Annotated
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 from pydantic import Field
 
 from footscan.mesh.mesh import Mesh
@@ -25,7 +24,8 @@ from pipelines.archive.running import ScanEnd, run_job
 from pipelines.archive.selection import Selection
 from pipelines.archive.table import CSV, update_results_table
 from pipelines.arrays import unpack
-from pipelines.engine.actions.step import Output, Step, Success
+from pipelines.engine.actions.step import Step
+from pipelines.engine.audit import input_digests
 from pipelines.engine.files.atomic import write_atomically
 from pipelines.engine.pool import Threads
 from pipelines.engine.run import content_of
@@ -35,9 +35,8 @@ from schemas.base.model import Document, Posture, canonical_json
 from schemas.choices import Choices, Decided, ExportFormat
 from schemas.landmarks import LandmarkPosition, ManualLandmarks, Places
 from schemas.measures import Axis, Measures
+from schemas.parameters.foot import MeasureParameters
 from schemas.sizes import People
-
-Floats = NDArray[np.float64]
 
 MAY_RUN = {"measure", "sizes.json", "quality.json", "report", *EXPORTED.values()}
 """Steps that a decision may run again. If another one would run, the results are not those of the present films,
@@ -92,7 +91,7 @@ class ScanEditor:
     @cached_property
     def mesh(self) -> Mesh:
         """The surface, mm, scanner frame."""
-        arrays = unpack(self._inputs["surface"])
+        arrays = unpack(self._planned_measuring[1]["surface"])
         return Mesh(arrays["vertices"], arrays["faces"], filled=arrays.get("filled"))
 
     def measures(self) -> Measures:
@@ -104,20 +103,19 @@ class ScanEditor:
 
     def on_surface(self, point: LandmarkPosition) -> LandmarkPosition:
         """The place of the surface that is nearest to a point, mm, scanner frame."""
-        x, y, z = self._surface.nearest(np.array([point]))[0].round(3).tolist()
+        x, y, z = self._surface.nearest(np.array([point])).places[0].round(3).tolist()
         return x, y, z
 
     def tried(self, edit: Edit) -> Measures:
         """The measures with these landmarks and choices, by the step that a run executes; nothing is written."""
         points = {name: self.on_surface(point) for name, point in edit.landmarks.items()}
-        ManualLandmarks(format="footscan.landmarks/1", landmarks=Places(**points))
+        Places(**points)  # refuses a name that is none
         with self._lock:
-            step = self._measuring
+            step, inputs = self._planned_measuring
             posture = edit.posture or self.scan.document.posture
-            parameters = step.parameters.model_copy(update={"axis": edit.axis or "toe2", "posture": posture})  # type: ignore[union-attr]
-            inputs = {name: content for name, content in self._inputs.items() if name != "landmarks"}
+            parameters = MeasureParameters(side=self.scan.document.side, posture=posture, axis=edit.axis or "toe2")
             if points:
-                inputs["landmarks"] = canonical_json(points).encode()
+                inputs = {**inputs, "landmarks": canonical_json(points).encode()}
             places = {"landmarks": self.folder / LANDMARKS_FILE}
             measures = Measures.model_validate_json(
                 importlib.import_module(step.module).run(inputs, parameters, places)
@@ -179,8 +177,8 @@ class ScanEditor:
         return planned
 
     @cached_property
-    def _surface(self) -> "_Nearest":
-        return _Nearest(self.mesh)
+    def _surface(self) -> MeshSurface:
+        return MeshSurface((self.mesh.vertices, self.mesh.faces))
 
     @cached_property
     def _planned_measuring(self) -> tuple[Step, dict[str, bytes]]:
@@ -188,35 +186,14 @@ class ScanEditor:
         planned = self._planned()
         [found] = planned.scans
         plan = planned.workspace.plan(draw_steps(found.scan, planned))
-        outcomes = {one.step.name: one.outcome for one in plan.steps}
         [step] = [one.step for one in plan.steps if one.step.kind == "measure"]
-        contents = {}
-        for name, source in step.inputs.items():
-            if name == "landmarks":
-                continue
-            outcome = outcomes[source.step] if isinstance(source, Output) else None
-            digest = outcome.digest if isinstance(outcome, Success) else getattr(source, "digest", "")
-            contents[name] = content_of(step, source, digest, planned.workspace.store)
-        planned.workspace.close()
-        return step, contents
-
-    @property
-    def _measuring(self) -> Step:
-        return self._planned_measuring[0]
-
-    @property
-    def _inputs(self) -> Mapping[str, bytes]:
-        return self._planned_measuring[1]
-
-
-class _Nearest:
-    """Nearest places of a mesh."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self._surface = MeshSurface((mesh.vertices, mesh.faces))
-
-    def nearest(self, points: Floats) -> Floats:
-        return self._surface.nearest(points).places
+        digests = input_digests(step, {one.step.name: one.outcome for one in plan.steps})
+        with planned.workspace as workspace:
+            return step, {
+                name: content_of(step, source, digests[name], workspace.store)
+                for name, source in step.inputs.items()
+                if name != "landmarks"
+            }
 
 
 def write_landmarks(file: Path, landmarks: ManualLandmarks) -> None:

@@ -10,14 +10,9 @@ from footscan.frames.film import film_files
 from footscan.frames.ingest import ingest_background, ingest_film
 from footscan.frames.repack import repack
 from footscan.recordings.scans import SCAN_FILE, RecordedScan, read_scan, scan_folders
+from pipelines.engine.progress import OnProgress, unheard
 from schemas.base.errors import FootscanError, RefusedInput
 from schemas.scan import CameraFilm
-
-OnProgress = Callable[[int, int], None]
-
-
-def _unheard(done: int, total: int) -> None:
-    """Progress that nobody looks at."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +40,7 @@ class CameraIngest:
         return dict(vars(self))
 
 
-def ingest_scans(folders: Sequence[Path], on_progress: OnProgress = _unheard) -> list[CameraIngest]:
+def ingest_scans(folders: Sequence[Path], on_progress: OnProgress = unheard) -> list[CameraIngest]:
     """Ingest the films of scan folders, and of all scans in archives; a failure affects its own camera only.
 
     `on_progress` is called with the scans that have ended and their number.
@@ -53,7 +48,7 @@ def ingest_scans(folders: Sequence[Path], on_progress: OnProgress = _unheard) ->
     return _each_camera(folders, _ingest, on_progress)
 
 
-def repack_scans(folders: Sequence[Path], on_progress: OnProgress = _unheard) -> list[CameraIngest]:
+def repack_scans(folders: Sequence[Path], on_progress: OnProgress = unheard) -> list[CameraIngest]:
     """Gather the frames of earlier versions' arrays, one file a frame, in one file a camera; no film is read.
 
     A failure affects its own camera only, and leaves its array as it was.

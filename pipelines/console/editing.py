@@ -55,12 +55,9 @@ def editing_routes(editor_of: Callable[[str, str], ScanEditor]) -> list[Route]:
     async def answer(work: Callable[[ScanEditor], Response], request: Request) -> Response:
         def run() -> Response:
             def problem(text: str, status: int) -> Response:
-                is_page = request.method == "GET"
-                return (
-                    PlainTextResponse(f"footscan: {text}\n", status)
-                    if is_page
-                    else JSONResponse({"problem": text}, status)
-                )
+                if request.method == "GET":
+                    return PlainTextResponse(f"footscan: {text}\n", status)
+                return JSONResponse({"problem": text}, status)
 
             try:
                 return work(cached(request.path_params["patient"], request.path_params["scan"]))
@@ -108,19 +105,17 @@ def _try(body: bytes, editor: ScanEditor) -> Response:
 
 def _compared(name: str, saved: Measures, now: Measures) -> dict[str, str]:
     measure, before = now.measures[name], saved.measures.get(name)
-    _, decimals = UNITS[measure.unit]
+    unit, decimals = UNITS[measure.unit]
     shown = "–" if measure.value is None else number(measure.value, decimals)
     change = ""
-    if before is not None and None not in (measure.value, before.value) and measure.value != before.value:
-        assert measure.value is not None
-        assert before.value is not None
+    if before is not None and measure.value is not None and before.value is not None:
         change = f"{measure.value - before.value:+.{decimals + 1}f}"
         change = change if float(change) else ""
     return {
         "label": words(name),
         "now": shown,
         "change": change,
-        "unit": UNITS[measure.unit][0],
+        "unit": unit,
         "status": measure.status,
     }
 

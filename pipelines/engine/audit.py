@@ -16,6 +16,7 @@ from pipelines.engine.files.names import blob_digest, latest_name, row_key
 from pipelines.engine.files.seal import UNSEALING_ERRORS, sealed, unsealed
 from pipelines.engine.files.secret import make_secret
 from pipelines.engine.plan import Plan, without_places
+from pipelines.engine.progress import OnProgress, unheard
 from pipelines.engine.run import content_of
 from pipelines.engine.store.lease import FOLDER as LEASES
 from pipelines.engine.store.lease import leases
@@ -69,7 +70,7 @@ class Difference:
     """Result of the repetition; None for a failure."""
 
 
-def verify(store: Store, on_progress: Callable[[int, int], None] = lambda *_: None) -> Audit:
+def verify(store: Store, on_progress: OnProgress = unheard) -> Audit:
     """Read all blobs, rows, last actions, pins and leases, and log a warning for each damaged file.
 
     `on_progress` is called with the files that were read and their number.

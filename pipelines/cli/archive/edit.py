@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from pipelines.cli.archive.selecting import Chosen
-from pipelines.cli.archive.why import job_of_one
+from pipelines.cli.archive.why import scan_of_job
 from pipelines.cli.terminal.output import message, print_line
 from schemas.base.errors import RefusedInput
 
@@ -40,8 +40,7 @@ def edit(
     if token is False and not is_loopback(host):
         raise RefusedInput("--no-token", "leaves the page open to the network, expected it with loopback alone")
     secret = secrets.token_urlsafe(32) if token or not is_loopback(host) else None
-    one = job_of_one(scan, Chosen(), workflow, calibration, out)
-    editor = ScanEditor(one if out is not None else Chosen().job(workflow), one.folders[0])
+    editor = ScanEditor(*scan_of_job(scan, Chosen(), workflow, calibration, out))
     assert len(editor.mesh.faces), "a scan with measures has a surface"
     with listen(host, port) as socket:
         shown = f"[{host}]" if ":" in host else host

@@ -65,7 +65,7 @@ def why(
     from pipelines.archive.planning import plan_job
 
     options = Chosen(only, since, until, force, settings, profile)
-    planned = plan_job(job_of_one(scan, options, workflow, calibration, out))
+    planned = plan_job(_job(scan, options, workflow, calibration, out))
     for refused in planned.refused:
         raise refused.error
     if scan is not None and not planned.scans:
@@ -109,20 +109,28 @@ def json_time(seconds: float | None) -> str | None:
     return None if seconds is None else datetime.fromtimestamp(seconds, UTC).isoformat(timespec="seconds")
 
 
-def job_of_one(
-    scan: str | None, options: Chosen, workflow: Path | None, calibration: Path | None, out: Path | None
-) -> "Job":
-    """The job of the one scan, a folder or `patient/scan`; without it that of the workflow."""
+def scan_of_job(
+    scan: str, options: Chosen, workflow: Path | None, calibration: Path | None, out: Path | None
+) -> "tuple[Job, Path]":
+    """The job of a scan, which may be a folder or `patient/scan`, and the folder of the scan among its folders."""
     if out is not None:
         if workflow is not None:
             raise RefusedInput("--workflow", "and --out exclude each other, expected one of them")
-        if scan is None:
-            raise RefusedInput("SCAN", "is missing, expected the folder of a scan with --out")
-        return options.of_scan(Path(scan), calibration, out)
+        return options.of_scan(Path(scan), calibration, out), Path(scan)
     if calibration is not None:
         raise RefusedInput("--calibration", "goes with --out, expected it in the workflow")
     job = options.job(workflow)
-    return job if scan is None else replace(job, folders=[_folder(scan, job)])
+    return job, _folder(scan, job)
+
+
+def _job(scan: str | None, options: Chosen, workflow: Path | None, calibration: Path | None, out: Path | None) -> "Job":
+    """The job of the one scan, or of the workflow."""
+    if scan is not None:
+        job, folder = scan_of_job(scan, options, workflow, calibration, out)
+        return replace(job, folders=[folder])
+    if out is not None or calibration is not None:
+        raise RefusedInput("SCAN", "is missing, expected the folder of a scan with --out and --calibration")
+    return options.job(workflow)
 
 
 def _folder(scan: str, job: "Job") -> Path:
