@@ -141,11 +141,14 @@ def walk(engine: str, package: str, folder: str, scans: str) -> dict[str, Any]:
     return {"times": times, "ran": ran}
 
 
-def plan_once(engine: str, package: str, folder: str, scans: str) -> dict[str, float]:
-    """Seconds of a plan in which nothing has to run, from opening the store until what was verified is saved."""
+def plan_once(engine: str, package: str, folder: str, scans: str, store: str) -> dict[str, float]:
+    """Seconds of a plan in which nothing has to run, from opening the store until what was verified is saved.
+
+    store : path or URL
+    """
     _engine(engine, package)
     start = time.perf_counter()
-    with Workspace(Path(folder) / "store", Path(folder)) as workspace:
+    with Workspace(store if "://" in store else Path(store), Path(folder)) as workspace:
         if ran := len(workspace.plan(draw(int(scans))).to_run):
             raise RuntimeError(f"{ran} steps would run, expected none")
     return {"seconds": time.perf_counter() - start}

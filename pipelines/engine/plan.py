@@ -12,7 +12,7 @@ from typing import NamedTuple
 from pipelines.engine.actions.key import image_text, key_of
 from pipelines.engine.actions.step import Failure, Outcome, Output, Step, Success, is_named
 from pipelines.engine.explain import changes, reason
-from pipelines.engine.files.packs import State as FileState
+from pipelines.engine.files.packs import PackedFiles, Snapshot
 from pipelines.engine.store.store import Store
 from pipelines.engine.store.verified_index import VerifiedRow
 
@@ -68,10 +68,10 @@ def make_plan(steps: Sequence[Step], store: Store, forced: Collection[str] = ())
     """
     planned: dict[str, PlannedStep] = {}
     with _without_garbage_collection(), nullcontext() if store.verified is None else store.verified.reading():
-        state = store.files.snapshot() if len(steps) >= MANY else store.files.state
+        files = store.files.snapshot() if len(steps) >= MANY else store.files
         for step in steps:
             is_forced = bool(forced) and any(is_named(step, name) for name in forced)
-            planned[step.name] = _plan_step(step, planned, store, state, is_forced=is_forced)
+            planned[step.name] = _plan_step(step, planned, store, files, is_forced=is_forced)
     return Plan(list(planned.values()))
 
 
@@ -118,7 +118,7 @@ def with_places(problem: str, places: Mapping[str, Path]) -> str:
 
 
 def _plan_step(
-    step: Step, planned: dict[str, PlannedStep], store: Store, state: FileState, *, is_forced: bool
+    step: Step, planned: dict[str, PlannedStep], store: Store, files: PackedFiles | Snapshot, *, is_forced: bool
 ) -> PlannedStep:
     digests: dict[str, str] = {}
     for name, source in step.inputs.items():
@@ -135,7 +135,7 @@ def _plan_step(
     if is_forced:
         return PlannedStep(step, State.MISS, None, FORCED)
     image = image_text(step, digests)
-    outcome = cached_outcome(step, store.lookup(key_of(image), state))
+    outcome = cached_outcome(step, store.lookup(key_of(image), files))
     if outcome is not None:
         return PlannedStep(step, State.HIT, outcome, "")
     return PlannedStep(step, State.MISS, None, _reason(step, image, store))

@@ -11,7 +11,7 @@ A pack begins with a table of its files (`ENTRY`); their contents follow. Its na
 import logging
 import re
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import groupby, takewhile
@@ -42,9 +42,6 @@ ENTRY = np.dtype([("digest", "V32"), ("offset", "<u8"), ("length", "<u4"), ("wri
 file was written, s since 1970."""
 
 Table = NDArray[np.void]
-State = Callable[[str], str | None]
-"""The state of a file by its name; None if it is missing."""
-
 _PACK = re.compile(rf"{FOLDER}/\w+/(\d+)-(\d+)-([0-9a-f]{{64}})").fullmatch
 
 
@@ -151,25 +148,12 @@ class PackedFiles:
             state = found.state
         return state
 
-    def snapshot(self) -> State:
-        """`state` of rows and blobs at present, for many of them.
-
-        Rows that lie by themselves are few, and the others are in packs: none has to be looked for. Blobs of a store at
-        a URL are listed, instead of a request for each.
-        """
-        packed, states = self._listed_anew(ROWS).files, self.place.states(ROWS)
-        is_remote = isinstance(self.place, RemoteFiles)
-        if is_remote:
+    def snapshot(self) -> "Snapshot":
+        """Rows and blobs as they are at present, for many of them."""
+        states = self.place.states(ROWS)
+        if isinstance(self.place, RemoteFiles):
             states |= self.place.states(BLOBS)
-
-        def state(name: str) -> str | None:
-            known = states.get(name)
-            if known is None and (parts := _split(name)) is not None and parts[0] == ROWS:
-                file = packed.get(parts[1])
-                return None if file is None else file.state
-            return known if is_remote or known is not None else self.place.state(name)
-
-        return state
+        return Snapshot(self, self._listed_anew(ROWS).files, states)
 
     def written(self, name: str) -> float | None:
         written = self.place.written(name)
@@ -298,6 +282,47 @@ class PackedFiles:
         name = f"{FOLDER}/{folder}/{number:08}-{len(files)}-{sha256(head)}"
         self.place.write(name, head + b"".join(file.data for file in files))
         self._indexes.pop(folder, None)
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Rows and blobs as they were when it was taken.
+
+    Rows that lie by themselves are few, and the others are in packs: none has to be looked for. Blobs of a store at a
+    URL were listed, instead of a request for each, and its packs are read as a whole.
+    """
+
+    files: PackedFiles
+    packed: Mapping[bytes, _Packed]
+    """Rows in packs, by the digest in their name"""
+    states: Mapping[str, str]
+    """Of what was listed, see `Files.state`"""
+    _packs: dict[str, bytes] = field(default_factory=dict)
+
+    def state(self, name: str) -> str | None:
+        """See `Files`."""
+        known = self.states.get(name)
+        if known is None and (found := self._in_pack(name)) is not None:
+            return found.state
+        is_listed = isinstance(self.files.place, RemoteFiles) or name.startswith(f"{ROWS}/")
+        return known if is_listed or known is not None else self.files.place.state(name)
+
+    def read(self, name: str) -> bytes:
+        """See `Files`."""
+        found = None if name in self.states else self._in_pack(name)
+        if found is None or not isinstance(self.files.place, RemoteFiles):
+            return self.files.read(name)
+        if (data := self._packs.get(found.pack.name)) is None:
+            try:
+                data = self._packs[found.pack.name] = self.files.place.read(found.pack.name)
+            except FileNotFoundError:  # another process has merged the pack with others
+                return self.files.read(name)
+        start, length = found.pack.span(found.number)
+        return data[start : start + length]
+
+    def _in_pack(self, name: str) -> _Packed | None:
+        parts = _split(name)
+        return self.packed.get(parts[1]) if parts is not None and parts[0] == ROWS else None
 
 
 def in_batches(names: Sequence[str], size: int) -> Iterator[Sequence[str]]:

@@ -14,7 +14,7 @@ from typing import Any
 from pipelines.engine.actions.key import PreImage, key_of
 from pipelines.engine.files.digest import sha256
 from pipelines.engine.files.names import blob_name, latest_name, plain_hex, row_name
-from pipelines.engine.files.packs import PackedFiles, State
+from pipelines.engine.files.packs import PackedFiles, Snapshot
 from pipelines.engine.files.places import LocalFiles, open_files
 from pipelines.engine.files.seal import UNSEALING_ERRORS, UnsealedError, sealed, unsealed
 from pipelines.engine.files.secret import secret_of
@@ -112,18 +112,19 @@ class Store:
         """Return True if the blob exists; only `get` checks its content."""
         return self.files.state(blob_name(digest)) is not None
 
-    def lookup(self, key: str, state: State | None = None) -> VerifiedRow | None:
+    def lookup(self, key: str, files: PackedFiles | Snapshot | None = None) -> VerifiedRow | None:
         """Return the recorded outcome of an action; None if there is none, or its result is missing or damaged.
 
-        state : as of `PackedFiles.snapshot`; default: of the files as they are
+        files : where the row is looked for; default: the files as they are
         """
-        state = state or self.files.state
+        files = files or self.files
+        state = files.state
         row_state = state(row_name(key))
         if row_state is None:
             return None
         verified_row = None if self.verified is None else self.verified.get(key)
         if verified_row is None or verified_row.row != row_state:
-            row = self.row(key)
+            row = self.row(key, files)
             if row is None:
                 return None
             verified_row = _verified_row(row_state, row, None)
@@ -172,9 +173,12 @@ class Store:
         except (KeyError, TypeError, ValueError):
             return None
 
-    def row(self, key: str) -> Row | None:
-        """Return the row of an action, even if its result is missing; None if the row is missing or damaged."""
-        value = self._read_sealed(row_name(key))
+    def row(self, key: str, files: PackedFiles | Snapshot | None = None) -> Row | None:
+        """Return the row of an action, even if its result is missing; None if the row is missing or damaged.
+
+        files : as in `lookup`
+        """
+        value = self._read_sealed(row_name(key), files)
         if value is None:
             return None
         try:
@@ -206,10 +210,10 @@ class Store:
         if self.verified is not None:
             self.verified.put(key, verified_row)
 
-    def _read_sealed(self, name: str) -> dict[str, Any] | None:
+    def _read_sealed(self, name: str, files: PackedFiles | Snapshot | None = None) -> dict[str, Any] | None:
         """Content of a small file, if its seal is right."""
         try:
-            return unsealed(self.files.read(name), self.secret)
+            return unsealed((files or self.files).read(name), self.secret)
         except FileNotFoundError:
             return None
         except UnsealedError as error:

@@ -88,6 +88,22 @@ def test_a_store_at_a_url_is_listed_for_a_large_plan(
     assert len(workspace.plan(steps(package)).to_run) == 2  # their results are equal, one blob
 
 
+def test_a_new_machine_reads_a_pack_at_a_url_once(
+    package: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = Workspace(f"memory://{uuid.uuid4().hex}", tmp_path / "one")
+    run(workspace, steps(package))
+    files = workspace.store.files
+    files.pack([name for name, _ in files.place.sizes("actions")])
+    monkeypatch.setattr("pipelines.engine.plan.MANY", 2)
+    requests: list[str] = []
+    read = RemoteFiles.read
+    monkeypatch.setattr(RemoteFiles, "read", lambda self, name: (requests.append(name), read(self, name))[1])
+    with Workspace(str(files.place.path("")).rstrip("/"), tmp_path / "two") as later:
+        assert later.plan(steps(package)).to_run == []
+    assert sorted(name.partition("/")[0] for name in requests) == ["blobs", "blobs", "packs"]
+
+
 def test_garbage_in_packs_goes(workspace: Workspace, package: Any) -> None:
     run(workspace, steps(package))
     before = {name for name, _ in workspace.store.files.sizes("actions")}
