@@ -106,7 +106,8 @@ def _not_yet_met(points: NDArray[np.void], head: Ints, confirmed: Mask, certain:
     There hardly a point of the head is confirmed, but many of another are; or its cameras confirm each other in the
     same mistake: most of their points are not `certain`, as they are confirmed in the plane of another laser as well.
     A camera whose own laser is on the foot would see two stripes. Heads of which hardly a frame is confirmed, or
-    certain, have too few cameras, or planes too close together, to say so.
+    certain, have too few cameras, or planes too close together, to say so. Some laser made what is seen in a frame: if
+    this holds for all heads, as on the blunt tip of a toe, it is that of the head of most confirmed points.
     """
     frame = points["frame"] - points["frame"][0]
     counts, certain_counts = np.zeros((2, int(head.max()) + 1, int(frame[-1]) + 1))
@@ -117,6 +118,8 @@ def _not_yet_met(points: NDArray[np.void], head: Ints, confirmed: Mask, certain:
         met = (counts > 0.0) & ~doubted
         says = met.sum(axis=1) > 0.5 * counts.any(axis=0).sum()
         not_met |= doubted & says[:, None]
+    is_dark = (not_met | (counts == 0.0)).all(axis=0) & counts.any(axis=0)
+    not_met[counts.argmax(axis=0)[is_dark], is_dark] = False
     return np.asarray(not_met[head, frame])
 
 

@@ -165,7 +165,8 @@ def remove_outliers(
         *moved_warning(glass, parameters.glass_mm),
     ]
     ends = (float(remaining["x"].min()), float(remaining["x"].max())) if len(remaining) else (0.0, 0.0)
-    contested = contested_ends(remaining, points[codes == 1 + REASONS.index("unconfirmed")])
+    denied, mistaken = (points[codes == 1 + REASONS.index(reason)] for reason in ("unconfirmed", "laser"))
+    contested = contested_ends(remaining, denied, mistaken, views)
     return remaining, Removed(codes, counts, warnings, glass, planes_apart(views, ends), contested)
 
 
