@@ -141,6 +141,25 @@ def test_cameras_of_one_head_do_not_confirm_each_other_in_the_stripe_of_another_
     np.testing.assert_array_equal(found, np.repeat([True, True, False], len(y)))
 
 
+def test_the_last_stripe_is_of_some_laser() -> None:
+    """Both cameras of head 2 agree on it, and what each camera of head 1 sees fits one of them as well: nothing is
+    certain, but some laser made the stripe."""
+    views = {**VIEWS, 4: View(np.array([-200.0, -80.0, 200.0]), np.empty((0, 2)), LOWER)}
+    points, _ = scene(views)
+    behind = np.full(60, 40.0 + LOWER.offset_mm)
+    tip = np.column_stack([behind, np.linspace(-9.0, 9.0, 60), np.full(60, 60.0)])
+    seen = []
+    for camera, of_head_1 in ((3, 1), (4, 2)):
+        seen.append(make_points(tip, camera, 20, plane=behind))
+        sight = views[camera].centre - np.column_stack([np.zeros(60), tip[:, 1:]])
+        ahead = UPPER.offset_mm - LOWER.offset_mm
+        other = tip + (ahead / sight[:, 0])[:, None] * sight
+        other[:, 0] = behind + ahead
+        seen.append(make_points(other, of_head_1, 20, plane=other[:, 0]))
+    found = is_of_other_laser(np.concatenate([points, *seen]), views)[len(points) :]
+    np.testing.assert_array_equal(found, np.repeat([False, True, False, True], 60))
+
+
 def test_the_stripe_of_another_laser_on_a_cap_that_nobody_else_sees_is_found() -> None:
     """It comes to lie within the foot, 1 mm behind the last confirmed place; the other plane is 3 mm ahead of it."""
     points, _ = scene(LOWER_PAIR)
