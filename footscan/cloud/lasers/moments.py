@@ -148,12 +148,30 @@ def planes_apart(views: Mapping[int, View], x_mm: tuple[float, float]) -> float:
     0.75
     """
     places = np.array([(y, z) for y in (-HALF_MM, HALF_MM) for z in (0.0, 2 * MIDDLE_Z_MM)])
-    at = []
-    for view in views.values():
-        if view.plane is None:
-            return np.inf
-        at.append([x_in_turned_plane(view.plane, plane_of_travel(view, np.full(4, x)), places) - x for x in x_mm])
-    return float(np.ptp(at, axis=0).max()) if at else np.inf
+    if not views or any(view.plane is None for view in views.values()):
+        return np.inf
+    return float(max(np.ptp(_planes_at(np.full(4, x), places, views), axis=0).max() for x in x_mm))
+
+
+def of_any_laser(points: NDArray[np.void], views: Mapping[int, View]) -> tuple[NDArray[np.void], NDArray[np.void]]:
+    """The points (N,) with the greatest X that the lasers of all heads give them, and with the least one.
+
+    None are given where it is not known how the planes lie, as with heads that travel one after the other.
+    """
+    views = {number: view for number, view in views.items() if view.plane is not None}
+    points = points[np.isin(points["camera"], list(views))]
+    if not len(points) or ahead_of_frames(renumbered(points, views), views) is None:
+        return points[:0], points[:0]
+    x = _planes_at(travel_of(points, views), coordinates(points)[:, 1:], views)
+    greatest, least = points.copy(), points.copy()
+    greatest["x"], least["x"] = x.max(axis=0), x.min(axis=0)
+    return greatest, least
+
+
+def _planes_at(travel: Floats, yz: Floats, views: Mapping[int, View]) -> Floats:
+    """X of the laser plane of each view at (N, 2) Y and Z, with the heads at `travel` (N,), (views, N) mm."""
+    planes = [(view.plane, plane_of_travel(view, travel)) for view in views.values()]
+    return np.array([x_in_turned_plane(plane, x, yz) for plane, x in planes if plane is not None])
 
 
 def _by_frame(frame: NDArray[np.integer], x: Floats, rows: NDArray[np.bool_]) -> dict[int, float]:

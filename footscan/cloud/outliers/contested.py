@@ -1,15 +1,11 @@
 """Stripes beyond the ends of the foot that were dropped."""
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.models.laser_plane import x_in_turned_plane
-from footscan.cloud.lasers.moments import ahead_of_frames, plane_of_travel, renumbered, travel_of
-from footscan.cloud.points import PLANE_MM, coordinates, stripe_step
-from footscan.cloud.views import View
+from footscan.cloud.points import PLANE_MM, stripe_step
 from footscan.rows import distinct_rows
 
 LEG_MM = 90.0
@@ -37,7 +33,7 @@ def ends_of(x: NDArray[np.floating]) -> tuple[float, float]:
 
 
 def contested_ends(
-    kept: NDArray[np.void], denied: NDArray[np.void], mistaken: NDArray[np.void], views: Mapping[int, View]
+    kept: NDArray[np.void], denied: NDArray[np.void], of_any_laser: tuple[NDArray[np.void], NDArray[np.void]]
 ) -> tuple[float, float]:
     """Find how far stripes that were dropped continue a foot beyond its ends.
 
@@ -49,8 +45,8 @@ def contested_ends(
     ----------
     kept : (N,) of `POINT_DTYPE`, mm
     denied : (M,) points that were dropped because other cameras did not confirm them
-    mistaken : (L,) points that were dropped because another head's laser made them
-    views : number -> view
+    of_any_laser : (L,) points each that were dropped because another head's laser made them, in the plane of greatest
+        X, and in that of least X
 
     Returns
     -------
@@ -62,7 +58,7 @@ def contested_ends(
     >>> y = np.tile(np.linspace(-20.0, 20.0, 40), 6)
     >>> x = np.repeat(np.arange(0.0, 12.0, 2.0), 40)
     >>> seen = make_points(np.column_stack([x, y, np.full(240, 30.0)]), camera=3, frame=(x / 2).astype(int))
-    >>> print(contested_ends(seen[x > 5.0], seen[x < 5.0], seen[:0], {}))
+    >>> print(contested_ends(seen[x > 5.0], seen[x < 5.0], (seen[:0], seen[:0])))
     (0.0, 10.0)
     """
     low = kept[kept["z"] < LEG_MM]
@@ -70,22 +66,8 @@ def contested_ends(
         return NOT_CONTESTED
     first, last = ends_of(low["x"])
     gap_mm = GAP_STEPS * max(stripe_step(kept), PLANE_MM)
-    farthest, nearest = (np.concatenate([denied, one]) for one in _of_any_laser(mistaken, views))
+    farthest, nearest = (np.concatenate([denied, one]) for one in of_any_laser)
     return 0.0 - _reach(low, -first, farthest, -1.0, gap_mm), _reach(low, last, nearest, 1.0, gap_mm)
-
-
-def _of_any_laser(points: NDArray[np.void], views: Mapping[int, View]) -> tuple[NDArray[np.void], NDArray[np.void]]:
-    """The points (L,) with the greatest X that the lasers of all heads give them, and with the least one; none where it
-    is not known how the planes lie, as with heads that travel one after the other."""
-    planes = [view for view in views.values() if view.plane is not None]
-    points = points[np.isin(points["camera"], [number for number, view in views.items() if view.plane is not None])]
-    if not len(points) or ahead_of_frames(renumbered(points, views), views) is None:
-        return points[:0], points[:0]
-    travel, yz = travel_of(points, views), coordinates(points)[:, 1:]
-    x = [x_in_turned_plane(view.plane, plane_of_travel(view, travel), yz) for view in planes if view.plane is not None]
-    greatest, least = points.copy(), points.copy()
-    greatest["x"], least["x"] = np.max(x, axis=0), np.min(x, axis=0)
-    return greatest, least
 
 
 def _reach(kept: NDArray[np.void], kept_end: float, denied: NDArray[np.void], way: float, gap_mm: float) -> float:

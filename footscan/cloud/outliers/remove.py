@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from footscan.cloud.contact import above_glass, estimate_glass, moved_warning
 from footscan.cloud.lasers.choose import choose_lasers
-from footscan.cloud.lasers.moments import planes_apart
+from footscan.cloud.lasers.moments import of_any_laser, planes_apart
 from footscan.cloud.outliers.body import body_range, is_apart
 from footscan.cloud.outliers.clutter import is_island, is_static
 from footscan.cloud.outliers.contested import NOT_CONTESTED, contested_ends
@@ -166,7 +166,7 @@ def remove_outliers(
     ]
     ends = (float(remaining["x"].min()), float(remaining["x"].max())) if len(remaining) else (0.0, 0.0)
     denied, mistaken = (points[codes == 1 + REASONS.index(reason)] for reason in ("unconfirmed", "laser"))
-    contested = contested_ends(remaining, denied, mistaken, views)
+    contested = contested_ends(remaining, denied, of_any_laser(mistaken, views))
     return remaining, Removed(codes, counts, warnings, glass, planes_apart(views, ends), contested)
 
 

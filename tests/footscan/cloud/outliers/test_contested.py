@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from footscan.cloud.lasers.moments import of_any_laser
 from footscan.cloud.outliers.contested import contested_ends
 from footscan.cloud.points import make_points
 from footscan.cloud.views import View
@@ -29,7 +30,7 @@ def test_stripes_of_another_laser_show_the_foot_in_the_plane_nearest_to_its_midd
     first, last = kept["x"].min(), kept["x"].max()
     after, before = foot(camera, range(20, 20 + dropped)), foot(camera, range(-dropped, 0))
     none = kept[:0]
-    ends = contested_ends(kept, none, np.concatenate([after, before]), VIEWS)
+    ends = contested_ends(kept, none, of_any_laser(np.concatenate([after, before]), VIEWS))
     # head 1 is 3 mm ahead: what it may have seen first lies there, and what head 2 may have seen last
     assert ends == pytest.approx((min(first, -2.0 * dropped + 1.5), max(last, 2.0 * (19 + dropped) - 1.5)))
 
@@ -37,4 +38,4 @@ def test_stripes_of_another_laser_show_the_foot_in_the_plane_nearest_to_its_midd
 def test_heads_whose_planes_are_not_known_contest_nothing() -> None:
     kept = foot(1, range(20))
     unknown = {1: View(np.zeros(3), np.empty((0, 2)))}
-    assert contested_ends(kept, kept[:0], foot(1, range(20, 23)), unknown) == (1.5, 39.5)
+    assert contested_ends(kept, kept[:0], of_any_laser(foot(1, range(20, 23)), unknown)) == (1.5, 39.5)
