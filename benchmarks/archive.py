@@ -1,12 +1,13 @@
-"""Archives of small scans as the command runs them: when all is done, as they arrive, how much memory they take, on how
-many workers.
+"""Archives as the command runs them: when all is done, as they arrive, how much memory they take, on how many workers.
 
     .venv/bin/python -m benchmarks.archive [SCAN] [warm | watch | memory | workers]
 
-SCAN is the scan of a folder that `footscan demo` made; of its films every fifth frame makes the small scans.
+SCAN is the scan of a folder that `footscan demo` made; of its films every fifth frame makes small scans, and all frames
+those of `workers`.
 """
 
 import os
+import resource
 import shutil
 import subprocess
 import sys
@@ -25,8 +26,9 @@ from footscan.virtual.filming.film import write_film
 
 DEFAULT = Path("demo/archive/P0001/demo-R")
 EVERY = 5
-"""Of the frames."""
+"""Of the frames of a small scan."""
 ROUNDS = 5
+COLD_SCANS, COLD_ROUNDS = 8, 2
 QUIET_S = 60.0
 """For so long the processor time of a watch is counted."""
 
@@ -88,14 +90,24 @@ def measure_memory(scan: Path) -> None:
 
 
 def time_workers(scan: Path) -> None:
-    """A cold archive of eight scans of eight cameras: one worker, two, and two threads, in turn."""
+    """A cold archive of whole scans of eight cameras: one worker, two, and two threads, in turn; and how much of both
+    cores they use."""
     with tempfile.TemporaryDirectory() as place:
-        workflow = _draw_archive(scan, Path(place), 8, 8)
+        workflow = _draw_archive(scan, Path(place), 8, COLD_SCANS, every=1)
         runs = {
-            text: partial(_run_cold, workflow, *text.split())
-            for text in ("--workers 1", "--workers 2", "--threads 1", "--threads 2")
+            text: partial(_run_cold, workflow, *text.split()) for text in ("--workers 1", "--workers 2", "--threads 2")
         }
-        print_ratios("A cold archive of 8 scans of 8 cameras", interleave(runs, 3), 8, "scan")
+        used: dict[str, list[float]] = {name: [] for name in runs}
+
+        def counted(name: str) -> None:
+            before, start = _children_s(), time.perf_counter()
+            runs[name]()
+            used[name].append((_children_s() - before) / (time.perf_counter() - start))
+
+        seconds = interleave({name: partial(counted, name) for name in runs}, COLD_ROUNDS)
+    print_ratios(f"A cold archive of {COLD_SCANS} scans of 8 cameras", seconds, COLD_SCANS, "scan")
+    for name, cores in used.items():
+        print(f"  {name:<44}{spread(cores, 2)} cores used")
 
 
 PARTS = {"warm": time_warm, "watch": measure_watch, "memory": measure_memory, "workers": time_workers}
@@ -133,10 +145,11 @@ def _done_archive(scan: Path, place: Path, cameras: int, scans: int) -> Path:
     return workflow
 
 
-def _draw_archive(scan: Path, place: Path, cameras: int, scans: int) -> Path:
+def _draw_archive(scan: Path, place: Path, cameras: int, scans: int, every: int = EVERY) -> Path:
     """An archive of scans no two of which share a film; returns its workflow."""
     for number in range(1, scans + 1):
-        _thin_out(scan, place / f"archive/P0001/S{number:04d}", cameras, f"scan {number}".encode(), number / 100)
+        folder = place / f"archive/P0001/S{number:04d}"
+        _thin_out(scan, folder, cameras, f"scan {number}".encode(), number / 100, every)
     return _workflow(scan, place)
 
 
@@ -147,19 +160,21 @@ def _workflow(scan: Path, place: Path) -> Path:
     return workflow
 
 
-def _thin_out(scan: Path, folder: Path, cameras: int, mark: bytes = b"", shift_mm: float = 0.0) -> None:
-    """A scan of every fifth frame of some of the cameras of another, with a comment in each JPEG, and moved in X."""
+def _thin_out(
+    scan: Path, folder: Path, cameras: int, mark: bytes = b"", shift_mm: float = 0.0, every: int = EVERY
+) -> None:
+    """A scan of some of the frames and cameras of another, with a comment in each JPEG, and moved in X."""
     recorded = read_scan(scan)
     folder.mkdir(parents=True)
     travel = recorded.document.travel
     assert travel is not None, "the demo has it"
     lines = [
         "format: footscan.scan/1", "patient: P0001", f"scan: {folder.name}", f"side: {recorded.document.side}",
-        f"travel: {{start_mm: {travel.start_mm + shift_mm}, step_mm: {EVERY * travel.step_mm}}}", "cameras:",
+        f"travel: {{start_mm: {travel.start_mm + shift_mm}, step_mm: {every * travel.step_mm}}}", "cameras:",
     ]  # fmt: skip
     for camera in recorded.document.cameras[:: 8 // cameras]:
         film = open_film(recorded.film(camera))
-        kept = film.stored(range(0, film.count, EVERY))
+        kept = film.stored(range(0, film.count, every))
         frames = [_commented(frame, mark) for frame in kept if isinstance(frame, bytes)]
         write_film(folder / f"cam{camera.id}.avi", frames, *film.size.px, 18)
         lines.append(f"- {{id: {camera.id}, file: cam{camera.id}.avi}}")
@@ -184,6 +199,12 @@ def _run_cold(workflow: Path, *options: str) -> None:
     for frames in (workflow.parent / "archive").rglob("*.zarr"):
         shutil.rmtree(frames)
     python("-c", COMMAND, "run", str(workflow), *options)
+
+
+def _children_s() -> float:
+    """Seconds of processor time that the processes took that this one started, and that have ended."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def _processor_s(process: psutil.Process, over_s: float) -> float:
