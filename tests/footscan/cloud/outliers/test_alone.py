@@ -63,3 +63,18 @@ def test_clouds_without_agreement_stay(ellipsoid: Film) -> None:
     cloud["cameras"] = 1
     assert not is_off_alone(cloud).any()
     assert not is_off_alone(cloud[:0]).any()
+
+
+def test_a_piece_of_stripe_that_joins_what_several_cameras_saw_may_be_farther_off() -> None:
+    x, y = (part.ravel() for part in np.mgrid[0:30:3, 0:12:0.5])
+    alone = (x == 12) & (y > 6)
+    depth = np.where(alone, -1.5, 0.0)
+    joined = make_points(np.column_stack([x, y, depth]), camera=1, frame=(x / 3).astype(int), source=np.arange(len(x)))
+    joined["z"][alone & (y == 6.5)] = -0.5  # the way down
+    joined["cameras"] = np.where(alone, 1, 3)
+    apart = joined[~((x == 12) & (y > 4) & (y < 8))]
+    assert not is_off_alone(joined).any()
+    assert np.array_equal(is_off_alone(apart), apart["cameras"] == 1)
+    deeper = joined.copy()
+    deeper["z"][alone & (y > 6.5)] = -2.5
+    assert is_off_alone(deeper).any()
