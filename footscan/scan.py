@@ -165,7 +165,7 @@ class OpenScan:
                 self._fused.cloud,
                 self._fused.report,
                 self.movement,
-                self._cleaned[1].lasers_apart_mm,
+                self._cleaned[1].lasers,
                 self._cleaned[1].contested_mm,
                 tip_doubts_mm(self.mesh),
             ),

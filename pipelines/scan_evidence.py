@@ -15,7 +15,7 @@ def evidence_of(inputs: Mapping[str, bytes]) -> Evidence:
         cloud=fused["cloud"],
         agreement=FusionReport.model_validate_json(fused["report"].tobytes()),
         movement=MovementReport.model_validate_json(cleaned["movement"].tobytes()),
-        lasers_apart_mm=cleaned["lasers_apart"].item(),
+        lasers=cleaned["lasers"],
         contested_mm=tuple(cleaned["contested"].tolist()),
         tip_doubts_mm=tuple(unpack(inputs["surface"])["tip_doubts"].tolist()),
     )

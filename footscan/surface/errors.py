@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye_array
 from scipy.spatial import KDTree
 
+from footscan.cloud.lasers.apart import UNKNOWN, between_lasers, planes_apart
 from footscan.cloud.outliers.contested import FEWEST_AT_END, LEG_MM, NOT_CONTESTED, ends_of
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.compiled import compiled
@@ -42,6 +43,11 @@ the scatter of all vertices; and the distance of stripes beyond which the mesh i
 then say nothing. Where a camera takes two lasers for one, its points contradict each other, and the surface follows
 them half the way. Tuned on films of `draw_assembled`, seeds 2503, 2513 and 2604. In the first two the root mean square
 of the errors is 0.04 mm where points are off by less than 0.01 mm, 0.12 to 0.18 by 0.05, and 0.16 to 0.22 by 0.12."""
+OF_BETWEEN, BETWEEN_MM = 0.15, (2.0, 3.0)
+"""Standard deviation of a vertex relative to the distance of two lasers that light it: cameras see both stripes as one,
+which lies between them. It falls to 0 from the first to the second distance, where a valley parts them. Tuned on 58
+films (`draw_assembled`, seeds 2681 to 2720 and 3501 to 3518): where the upper lasers are 0.6 to 2 mm apart, the height
+of the big toe errs by 0.41 mm (root mean square), up to 2.6 mm by 0.18, and beyond by 0.13."""
 FACING_GROWS = 0.15
 """Growth of the standard deviation per mm into filled surface that faces the travel, as the tips of the shorter toes
 do: root mean square 0.16 per mm on 16 calibrated scanners (`draw_assembled`, seeds 1001 to 1016)."""
@@ -168,8 +174,8 @@ class Evidence(NamedTuple):
     """Of the cameras; None: exact"""
     movement: MovementReport | None = None
     """Of the foot; None: it stood still"""
-    lasers_apart_mm: float = math.inf
-    """Largest distance between the laser planes of two heads: so much too far out may one camera alone see an end"""
+    lasers: Floats = UNKNOWN
+    """(H, 6) as of `head_planes`: one camera alone may see an end too far out by the largest distance of two"""
     contested_mm: tuple[float, float] = NOT_CONTESTED
     """Least and greatest X of the foot with stripes that were dropped for contradicting other cameras"""
     tip_doubts_mm: tuple[float, float] = (0.0, 0.0)
@@ -215,6 +221,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     fields = [
         *_broad_and_narrow("noise", np.maximum(_noise(around, step_mm), _scattered(scatter_mm, step_mm))),
         ErrorField("noise", everywhere * COMMON_MM, WIDE_MM),
+        ErrorField("noise", _between_stripes(vertices, evidence), REACH_MM),
         ErrorField("filling", np.where(inside, ERROR_GROWS * gap_mm, 0.0), REACH_MM),
         *_broad_and_narrow("filling", np.where(inside, FACING_GROWS * gap_mm * np.abs(normals[:, 0]), 0.0)),
         *_broad_and_narrow("ends", END_GROWS * np.maximum(beyond_mm, 0.0)),
@@ -290,7 +297,7 @@ def _ends(vertices: Floats, evidence: Evidence) -> list[_End]:
     for side, outward in enumerate((-1.0, 1.0)):
         alone = 0.0 if confirmed is None else outward * (outermost[side] - confirmed[side])
         dropped, short = (outward * (seen[side] - surface[side]) for seen in (evidence.contested_mm, outermost))
-        alone = min(alone, evidence.lasers_apart_mm)
+        alone = min(alone, planes_apart(evidence.lasers, outermost))
         unsure = float(alone), max(float(dropped), 0.0), max(float(short), 0.0)
         ends.append(_End(float(surface[side]), *unsure, evidence.tip_doubts_mm[side]))
     return ends
@@ -318,6 +325,16 @@ def _scattered(scatter_mm: Floats, step_mm: float) -> Floats:
 def _least(step_mm: float) -> float:
     """Standard deviation of any vertex, and scatter of the points off the coarse mesh of distant stripes, mm."""
     return ERROR_MM * max(1.0, (step_mm / USUAL_STEP_MM) ** 2)
+
+
+def _between_stripes(vertices: Floats, evidence: Evidence) -> Floats:
+    """(V,) standard deviations of vertices where two lasers are so close that cameras see one stripe, mm."""
+    if evidence.cloud is None or evidence.agreement is None or not len(evidence.cloud) or not len(evidence.lasers):
+        return np.zeros(len(vertices))
+    apart = between_lasers(evidence.lasers, vertices, evidence.cloud, evidence.agreement.heads)
+    near, far = BETWEEN_MM
+    apart = np.minimum(apart, far)
+    return OF_BETWEEN * apart * np.minimum((far - apart) / (far - near), 1.0)
 
 
 def _noise(around: NDArray[np.void] | None, step_mm: float) -> Floats | float:

@@ -23,8 +23,8 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
 
     `inputs`: `points-N` of each camera, the `calibration` of all, and `heads`, where they were. The result holds the
     kept `points`, with the foot held still, the `codes` of all points, the counts of `removed` points by camera and
-    reason, `warnings`, the `glass` below the foot, its `movement`, how far `lasers_apart` lie, mm, how
-    far the ends are `contested`, X in mm, and the `heads` of the cameras.
+    reason, `warnings`, the `glass` below the foot, its `movement`, where the planes of its `lasers`
+    lie, how far the ends are `contested`, X in mm, and the `heads` of the cameras.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
         warnings=_json([*removed.warnings, *movement.warnings]),
         glass=_json(removed.glass.model_dump(mode="json")),
         movement=_json(movement.model_dump(mode="json")),
-        lasers_apart=np.array(removed.lasers_apart_mm),
+        lasers=removed.lasers,
         contested=np.array(removed.contested_mm),
         heads=_json(heads),
     )

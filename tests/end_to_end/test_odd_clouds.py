@@ -118,7 +118,7 @@ def meshed(cloud: Cloud, calibration: bytes, parameters: SurfaceParameters) -> d
     reports = {name: np.frombuffer(text.encode(), np.uint8) for name, text in nothing.items()}
     codes = np.full(len(cloud), KEPT, np.uint8)
     contested = np.array([np.inf, -np.inf])
-    clean = pack(points=cloud, codes=codes, lasers_apart=np.float64(0.0), contested=contested, **reports)
+    clean = pack(points=cloud, codes=codes, lasers=np.zeros((2, 6)), contested=contested, **reports)
     fused = fuse.run({"clean": clean}, FusionParameters(), {})
     oriented = orient.run({"fused": fused, "calibration": calibration}, NormalParameters(), {})
     return {

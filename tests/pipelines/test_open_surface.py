@@ -26,7 +26,7 @@ WINDOW_MM = 30.0
 NOWHERE: dict[str, Path] = {}
 IN_PLACE = pack(
     glass=np.frombuffer(GlassPlane().model_dump_json().encode(), np.uint8),
-    lasers_apart=np.array(np.inf),
+    lasers=np.empty((0, 6)),
     contested=np.array([np.inf, -np.inf]),
     movement=np.frombuffer(MovementReport().model_dump_json().encode(), np.uint8),
 )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from footscan.calibration.models.laser_plane import MIDDLE_Z_MM, x_in_turned_plane
+from footscan.calibration.models.laser_plane import x_in_turned_plane
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.cloud.views import View
 
@@ -19,8 +19,6 @@ Floats = NDArray[np.float64]
 MOST_STEPS = 5.0
 """Cameras may begin with another frame: heads that are farther apart in frames of one number, in steps of the travel,
 do not run together. Chosen by hand."""
-HALF_MM = 50.0
-"""Half the breadth of the volume of a foot."""
 LEAST_MM = 0.01
 """Travel within a frame below which all its rows count as of one moment. Chosen by hand."""
 MOST_SLOPE = 10.0
@@ -131,26 +129,6 @@ def motion(points: NDArray[np.void], late: Floats) -> Floats:
             found += known
         way_per_mm[rows] /= np.maximum(found, 1.0)[:, None]
     return way_per_mm
-
-
-def planes_apart(views: Mapping[int, View], x_mm: tuple[float, float]) -> float:
-    """Largest distance along X between the laser planes of two heads over the volume of a foot, mm; infinite where no
-    film or scan has shown a plane.
-
-    x_mm : least and greatest X of the foot
-
-    >>> from schemas.calibration import LaserPlane
-    >>> views = {
-    ...     head: View(np.zeros(3), np.empty((0, 2)), LaserPlane(head=head, offset_mm=offset, sd=[0.0] * 7))
-    ...     for head, offset in ((1, 0.5), (2, -0.25))
-    ... }
-    >>> planes_apart(views, (0.0, 250.0))
-    0.75
-    """
-    places = np.array([(y, z) for y in (-HALF_MM, HALF_MM) for z in (0.0, 2 * MIDDLE_Z_MM)])
-    if not views or any(view.plane is None for view in views.values()):
-        return np.inf
-    return float(max(np.ptp(_planes_at(np.full(4, x), places, views), axis=0).max() for x in x_mm))
 
 
 def of_any_laser(points: NDArray[np.void], views: Mapping[int, View]) -> tuple[NDArray[np.void], NDArray[np.void]]:

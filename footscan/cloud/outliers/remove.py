@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.contact import above_glass, estimate_glass, moved_warning
+from footscan.cloud.lasers.apart import UNKNOWN, head_planes
 from footscan.cloud.lasers.choose import choose_lasers
-from footscan.cloud.lasers.moments import of_any_laser, planes_apart
+from footscan.cloud.lasers.moments import of_any_laser
 from footscan.cloud.outliers.body import body_range, is_apart
 from footscan.cloud.outliers.clutter import is_island, is_static
 from footscan.cloud.outliers.contested import NOT_CONTESTED, contested_ends
@@ -62,8 +63,8 @@ class Removed:
     one on a plate that was moved."""
     glass: GlassPlane
     """The glass on which the foot stands; points were judged by their height above it."""
-    lasers_apart_mm: float = math.inf
-    """As of `planes_apart`, over the points that are kept."""
+    lasers: NDArray[np.float64] = field(default_factory=UNKNOWN.copy)
+    """As of `head_planes`."""
     contested_mm: tuple[float, float] = NOT_CONTESTED
     """As of `contested_ends`; nothing is contested where no other cameras were asked."""
 
@@ -164,10 +165,9 @@ def remove_outliers(
         *_cut_warnings(points, codes, parameters, views),
         *moved_warning(glass, parameters.glass_mm),
     ]
-    ends = (float(remaining["x"].min()), float(remaining["x"].max())) if len(remaining) else (0.0, 0.0)
     denied, mistaken = (points[codes == 1 + REASONS.index(reason)] for reason in ("unconfirmed", "laser"))
     contested = contested_ends(remaining, denied, of_any_laser(mistaken, views))
-    return remaining, Removed(codes, counts, warnings, glass, planes_apart(views, ends), contested)
+    return remaining, Removed(codes, counts, warnings, glass, head_planes(views), contested)
 
 
 def _drop_by_segment(

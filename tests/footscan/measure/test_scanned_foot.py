@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from footscan.cloud.lasers.apart import UNKNOWN
 from footscan.cloud.points import make_points
 from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
@@ -127,6 +128,19 @@ def test_an_end_that_falls_short_of_the_outermost_stripe_is_worth_less(foot: Mes
 def test_a_cloud_of_the_leg_alone_says_nothing_of_the_ends(foot: Mesh) -> None:
     leg = make_points(foot.vertices[foot.vertices[:, 2] > 80.0], camera=1)
     assert np.isfinite(scan_errors(foot, Evidence(leg)).deviations).all()
+
+
+@pytest.mark.parametrize(("apart_mm", "widens"), [(0.0, False), (1.5, True), (3.5, False)])
+def test_lasers_so_close_that_their_stripes_are_one_widen_the_heights(
+    foot: Mesh, apart_mm: float, widens: bool
+) -> None:
+    cloud = make_points(foot.vertices, camera=1 + np.arange(len(foot.vertices)) % 2)
+    cloud["cameras"] = 2
+    lasers = np.array([[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [2.0, apart_mm, 0.0, 0.0, 0.0, 0.0]])
+    evidence = Evidence(cloud, FusionReport(heads={1: 1, 2: 2}), lasers=lasers)
+    deviations = scan_errors(foot, evidence).deviations
+    usual = scan_errors(foot, evidence._replace(lasers=UNKNOWN)).deviations
+    assert np.median(deviations / usual) > 2.0 if widens else deviations == pytest.approx(usual)
 
 
 def test_heads_that_jitter_widen_what_rests_on_x(foot: Mesh) -> None:
