@@ -45,9 +45,10 @@ them half the way. Tuned on films of `draw_assembled`, seeds 2503, 2513 and 2604
 of the errors is 0.04 mm where points are off by less than 0.01 mm, 0.12 to 0.18 by 0.05, and 0.16 to 0.22 by 0.12."""
 OF_BETWEEN, BETWEEN_MM = 0.15, (2.0, 3.0)
 """Standard deviation of a vertex relative to the distance of two lasers that light it: cameras see both stripes as one,
-which lies between them. It falls to 0 from the first to the second distance, where a valley parts them. Tuned on 58
-films (`draw_assembled`, seeds 2681 to 2720 and 3501 to 3518): where the upper lasers are 0.6 to 2 mm apart, the height
-of the big toe errs by 0.41 mm (root mean square), up to 2.6 mm by 0.18, and beyond by 0.13."""
+which lies between them, all over the skin that both light. It falls to 0 from the first to the second distance, where a
+valley parts them. Tuned on 58 films (`draw_assembled`, seeds 2681 to 2720 and 3501 to 3518): where the upper lasers are
+0.6 to 2 mm apart, the height of the big toe errs by 0.41 mm (root mean square), up to 2.6 mm by 0.18, and beyond by
+0.13."""
 FACING_GROWS = 0.15
 """Growth of the standard deviation per mm into filled surface that faces the travel, as the tips of the shorter toes
 do: root mean square 0.16 per mm on 16 calibrated scanners (`draw_assembled`, seeds 1001 to 1016)."""
@@ -221,7 +222,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     fields = [
         *_broad_and_narrow("noise", np.maximum(_noise(around, step_mm), _scattered(scatter_mm, step_mm))),
         ErrorField("noise", everywhere * COMMON_MM, WIDE_MM),
-        ErrorField("noise", _between_stripes(vertices, evidence), REACH_MM),
+        ErrorField("noise", _between_stripes(vertices, evidence), WIDE_MM),
         ErrorField("filling", np.where(inside, ERROR_GROWS * gap_mm, 0.0), REACH_MM),
         *_broad_and_narrow("filling", np.where(inside, FACING_GROWS * gap_mm * np.abs(normals[:, 0]), 0.0)),
         *_broad_and_narrow("ends", END_GROWS * np.maximum(beyond_mm, 0.0)),
