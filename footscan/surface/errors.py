@@ -176,7 +176,7 @@ class Evidence(NamedTuple):
     movement: MovementReport | None = None
     """Of the foot; None: it stood still"""
     lasers: Floats = UNKNOWN
-    """(H, 6) as of `head_planes`: one camera alone may see an end too far out by the largest distance of two"""
+    """(L, 6) as of `lasers_of`: one camera alone may see an end too far out by the largest distance of two"""
     contested_mm: tuple[float, float] = NOT_CONTESTED
     """Least and greatest X of the foot with stripes that were dropped for contradicting other cameras"""
     tip_doubts_mm: tuple[float, float] = (0.0, 0.0)
@@ -294,11 +294,11 @@ def _ends(vertices: Floats, evidence: Evidence) -> list[_End]:
     if cloud is None or len(stripes) < FEWEST_AT_END or not len(low):
         return []
     surface, outermost, confirmed = (low.min(), low.max()), ends_of(stripes), confirmed_ends(cloud)
-    ends = []
+    farthest, ends = planes_apart(evidence.lasers, outermost), []
     for side, outward in enumerate((-1.0, 1.0)):
         alone = 0.0 if confirmed is None else outward * (outermost[side] - confirmed[side])
         dropped, short = (outward * (seen[side] - surface[side]) for seen in (evidence.contested_mm, outermost))
-        alone = min(alone, planes_apart(evidence.lasers, outermost))
+        alone = min(alone, farthest)
         unsure = float(alone), max(float(dropped), 0.0), max(float(short), 0.0)
         ends.append(_End(float(surface[side]), *unsure, evidence.tip_doubts_mm[side]))
     return ends
@@ -330,7 +330,7 @@ def _least(step_mm: float) -> float:
 
 def _between_stripes(vertices: Floats, evidence: Evidence) -> Floats:
     """(V,) standard deviations of vertices where two lasers are so close that cameras see one stripe, mm."""
-    if evidence.cloud is None or evidence.agreement is None or not len(evidence.cloud) or not len(evidence.lasers):
+    if evidence.cloud is None or evidence.agreement is None:
         return np.zeros(len(vertices))
     apart = between_lasers(evidence.lasers, vertices, evidence.cloud, evidence.agreement.heads)
     near, far = BETWEEN_MM

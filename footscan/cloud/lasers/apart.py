@@ -1,12 +1,13 @@
 """How far the laser planes of the heads lie apart: where they are close, cameras see two stripes as one."""
 
 from collections.abc import Mapping
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from footscan.calibration.models.laser_plane import BEND_MM, MIDDLE_Z_MM
+from footscan.calibration.models.laser_plane import MIDDLE_Z_MM, terms_of_plane
 from footscan.cloud.points import coordinates
 from footscan.cloud.views import View
 
@@ -20,13 +21,13 @@ UNKNOWN = np.empty((0, 6))
 """Planes of which no film or scan has shown where they lie."""
 
 
-def head_planes(views: Mapping[int, View]) -> Floats:
-    """(H, 6) for each head its number, and how far its laser plane is ahead of the travel, mm: constant, and for each
-    mm of Y, of Z - `MIDDLE_Z_MM`, of the bend by (Y / `BEND_MM`)², and of X; `UNKNOWN` if a view has no plane.
+def lasers_of(views: Mapping[int, View]) -> Floats:
+    """(L, 6) for each laser the number of its head, and how far its plane is ahead of the travel, mm: the factors of
+    the first five `terms_of_plane` with their X counted from 0; `UNKNOWN` if a view has no plane.
 
     >>> from schemas.calibration import LaserPlane
     >>> plane = LaserPlane(head=2, offset_mm=0.5, yaw=0.01, sd=[0.0] * 7)
-    >>> head_planes({4: View(np.zeros(3), np.empty((0, 2)), plane)}).tolist()
+    >>> lasers_of({4: View(np.zeros(3), np.empty((0, 2)), plane)}).tolist()
     [[2.0, 0.5, 0.01, 0.0, 0.0, 0.0]]
     """
     found = {}
@@ -35,12 +36,13 @@ def head_planes(views: Mapping[int, View]) -> Floats:
         if plane is None:
             return UNKNOWN
         constant = view.ahead_mm + plane.offset_mm + plane.scale * (view.ahead_mm - plane.x_mm)
-        found[plane.head] = [plane.head, constant, plane.yaw, plane.pitch, plane.bend_mm, plane.scale]
-    return np.array([found[head] for head in sorted(found)]) if found else UNKNOWN
+        terms = [plane.head, constant, plane.yaw, plane.pitch, plane.bend_mm, plane.scale]
+        found[plane.head, view.ahead_mm] = terms
+    return np.array([found[laser] for laser in sorted(found)]) if found else UNKNOWN
 
 
 def planes_apart(planes: Floats, x_mm: tuple[float, float]) -> float:
-    """Largest distance along X between two planes (H, 6) over the volume of a foot, mm; infinite if they are `UNKNOWN`.
+    """Largest distance along X between two planes (L, 6) over the volume of a foot, mm; infinite if they are `UNKNOWN`.
 
     x_mm : least and greatest X of the foot
 
@@ -56,7 +58,7 @@ def planes_apart(planes: Floats, x_mm: tuple[float, float]) -> float:
 def between_lasers(
     planes: Floats, places: Floats, cloud: NDArray[np.void], head_of: Mapping[int, int]
 ) -> NDArray[np.float64]:
-    """(V,) least distance along X between two of the `planes` (H, 6) whose lasers light a place, mm; infinite where at
+    """(V,) least distance along X between two of the `planes` (L, 6) whose lasers light a place, mm; infinite where at
     most one does.
 
     Parameters
@@ -65,21 +67,20 @@ def between_lasers(
     cloud : (N,) of `POINT_DTYPE`
     head_of : camera of the cloud -> number of its head
     """
+    lit = {}
+    for head in set(planes[:, 0]):
+        own = np.isin(cloud["camera"], [camera for camera, of_camera in head_of.items() if of_camera == head])
+        lit[head] = KDTree(coordinates(cloud[own])).query(places, distance_upper_bound=LIT_MM)[0] <= LIT_MM
     least = np.full(len(places), np.inf)
-    head = np.array([head_of.get(camera, 0) for camera in range(256)])[cloud["camera"]]
-    ahead, lit = _ahead(planes, places), []
-    for number in planes[:, 0].astype(int):
-        own = coordinates(cloud[head == number])
-        far = np.full(len(places), np.inf) if not len(own) else np.asarray(KDTree(own).query(places)[0])
-        lit.append(far <= LIT_MM)
-    for one in range(len(planes)):
-        for other in range(one):
-            apart = np.where(lit[one] & lit[other], np.abs(ahead[one] - ahead[other]), np.inf)
-            least = np.minimum(least, apart)
+    lasers = zip(planes[:, 0], _ahead(planes, places), strict=True)
+    for (one, one_ahead), (other, other_ahead) in combinations(lasers, 2):
+        apart = np.where(lit[one] & lit[other], np.abs(one_ahead - other_ahead), np.inf)
+        least = np.minimum(least, apart)
     return least
 
 
 def _ahead(planes: Floats, places: Floats) -> Floats:
-    """(H, V) how far the planes are ahead of the travel at `places` (V, 3), mm."""
-    x, y, z = places.T
-    return np.asarray(planes[:, 1:] @ np.array([np.ones(len(x)), y, z - MIDDLE_Z_MM, (y / BEND_MM) ** 2, x]))
+    """(L, V) how far the planes are ahead of the travel at `places` (V, 3), mm."""
+    still = np.zeros(len(places))
+    terms = terms_of_plane(places[:, 0], places[:, 1:], still, still, 0.0)
+    return np.asarray(planes[:, 1:] @ terms[:, :5].T)

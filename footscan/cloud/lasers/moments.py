@@ -140,16 +140,12 @@ def of_any_laser(points: NDArray[np.void], views: Mapping[int, View]) -> tuple[N
     points = points[np.isin(points["camera"], list(views))]
     if not len(points) or ahead_of_frames(renumbered(points, views), views) is None:
         return points[:0], points[:0]
-    x = _planes_at(travel_of(points, views), coordinates(points)[:, 1:], views)
+    travel, yz = travel_of(points, views), coordinates(points)[:, 1:]
+    planes = [(view.plane, plane_of_travel(view, travel)) for view in views.values()]
+    x = np.array([x_in_turned_plane(plane, middle, yz) for plane, middle in planes if plane is not None])
     greatest, least = points.copy(), points.copy()
     greatest["x"], least["x"] = x.max(axis=0), x.min(axis=0)
     return greatest, least
-
-
-def _planes_at(travel: Floats, yz: Floats, views: Mapping[int, View]) -> Floats:
-    """X of the laser plane of each view at (N, 2) Y and Z, with the heads at `travel` (N,), (views, N) mm."""
-    planes = [(view.plane, plane_of_travel(view, travel)) for view in views.values()]
-    return np.array([x_in_turned_plane(plane, x, yz) for plane, x in planes if plane is not None])
 
 
 def _by_frame(frame: NDArray[np.integer], x: Floats, rows: NDArray[np.bool_]) -> dict[int, float]:

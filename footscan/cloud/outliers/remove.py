@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.contact import above_glass, estimate_glass, moved_warning
-from footscan.cloud.lasers.apart import UNKNOWN, head_planes
+from footscan.cloud.lasers.apart import UNKNOWN, lasers_of
 from footscan.cloud.lasers.choose import choose_lasers
 from footscan.cloud.lasers.moments import of_any_laser
 from footscan.cloud.outliers.body import body_range, is_apart
@@ -64,7 +64,7 @@ class Removed:
     glass: GlassPlane
     """The glass on which the foot stands; points were judged by their height above it."""
     lasers: NDArray[np.float64] = field(default_factory=UNKNOWN.copy)
-    """As of `head_planes`."""
+    """As of `lasers_of`."""
     contested_mm: tuple[float, float] = NOT_CONTESTED
     """As of `contested_ends`; nothing is contested where no other cameras were asked."""
 
@@ -167,7 +167,7 @@ def remove_outliers(
     ]
     denied, mistaken = (points[codes == 1 + REASONS.index(reason)] for reason in ("unconfirmed", "laser"))
     contested = contested_ends(remaining, denied, of_any_laser(mistaken, views))
-    return remaining, Removed(codes, counts, warnings, glass, head_planes(views), contested)
+    return remaining, Removed(codes, counts, warnings, glass, lasers_of(views), contested)
 
 
 def _drop_by_segment(
