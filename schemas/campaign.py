@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from schemas.base.model import Document
-from schemas.measures import Status
+from schemas.measures import ErrorCause, Status
 from schemas.parameters.simulation import Seed
 
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -34,6 +34,8 @@ class WorldMeasure(Document):
     sigma: float | None
     """Standard deviation that was reported."""
     status: Status
+    budget: dict[ErrorCause, float] | None = None
+    """Standard deviation by its cause, as reported; None in files of earlier versions."""
 
     @property
     def error(self) -> float | None:

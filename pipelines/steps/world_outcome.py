@@ -49,7 +49,13 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
         surface=error(measured),
         warnings=[*heads.warnings, *cleaning, *agreement.warnings, *measures.warnings],
         measures={
-            name: WorldMeasure(value=measure.value, truth=known[name], sigma=measure.uncertainty, status=measure.status)
+            name: WorldMeasure(
+                value=measure.value,
+                truth=known[name],
+                sigma=measure.uncertainty,
+                status=measure.status,
+                budget=measure.budget,
+            )
             for name, measure in measures.measures.items()
             if name in known
         },
