@@ -36,6 +36,8 @@ class WorldMeasure(Document):
     status: Status
     budget: dict[ErrorCause, float] | None = None
     """Standard deviation by its cause, as reported; None in files of earlier versions."""
+    note: str | None = None
+    """Reasons for the status, as reported."""
 
     @property
     def error(self) -> float | None:

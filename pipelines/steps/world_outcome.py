@@ -55,6 +55,7 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
                 sigma=measure.uncertainty,
                 status=measure.status,
                 budget=measure.budget,
+                note=measure.note,
             )
             for name, measure in measures.measures.items()
             if name in known
