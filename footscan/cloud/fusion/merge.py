@@ -32,9 +32,11 @@ def merge(stripes: Stripes, yz: Floats, reach: Floats, deviations: Floats, param
 
     The most certain points are kept, thinned out, and moved along their normals to the weighted mean of all cameras
     there, with weights 1 / sigma^2. There is no averaging along the stripe, which preserves edges. If cameras
-    contradict each other, the largest group that agrees is kept, or of equally large groups the most certain; the
-    points of the others are dropped. A merged point has the camera, frame and source of its most certain point. Its
-    sigma is that of the mean, and larger if the points differ by more than their sigmas.
+    contradict each other, the majority that agrees is kept, and the points of the others are dropped. Without a
+    majority all of them count, and the point is as doubtful as they differ: where cameras see the stripes of two lasers
+    as one, those that look from ahead err one way, and those from behind the other way. A merged point has the camera,
+    frame and source of its most certain point. Its sigma is that of the mean, and larger if the points differ by more
+    than their sigmas.
 
     Parameters
     ----------
@@ -79,7 +81,7 @@ def _merge(
     -------
     places : (N, 3), where each point is moved to, mm.
     surest : (N,), the most certain point of those that it is made of.
-    members : (N,), the number of its cameras; 0 if it is thinned out, -1 if it is contradicted.
+    members : (N,), the number of cameras that agree on it; 0 if it is thinned out, -1 if it is contradicted.
     spread : (N,), its standard deviation, mm.
     """
     _, plane, _, x, yz, sigma, normals, _, _ = traces
@@ -96,7 +98,16 @@ def _merge(
         if not _is_free(plane[n], yz[n], spacing, plane, places, table, previous):
             continue
         seen = _look(n, reach, traces, sights, seen_by)
-        agree, weight = _vote(seen, sights, seen_by, sigmas, deviations, agreeing)
+        agree = _vote(seen, sights, seen_by, sigmas, deviations, agreeing)
+        is_undecided = 2 * agree <= seen
+        if is_undecided:
+            sights[:seen, 2] += (0.5 * np.ptp(sights[:seen, 0])) ** 2
+            agreeing[:seen] = True
+        counted, weight = 0, 0.0
+        for m in range(seen):
+            if agreeing[m]:
+                counted += 1
+                weight += 1.0 / sights[m, 2]
         mean = mean_x = most = squares = 0.0
         contradicted = True
         for m in range(seen):
@@ -113,13 +124,13 @@ def _merge(
             continue
         # The sigma of the mean grows with the scatter (R. T. Birge, Physical Review 40, 1932,
         # doi:10.1103/PhysRev.40.207).
-        ratio = (squares - mean**2 * weight) / max(agree - 1, 1)
+        ratio = (squares - mean**2 * weight) / max(counted - 1, 1)
         spread[n] = np.sqrt(max(1.0, ratio) / weight)
         places[n, 0] += mean_x
         places[n, 1] += mean * normals[n, 0]
         places[n, 2] += mean * normals[n, 1]
         if _is_free(plane[n], places[n, 1:], spacing, plane, places, table, previous):
-            members[n] = agree
+            members[n] = 1 if is_undecided else agree
             bucket = _bucket(plane[n], _cell(places[n, 1], spacing), _cell(places[n, 2], spacing))
             previous[n] = table[bucket]
             table[bucket] = n
@@ -168,8 +179,8 @@ def _vote(
     sigmas: float,
     deviations: Floats,
     agreeing: NDArray[np.bool_],
-) -> tuple[int, float]:
-    """Mark in `agreeing` the largest (or most certain) group of sights that agree; returns its size and weight."""
+) -> int:
+    """Mark in `agreeing` the largest (or most certain) group of sights that agree; returns its size."""
     best, best_count, best_weight = 0, 0, 0.0
     for k in range(seen):
         count, weight = 0, 0.0
@@ -181,7 +192,7 @@ def _vote(
             best, best_count, best_weight = k, count, weight
     for m in range(seen):
         agreeing[m] = _agree(best, m, sights, seen_by, sigmas, deviations)
-    return best_count, best_weight
+    return best_count
 
 
 @compiled

@@ -52,10 +52,19 @@ def test_of_three_that_contradict_each_other_two_win() -> None:
     assert contradicted == {1: 0, 2: 100, 3: 0}
 
 
-def test_of_two_that_contradict_each_other_the_surer_one_wins() -> None:
+def test_of_two_that_contradict_each_other_none_wins() -> None:
     cloud, contradicted = merged(row(10.0, 1, 0.03), row(10.4, 2, 0.02))
-    np.testing.assert_allclose(cloud["z"], 10.4, atol=1e-5)
-    assert contradicted == {1: 100, 2: 0}
+    np.testing.assert_allclose(inner(cloud)["z"], 10.2, atol=0.01)
+    np.testing.assert_allclose(inner(cloud)["sigma"], 0.2, atol=0.01)
+    assert set(inner(cloud)["cameras"].tolist()) == {1}
+    assert contradicted == {1: 0, 2: 0}
+
+
+def test_of_two_pairs_that_contradict_each_other_none_wins() -> None:
+    cloud, _ = merged(row(10.0, 1), row(10.4, 2), row(10.01, 3), row(10.41, 4))
+    np.testing.assert_allclose(inner(cloud)["z"], 10.205, atol=0.01)
+    assert inner(cloud)["sigma"].min() > 0.1
+    assert set(inner(cloud)["cameras"].tolist()) == {1}
 
 
 def test_cameras_that_always_differ_by_so_much_do_not_contradict_each_other() -> None:
