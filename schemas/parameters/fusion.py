@@ -18,8 +18,8 @@ class FusionParameters(Document):
     contradiction_mm: Annotated[float, Field(gt=0, le=10)] = 1.0
     """Points of two cameras that lie farther apart show different surfaces."""
     contradiction_sigmas: Annotated[float, Field(ge=1, le=20)] = 4.0
-    """If points are closer, but more than this number of standard deviations apart, they contradict each other: those of
-    the majority stay, or the mean of all without one."""
+    """If points are closer, but more than this number of standard deviations apart, they contradict each other: those
+    of the majority stay, or the mean of all without one."""
     correct_cameras: bool = True
     """True if a camera may be moved to agree with others on the skin that they all see."""
     overlap_mm: Annotated[float, Field(gt=0, le=20)] = 3.0
