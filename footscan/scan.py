@@ -32,7 +32,7 @@ from footscan.recordings.scans import RecordedScan, read_scan
 from footscan.stripe.film import extract_film
 from footscan.stripe.laser import adapted
 from footscan.stripe.points import StripePoints
-from footscan.surface.errors import Evidence
+from footscan.surface.errors.evidence import Evidence
 from footscan.surface.surface_of_cloud import surface_of_cloud, tip_doubts_mm
 from schemas.base.errors import Finding, RefusedInput
 from schemas.base.json_files import read_text

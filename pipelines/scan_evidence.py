@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from footscan.surface.errors import Evidence
+from footscan.surface.errors.evidence import Evidence
 from pipelines.arrays import unpack
 from schemas.fusion import FusionReport
 from schemas.movement import MovementReport

@@ -158,6 +158,20 @@ class FusionReport(Document):
             _root_mean_square((mm, places[heads]) for heads, mm in self.heads_apart.items()),
         )
 
+    @property
+    def gross_mm(self) -> float:
+        """Gross errors: by how much cameras that see the same skin differ beyond their scatter, mm, after the
+        corrections. Root mean square over all places; 0 without comparisons.
+
+        >>> apart = Disagreement(median_mm=0.0, deviation_mm=0.03, rms_mm=0.05)
+        >>> pair = PairDisagreement(cameras=(1, 2), points=99, before=apart, after=apart)
+        >>> print(f"{FusionReport(pairs=[pair]).gross_mm:.2f} mm")
+        0.04 mm
+        """
+        square = _root_mean_square((pair.after.rms_mm, pair.points) for pair in self.pairs) ** 2
+        scatter = _root_mean_square((pair.after.deviation_mm, pair.points) for pair in self.pairs) ** 2
+        return math.sqrt(max(square - scatter, 0.0))
+
     def systematic_of(self, camera: Camera) -> float:
         """Systematic disagreement of a camera with those of other heads, mm; of all cameras, if that is more.
 

@@ -22,7 +22,7 @@ from footscan.measure.replicates import REPLICATES, of_replicates
 from footscan.measure.roughness import Roughness
 from footscan.measure.uncertainty import Scatter, SurfaceErrors, scatter_of, with_landmarks
 from footscan.mesh.rigid_transform import apply
-from footscan.surface.errors import ErrorField
+from footscan.surface.errors.field import ErrorField
 from schemas.base.errors import Finding
 from schemas.base.model import Side
 from schemas.glass import GlassPlane

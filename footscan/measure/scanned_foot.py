@@ -9,7 +9,8 @@ from footscan.measure.measures import measure_foot
 from footscan.measure.replicates import REPLICATES
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
-from footscan.surface.errors import NO_EVIDENCE, Evidence, scan_errors
+from footscan.surface.errors.evidence import NO_EVIDENCE, Evidence
+from footscan.surface.errors.scan_errors import scan_errors
 from schemas.base.model import Side
 from schemas.glass import GlassPlane
 from schemas.measures import Axis, Measures

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.measure.quantity import Quantity
-from footscan.surface.errors import ErrorField
+from footscan.surface.errors.field import ErrorField
 from schemas.measures import ErrorCause
 
 FEWEST_REPLICATES = 5

@@ -18,7 +18,7 @@ from footscan.report.scan.foot_colours import FootSurface
 from footscan.report.scan.page import ScanPoints, ScanTitle, scan_page
 from footscan.side_by_side import together
 from footscan.stripe.points import StripePoints
-from footscan.surface.errors import scan_errors
+from footscan.surface.errors.scan_errors import scan_errors
 from pipelines.arrays import unpack
 from pipelines.scan_evidence import evidence_of
 from schemas.calibration import Calibration

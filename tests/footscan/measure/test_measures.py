@@ -12,7 +12,7 @@ from footscan.measure.frame.foot_frame import FootFrame
 from footscan.measure.measures import measure_foot, take_measures
 from footscan.mesh.formats.files import read_mesh
 from footscan.mesh.topology import vertex_normals
-from footscan.surface.errors import ErrorField
+from footscan.surface.errors.field import ErrorField
 from footscan.virtual.foot.foot import Foot, make_foot
 from schemas.base.errors import Finding
 from schemas.glass import GlassPlane

@@ -9,7 +9,7 @@ from footscan.measure.replicates import of_replicates
 from footscan.measure.uncertainty import SurfaceErrors, scatter_of
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
-from footscan.surface.errors import ErrorField
+from footscan.surface.errors.field import ErrorField
 from footscan.virtual.foot.foot import make_foot
 
 SD_MM, REACH_MM = 0.03, 10.0

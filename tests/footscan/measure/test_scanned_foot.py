@@ -8,7 +8,9 @@ from footscan.cloud.points import make_points
 from footscan.measure.scanned_foot import measure_scanned_foot
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
-from footscan.surface.errors import Evidence, confirmed_ends, scan_errors
+from footscan.surface.errors.ends import confirmed_ends
+from footscan.surface.errors.evidence import Evidence
+from footscan.surface.errors.scan_errors import scan_errors
 from footscan.virtual.foot.foot import make_foot
 from schemas.fusion import Disagreement, FusionReport, PairDisagreement
 from schemas.glass import GlassPlane
@@ -76,6 +78,18 @@ def test_cameras_that_disagree_widen_every_measure(foot: Mesh) -> None:
         assert (apart[name].uncertainty or 0.0) > 2 * (agreeing[name].uncertainty or np.inf)
         assert (apart[name].budget or {})["cameras"] > 0.05
         assert "cameras" not in (agreeing[name].budget or {"cameras": 0.0})
+
+
+def test_skin_that_one_camera_alone_saw_is_worth_less_where_cameras_err_grossly(foot: Mesh) -> None:
+    cloud = make_points(foot.vertices, camera=1)
+    alone = np.abs(foot.vertices[:, 0] - 120.0) < 30.0
+    cloud["cameras"], cloud["sigma"] = np.where(alone, 1, 2), 0.03
+    apart = Disagreement(median_mm=0.0, deviation_mm=0.03, rms_mm=0.1)
+    pairs = [PairDisagreement(cameras=(1, 2), points=1000, before=apart, after=apart)]
+    deviations = scan_errors(foot, Evidence(cloud, FusionReport(pairs=pairs))).deviations
+    usual = scan_errors(foot, Evidence(cloud, FusionReport())).deviations
+    assert np.median(deviations[alone]) > 2.0 * np.median(usual[alone])
+    np.testing.assert_allclose(np.median(deviations[~alone] - usual[~alone]), 0.0, atol=1e-9)
 
 
 def test_the_causes_of_an_uncertainty_make_it_up(foot: Mesh) -> None:

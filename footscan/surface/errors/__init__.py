@@ -1,0 +1,1 @@
+"""Errors of the surface of a scan: standard deviations of its vertices, one field a cause."""

@@ -1,0 +1,89 @@
+"""Errors of the measured part of a surface: from its points, their scatter, and cameras that contradict each other."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from footscan.cloud.lasers.apart import between_lasers
+from footscan.cloud.points import coordinates
+from footscan.surface.errors.evidence import Evidence
+from schemas.fusion import FusionReport
+
+Floats = NDArray[np.float64]
+
+ERROR_MM = 0.015
+"""Standard deviation of a measured vertex. Tuned on virtual feet: docs/surface.md."""
+USUAL_STEP_MM = 2.0
+"""Distance of stripes at which that holds. It grows with the square of a longer one, as the sagitta of the skin between
+two stripes does."""
+NEAREST, SHARED = 4, 0.25
+"""Points nearest to a vertex, and the part of their standard deviation that all points around it share. Tuned on
+scanners without pictures whose planes a body has shown: `draw_assembled`, seeds 801 to 810."""
+SCATTERED, OF_SCATTER, SCATTER_STEP_MM = 16, 2.5, 4.0
+"""Points nearest to a vertex whose scatter off the surface is judged; errors of the surface relative to what exceeds
+the scatter of all vertices; and the distance of stripes beyond which the mesh is too coarse to follow its points, which
+then say nothing. Where a camera takes two lasers for one, its points contradict each other, and the surface follows
+them half the way. Tuned on films of `draw_assembled`, seeds 2503, 2513 and 2604. In the first two the root mean square
+of the errors is 0.04 mm where points are off by less than 0.01 mm, 0.12 to 0.18 by 0.05, and 0.16 to 0.22 by 0.12."""
+OF_GROSS = 2.0
+"""Standard deviation of a vertex whose points one camera alone saw, relative to the gross errors of cameras that see
+the same skin. Tuned on films of `draw_assembled`, seeds 2503, 2506, 2604, 3516 and 3582, and on 2060, 2355 and 2821
+without pictures."""
+OF_BETWEEN, BETWEEN_MM = 0.15, (2.0, 3.0)
+"""Standard deviation of a vertex relative to the distance of two lasers that light it: cameras see both stripes as one,
+which lies between them, all over the skin that both light. It falls to 0 from the first to the second distance, where a
+valley parts them. Tuned on 58 films (`draw_assembled`, seeds 2681 to 2720 and 3501 to 3518): where the upper lasers are
+0.6 to 2 mm apart, the height of the big toe errs by 0.41 mm (root mean square), up to 2.6 mm by 0.18, and beyond by
+0.13."""
+
+
+def around(vertices: Floats, normals: Floats, cloud: NDArray[np.void] | None) -> tuple[NDArray[np.void] | None, Floats]:
+    """Returns (V, NEAREST) the points of a cloud nearest to each vertex, and (V,) how far the points around it are
+    off the surface on average, mm; None and 0 without enough points."""
+    if cloud is None or len(cloud) < SCATTERED:
+        return None, np.zeros(len(vertices))
+    points = coordinates(cloud)
+    vertex = np.asarray(KDTree(vertices).query(points)[1])
+    off_mm = np.abs(((points - vertices[vertex]) * normals[vertex]).sum(axis=1))
+    near = np.asarray(KDTree(points).query(vertices, SCATTERED)[1])
+    return cloud[near[:, :NEAREST]], off_mm[near].mean(axis=1)
+
+
+def measured_noise(
+    points: NDArray[np.void] | None, scatter_mm: Floats, agreement: FusionReport | None, step_mm: float
+) -> Floats:
+    """Return (V,) the standard deviations of vertices, mm: by the points around them, by how far these scatter, or,
+    where one camera alone saw them, by the gross errors of others, whichever is largest.
+
+    `points`, `scatter_mm` : as of `around`
+    """
+    least = ERROR_MM * max(1.0, (step_mm / USUAL_STEP_MM) ** 2)
+    # That is also how far points are off the coarse mesh of distant stripes.
+    noise = np.maximum(least, OF_SCATTER * np.maximum(scatter_mm - least, 0.0) * (step_mm <= SCATTER_STEP_MM))
+    if points is not None:
+        noise = np.maximum(noise, SHARED * points["sigma"].mean(axis=1))
+        if agreement is not None:
+            noise = np.maximum(noise, OF_GROSS * agreement.gross_mm * (points["cameras"] == 1).mean(axis=1))
+    return np.asarray(noise)
+
+
+def between_stripes(vertices: Floats, evidence: Evidence) -> Floats:
+    """Return (V,) the standard deviations of vertices where two lasers are so close that cameras see one stripe, mm."""
+    if evidence.cloud is None or evidence.agreement is None:
+        return np.zeros(len(vertices))
+    apart = between_lasers(evidence.lasers, vertices, evidence.cloud, evidence.agreement.heads)
+    near, far = BETWEEN_MM
+    apart = np.minimum(apart, far)
+    return OF_BETWEEN * apart * np.minimum((far - apart) / (far - near), 1.0)
+
+
+def systematic(points: NDArray[np.void] | None, agreement: FusionReport | None) -> Floats | float:
+    """Return (V,) the systematic disagreement of the cameras of the `points` around each vertex, mm; one for all
+    without points."""
+    if agreement is None:
+        return 0.0
+    if points is None:
+        return agreement.systematic_mm
+    cameras, number = np.unique(points["camera"], return_inverse=True)
+    apart = np.array([agreement.systematic_of(int(camera)) for camera in cameras])
+    return np.asarray(apart[number.reshape(points.shape)].mean(axis=1))

@@ -1,0 +1,114 @@
+"""The errors of a scanned surface from all causes."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from footscan.cloud.points import stripe_step
+from footscan.mesh.mesh import Mesh
+from footscan.mesh.topology import vertex_normals
+from footscan.surface.errors.ends import beyond_stripes, find_ends
+from footscan.surface.errors.evidence import Evidence
+from footscan.surface.errors.field import NARROW_MM, REACH_MM, WIDE_MM, ErrorField, broad_and_narrow
+from footscan.surface.errors.measured import USUAL_STEP_MM, around, between_stripes, measured_noise, systematic
+from schemas.movement import MovementReport
+
+Floats = NDArray[np.float64]
+
+ERROR_GROWS = 0.04
+"""Growth of the standard deviation per mm into filled surface. Tuned on virtual feet: docs/surface.md."""
+COMMON_MM = 0.015
+"""Standard deviation that a whole part of the foot, as broad as `WIDE_MM`, has in common: stripes and surfaces that are
+a little too far in make a girth too small all around. Tuned on ideal scanners (`draw_assembled`, seeds 701 and 702, as
+designed), whose girths at waist and instep are 0.13 to 0.18 mm too small."""
+FACING_GROWS = 0.15
+"""Growth of the standard deviation per mm into filled surface that faces the travel, as the tips of the shorter toes
+do: root mean square 0.16 per mm on 16 calibrated scanners (`draw_assembled`, seeds 1001 to 1016)."""
+END_GROWS = 0.08
+"""Growth of the standard deviation per mm along the travel beyond the outermost stripe, at heel and toes: some 0.06 of
+heels and 0.1 of toes on 50 scans of virtual feet (`draw_assembled`)."""
+ASIDE = 0.1
+"""Errors of an end that vary over `NARROW_MM`, relative to those along the travel that it has as a whole. Chosen by
+hand, after `draw_assembled`, seeds 971 to 978."""
+OF_DISAGREEMENT = 0.75
+"""Errors of the mean of all cameras, relative to their systematic disagreement, and as broad as a camera's view. Tuned
+on 40 films (`draw_assembled`, seeds 3559 to 3598): 84 % of the errors of measures lie within one standard deviation, 93
+% with twice as much. In six films (2503, 2506, 2604, 3516, 3568 and 3582) the surface errs by 0.1 to 1.0 of the
+disagreement where cameras agree (root mean square)."""
+SWAY_MM, SWAY_STEPS = 0.07, 12.0
+"""Standard deviation of slow movement of the foot, along X and across, where nothing is known of it, as in
+`footscan.cloud.movement.sway`; and the steps of the travel over which it varies. Over a tenth of a metre it looks like
+the form of another foot. Chosen by hand, the second one for a sway of 0.7 Hz, which turns over in 13 frames."""
+FORM_MM, OF_TREMOR = 0.03, 2.0
+"""Tremor that the form of a still foot looks like, and errors of X relative to what exceeds it where the foot was not
+moved back: heads that jitter also ripple, which no stripe shows. Chosen by hand: ideal scanners (`draw_assembled`,
+seeds 701 to 703, as designed) look like a tremor of 0.03 mm, those whose heads jitter and ripple by 0.2 mm like one of
+0.08."""
+LEFT_OF_TREMOR = 0.2
+"""Share of a tremor that is left when the foot was moved back: 0.1 to 0.15 on the feet that `movement` was tuned on."""
+RELIABLE_MM = 5.0
+"""Filled surface nearer than this to measured surface counts as measured: a smooth surface hardly errs there. Chosen by
+hand."""
+
+
+class ScanErrors(NamedTuple):
+    """The errors of a scanned surface of V vertices."""
+
+    fields: list[ErrorField]
+    """Independent of each other"""
+    is_unseen: NDArray[np.bool_]
+    """(V,) far from measured surface, or an end that one camera alone saw"""
+
+    @property
+    def deviations(self) -> Floats:
+        """(V,) standard deviations from all causes along the normals, mm: their root sum of squares."""
+        return np.asarray(np.sqrt(sum(field.deviations**2 for field in self.fields)))
+
+
+def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
+    """Estimate the errors of a scanned surface.
+
+    `mesh` : mm, scanner frame; without `filled`, all vertices count as measured
+    """
+    vertices, cloud = mesh.vertices, evidence.cloud
+    normals = vertex_normals(vertices, mesh.faces)
+    seen = np.ones(len(vertices), bool) if mesh.filled is None else ~mesh.filled
+    step_mm = USUAL_STEP_MM if cloud is None else stripe_step(cloud) or USUAL_STEP_MM
+    beyond_mm = beyond_stripes(vertices, ~seen, cloud, step_mm)
+    gap_mm = np.maximum(beyond_mm, 0.0)
+    inside = ~seen & (beyond_mm <= 0)
+    gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside])[0]
+    points, scatter_mm = around(vertices, normals, cloud)
+    everywhere = np.ones(len(vertices))
+    sway_mm = (evidence.movement and evidence.movement.sway_by_axis_mm) or (SWAY_MM, SWAY_MM)
+    ends = find_ends(vertices, evidence)
+    shift_mm = np.max([np.zeros(len(vertices)), *(end.shift_at(vertices[:, 0], step_mm) for end in ends)], axis=0)
+    fields = [
+        *broad_and_narrow("noise", measured_noise(points, scatter_mm, evidence.agreement, step_mm)),
+        ErrorField("noise", everywhere * COMMON_MM, WIDE_MM),
+        ErrorField("noise", between_stripes(vertices, evidence), WIDE_MM),
+        ErrorField("filling", np.where(inside, ERROR_GROWS * gap_mm, 0.0), REACH_MM),
+        *broad_and_narrow("filling", np.where(inside, FACING_GROWS * gap_mm * np.abs(normals[:, 0]), 0.0)),
+        *broad_and_narrow("ends", END_GROWS * np.maximum(beyond_mm, 0.0)),
+        ErrorField("ends", shift_mm * normals[:, 0], WIDE_MM, is_of_section=True),
+        ErrorField("ends", ASIDE * shift_mm, NARROW_MM),
+        ErrorField("cameras", everywhere * OF_DISAGREEMENT * systematic(points, evidence.agreement), WIDE_MM),
+        ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, is_of_section=True),
+        *(
+            ErrorField("sway", sway_mm[axis] * normals[:, axis], SWAY_STEPS * step_mm, is_of_section=True)
+            for axis in (0, 1)
+        ),
+    ]
+    return ScanErrors(fields, np.any([gap_mm > RELIABLE_MM, *(end.is_unseen(vertices[:, 0]) for end in ends)], axis=0))
+
+
+def _moved_mm(movement: MovementReport | None) -> float:
+    """Standard deviation of the X of a stripe, mm."""
+    if movement is None:
+        return 0.0
+    if movement.x_mm:
+        return LEFT_OF_TREMOR * movement.tremor_mm
+    return max(movement.tremor_mm, OF_TREMOR * math.sqrt(max(movement.tremor_mm**2 - FORM_MM**2, 0.0)))
