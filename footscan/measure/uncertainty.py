@@ -13,6 +13,9 @@ from schemas.measures import ErrorCause
 
 FEWEST_REPLICATES = 5
 """Replicates that must have a measure for a standard deviation."""
+OF_REPLICATES = 0.7
+"""Movement of the landmarks of a foot relative to that of its replicates, which err twice: as the foot itself does, and
+as they were displaced. With equal variances that is the square root of a half."""
 
 Floats = NDArray[np.float64]
 
@@ -55,16 +58,19 @@ class SurfaceErrors:
 def with_landmarks(budget: Mapping[ErrorCause, float] | None, scatter: float | None) -> dict[ErrorCause, float] | None:
     """Add what a measure scatters by over replicates beyond its linear budget: landmarks that move on plateaus.
 
+    That counts `OF_REPLICATES`; where there is no linear budget, all of the scatter counts.
+
     >>> with_landmarks({"noise": 0.03, "cameras": 0.04}, 0.13)
-    {'noise': 0.03, 'cameras': 0.04, 'landmarks': 0.12}
+    {'noise': 0.03, 'cameras': 0.04, 'landmarks': 0.084}
     >>> with_landmarks({"noise": 0.03, "cameras": 0.04}, 0.02)
     {'noise': 0.03, 'cameras': 0.04}
+    >>> with_landmarks(None, 0.13)
+    {'landmarks': 0.13}
     """
-    if scatter is None:
-        return None if budget is None else dict(budget)
-    linear = budget or {}
-    left = scatter**2 - sum(sd**2 for sd in linear.values())
-    return {**linear, **({"landmarks": round(math.sqrt(left), 9)} if left > 0.0 else {})}
+    if budget is None:
+        return None if scatter is None else {"landmarks": scatter}
+    left = 0.0 if scatter is None else scatter**2 - sum(sd**2 for sd in budget.values())
+    return {**budget, **({"landmarks": round(OF_REPLICATES * math.sqrt(left), 9)} if left > 0.0 else {})}
 
 
 class Scatter(NamedTuple):
