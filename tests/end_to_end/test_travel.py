@@ -79,12 +79,10 @@ def test_a_camera_that_lost_a_frame_is_named(
 
 
 def test_a_film_of_a_foot_is_refused(
-    recorded: Path, footscan: Callable[..., subprocess.CompletedProcess[str]],
+    fresh: Path, footscan: Callable[..., subprocess.CompletedProcess[str]],
     mistake: Callable[[subprocess.CompletedProcess[str]], str],
 ) -> None:  # fmt: skip
-    done = footscan(
-        "calibrate", "travel", recorded / "archive/P0001/small", "--calibration", recorded / "calibration.json"
-    )
+    done = footscan("calibrate", "travel", fresh / "archive/P0001/small", "--calibration", fresh / "calibration.json")
     assert done.returncode == 2
     assert "is it the film of this body" in mistake(done)
 
