@@ -103,20 +103,16 @@ def _merge(
         if is_undecided:
             sights[:seen, 2] += (0.5 * np.ptp(sights[:seen, 0])) ** 2
             agreeing[:seen] = True
-        counted, weight = 0, 0.0
-        for m in range(seen):
-            if agreeing[m]:
-                counted += 1
-                weight += 1.0 / sights[m, 2]
-        mean = mean_x = most = squares = 0.0
+        counted, weight, away, ahead, squares, most = 0, 0.0, 0.0, 0.0, 0.0, 0.0
         contradicted = True
         for m in range(seen):
             if agreeing[m]:
                 contradicted &= seen_by[m, 1] != n
-                away, ahead, own_weight = sights[m, 0], sights[m, 1], 1.0 / sights[m, 2]
-                mean += away * own_weight / weight
-                mean_x += ahead * own_weight / weight
-                squares += away**2 * own_weight
+                own_weight = 1.0 / sights[m, 2]
+                counted, weight = counted + 1, weight + own_weight
+                away += own_weight * sights[m, 0]
+                ahead += own_weight * sights[m, 1]
+                squares += own_weight * sights[m, 0] ** 2
                 if own_weight > most:
                     most, surest[n] = own_weight, seen_by[m, 1]
         if contradicted:
@@ -124,9 +120,10 @@ def _merge(
             continue
         # The sigma of the mean grows with the scatter (R. T. Birge, Physical Review 40, 1932,
         # doi:10.1103/PhysRev.40.207).
+        mean = away / weight
         ratio = (squares - mean**2 * weight) / max(counted - 1, 1)
         spread[n] = np.sqrt(max(1.0, ratio) / weight)
-        places[n, 0] += mean_x
+        places[n, 0] += ahead / weight
         places[n, 1] += mean * normals[n, 0]
         places[n, 2] += mean * normals[n, 1]
         if _is_free(plane[n], places[n, 1:], spacing, plane, places, table, previous):

@@ -23,7 +23,8 @@ class Evidence(NamedTuple):
     movement: MovementReport | None = None
     """Of the foot; None: it stood still"""
     lasers: Floats = UNKNOWN
-    """(L, 6) as of `lasers_of`: one camera alone may see an end too far out by the largest distance of two"""
+    """(L, 6) as of `lasers_of`: one camera alone may see an end too far out by the largest distance of two, and cameras
+    see the stripes of two close ones as one"""
     contested_mm: tuple[float, float] = NOT_CONTESTED
     """Least and greatest X of the foot with stripes that were dropped for contradicting other cameras"""
     tip_doubts_mm: tuple[float, float] = (0.0, 0.0)
