@@ -162,12 +162,14 @@ class OpenScan:
             self.glass,
             doubts,
             Evidence(
-                self._fused.cloud,
-                self._fused.report,
-                self.movement,
-                self._cleaned[1].lasers,
-                self._cleaned[1].contested_mm,
-                tip_doubts_mm(self.mesh),
+                cloud=self._fused.cloud,
+                seen=self._steadied[0],
+                parted_mm=self._cleaned[1].parted_mm,
+                agreement=self._fused.report,
+                movement=self.movement,
+                lasers=self._cleaned[1].lasers,
+                contested_mm=self._cleaned[1].contested_mm,
+                tip_doubts_mm=tip_doubts_mm(self.mesh),
             ),
         )
         return measures.model_copy(update={"posture": self.recorded.document.posture})

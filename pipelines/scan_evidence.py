@@ -13,6 +13,8 @@ def evidence_of(inputs: Mapping[str, bytes]) -> Evidence:
     cleaned, fused = unpack(inputs["clean"]), unpack(inputs["fused"])
     return Evidence(
         cloud=fused["cloud"],
+        seen=cleaned["points"],
+        parted_mm=cleaned.get("parted"),
         agreement=FusionReport.model_validate_json(fused["report"].tobytes()),
         movement=MovementReport.model_validate_json(cleaned["movement"].tobytes()),
         lasers=cleaned["lasers"],

@@ -11,6 +11,7 @@ from footscan.cloud.contact import above_glass, estimate_glass, moved_warning
 from footscan.cloud.lasers.apart import UNKNOWN, lasers_of
 from footscan.cloud.lasers.choose import choose_lasers
 from footscan.cloud.lasers.moments import of_any_laser
+from footscan.cloud.lasers.parted import parted_mm
 from footscan.cloud.outliers.body import body_range, is_apart
 from footscan.cloud.outliers.clutter import is_island, is_static
 from footscan.cloud.outliers.contested import NOT_CONTESTED, contested_ends
@@ -67,6 +68,8 @@ class Removed:
     """As of `lasers_of`."""
     contested_mm: tuple[float, float] = NOT_CONTESTED
     """As of `contested_ends`; nothing is contested where no other cameras were asked."""
+    parted_mm: NDArray[np.float32] | None = None
+    """As of `parted_mm`, for each point that is kept; None where no other lasers were looked for."""
 
 
 def remove_outliers(
@@ -167,7 +170,8 @@ def remove_outliers(
     ]
     denied, mistaken = (points[codes == 1 + REASONS.index(reason)] for reason in ("unconfirmed", "laser"))
     contested = contested_ends(remaining, denied, of_any_laser(mistaken, views))
-    return remaining, Removed(codes, counts, warnings, glass, lasers_of(views), contested)
+    parted = parted_mm(remaining, mistaken)
+    return remaining, Removed(codes, counts, warnings, glass, lasers_of(views), contested, parted)
 
 
 def _drop_by_segment(

@@ -24,7 +24,11 @@ class Evidence(NamedTuple):
     """Of the foot; None: it stood still"""
     lasers: Floats = UNKNOWN
     """(L, 6) as of `lasers_of`: one camera alone may see an end too far out by the largest distance of two, and cameras
-    see the stripes of two close ones as one"""
+    see the stripes of two close ones as one, unless they are parted"""
+    seen: NDArray[np.void] | None = None
+    """(P,) of `POINT_DTYPE`, the points of all cameras before they were fused"""
+    parted_mm: NDArray[np.float32] | None = None
+    """(P,) how far from each of them its camera sees the stripe of another laser, as of `parted_mm`"""
     contested_mm: tuple[float, float] = NOT_CONTESTED
     """Least and greatest X of the foot with stripes that were dropped for contradicting other cameras"""
     tip_doubts_mm: tuple[float, float] = (0.0, 0.0)

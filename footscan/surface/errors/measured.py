@@ -35,6 +35,10 @@ which lies between them, all over the skin that both light. It falls to 0 from t
 valley parts them. Tuned on 58 films (`draw_assembled`, seeds 2681 to 2720 and 3501 to 3518): where the upper lasers are
 0.6 to 2 mm apart, the height of the big toe errs by 0.41 mm (root mean square), up to 2.6 mm by 0.18, and beyond by
 0.13."""
+ASKED, BESIDE, BESIDE_MM = 16, 2.0, 0.2
+"""Points around a vertex of which it is asked whether their camera sees two stripes; how far the second one may lie,
+relative to the distance of the lasers; and beyond that, mm. Lines of sight slope by up to 60 degrees from the normals
+of the lasers' planes. Chosen by hand."""
 
 
 def around(vertices: Floats, normals: Floats, cloud: NDArray[np.void] | None) -> tuple[NDArray[np.void] | None, Floats]:
@@ -74,7 +78,25 @@ def between_stripes(vertices: Floats, evidence: Evidence) -> Floats:
     apart = between_lasers(evidence.lasers, vertices, evidence.cloud, evidence.agreement.heads)
     near, far = BETWEEN_MM
     apart = np.minimum(apart, far)
-    return OF_BETWEEN * apart * np.minimum((far - apart) / (far - near), 1.0)
+    merged = OF_BETWEEN * apart * np.minimum((far - apart) / (far - near), 1.0)
+    if evidence.seen is not None and evidence.parted_mm is not None:
+        doubtful = np.flatnonzero(merged)
+        merged[doubtful] *= 1.0 - _parted(vertices[doubtful], apart[doubtful], evidence.seen, evidence.parted_mm)
+    return merged
+
+
+def _parted(
+    places: Floats, apart: Floats, seen: NDArray[np.void], parted_mm: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """Return (V,) the share of the points around each place (V, 3), mm, beside which their camera sees the stripe of a
+    laser that is `apart` (V,), mm, from their own: these are two stripes.
+
+    `seen`, `parted_mm` : as of `Evidence`
+    """
+    if len(seen) < ASKED or not len(places):
+        return np.zeros(len(places))
+    near = np.asarray(KDTree(coordinates(seen)).query(places, ASKED)[1])
+    return np.asarray(np.mean(parted_mm[near] <= BESIDE * apart[:, None] + BESIDE_MM, axis=1))
 
 
 def systematic(points: NDArray[np.void] | None, agreement: FusionReport | None) -> Floats | float:
