@@ -13,9 +13,11 @@ from schemas.measures import ErrorCause
 
 FEWEST_REPLICATES = 5
 """Replicates that must have a measure for a standard deviation."""
-OF_REPLICATES = 0.7
+OF_REPLICATES = 0.5
 """Movement of the landmarks of a foot relative to that of its replicates, which err twice: as the foot itself does, and
-as they were displaced. With equal variances that is the square root of a half."""
+as they were displaced. With equal variances that is the square root of a half; but true errors are less than stated
+ones. Tuned on 40 films and 136 worlds without pictures (`draw_assembled`, seeds 4000 to 4039, 4100 to 4143, 4210 to
+4253, 4400 to 4423 and 4460 to 4483), with no silent error."""
 
 Floats = NDArray[np.float64]
 
@@ -61,7 +63,7 @@ def with_landmarks(budget: Mapping[ErrorCause, float] | None, scatter: float | N
     That counts `OF_REPLICATES`; where there is no linear budget, all of the scatter counts.
 
     >>> with_landmarks({"noise": 0.03, "cameras": 0.04}, 0.13)
-    {'noise': 0.03, 'cameras': 0.04, 'landmarks': 0.084}
+    {'noise': 0.03, 'cameras': 0.04, 'landmarks': 0.06}
     >>> with_landmarks({"noise": 0.03, "cameras": 0.04}, 0.02)
     {'noise': 0.03, 'cameras': 0.04}
     >>> with_landmarks(None, 0.13)
