@@ -14,7 +14,7 @@ def evidence_of(inputs: Mapping[str, bytes]) -> Evidence:
     return Evidence(
         cloud=fused["cloud"],
         seen=cleaned["points"],
-        parted_mm=cleaned.get("parted"),
+        parted_mm=cleaned["parted"],
         agreement=FusionReport.model_validate_json(fused["report"].tobytes()),
         movement=MovementReport.model_validate_json(cleaned["movement"].tobytes()),
         lasers=cleaned["lasers"],

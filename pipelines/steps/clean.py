@@ -57,7 +57,7 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
         movement=_json(movement.model_dump(mode="json")),
         lasers=removed.lasers,
         contested=np.array(removed.contested_mm),
-        **({} if removed.parted_mm is None else {"parted": removed.parted_mm}),
+        parted=removed.parted_mm,
         heads=_json(heads),
     )
 

@@ -117,8 +117,8 @@ def meshed(cloud: Cloud, calibration: bytes, parameters: SurfaceParameters) -> d
     }  # fmt: skip
     reports = {name: np.frombuffer(text.encode(), np.uint8) for name, text in nothing.items()}
     codes = np.full(len(cloud), KEPT, np.uint8)
-    contested = np.array([np.inf, -np.inf])
-    clean = pack(points=cloud, codes=codes, lasers=np.zeros((2, 6)), contested=contested, **reports)
+    contested, parted = np.array([np.inf, -np.inf]), np.full(len(cloud), np.inf, np.float32)
+    clean = pack(points=cloud, codes=codes, lasers=np.zeros((2, 6)), contested=contested, parted=parted, **reports)
     fused = fuse.run({"clean": clean}, FusionParameters(), {})
     oriented = orient.run({"fused": fused, "calibration": calibration}, NormalParameters(), {})
     return {

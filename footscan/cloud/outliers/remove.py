@@ -64,12 +64,12 @@ class Removed:
     one on a plate that was moved."""
     glass: GlassPlane
     """The glass on which the foot stands; points were judged by their height above it."""
+    parted_mm: NDArray[np.float32]
+    """As of `parted_mm`, for each point that is kept; infinite where no other lasers were looked for."""
     lasers: NDArray[np.float64] = field(default_factory=UNKNOWN.copy)
     """As of `lasers_of`."""
     contested_mm: tuple[float, float] = NOT_CONTESTED
     """As of `contested_ends`; nothing is contested where no other cameras were asked."""
-    parted_mm: NDArray[np.float32] | None = None
-    """As of `parted_mm`, for each point that is kept; None where no other lasers were looked for."""
 
 
 def remove_outliers(
@@ -137,7 +137,8 @@ def remove_outliers(
         drop("isolated", lambda left: is_far(left, parameters.nearest_mm))
         drop("volume", lambda left: _outside(left, volume))
         drop("median", lambda left: is_off_median(left, parameters.median_mm))
-        return remaining, Removed(codes, _count(camera_numbers(points), codes), [], GlassPlane())
+        counts, parted = _count(camera_numbers(points), codes), parted_mm(remaining, remaining[:0])
+        return remaining, Removed(codes, counts, [], GlassPlane(), parted)
     drop("volume", lambda left: _outside(left, volume))
     if parameters.drop_unsupported:
         drop("extrapolated", lambda left: ~left["supported"])
@@ -171,7 +172,7 @@ def remove_outliers(
     denied, mistaken = (points[codes == 1 + REASONS.index(reason)] for reason in ("unconfirmed", "laser"))
     contested = contested_ends(remaining, denied, of_any_laser(mistaken, views))
     parted = parted_mm(remaining, mistaken)
-    return remaining, Removed(codes, counts, warnings, glass, lasers_of(views), contested, parted)
+    return remaining, Removed(codes, counts, warnings, glass, parted, lasers_of(views), contested)
 
 
 def _drop_by_segment(
