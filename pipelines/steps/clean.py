@@ -23,9 +23,9 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
 
     `inputs`: `points-N` of each camera, the `calibration` of all, and `heads`, where they were. The result holds the
     kept `points`, with the foot held still, the `codes` of all points, the counts of `removed` points by camera and
-    reason, `warnings`, the `glass` below the foot, its `movement`, where the planes of its `lasers`
-    lie, how far the ends are `contested`, X in mm, how far from the kept points those of other lasers are `parted`, mm,
-    and the `heads` of the cameras.
+    reason, `warnings`, the `glass` below the foot, its `movement`, where the planes of its `lasers` lie, how far the
+    ends are `contested`, X in mm, how far the stripes of other lasers are `parted` from the kept points, mm, and the
+    `heads` of the cameras.
 
     Raises
     ------

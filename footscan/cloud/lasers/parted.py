@@ -8,9 +8,7 @@ FARTHEST_MM = 6.0
 """Distance beyond which a stripe does not lie beside another: twice that of two lasers whose stripes may be one. Chosen
 by hand."""
 FRAMES_APART_MM = 1e3
-"""Stripes of two frames are farther from each other than all skin."""
-MOST_FRAMES = 1 << 20
-"""Greater than any number of frames of a camera."""
+"""Distance by which stripes of two frames, or of two views, are kept from lying beside each other."""
 
 
 def parted_mm(points: NDArray[np.void], others: NDArray[np.void]) -> NDArray[np.float32]:
@@ -39,6 +37,6 @@ def parted_mm(points: NDArray[np.void], others: NDArray[np.void]) -> NDArray[np.
 
 
 def _of_frames(points: NDArray[np.void]) -> NDArray[np.float64]:
-    """(N, 3) Y and Z, and a number that differs between two frames by more than any distance."""
-    frame = points["camera"].astype(np.float64) * MOST_FRAMES + points["frame"]
-    return np.column_stack([points["y"], points["z"], FRAMES_APART_MM * frame])
+    """(N, 4) Y and Z, mm, and frame and view as if they were places `FRAMES_APART_MM` apart."""
+    apart = [FRAMES_APART_MM * points[name] for name in ("frame", "camera")]
+    return np.column_stack([points["y"], points["z"], *apart])

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from footscan.cloud.lasers.apart import UNKNOWN
 from footscan.cloud.outliers.contested import NOT_CONTESTED
+from footscan.cloud.points import POINT_DTYPE
 from schemas.fusion import FusionReport
 from schemas.movement import MovementReport
 
@@ -25,9 +26,9 @@ class Evidence(NamedTuple):
     lasers: Floats = UNKNOWN
     """(L, 6) as of `lasers_of`: one camera alone may see an end too far out by the largest distance of two, and cameras
     see the stripes of two close ones as one, unless they are parted"""
-    seen: NDArray[np.void] | None = None
+    seen: NDArray[np.void] = np.empty(0, POINT_DTYPE)
     """(P,) of `POINT_DTYPE`, the points of all cameras before they were fused"""
-    parted_mm: NDArray[np.float32] | None = None
+    parted_mm: NDArray[np.float32] = np.empty(0, np.float32)
     """(P,) how far from each of them its camera sees the stripe of another laser, as of `parted_mm`"""
     contested_mm: tuple[float, float] = NOT_CONTESTED
     """Least and greatest X of the foot with stripes that were dropped for contradicting other cameras"""

@@ -79,9 +79,8 @@ def between_stripes(vertices: Floats, evidence: Evidence) -> Floats:
     near, far = BETWEEN_MM
     apart = np.minimum(apart, far)
     merged = OF_BETWEEN * apart * np.minimum((far - apart) / (far - near), 1.0)
-    if evidence.seen is not None and evidence.parted_mm is not None:
-        doubtful = np.flatnonzero(merged)
-        merged[doubtful] *= 1.0 - _parted(vertices[doubtful], apart[doubtful], evidence.seen, evidence.parted_mm)
+    doubtful = np.flatnonzero(merged)
+    merged[doubtful] *= 1.0 - _parted(vertices[doubtful], apart[doubtful], evidence.seen, evidence.parted_mm)
     return merged
 
 
