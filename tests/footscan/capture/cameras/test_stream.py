@@ -12,6 +12,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import simplejpeg
+from numpy.typing import NDArray
 
 from footscan.capture.cameras.frame_clock import FrameTimes
 from footscan.capture.cameras.source import CameraSource, driver_stamp
@@ -67,11 +68,15 @@ class Filmed:
         true = np.array([number_of(frame) for frame in self.frames])
         return (numbers + round(float(np.median((true - numbers)[true < self.start])))).tolist()
 
+    def is_held_back(self) -> NDArray[np.bool_]:
+        """(N,) True for frames that came half a period or more after their exposure and the camera's 30 ms."""
+        delays = [frame.seconds - self.sent[number_of(frame)].exposed - 0.03 for frame in self.frames]
+        return np.array(delays) > 0.5 / RATE
+
     def share_held_back(self) -> float:
-        """By this machine, for half a period or longer: of the sound frames of a camera with 30 ms of latency."""
-        sound = [(f, self.sent[number_of(f)]) for f in self.frames[2:] if f.problem is None]
-        delays = [frame.seconds - sent.exposed - 0.03 for frame, sent in sound if sent.fault is None]
-        return float(np.mean(np.array(delays) > 0.5 / RATE))
+        """By this machine, of the sound frames."""
+        is_sound = [frame.problem is None and self.sent[number_of(frame)].fault is None for frame in self.frames]
+        return float(np.mean(self.is_held_back()[2:][is_sound[2:]]))
 
 
 FAULTS = {
@@ -163,12 +168,15 @@ def test_lost_frames_leave_their_numbers_empty(filmed: dict[int, Filmed]) -> Non
     film = filmed[1]
     found, true = np.array(film.exact_numbers()), np.array([number_of(frame) for frame in film.frames])
     # This machine, too, may hold a frame back, just behind the loss: its number is then not certain, and says so.
+    # One that it holds back just before the loss may come when the lost frame was due: no stamp tells the two apart.
     is_certain = film.times.is_certain[[frame.arrival - film.first for frame in film.frames]]
     assert is_certain.mean() > 0.85
-    assert found[is_certain].tolist() == true[is_certain].tolist()
+    is_on_time = is_certain & ~film.is_held_back()
+    assert is_on_time.mean() > 0.7
+    assert found[is_on_time].tolist() == true[is_on_time].tolist()
     missing = film.times.missing + found[0] - film.start
     assert len(missing) == 4
-    if is_certain.all():
+    if is_certain.all() and not film.is_held_back().any():
         assert missing.tolist() == [5, 15, 16, 17]
 
 
