@@ -73,6 +73,14 @@ def test_definitions_in_mm_do_not_grow_with_a_foot(length_mm: float) -> None:
     assert subject.measures["heel_breadth"] == pytest.approx(np.ptp(low[(along >= 0.1) & (along <= 0.2), 1]), abs=0.5)
 
 
+def test_the_mesh_that_is_filmed_has_the_true_girth() -> None:
+    subject = make_subject(WorldSubject())
+    mesh = trimesh.Trimesh(subject.mesh.vertices, subject.mesh.faces, process=False)
+    section = mesh.section(plane_origin=[200.0, 0.0, 0.0], plane_normal=[1.0, 0.0, 0.0])  # half the length
+    girth = ConvexHull(section.vertices[:, 1:]).area
+    assert girth == pytest.approx(subject.measures["instep_girth"], abs=0.03)
+
+
 def test_a_body_stands_in_the_middle_and_keeps_its_form() -> None:
     corners = np.array([[x, y, z] for x in (-40.0, 40.0) for y in (-20.0, 20.0) for z in (0.0, 50.0)])
     box = Mesh(corners, ConvexHull(corners).simplices.astype(np.int64))
