@@ -36,8 +36,8 @@ LARGEST_SD_MM, LARGEST_GIRTH_SD_MM = 1.0, 2.0
 """Standard deviations from which a length and a girth are uncertain: half of what ISO 20685-1:2018 allows a scanner to
 be off, 2 mm for the foot and 4 mm for small circumferences."""
 NO_SECOND_TOE = "the axis runs through the ball, since the second toe was not found"
-HEIGHT = "_height"
-"""Ending of the names of measures that count from the glass."""
+HEIGHT, PRINT = "_height", "footprint"
+"""Ending of the names of measures that count from the glass, and a word in the texts of those on the print."""
 ROUGH_MM = 0.05
 """Median roughness of a mesh at which landmarks begin to move, and propagation is no longer linear. Chosen by hand."""
 MISSING_SHARE = 0.2
@@ -304,7 +304,7 @@ def take_measures(
         name: _measure(
             definition,
             surface,
-            (known, scatter.get(name), glass_sd_mm if name.endswith(HEIGHT) else 0.0),
+            (known, scatter.get(name), glass_sd_mm if name.endswith(HEIGHT) or PRINT in definition.text else 0.0),
             filled,
             (calibration or {}).get(name),
             to_mesh,
@@ -355,7 +355,7 @@ def _measure(
         doubts.append(f"it cannot be measured in {100 * scatter.missing:.0f} % of the ways in which the scan may err")
     budget = with_landmarks(surface_errors.budget(quantity), None if scatter is None else scatter.about(quantity.value))
     if budget is not None and glass_sd_mm:
-        budget["glass"] = glass_sd_mm
+        budget["glass"] = glass_sd_mm * (quantity.by_lift(surface.normals) if PRINT in definition.text else 1.0)
     sd = None if budget is None else abs(factor) * math.hypot(*budget.values())
     largest = LARGEST_SD_MM if quantity.plane is None else LARGEST_GIRTH_SD_MM
     if sd is not None and sd > largest and definition.unit == "mm":

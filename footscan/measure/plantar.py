@@ -87,8 +87,11 @@ def arch_index(foot: FootSurface) -> Quantity:
     """
     contact = foot.once(footprint)
     third = (contact.front - contact.rear) / 3
-    is_middle = (contact.stations > contact.rear + third) & (contact.stations <= contact.rear + 2 * third)
-    index = float(contact.widths[is_middle].sum() / contact.widths.sum())
+    half = (contact.front - contact.rear) / len(contact.stations) / 2
+    starts = np.maximum(contact.stations - half, contact.rear + third)
+    stops = np.minimum(contact.stations + half, contact.rear + 2 * third)
+    in_middle = np.maximum(stops - starts, 0.0) / (2 * half)
+    index = float(in_middle @ contact.widths / contact.widths.sum())
     area = float(contact.widths.mean()) * (contact.front - contact.rear)
     ends = (_end(foot, contact, -1.0), _end(foot, contact, 1.0))
     gradient = np.zeros(len(foot.normals))

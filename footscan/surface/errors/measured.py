@@ -11,12 +11,14 @@ from schemas.fusion import FusionReport
 
 Floats = NDArray[np.float64]
 
-ERROR_MM = 0.015
+ERROR_MM = 0.0075
 """Standard deviation of a measured vertex. Tuned on virtual feet: docs/surface.md."""
+USUAL_SCATTER_MM = 0.015
+"""Mean distance of points from the surface that says nothing of its errors."""
 USUAL_STEP_MM = 2.0
-"""Distance of stripes at which that holds. It grows with the square of a longer one, as the sagitta of the skin between
+"""Distance of stripes at which both hold. They grow with the square of a longer one, as the sagitta of the skin between
 two stripes does."""
-NEAREST, SHARED = 4, 0.25
+NEAREST, SHARED = 4, 0.125
 """Points nearest to a vertex, and the part of their standard deviation that all points around it share. Tuned on
 scanners without pictures whose planes a body has shown: `draw_assembled`, seeds 801 to 810."""
 SCATTERED, OF_SCATTER, SCATTER_STEP_MM = 16, 2.5, 4.0
@@ -61,9 +63,9 @@ def measured_noise(
 
     `points`, `scatter_mm` : as of `around`
     """
-    least = ERROR_MM * max(1.0, (step_mm / USUAL_STEP_MM) ** 2)
-    # That is also how far points are off the coarse mesh of distant stripes.
-    noise = np.maximum(least, OF_SCATTER * np.maximum(scatter_mm - least, 0.0) * (step_mm <= SCATTER_STEP_MM))
+    sagitta = max(1.0, (step_mm / USUAL_STEP_MM) ** 2)
+    excess_mm = np.maximum(scatter_mm - USUAL_SCATTER_MM * sagitta, 0.0)
+    noise = np.maximum(ERROR_MM * sagitta, OF_SCATTER * excess_mm * (step_mm <= SCATTER_STEP_MM))
     if points is not None:
         noise = np.maximum(noise, SHARED * points["sigma"].mean(axis=1))
         if agreement is not None:
