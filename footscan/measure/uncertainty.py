@@ -14,7 +14,7 @@ from schemas.measures import ErrorCause
 
 FEWEST_REPLICATES = 5
 """Replicates that must have a measure for a standard deviation."""
-OF_REPLICATES = 0.35
+OF_REPLICATES = 0.5
 """Movement of the landmarks of a foot relative to that of its replicates, which err twice: as the foot itself does, and
 as they were displaced. With equal variances that is the square root of a half; but true errors are less than stated
 ones. Tuned on 40 films and 136 worlds without pictures (`draw_assembled`, seeds 4000 to 4039, 4100 to 4143, 4210 to
