@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -19,11 +18,6 @@ OF_REPLICATES = 0.5
 as they were displaced. With equal variances that is the square root of a half; but true errors are less than stated
 ones. Tuned on 40 films and 136 worlds without pictures (`draw_assembled`, seeds 4000 to 4039, 4100 to 4143, 4210 to
 4253, 4400 to 4423 and 4460 to 4483)."""
-DRAWN: Mapping[ErrorCause, float] = MappingProxyType({"ends": 1.5})
-"""Errors of replicates relative to the stated ones, if they differ: an end that is bent turns the axis, and with it all
-that is taken along and across it. That is rare, but then it is more than landmarks move by on plateaus. Tuned on
-`draw_assembled`, seed 4134, where the axis is off by 1.3 degrees."""
-
 Floats = NDArray[np.float64]
 
 
@@ -54,9 +48,9 @@ class SurfaceErrors:
         return parts
 
     def draw(self, random: np.random.Generator) -> Floats:
-        """(V,) displacements along the normals, mm, drawn at random: the stated errors, or `DRAWN` times as much."""
+        """(V,) displacements along the normals, mm, drawn at random."""
         drawn = [
-            DRAWN.get(field.cause, 1.0) * field.deviations * (shares @ random.normal(size=shares.shape[1]))
+            field.deviations * (shares @ random.normal(size=shares.shape[1]))
             for field, shares in zip(self.fields, self._shares, strict=True)
         ]
         return np.asarray(np.sum(drawn, axis=0))
@@ -65,7 +59,7 @@ class SurfaceErrors:
 def with_landmarks(budget: Mapping[ErrorCause, float] | None, scatter: float | None) -> dict[ErrorCause, float] | None:
     """Add what a measure scatters by over replicates beyond its linear budget: landmarks that move on plateaus.
 
-    That counts `OF_REPLICATES`; where there is no linear budget, all of the scatter counts. Replicates err as `DRAWN`.
+    That counts `OF_REPLICATES`; where there is no linear budget, all of the scatter counts.
 
     >>> with_landmarks({"noise": 0.03, "cameras": 0.04}, 0.13)
     {'noise': 0.03, 'cameras': 0.04, 'landmarks': 0.06}
@@ -76,8 +70,7 @@ def with_landmarks(budget: Mapping[ErrorCause, float] | None, scatter: float | N
     """
     if budget is None:
         return None if scatter is None else {"landmarks": scatter}
-    linear = sum((DRAWN.get(cause, 1.0) * sd) ** 2 for cause, sd in budget.items())
-    left = 0.0 if scatter is None else scatter**2 - linear
+    left = 0.0 if scatter is None else scatter**2 - sum(sd**2 for sd in budget.values())
     return {**budget, **({"landmarks": round(OF_REPLICATES * math.sqrt(left), 9)} if left > 0.0 else {})}
 
 
