@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from footscan.cloud.outliers.other_laser import is_of_other_laser
 from footscan.cloud.points import make_points
@@ -139,6 +140,21 @@ def test_cameras_of_one_head_do_not_confirm_each_other_in_the_stripe_of_another_
     alone = make_points(noisy, 1, 20, plane=x)
     found = is_of_other_laser(np.concatenate([points, *mistaken, alone]), views)[len(points) :]
     np.testing.assert_array_equal(found, np.repeat([True, True, False], len(y)))
+
+
+@pytest.mark.parametrize(("apart_mm", "is_dropped"), [(0.02, False), (0.15, True)])
+def test_a_stripe_on_which_cameras_hardly_agree_makes_no_end(apart_mm: float, is_dropped: bool) -> None:
+    """Two cameras that see other lasers meet by chance in the plane of a third one, beyond the foot."""
+    points, _ = scene()
+    y = np.arange(-6.0, 6.0, 0.3)
+    own_plane, plane = 44.0 + UPPER.offset_mm, 44.0 + LOWER.offset_mm
+    beyond = np.column_stack([np.full(len(y), own_plane), y, np.full(len(y), 35.0)])
+    eye = VIEWS[3].centre + np.array([plane, 0.0, 0.0])
+    met = beyond + np.array([0.0, 0.0, apart_mm])
+    elsewhere = met + ((plane - own_plane) / (eye[0] - own_plane)) * (eye - met)
+    ends = [make_points(beyond, 1, 22, plane=beyond[:, 0]), make_points(elsewhere, 3, 22, plane=elsewhere[:, 0])]
+    found = is_of_other_laser(np.concatenate([points, *ends]), VIEWS)[len(points) :]
+    np.testing.assert_array_equal(found[: len(y)], is_dropped)
 
 
 def test_the_last_stripe_is_of_some_laser() -> None:
