@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-FARTHEST_MM = 6.0
-"""Distance beyond which a stripe does not lie beside another: twice that of two lasers whose stripes may be one. Chosen
-by hand."""
+FARTHEST_MM = 12.0
+"""Distance beyond which a stripe does not lie beside another: four times that of two lasers whose stripes may be one,
+as on skin that faces the travel. Chosen by hand."""
 FRAMES_APART_MM = 1e3
 """Distance by which stripes of two frames, or of two views, are kept from lying beside each other."""
 

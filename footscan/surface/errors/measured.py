@@ -40,7 +40,10 @@ valley parts them. Tuned on 58 films (`draw_assembled`, seeds 2681 to 2720 and 3
 ASKED, BESIDE, BESIDE_MM = 16, 2.0, 0.2
 """Points around a vertex of which it is asked whether their camera sees two stripes; how far the second one may lie,
 relative to the distance of the lasers; and beyond that, mm. Lines of sight slope by up to 60 degrees from the normals
-of the lasers' planes. Chosen by hand."""
+of the lasers' planes. Skin that faces the travel parts the stripes by more. Chosen by hand."""
+LEAST_SINE = 0.2
+"""Least sine of the angle between the normal of such skin and the travel: with less, any second stripe lies beside the
+first one. Chosen by hand."""
 
 
 def around(vertices: Floats, normals: Floats, cloud: NDArray[np.void] | None) -> tuple[NDArray[np.void] | None, Floats]:
@@ -73,7 +76,7 @@ def measured_noise(
     return np.asarray(noise)
 
 
-def between_stripes(vertices: Floats, evidence: Evidence) -> Floats:
+def between_stripes(vertices: Floats, normals: Floats, evidence: Evidence) -> Floats:
     """Return (V,) the standard deviations of vertices where two lasers are so close that cameras see one stripe, mm."""
     if evidence.cloud is None or evidence.agreement is None:
         return np.zeros(len(vertices))
@@ -82,22 +85,25 @@ def between_stripes(vertices: Floats, evidence: Evidence) -> Floats:
     apart = np.minimum(apart, far)
     merged = OF_BETWEEN * apart * np.minimum((far - apart) / (far - near), 1.0)
     doubtful = np.flatnonzero(merged)
-    merged[doubtful] *= 1.0 - _parted(vertices[doubtful], apart[doubtful], evidence.seen, evidence.parted_mm)
+    facing = np.abs(normals[doubtful, 0])
+    slope = facing / np.sqrt(np.maximum(1.0 - facing**2, LEAST_SINE**2))
+    beside_mm = (BESIDE + slope) * apart[doubtful] + BESIDE_MM
+    merged[doubtful] *= 1.0 - _parted(vertices[doubtful], beside_mm, evidence.seen, evidence.parted_mm)
     return merged
 
 
 def _parted(
-    places: Floats, apart: Floats, seen: NDArray[np.void], parted_mm: NDArray[np.float32]
+    places: Floats, beside_mm: Floats, seen: NDArray[np.void], parted_mm: NDArray[np.float32]
 ) -> NDArray[np.float64]:
-    """Return (V,) the share of the points around each place (V, 3), mm, beside which their camera sees the stripe of a
-    laser that is `apart` (V,), mm, from their own: these are two stripes.
+    """Return (V,) the share of the points around each place (V, 3), mm, whose camera sees a second stripe within
+    `beside_mm` (V,) of their own: these are two stripes.
 
     `seen`, `parted_mm` : as of `Evidence`
     """
     if len(seen) < ASKED or not len(places):
         return np.zeros(len(places))
     near = np.asarray(KDTree(coordinates(seen)).query(places, ASKED)[1])
-    return np.asarray(np.mean(parted_mm[near] <= BESIDE * apart[:, None] + BESIDE_MM, axis=1))
+    return np.asarray(np.mean(parted_mm[near] <= beside_mm[:, None], axis=1))
 
 
 def systematic(points: NDArray[np.void] | None, agreement: FusionReport | None) -> Floats | float:
