@@ -66,7 +66,7 @@ def test_measures_are_those_of_the_foot(folder: Path) -> None:
     assert length["unit"] == breadth["unit"] == "mm"
     for name, measure in (("foot_length", length), ("foot_breadth", breadth)):
         assert measure["value"] == pytest.approx(known[name], abs=3.0 * measure["uncertainty"])
-    assert length["status"] == "uncertain"  # with so few frames, the ends lie between stripes
+    assert length["uncertainty"] > 0.5  # with so few frames, the ends lie between stripes
     assert length["value"] == pytest.approx(known["foot_length"], abs=3.0)
     assert breadth["value"] == pytest.approx(known["foot_breadth"], abs=2.0)
 

@@ -16,8 +16,8 @@ ERROR_MM = 0.0075
 USUAL_SCATTER_MM = 0.015
 """Mean distance of points from the surface that says nothing of its errors."""
 USUAL_STEP_MM = 2.0
-"""Distance of stripes at which both hold. They grow with the square of a longer one, as the sagitta of the skin between
-two stripes does."""
+"""Distance of stripes at which both hold. Of distant stripes both grow as the sagitta of the skin between two, with the
+square of their distance; that of 2 mm is about `USUAL_SCATTER_MM`."""
 NEAREST, SHARED = 4, 0.125
 """Points nearest to a vertex, and the part of their standard deviation that all points around it share. Tuned on
 scanners without pictures whose planes a body has shown: `draw_assembled`, seeds 801 to 810."""
@@ -66,9 +66,9 @@ def measured_noise(
 
     `points`, `scatter_mm` : as of `around`
     """
-    sagitta = max(1.0, (step_mm / USUAL_STEP_MM) ** 2)
-    excess_mm = np.maximum(scatter_mm - USUAL_SCATTER_MM * sagitta, 0.0)
-    noise = np.maximum(ERROR_MM * sagitta, OF_SCATTER * excess_mm * (step_mm <= SCATTER_STEP_MM))
+    sagitta_mm = USUAL_SCATTER_MM * max((step_mm / USUAL_STEP_MM) ** 2 - 1.0, 0.0)
+    excess_mm = np.maximum(scatter_mm - USUAL_SCATTER_MM - sagitta_mm, 0.0)
+    noise = np.maximum(ERROR_MM + sagitta_mm, OF_SCATTER * excess_mm * (step_mm <= SCATTER_STEP_MM))
     if points is not None:
         noise = np.maximum(noise, SHARED * points["sigma"].mean(axis=1))
         if agreement is not None:
