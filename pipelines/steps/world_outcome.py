@@ -47,7 +47,8 @@ def run(inputs: Mapping[str, bytes], parameters: World, places: Mapping[str, Pat
         shift_mm=float(np.linalg.norm((turn - np.eye(3)) @ measured.mean(axis=0) + shift)),
         cloud=error(coordinates(oriented["cloud"])),
         surface=error(measured),
-        warnings=[*heads.warnings, *cleaning, *agreement.warnings, *measures.warnings],
+        # A foot that moved is a warning of the points, and the doubt of its measures.
+        warnings=list(dict.fromkeys([*heads.warnings, *cleaning, *agreement.warnings, *measures.warnings])),
         measures={
             name: WorldMeasure(
                 value=measure.value,
