@@ -18,6 +18,7 @@ OF_REPLICATES = 0.5
 as they were displaced. With equal variances that is the square root of a half; but true errors are less than stated
 ones. Tuned on 40 films and 136 worlds without pictures (`draw_assembled`, seeds 4000 to 4039, 4100 to 4143, 4210 to
 4253, 4400 to 4423 and 4460 to 4483)."""
+
 Floats = NDArray[np.float64]
 
 

@@ -22,9 +22,9 @@ Mask = NDArray[np.bool_]
 CONFIRMED = 0.25
 """Support, in cameras, from which a point is confirmed. Chosen by hand."""
 SURE = 0.75
-"""Support, in cameras, that a point of a stripe must have for the stripe to make an end of the foot: there cameras that
-see one other laser meet in the plane of another by chance. Tuned on a scanner without pictures (`draw_assembled`, seed
-4134), where two cameras whose points are off by 1.5 mm confirm each other by 0.1 to 0.66."""
+"""Support, in cameras, that a point of a stripe must have for the stripe to make an end of the foot: there cameras of
+two heads that see one laser meet in the plane of the other by chance. Tuned on a scanner without pictures
+(`draw_assembled`, seed 4134), where two cameras whose points are off by 1.5 mm confirm each other by 0.1 to 0.66."""
 AROUND_MM, FEWEST = 2.5, 8
 """Points within this distance make the skin at a place, if they are so many. Chosen by hand."""
 BROAD = 0.2
@@ -86,22 +86,21 @@ def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mappin
     elsewhere = np.where(of_head, 0.0, supports).max(axis=0)
     strange = np.asarray(laser != own)
     decided = strange | (at_own > CONFIRMED)
-    strange |= ~decided & _vote(strange, decided, linked)
+    stripe = stripe_numbers(linked)
+    strange |= ~decided & _vote(strange, decided, stripe)
     strange |= _not_yet_met(points, own, decided & ~strange, at_own > elsewhere + BETTER)
     decided |= strange
-    stripe = stripe_numbers(linked)
     sure = decided & ~strange & (np.bincount(stripe, at_own > SURE) > 0)[stripe]
     ends = _confirmed_ends(points, own, sure)
     strange |= ~sure & _beyond_ends(points, ends, planes)
     confirmed = decided & ~strange
     doubtful = np.flatnonzero(~decided & ~strange)
-    strange |= _met_other_laser(points, doubtful, confirmed, linked, places, planes, ends)
+    strange |= _met_other_laser(points, doubtful, confirmed, stripe, places, planes, ends)
     return strange
 
 
-def _vote(strange: Mask, decided: Mask, linked: Mask) -> Mask:
+def _vote(strange: Mask, decided: Mask, stripe: Ints) -> Mask:
     """What most of the points (N,) that are decided say of the stripe of each point; false where none says anything."""
-    stripe = stripe_numbers(linked)
     most = 2 * np.bincount(stripe, strange & decided) > np.bincount(stripe, decided)
     return np.asarray(most[stripe])
 
@@ -162,7 +161,7 @@ def _met_other_laser(
     points: NDArray[np.void],
     doubtful: NDArray[np.intp],
     confirmed: Mask,
-    linked: Mask,
+    stripe: Ints,
     places: Floats,
     planes: Floats,
     ends: Floats,
@@ -174,7 +173,7 @@ def _met_other_laser(
     2060, 2106, 2129, 2143 and 2144). Beyond the ends there is neither: the stripe of another laser on the cap of a
     heel, which cameras of this head alone may see, is selected if it is not on the skin in its own plane.
 
-    confirmed : (N,) points that make the skin. linked : (N,) whether the point and the next one are of one stripe.
+    confirmed : (N,) points that make the skin. stripe : (N,) number of the stripe of each point.
     places, planes : of each point in the plane of each head. ends : (2, N) X of the first and the last confirmed place;
     infinite for heads whose stripes are hardly ever confirmed
     """
@@ -185,7 +184,6 @@ def _met_other_laser(
     skin = KDTree(xyz[confirmed])
     own = _heights(skin, xyz[doubtful])
     is_between = np.isfinite(ends[0, doubtful]) & ~_is_beyond(xyz[doubtful, 0], ends[:, doubtful])
-    stripe = stripe_numbers(linked)
     is_alone = (np.bincount(stripe, confirmed) == 0.0)[stripe[doubtful]]
     is_alone &= stripe_step(points) < AROUND_MM  # otherwise a stripe without confirmed points has no skin around it
     for head_places, plane in zip(places, planes, strict=True):

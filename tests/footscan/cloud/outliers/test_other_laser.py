@@ -144,7 +144,7 @@ def test_cameras_of_one_head_do_not_confirm_each_other_in_the_stripe_of_another_
 
 @pytest.mark.parametrize(("apart_mm", "is_dropped"), [(0.02, False), (0.15, True)])
 def test_a_stripe_on_which_cameras_hardly_agree_makes_no_end(apart_mm: float, is_dropped: bool) -> None:
-    """Two cameras that see other lasers meet by chance in the plane of a third one, beyond the foot."""
+    """Cameras of two heads meet by chance in the plane of one of them, beyond the foot."""
     points, _ = scene()
     y = np.arange(-6.0, 6.0, 0.3)
     own_plane, plane = 44.0 + UPPER.offset_mm, 44.0 + LOWER.offset_mm
