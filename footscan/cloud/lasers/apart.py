@@ -15,8 +15,6 @@ Floats = NDArray[np.float64]
 
 HALF_MM = 50.0
 """Half the breadth of the volume of a foot."""
-LIT_MM = 6.0
-"""A laser lights the skin around the points of its head up to this distance. Chosen by hand."""
 UNKNOWN = np.empty((0, 6))
 """Planes of which no film or scan has shown where they lie."""
 
@@ -56,7 +54,7 @@ def planes_apart(planes: Floats, x_mm: tuple[float, float]) -> float:
 
 
 def between_lasers(
-    planes: Floats, places: Floats, cloud: NDArray[np.void], head_of: Mapping[int, int]
+    planes: Floats, places: Floats, cloud: NDArray[np.void], head_of: Mapping[int, int], lit_mm: Floats | float
 ) -> NDArray[np.float64]:
     """(V,) least distance along X between two of the `planes` (L, 6) whose lasers light a place, mm; infinite where at
     most one does.
@@ -66,11 +64,12 @@ def between_lasers(
     places : (V, 3) mm
     cloud : (N,) of `POINT_DTYPE`
     head_of : camera of the cloud -> number of its head
+    lit_mm : (V,) or one for all: a laser lights a place if points of its head are nearer than this
     """
     lit = {}
     for head in set(planes[:, 0]):
         own = np.isin(cloud["camera"], [camera for camera, of_camera in head_of.items() if of_camera == head])
-        lit[head] = KDTree(coordinates(cloud[own])).query(places, distance_upper_bound=LIT_MM)[0] <= LIT_MM
+        lit[head] = KDTree(coordinates(cloud[own])).query(places, distance_upper_bound=np.max(lit_mm))[0] < lit_mm
     least = np.full(len(places), np.inf)
     lasers = zip(planes[:, 0], _ahead(planes, places), strict=True)
     for (one, one_ahead), (other, other_ahead) in combinations(lasers, 2):

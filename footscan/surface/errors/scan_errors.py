@@ -89,7 +89,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     fields = [
         *broad_and_narrow("noise", measured_noise(points, scatter_mm, evidence.agreement, step_mm)),
         ErrorField("noise", everywhere * COMMON_MM, WIDE_MM),
-        ErrorField("noise", between_stripes(vertices, normals, evidence), WIDE_MM),
+        ErrorField("noise", between_stripes(vertices, normals, points, evidence), WIDE_MM),
         ErrorField("filling", np.where(inside, ERROR_GROWS * gap_mm, 0.0), REACH_MM),
         *broad_and_narrow("filling", np.where(inside, FACING_GROWS * gap_mm * np.abs(normals[:, 0]), 0.0)),
         *broad_and_narrow("ends", END_GROWS * np.maximum(beyond_mm, 0.0)),

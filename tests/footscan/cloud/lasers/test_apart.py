@@ -21,7 +21,7 @@ def test_the_planes_lie_where_the_calibration_says() -> None:
     still = np.zeros(1)
     at = [x_in_plane(plane, place[:, 0], place[:, 1:], still, still)[0] for plane in planes]
     cloud = make_points(np.concatenate([place, place]), camera=np.array([1, 2]))
-    apart = between_lasers(lasers_of({1: one, 2: other}), place, cloud, HEADS)
+    apart = between_lasers(lasers_of({1: one, 2: other}), place, cloud, HEADS, 6.0)
     assert apart == pytest.approx([at[0] - at[1]])
 
 
@@ -29,7 +29,8 @@ def test_skin_that_one_laser_lights_is_between_none() -> None:
     planes = lasers_of({1: view(1), 2: view(2, offset_mm=1.5)})
     places = np.array([[100.0, y, 50.0] for y in (-20.0, 0.0, 20.0)])
     cloud = make_points(places[[0, 1, 1, 2]], camera=np.array([1, 1, 2, 2]))
-    assert between_lasers(planes, places, cloud, HEADS).tolist() == [np.inf, 1.5, np.inf]
+    assert between_lasers(planes, places, cloud, HEADS, 6.0).tolist() == [np.inf, 1.5, np.inf]
+    assert between_lasers(planes, places, cloud, HEADS, np.array([25.0, 25.0, 6.0])).tolist() == [1.5, 1.5, np.inf]
 
 
 def test_planes_that_nothing_has_shown_are_unknown() -> None:
