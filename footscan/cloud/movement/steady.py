@@ -37,7 +37,11 @@ def steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArra
     report = report.model_copy(update={"sway_mm": round(sway, 4), "sway_by_axis_mm": (x, y)})
     if sway <= DOUBT_MM:
         return points, report
-    doubt = f"the foot moved slowly, by {sway:.1f} mm (root mean square): scan again, and see that it stands still"
+    # A head that loses steps shows the same skin at another place, too.
+    doubt = (
+        f"the foot moved slowly, by {sway:.1f} mm (root mean square), or a head lost steps: see that the foot stands "
+        "still and nothing brakes the heads, then scan again"
+    )
     return points, report.model_copy(update={"warnings": [*report.warnings, doubt], "doubt": doubt})
 
 
