@@ -38,8 +38,8 @@ a millimetre, and a quadric does not. It overshoots narrow tips, as of toes. Tun
 (`draw_assembled`), steps of 2 and 4 mm: radii of 14 to 30 mm against 3 to 11 mm."""
 ALONE = 0.15
 """Standard deviation of a tip that the surface alone predicts, in mm per mm. Chosen by hand: where it predicted heels
-0.4 to 2 mm beyond the last stripe and a quadric others (`draw_assembled`, seeds 4514, 4518, 5401 and 5405), lengths
-erred by 0.02 to 0.06 mm."""
+0.5 to 2 mm beyond the last stripe and a quadric contradicted it (`draw_assembled`, seeds 4514, 4518, 5401 and 5405),
+lengths erred by 0.01 to 0.06 mm."""
 DEPTH_STEPS, EXTENT = 1.5, (0.02, 0.98)
 """Depth of the end at which that radius is taken, and the quantiles of Z there. Chosen by hand."""
 
@@ -76,8 +76,8 @@ class TravelEnd:
 
     def tip_from(self, reached_mm: float) -> float:
         """Distance of the tip beyond the last stripe, mm, of a surface that reaches so far by itself."""
-        by_sections = None if self.is_broad else self.tip_mm
-        tip = reached_mm if by_sections is None else (reached_mm + self._within(by_sections)) / 2
+        by_sections = self._by_sections_mm
+        tip = reached_mm if by_sections is None else (reached_mm + by_sections) / 2
         return self._within(tip)
 
     def doubt_mm(self, reached_mm: float) -> float:
@@ -88,10 +88,16 @@ class TravelEnd:
         """
         if reached_mm <= 0.0:
             return 0.0
-        if self.tip_mm is None or self.is_broad:
+        by_sections = self._by_sections_mm
+        if by_sections is None:
             return ALONE * reached_mm
         tip = self.tip_from(reached_mm)
-        return max(abs(reached_mm - tip), abs(self._within(self.tip_mm) - tip))
+        return max(abs(reached_mm - tip), abs(by_sections - tip))
+
+    @property
+    def _by_sections_mm(self) -> float | None:
+        """Distance of the tip beyond the last stripe by the sections, mm; None where they say less than the surface."""
+        return None if self.tip_mm is None or self.is_broad else self._within(self.tip_mm)
 
     def _within(self, tip_mm: float) -> float:
         return float(np.clip(tip_mm, self.least_mm, self.most_mm))

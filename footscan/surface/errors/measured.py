@@ -81,8 +81,13 @@ def measured_noise(
     if points is not None:
         noise = np.maximum(noise, SHARED * points["sigma"].mean(axis=1))
         if agreement is not None:
-            noise = np.maximum(noise, OF_GROSS * agreement.gross_mm * (points["cameras"] == 1).mean(axis=1))
+            noise = np.maximum(noise, OF_GROSS * agreement.gross_mm * _seen_alone(points))
     return np.asarray(noise)
+
+
+def _seen_alone(points: NDArray[np.void]) -> Floats:
+    """Returns (V,) the share of the `points` around each vertex that one camera alone saw."""
+    return np.asarray((points["cameras"] == 1).mean(axis=1))
 
 
 def between_stripes(vertices: Floats, normals: Floats, points: NDArray[np.void] | None, evidence: Evidence) -> Floats:
@@ -92,7 +97,7 @@ def between_stripes(vertices: Floats, normals: Floats, points: NDArray[np.void] 
     """
     if evidence.cloud is None or evidence.agreement is None:
         return np.zeros(len(vertices))
-    alone = np.ones(len(vertices)) if points is None else (points["cameras"] == 1).mean(axis=1)
+    alone = 1.0 if points is None else _seen_alone(points)
     lit_mm = LIT_MM[0] + (LIT_MM[1] - LIT_MM[0]) * alone
     apart = between_lasers(evidence.lasers, vertices, evidence.cloud, evidence.agreement.heads, lit_mm)
     near, far = BETWEEN_MM
