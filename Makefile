@@ -11,6 +11,7 @@ setup:    ## system libraries, .venv, pinned packages; starts at once when they 
 	@scripts/setup.sh
 
 compiled: setup
+	@$(BIN)/python -m compileall -q footscan pipelines schemas  # also where Python must not write byte code by itself
 	@$(BIN)/python -m footscan.ahead_of_time
 
 demo: compiled ## films, calibrates, scans and measures a foot; the result is in demo/

@@ -39,7 +39,7 @@ def mesh_cloud(
     Finding
         The points are too few or too far apart for a surface.
     """
-    import open3d as o3d
+    from footscan.open3d_without_plots import o3d
 
     cloud, cloud_normals = np.asarray(points, np.float64), np.asarray(normals, np.float64)
     spacing = parameters.spacing_steps * step_mm

@@ -75,7 +75,7 @@ def _points(mesh: Mesh) -> NDArray[np.float64]:
 
 def _distances(points: NDArray[np.float64], mesh: Mesh) -> NDArray[np.float64]:
     """Returns (N,) distances in mm of (N, 3) points to the surface."""
-    import open3d as o3d
+    from footscan.open3d_without_plots import o3d
 
     middle = mesh.vertices.mean(axis=0)  # single precision errs by 0.00001 mm at such distances from the middle
     tensor = o3d.core.Tensor.from_numpy

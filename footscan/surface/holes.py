@@ -76,7 +76,9 @@ def rims(faces: NDArray[np.integer]) -> list[list[int]]:
     size = int(faces.max()) + 1 if faces.size else 1
     forward, backward = edges @ [size, 1], edges @ [1, size]
     following: dict[int, list[int]] = {}
-    for start, end in edges[~np.isin(backward, forward)][:, ::-1].tolist():
+    forward.sort()
+    has_twin = forward[np.searchsorted(forward[:-1], backward)] == backward  # `np.isin` takes ten times as long
+    for start, end in edges[~has_twin][:, ::-1].tolist():
         following.setdefault(start, []).append(end)
     loops = []
     for first in sorted(following):

@@ -62,7 +62,7 @@ class SearchedMesh:
 
     def __init__(self, mesh: Shape) -> None:
         """Errors are those of `distances_to_mesh` that concern the mesh."""
-        import open3d as o3d
+        from footscan.open3d_without_plots import o3d
 
         check_places(mesh[0], "reference")
         self._sides = sides(mesh)

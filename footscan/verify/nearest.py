@@ -46,7 +46,7 @@ class MeshSurface:
     """The surface of a mesh: its triangles."""
 
     def __init__(self, mesh: Shape) -> None:
-        import open3d as o3d
+        from footscan.open3d_without_plots import o3d
 
         self._vertices, self._faces = np.asarray(mesh[0], np.float64), mesh[1]
         self._middle = (self._vertices.min(axis=0) + self._vertices.max(axis=0)) / 2  # the scene uses float32

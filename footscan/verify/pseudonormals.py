@@ -91,7 +91,7 @@ def _contradicts(edge_of: NDArray[np.int64], along: NDArray[np.int8], meeting: N
 
 
 def _turned_alike(vertices: Floats, faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    import open3d as o3d
+    from footscan.open3d_without_plots import o3d
 
     mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(faces))
     mesh.orient_triangles()  # as far as possible: a Möbius strip has one side

@@ -99,7 +99,9 @@ class Threads:
 
     def run(self, tasks: Mapping[str, Task], run_task: RunTask, on_step_end: OnStepEnd) -> dict[str, Outcome]:
         """See `Pool`."""
-        import dask  # imported late: it takes time, and a run without misses does not need it
+        # Imported late: it takes time, and a run without misses does not need it.
+        import dask
+        from dask.threaded import get  # by its name, "threads", Dask would load distributed as well
 
         def run_and_report(task: Task, ended: Mapping[str, StepEnd]) -> StepEnd:
             end = run_task(task, ended)
@@ -108,7 +110,7 @@ class Threads:
 
         _limit_heaps()
         delayed = _delayed(tasks, run_and_report, lambda step: step.name)
-        ends = dask.compute(*delayed.values(), scheduler="threads", num_workers=self.count)
+        ends = dask.compute(*delayed.values(), scheduler=get, num_workers=self.count)
         return {name: end.outcome for name, end in zip(delayed, ends, strict=True)}
 
 

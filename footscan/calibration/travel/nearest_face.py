@@ -1,11 +1,11 @@
 """Distances of points from the faces of a body."""
 
 import numpy as np
-import open3d as o3d
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from footscan.calibration.travel.body import Body
+from footscan.open3d_without_plots import o3d
 
 Floats = NDArray[np.float64]
 

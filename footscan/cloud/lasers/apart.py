@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 from footscan.calibration.models.laser_plane import MIDDLE_Z_MM, terms_of_plane
 from footscan.cloud.points import coordinates
 from footscan.cloud.views import View
+from footscan.side_by_side import cores
 
 Floats = NDArray[np.float64]
 
@@ -69,7 +70,8 @@ def between_lasers(
     lit = {}
     for head in set(planes[:, 0]):
         own = np.isin(cloud["camera"], [camera for camera, of_camera in head_of.items() if of_camera == head])
-        lit[head] = KDTree(coordinates(cloud[own])).query(places, distance_upper_bound=np.max(lit_mm))[0] < lit_mm
+        near = KDTree(coordinates(cloud[own])).query(places, distance_upper_bound=np.max(lit_mm), workers=cores())
+        lit[head] = near[0] < lit_mm
     least = np.full(len(places), np.inf)
     lasers = zip(planes[:, 0], _ahead(planes, places), strict=True)
     for (one, one_ahead), (other, other_ahead) in combinations(lasers, 2):

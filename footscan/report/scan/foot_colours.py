@@ -11,6 +11,7 @@ from footscan.report.colours import colour_bar, colour_limit, distance_colours
 from footscan.report.filled import CUT, filled_colours, filled_key
 from footscan.report.markup import key, number
 from footscan.report.viewer import Colouring
+from footscan.side_by_side import cores
 from schemas.quality import MeshQuality
 
 Floats = NDArray[np.float64]
@@ -64,7 +65,7 @@ def foot_colourings(surface: FootSurface, mesh: MeshQuality, cloud: NDArray[np.v
         colours = distance_colours(surface.truth_distance, limit)
         colourings.insert(0, Colouring("Distance to reference", colours, colour_bar(limit)))
     if len(cloud):
-        nearest = cloud[KDTree(coordinates(cloud)).query(surface.vertices)[1]]
+        nearest = cloud[KDTree(coordinates(cloud)).query(surface.vertices, workers=cores())[1]]
         colourings.append(_by_camera(nearest, filled))
     return [*colourings, _by_uncertainty(surface.deviations)]
 

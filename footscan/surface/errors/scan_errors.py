@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 from footscan.cloud.points import stripe_step
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
+from footscan.side_by_side import cores
 from footscan.surface.errors.ends import beyond_stripes, find_ends
 from footscan.surface.errors.evidence import Evidence
 from footscan.surface.errors.field import REACH_MM, WIDE_MM, ErrorField, broad_and_narrow
@@ -80,7 +81,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     beyond_mm = beyond_stripes(vertices, ~seen, cloud, step_mm)
     gap_mm = np.maximum(beyond_mm, 0.0)
     inside = ~seen & (beyond_mm <= 0)
-    gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside])[0]
+    gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside], workers=cores())[0]
     points, scatter_mm = around(vertices, normals, cloud)
     everywhere = np.ones(len(vertices))
     sway_mm = (evidence.movement and evidence.movement.sway_by_axis_mm) or (SWAY_MM, SWAY_MM)

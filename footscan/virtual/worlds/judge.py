@@ -1,9 +1,9 @@
 """How far a reconstruction is from the truth of a world."""
 
 import numpy as np
-import open3d as o3d
 from numpy.typing import NDArray
 
+from footscan.open3d_without_plots import o3d
 from footscan.virtual.optics.scene import Mesh
 
 Floats = NDArray[np.float64]
