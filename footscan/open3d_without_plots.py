@@ -31,6 +31,6 @@ class _LoadedWhenCalled(ModuleType):
 if "open3d" not in sys.modules:
     sys.modules[PLOTS] = _LoadedWhenCalled(PLOTS)
 
-import open3d as o3d  # noqa: E402
+import open3d as o3d  # noqa: E402 (what stands for its plots must be there first)
 
 __all__ = ["o3d"]

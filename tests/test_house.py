@@ -23,7 +23,7 @@ KINDS = {"pipelines/steps", "schemas"}
 """Folders in which each module is one of a kind: a step, a document."""
 
 ORCHESTRATION = {"dask", "distributed", "typer", "click", "rich"}
-NEUTRAL = ("child_process", "clock", "compiled", "open3d_without_plots")
+NEUTRAL = {"child_process", "clock", "compiled", "open3d_without_plots"}
 """How processes end, clocks run, loops are compiled and a library loads says nothing of what is computed."""
 CONTRACTS_MAY_USE = sys.stdlib_module_names | {"pydantic", "yaml", "schemas"}
 
@@ -217,7 +217,7 @@ def reason_against(module: Path, imported: str) -> str | None:
         return "schemas imports pydantic, yaml and the standard library"
     if package == "footscan" and (top == "pipelines" or top in ORCHESTRATION):
         return "footscan knows nothing of the dataflow, of Dask or of a command line"
-    if package == "footscan" and top == "footscan" and below[:1] in ([neutral] for neutral in NEUTRAL):
+    if package == "footscan" and top == "footscan" and below and below[0] in NEUTRAL:
         return None
     if package == "footscan" and top == "footscan" and (below[:1] == ["virtual"]) != (room == "virtual"):
         return "the virtual scanner and the reconstruction share nothing but schemas"

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-PLOTTING = "('dash', 'plotly', 'IPython')"
+PLOTTING = ("dash", "plotly", "IPython")
 
 
 def in_new_process(program: str) -> list[str]:
