@@ -5,6 +5,7 @@ from footscan.cloud.outliers.visibility import CONFIRMED, DENIED, UNKNOWN, ask_o
 from footscan.cloud.views import View
 from footscan.mesh.voxels import voxelise
 
+RADIUS_MM = 150.0
 WIDE = np.array([[-100.0, -100.0], [100.0, -100.0], [100.0, 100.0], [-100.0, 100.0]])
 LEFT, RIGHT = View(np.array([100.0, 150.0, 200.0]), WIDE), View(np.array([-100.0, -150.0, 200.0]), WIDE)
 
@@ -111,4 +112,22 @@ def test_a_reflection_that_two_cameras_see_behind_a_surface_of_three_is_denied()
     for answer in found[3:]:
         assert (middle_of(answer, behind) == DENIED).all()
     for answer in found[:3]:
+        assert (answer == CONFIRMED).all()
+
+
+def test_skin_does_not_hide_what_lies_farther_round() -> None:
+    """A cylinder along X: the sight of one camera grazes what three see on its way to what two see."""
+
+    def cylinder(first: float, last: float) -> np.ndarray:
+        """From `first` to `last` degrees from the direction of the left camera, which sees up to 68."""
+        x, angle = np.meshgrid(np.arange(0.0, 81.0, 2.0), np.radians(np.arange(first, last, 0.15)), indexing="ij")
+        angle += np.arctan2(LEFT.centre[2] + RADIUS_MM, LEFT.centre[1])
+        y, z = RADIUS_MM * np.cos(angle), RADIUS_MM * (np.sin(angle) - 1.0)
+        return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+
+    third = View(np.array([-100.0, 0.0, 200.0]), WIDE)
+    near, round_the_side = cylinder(40.0, 60.0), cylinder(60.0, 67.0)
+    parts = [(0, near), (1, near), (2, near), (0, round_the_side), (1, round_the_side)]
+    found = answers(parts, [LEFT, RIGHT, third], [np.arange(0.0, 81.0, 2.0)] * 3)
+    for answer in found:
         assert (answer == CONFIRMED).all()
