@@ -30,6 +30,8 @@ SEEN_HEADS_MM = 60.0
 """Stripes of other heads that are farther away are out of the picture."""
 BEND_HALF_MM = 70.0
 """The sagitta of a bent sheet is measured over twice this length."""
+ROUNDING_MM = 1e-6
+"""Of a place that is computed in two ways, at most."""
 BODY = WorldSubject(kind="cast", albedo=0.7, scatter_mm=0.1)
 """A body that stands still; its form is given apart."""
 TREMOR_HZ, SWAY_HZ = (8.0, 12.0), (0.2, 0.8)
@@ -168,6 +170,18 @@ class Machine:
         bend = self.world.laser.bend_mm / BEND_HALF_MM**2
         pose, way = exposure.pose, exposure.way
         return np.asarray(_sheet_distance(points, np.asarray(share, np.float64), pose.turn, pose.shift, way, bend))
+
+    def sheet_reach(self, corners: Floats, exposure: Exposure) -> tuple[float, float]:
+        """Least and greatest X, mm, that a laser sheet has in a box while a frame is exposed.
+
+        corners : (8, 3) mm, plate frame, of the box; its sides are parallel to the axes.
+        """
+        turn = exposure.pose.turn
+        from_head = np.concatenate([corners, corners - exposure.way]) - exposure.pose.shift
+        x, y = from_head @ turn[:, 0] / turn[0, 0], from_head @ turn[:, 1]
+        flat = np.tile(corners[:, 0], 2) - x
+        bent = abs(self.world.laser.bend_mm) * (np.abs(y).max() / BEND_HALF_MM) ** 2 / turn[0, 0]
+        return float(flat.min() - bent - ROUNDING_MM), float(flat.max() + bent + ROUNDING_MM)
 
     def _head_pose(self, head: int, seconds: float) -> Pose:
         still = self.calibration_pose(head)

@@ -44,24 +44,42 @@ class CutMesh:
         for corner in range(3):
             np.add.at(normals, faces[:, corner], crossed)
         self._normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+        box = np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
+        self.corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(8, 3)
+        """Of the box around the mesh, mm."""
+        reach = np.sort(mesh.vertices[self._edges, 0], axis=1)
+        self._by_x = np.argsort(reach[:, 0], kind="stable")
+        self._least_x, self._greatest_x = reach[self._by_x].T.copy()
+        self._longest = float((reach[:, 1] - reach[:, 0]).max())
 
-    def ends_near(self, distance: Floats, mm: float) -> Ints:
-        """Vertices, (K,), whose edges may be cut if `distance`, (V,) mm at the vertices, changes by less than `mm`."""
-        return np.flatnonzero(_ends_near(self._edges, distance, mm))
+    def edges_within(self, least: float, greatest: float) -> Ints:
+        """The edges, (E,) in ascending order, that reach into a range of X, mm."""
+        first = np.searchsorted(self._least_x, least - self._longest)
+        last = np.searchsorted(self._least_x, greatest, side="right")
+        return np.sort(self._by_x[first:last][self._greatest_x[first:last] >= least])
 
-    def cut(self, distance: Floats) -> Cut:
-        """Cut where `distance`, (V,) mm at the vertices, is zero."""
-        edges = np.flatnonzero(_crosses(self._edges, distance))
+    def ends(self, edges: Ints) -> Ints:
+        """Both vertices of each of edges (E,), (2 E,)."""
+        return self._edges[edges].ravel()
+
+    def ends_near(self, distance: Floats, edges: Ints, mm: float) -> Ints:
+        """Vertices, (K,), of those of `edges` (E,) that may be cut if `distance` changes by less than `mm`.
+
+        distance : (V,) mm, at the vertices
+        """
+        return np.flatnonzero(_ends_near(self._edges[edges], distance, mm))
+
+    def cut(self, distance: Floats, edges: Ints) -> Cut:
+        """Cut where `distance`, (V,) mm at the vertices, is zero; `edges` (E,), ascending, are all that may be cut."""
+        edges = edges[_crosses(self._edges[edges], distance)]
         if not len(edges):
             return Cut(np.empty((0, 3)), np.empty((0, 3)))
-        row_of_edge = np.full(len(self._edges), -1, np.int64)
-        row_of_edge[edges] = np.arange(len(edges))
         faces = np.unique(self._faces_of_edge[edges])
-        row_of_face = np.full(len(self.mesh.faces), -1, np.int64)
-        row_of_face[faces] = np.arange(len(faces))
-        rows = row_of_edge[self._edges_of_face[faces]]
-        ends = np.sort(rows, axis=1)[:, 1:]  # one of the three edges of a cut face is not cut
-        order, line = _trace(ends, row_of_face[self._faces_of_edge[edges]])
+        of_face = self._edges_of_face[faces]
+        rows = np.minimum(np.searchsorted(edges, of_face), len(edges) - 1)
+        rows[edges[rows] != of_face] = -1  # one of the three edges of a cut face is not cut
+        ends = np.sort(rows, axis=1)[:, 1:]
+        order, line = _trace(ends, np.searchsorted(faces, self._faces_of_edge[edges]))
         first, second = self._edges[edges[order]].T
         share = (distance[first] / (distance[first] - distance[second]))[:, None]
         points = self.mesh.vertices[first] * (1.0 - share) + self.mesh.vertices[second] * share

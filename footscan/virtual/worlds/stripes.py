@@ -22,6 +22,7 @@ from footscan.virtual.worlds.subject import Subject
 from schemas.world import World
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 STRIPE_DTYPE = np.dtype(
@@ -111,25 +112,36 @@ def _seen_in_frame(
     for other in machine.sheets_near(head, own.seconds):
         sheet = machine.sheet(other, own.seconds)
         if max(np.abs(own.way).max(), np.abs(sheet.way).max()) > ONE_MOMENT_MM:
-            distance = _distance_by_rows(machine, camera, own.way, sheet, cut_mesh)
-            stripe = _lit_stripe(machine, other, sheet, cut_mesh.cut(distance), scene)
+            cut = _cut_row_by_row(machine, camera, own.way, sheet, cut_mesh)
+            stripe = _lit_stripe(machine, other, sheet, cut, scene)
         else:
             if other not in lit:
-                distance = machine.sheet_distance(cut_mesh.mesh.vertices, sheet, _middle(cut_mesh.mesh.vertices))
-                lit[other] = _lit_stripe(machine, other, sheet, cut_mesh.cut(distance), scene)
+                cut = cut_mesh.cut(*_distance(machine, sheet, cut_mesh))
+                lit[other] = _lit_stripe(machine, other, sheet, cut, scene)
             stripe = lit[other]
         parts.append(_seen_by(machine, camera, own.way, stripe, scene))
     return _Seen(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 
 
-def _distance_by_rows(machine: Machine, camera: Camera, way: Floats, sheet: Exposure, cut_mesh: CutMesh) -> Floats:
-    """Distances (V,) in X of vertices from a sheet as it stands when the row of each vertex is exposed."""
-    vertices = cut_mesh.mesh.vertices
-    distance = machine.sheet_distance(vertices, sheet, _middle(vertices))
-    near = cut_mesh.ends_near(distance, float(np.abs(sheet.way).max()))
-    share = _row_share(camera, way, vertices[near], machine.size[0])
-    distance[near] = machine.sheet_distance(vertices[near], sheet, share)
-    return distance
+def _distance(machine: Machine, sheet: Exposure, cut_mesh: CutMesh) -> tuple[Floats, Ints]:
+    """Distances (V,) in X, mm, of vertices from a sheet in the middle of its exposure, and the edges (E,) near it.
+
+    The distance is set at the ends of these edges, and NaN elsewhere.
+    """
+    edges = cut_mesh.edges_within(*machine.sheet_reach(cut_mesh.corners, sheet))
+    vertices, ends = cut_mesh.mesh.vertices, cut_mesh.ends(edges)
+    distance = np.full(len(vertices), np.nan)
+    distance[ends] = machine.sheet_distance(vertices[ends], sheet, _middle(ends))
+    return distance, edges
+
+
+def _cut_row_by_row(machine: Machine, camera: Camera, way: Floats, sheet: Exposure, cut_mesh: CutMesh) -> Cut:
+    """Cut by a sheet as it stands when the row of each point is exposed."""
+    distance, edges = _distance(machine, sheet, cut_mesh)
+    near = cut_mesh.ends_near(distance, edges, float(np.abs(sheet.way).max()))
+    vertices = cut_mesh.mesh.vertices[near]
+    distance[near] = machine.sheet_distance(vertices, sheet, _row_share(camera, way, vertices, machine.size[0]))
+    return cut_mesh.cut(distance, edges)
 
 
 def _row_share(camera: Camera, way: Floats, points: Floats, rows: int) -> Floats:
@@ -143,7 +155,7 @@ def _row_share(camera: Camera, way: Floats, points: Floats, rows: int) -> Floats
     return share
 
 
-def _middle(points: Floats) -> Floats:
+def _middle(points: Floats | Ints) -> Floats:
     return np.full(len(points), 0.5)
 
 
