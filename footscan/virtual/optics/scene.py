@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
+from footscan.virtual.optics.ranges import Ranges
 from footscan.virtual.optics.ray_tree import any_hits, first_hits, ray_tree
 from footscan.virtual.portable import cos_sin
 
@@ -76,11 +77,9 @@ class Scene:
         area = np.linalg.norm(crossed, axis=1, keepdims=True)
         self._facet_normals = crossed / np.maximum(area, 1e-30)
         self._corner_normals = _smooth_normals(faces, crossed, self._facet_normals, len(vertices))
-        patches = _patches(corners, PATCH_MM)
-        reach = np.stack([patches[:, :, 0].min(axis=1), patches[:, :, 0].max(axis=1)], axis=1)
-        order = np.argsort(reach[:, 0], kind="stable")
-        self._patches, self._reach = patches[order], reach[order]
-        self._longest = float((reach[:, 1] - reach[:, 0]).max())
+        self._patches = _patches(corners, PATCH_MM)
+        x = self._patches[:, :, 0]
+        self._ranges = Ranges(np.stack([x.min(axis=1), x.max(axis=1)], axis=1))
 
     def cast(self, origins: Floats, directions: Floats) -> Hits:
         """First hits of rays, each array (N, 3)."""
@@ -100,9 +99,7 @@ class Scene:
 
     def patches_near(self, x: float, reach: float) -> Floats:
         """Corners, (K, 3, 3), of small triangles that cover all of the surface within `reach` mm of X = x."""
-        first = np.searchsorted(self._reach[:, 0], x - reach - self._longest)
-        last = np.searchsorted(self._reach[:, 0], x + reach, side="right")
-        return self._patches[first:last][self._reach[first:last, 1] >= x - reach]
+        return np.asarray(self._patches[self._ranges.within(x - reach, x + reach)])
 
 
 def _smooth_normals(faces: Ints, crossed: Floats, facet_normals: Floats, vertices: int) -> Floats:

@@ -31,7 +31,7 @@ SEEN_HEADS_MM = 60.0
 BEND_HALF_MM = 70.0
 """The sagitta of a bent sheet is measured over twice this length."""
 ROUNDING_MM = 1e-6
-"""Of a place that is computed in two ways, at most."""
+"""What a place that is computed in two ways differs by, at most."""
 BODY = WorldSubject(kind="cast", albedo=0.7, scatter_mm=0.1)
 """A body that stands still; its form is given apart."""
 TREMOR_HZ, SWAY_HZ = (8.0, 12.0), (0.2, 0.8)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
+from footscan.virtual.optics.ranges import Ranges
 from footscan.virtual.optics.scene import Mesh
 
 Floats = NDArray[np.float64]
@@ -47,16 +48,11 @@ class CutMesh:
         box = np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
         self.corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(8, 3)
         """Of the box around the mesh, mm."""
-        reach = np.sort(mesh.vertices[self._edges, 0], axis=1)
-        self._by_x = np.argsort(reach[:, 0], kind="stable")
-        self._least_x, self._greatest_x = reach[self._by_x].T.copy()
-        self._longest = float((reach[:, 1] - reach[:, 0]).max())
+        self._ranges = Ranges(np.sort(mesh.vertices[self._edges, 0], axis=1))
 
     def edges_within(self, least: float, greatest: float) -> Ints:
         """The edges, (E,) in ascending order, that reach into a range of X, mm."""
-        first = np.searchsorted(self._least_x, least - self._longest)
-        last = np.searchsorted(self._least_x, greatest, side="right")
-        return np.sort(self._by_x[first:last][self._greatest_x[first:last] >= least])
+        return np.sort(self._ranges.within(least, greatest))
 
     def ends(self, edges: Ints) -> Ints:
         """Both vertices of each of edges (E,), (2 E,)."""
