@@ -42,7 +42,8 @@ def of_replicates(
     """Displace a foot at random, `count` times, find its axis anew, and return what `compute` makes of each.
 
     The floor stays where it is, and so do the landmarks that a person has `marked`, (3,) mm in the frame of the foot. A
-    replicate that is no foot any more is left out.
+    replicate that is no foot any more is left out. Where the requested axis could not be found, it is sought in the
+    replicates again: what they find shows how much rests on it.
     """
     normals = vertex_normals(foot.vertices, foot.faces)
     random = np.random.default_rng(SEED)
@@ -62,7 +63,8 @@ def _reframed(foot: FootFrame, vertices: Floats, marked: Mapping[str, Floats]) -
     samples = dense_points(vertices, foot.faces, SPACING_MM)
     low = samples[samples[:, 2] <= low_height(foot.length)]
     forefoot = forefoot_points(vertices, foot.faces, foot.length, foot.low)
-    turn, axis, length = along_axis(np.eye(4), low, forefoot, foot.length, foot.axis, marked)
+    wish = foot.axis_not_found or foot.axis
+    turn, axis, length = along_axis(np.eye(4), low, forefoot, foot.length, wish, marked)
     return foot._replace(
         vertices=apply(turn, vertices),
         samples=apply(turn, samples),

@@ -89,6 +89,8 @@ class FootFrame(NamedTuple):
     """Standard deviation of the skin on the floor about it, mm."""
     cut_height: float | None = None
     """Lowest point of the cut through the leg, mm; None if the leg has no flat end."""
+    axis_not_found: Axis | None = None
+    """The requested axis of a whole foot where `axis` is another one, since the second toe could not be identified."""
 
     @property
     def low(self) -> float:
@@ -164,6 +166,7 @@ def foot_frame(
         floor=floor,
         floor_residual=pose.residual,
         cut_height=None if pose.leg_end is None else float(apply(transform, pose.leg_end)[:, 2].min()),
+        axis_not_found=axis if body.is_whole and actual_axis != axis else None,
     )
 
 

@@ -79,6 +79,16 @@ def test_replicates_are_the_same_in_every_run(foot: Mesh) -> None:
     assert abs(first[0].length - frame.length) < 0.5
 
 
+def test_an_axis_that_was_not_found_is_sought_again(foot: Mesh) -> None:
+    frame = foot_frame(foot.vertices, foot.faces, "right", axis="ball_center")
+    errors = SurfaceErrors(frame.vertices, [ErrorField("noise", np.full(len(frame.vertices), 0.1 * SD_MM))])
+    assert [one.axis for one in of_replicates(frame, errors, 1, lambda one: one)] == ["ball_center"]
+    fallback = frame._replace(axis_not_found="toe2")
+    [replicate] = of_replicates(fallback, errors, 1, lambda one: one)
+    assert replicate.axis == "toe2"
+    assert abs(replicate.transform[1, 0] - frame.transform[1, 0]) > np.deg2rad(0.5)
+
+
 def test_a_measure_that_few_replicates_have_has_no_scatter() -> None:
     values = [{"foot_length": 250.0 + k, **({"ball_girth": 240.0} if k < 4 else {})} for k in range(10)]
     scatter = scatter_of(values, count=20)

@@ -18,11 +18,12 @@ from schemas.parameters.scan import ScanParameters
 from schemas.regression import Seeds, SuiteWorlds
 from schemas.world import World, WorldCameras, WorldGlass, WorldLaser, WorldSubject
 
-COARSE = WorldCameras(frames=50, step_mm=8.0)
+COARSE, FINE = WorldCameras(frames=50, step_mm=8.0), WorldCameras(frames=100, step_mm=4.0)
+"""Toes are not separated by stripes 8 mm apart: the foot axis turns, and its standard deviation says so."""
 WORLDS = {
-    1: World(seed=1, cameras=COARSE),
+    1: World(seed=1, cameras=FINE),
     2: World(seed=2, cameras=COARSE, laser=WorldLaser(power=0.01)),
-    4: World(seed=4, cameras=COARSE, glass=WorldGlass(height_mm=-1.6, tilt_x_deg=0.4, tilt_y_deg=-0.3)),
+    4: World(seed=4, cameras=FINE, glass=WorldGlass(height_mm=-1.6, tilt_x_deg=0.4, tilt_y_deg=-0.3)),
     3: World(seed=3, cameras=COARSE, subject=WorldSubject(kind="last", toe_gap_mm=-1.0, leg_mm=90.0)),
 }
 
