@@ -299,7 +299,7 @@ def take_measures(
     marked = {name: one.point for name, one in landmarks.items() if one.method == "manual"}
     manual = {name: apply(to_mesh, point[None])[0] for name, point in marked.items()}
     compute = partial(_values, rough=surface.roughness, manual=manual)
-    scatter = scatter_of(of_replicates(foot, known, count, compute, marked), count)
+    scatter = scatter_of(of_replicates(foot, known, count, compute, marked), count, foot.axis_not_found is not None)
     measures = {
         name: _measure(
             definition,
@@ -353,7 +353,7 @@ def _measure(
     surface_errors, scatter, glass_sd_mm = errors
     if scatter is not None and scatter.missing > MISSING_SHARE:
         doubts.append(f"it cannot be measured in {100 * scatter.missing:.0f} % of the ways in which the scan may err")
-    budget = with_landmarks(surface_errors.budget(quantity), None if scatter is None else scatter.about(quantity.value))
+    budget = with_landmarks(surface_errors.budget(quantity), scatter, quantity.value)
     if budget is not None and glass_sd_mm:
         budget["glass"] = glass_sd_mm * (quantity.by_lift(surface.normals) if PRINT in definition.text else 1.0)
     sd = None if budget is None else abs(factor) * math.hypot(*budget.values())

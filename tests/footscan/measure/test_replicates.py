@@ -6,7 +6,7 @@ import pytest
 from footscan.measure.frame.foot_frame import foot_frame
 from footscan.measure.measures import measure_foot
 from footscan.measure.replicates import of_replicates
-from footscan.measure.uncertainty import SurfaceErrors, scatter_of
+from footscan.measure.uncertainty import SurfaceErrors, scatter_of, with_landmarks
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
 from footscan.surface.errors.field import ErrorField
@@ -87,6 +87,14 @@ def test_an_axis_that_was_not_found_is_sought_again(foot: Mesh) -> None:
     [replicate] = of_replicates(fallback, errors, 1, lambda one: one)
     assert replicate.axis == "toe2"
     assert abs(replicate.transform[1, 0] - frame.transform[1, 0]) > np.deg2rad(0.5)
+
+
+def test_the_turn_from_one_axis_to_the_other_counts_once() -> None:
+    values = [{"foot_breadth": 98.0 + 0.1 * (k % 2)} for k in range(16)]
+    same, other = (scatter_of(values, 16, is_on_other_axis)["foot_breadth"] for is_on_other_axis in (False, True))
+    budget = with_landmarks({}, other, 98.8)
+    assert budget == {"landmarks": pytest.approx(0.75, abs=0.01)}
+    assert with_landmarks({}, same, 98.8) == {"landmarks": pytest.approx(0.5 * budget["landmarks"])}
 
 
 def test_a_measure_that_few_replicates_have_has_no_scatter() -> None:
