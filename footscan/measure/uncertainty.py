@@ -64,7 +64,7 @@ class Scatter(NamedTuple):
     sd: float
     missing: float
     """Share of the replicates that do not have it."""
-    counts: float = OF_REPLICATES
+    weight: float = OF_REPLICATES
     """Movement of the landmarks of the foot relative to that of the replicates."""
 
     def about(self, value: float) -> float:
@@ -81,7 +81,7 @@ def with_landmarks(
 ) -> dict[ErrorCause, float] | None:
     """Add what a measure of this value scatters by over replicates beyond its linear budget: landmarks that move.
 
-    That counts `Scatter.counts`; where there is no linear budget, all of the scatter counts.
+    That counts with `Scatter.weight`; where there is no linear budget, all of the scatter counts.
 
     >>> with_landmarks({"noise": 0.03, "cameras": 0.04}, Scatter(mean=250.0, sd=0.13, missing=0.0), 250.0)
     {'noise': 0.03, 'cameras': 0.04, 'landmarks': 0.06}
@@ -96,14 +96,14 @@ def with_landmarks(
     if budget is None:
         return {"landmarks": about}
     left = about**2 - sum(sd**2 for sd in budget.values())
-    return {**budget, **({"landmarks": round(scatter.counts * math.sqrt(left), 9)} if left > 0.0 else {})}
+    return {**budget, **({"landmarks": round(scatter.weight * math.sqrt(left), 9)} if left > 0.0 else {})}
 
 
 def scatter_of(values: Sequence[Mapping[str, float]], count: int, is_on_other_axis: bool = False) -> dict[str, Scatter]:
     """The scatter of each measure, if enough of `count` replicates have it.
 
-    All of it counts where the foot is on another axis than its replicates: then it is mostly the turn from one axis to
-    the other, by which the foot errs once.
+    All of it counts where the foot is on another axis than its replicates may be: then it is mostly the turn from one
+    axis to the other, by which the foot errs once.
 
     The standard deviation is that of the t distribution of a value whose variance is estimated from few (JCGM 101:2008,
     6.4.9).
@@ -121,7 +121,7 @@ def scatter_of(values: Sequence[Mapping[str, float]], count: int, is_on_other_ax
             mean=float(np.mean(each)),
             sd=float(np.std(each, ddof=1)) * math.sqrt((len(each) - 1) / (len(each) - 3)),
             missing=1 - len(each) / count,
-            counts=1.0 if is_on_other_axis else OF_REPLICATES,
+            weight=1.0 if is_on_other_axis else OF_REPLICATES,
         )
         for name, each in found.items()
         if len(each) >= FEWEST_REPLICATES
