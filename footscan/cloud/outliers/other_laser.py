@@ -54,8 +54,8 @@ def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Ma
     anything is confirmed of its own one in this frame. Where that says nothing, it is selected if it lies on the skin
     that the confirmed points make in the plane of the other laser, and off it in its own one, or if it lies beyond all
     confirmed ones along the travel. A point of a stripe on which no two cameras agree well is also selected if there is
-    no skin around it, and the plane of the other laser is beyond the end. Cameras whose calibration does not say where their laser plane lies are left as
-    they are, unless the construction of a head says how far apart two lasers are.
+    no skin around it, and the plane of the other laser is beyond the end. Cameras whose calibration does not say where
+    their laser plane lies are left as they are, unless the construction of a head says how far apart two lasers are.
     """
     strange = np.zeros(len(points), np.bool_)
     views = _with_planes(views)
