@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.calibration.models.laser_plane import x_in_turned_plane
 from footscan.cloud.fusion.stripes import Floats
 from footscan.cloud.heads.comparisons import Comparisons, compare
 from footscan.cloud.heads.equations import (
@@ -125,7 +124,7 @@ def _refined(
         seen = lasers_seen(moved, views_there, heads)
         if not _is_of_one_moment(seen) or _travels_alone(seen, places):
             break
-        of_laser, laser = _in_laser_planes(moved, seen, views_there, heads)
+        of_laser, laser = _in_laser_planes(moved, seen)
         comparisons = compare(of_laser, laser, views, head_of, x_mm, NEAR_MM)
         change, distance = _of_lines(comparisons, fit)
         fit = solve(comparisons, change, distance, fit)
@@ -148,18 +147,13 @@ def _travels_alone(seen: LasersSeen, places: Floats) -> bool:
     return bool(np.ptp(places[:, 0]) > LINE_MM and np.mean(seen.laser != seen.own) < STRANGE)
 
 
-def _in_laser_planes(
-    points: NDArray[np.void], seen: LasersSeen, views: Mapping[int, View], heads: Mapping[int, int]
-) -> tuple[NDArray[np.void], NDArray[np.intp]]:
+def _in_laser_planes(points: NDArray[np.void], seen: LasersSeen) -> tuple[NDArray[np.void], NDArray[np.intp]]:
     """The points in the planes of their lasers, and the index of each laser."""
     moved = points.copy()
-    for number, head in enumerate(sorted(set(heads.values()))):
-        plane = next(views[camera].plane for camera in heads if heads[camera] == head)
-        assert plane is not None
+    for number in range(len(seen.places)):
         rows = np.flatnonzero((seen.laser == number) & (seen.own != number))
-        moved["y"][rows], moved["z"][rows] = seen.places[number, rows].T
+        moved["x"][rows], moved["y"][rows], moved["z"][rows] = seen.places[number, rows].T
         moved["plane"][rows] = seen.planes[number, rows]
-        moved["x"][rows] = x_in_turned_plane(plane, seen.planes[number, rows], seen.places[number, rows])
     usable = np.isfinite(moved["y"]) & np.isfinite(moved["x"])
     return moved[usable], seen.laser[usable]
 

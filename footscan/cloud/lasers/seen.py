@@ -60,7 +60,7 @@ class LasersSeen(NamedTuple):
     supports: Floats
     """(H, N) number of other cameras that saw the point, if it is of the laser of each head"""
     places: Floats
-    """(H, N, 2) Y and Z in the plane of each head, mm"""
+    """(H, N, 3) mm, in the plane of each head; NaN where it is not known"""
     planes: Floats
     """(H, N) X of each plane in the frame of the point, mm; NaN if it is not known"""
     linked: Mask
@@ -79,7 +79,7 @@ def lasers_seen(points: NDArray[np.void], views: Mapping[int, View], heads: Mapp
     own: Ints = np.array([numbers.index(heads[number]) for number in points["camera"].tolist()], np.int64)
     ahead = ahead_of_frames(points, views)
     planes = _planes_by_frame(points, own, len(numbers)) if ahead is None else _planes_at_once(points, views, heads)
-    places = np.full((len(numbers), len(points), 2), np.nan)
+    places = np.full((len(numbers), len(points), 3), np.nan)
     apart = np.full((len(numbers), len(points)), np.inf)
     for camera, view in views.items():
         rows = np.flatnonzero(points["camera"] == camera)
@@ -98,12 +98,12 @@ def lasers_seen(points: NDArray[np.void], views: Mapping[int, View], heads: Mapp
     spread = SLOPE_ERROR * np.linalg.norm(moved, axis=1)
 
     def support_in(place: Floats, counts: Mask) -> Floats:
-        return smoothed(_support(place, seen_by, counts, linked, frames, spread), linked)
+        return smoothed(_support(place[:, 1:] - moved, seen_by, counts, linked, frames, spread), linked)
 
     for turn in range(ROUNDS):
         counts = [np.isfinite(place[:, 0]) & ((laser == n) | (turn == 0)) for n, place in enumerate(places)]
         support = np.array(
-            together(partial(support_in, place - moved, count) for place, count in zip(places, counts, strict=True))
+            together(partial(support_in, place, count) for place, count in zip(places, counts, strict=True))
         )
         at_own = np.take_along_axis(support, own[None], axis=0)[0]
         may_be = np.where((apart > LEAST_MM) & (apart < FARTHEST_MM), support - BETTER, -np.inf)
@@ -140,14 +140,15 @@ def _planes_by_frame(points: NDArray[np.void], own: Ints, heads: int) -> Floats:
 
 
 def _in_plane(points: NDArray[np.void], view: View, other: View, plane_x: Floats) -> tuple[Floats, Floats]:
-    """Y and Z of points (N,) if they were seen in the plane of another head, (N, 2) mm, and how far the two planes are
+    """Places of points (N,) if they were seen in the plane of another head, (N, 3) mm, and how far the two planes are
     apart there along X, (N,) mm."""
     assert view.plane is not None
     assert other.plane is not None
     xyz, x = coordinates(points), points["plane"].astype(np.float64)
     apart = x_in_turned_plane(other.plane, plane_x, xyz[:, 1:]) - x_in_turned_plane(view.plane, x, xyz[:, 1:])
     sight = view.centre - np.column_stack([np.zeros(len(x)), xyz[:, 1:]])
-    return xyz[:, 1:] + (apart / sight[:, 0])[:, None] * sight[:, 1:], np.abs(apart)
+    yz = xyz[:, 1:] + (apart / sight[:, 0])[:, None] * sight[:, 1:]
+    return np.column_stack([x_in_turned_plane(other.plane, plane_x, yz), yz]), np.abs(apart)
 
 
 def _linked(points: NDArray[np.void]) -> Mask:

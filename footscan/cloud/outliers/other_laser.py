@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from footscan.cloud.lasers.moments import renumbered
 from footscan.cloud.lasers.seen import BETTER, FARTHEST_MM, LEAST_MM, lasers_seen, stripe_numbers
+from footscan.cloud.outliers.heel_cap import is_off_cap
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.cloud.views import View
 from footscan.side_by_side import together
@@ -25,8 +26,6 @@ SURE = 0.75
 """Support, in cameras, that a point of a stripe must have for the stripe to make an end of the foot: there cameras of
 two heads that see one laser meet in the plane of the other by chance. Tuned on a scanner without pictures
 (`draw_assembled`, seed 4134), where two cameras whose points are off by 1.5 mm confirm each other by 0.1 to 0.66."""
-MOSTLY = 0.9
-"""Share of the confirmed points that are of such stripes from which the others do not count as skin. Chosen by hand."""
 AROUND_MM, FEWEST = 2.5, 8
 """Points within this distance make the skin at a place, if they are so many. Chosen by hand."""
 BROAD = 0.2
@@ -53,9 +52,9 @@ def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Ma
     A point that no other camera confirms is of the laser of most points of its stripe, or of another head if hardly
     anything is confirmed of its own one in this frame. Where that says nothing, it is selected if it lies on the skin
     that the confirmed points make in the plane of the other laser, and off it in its own one, or if it lies beyond all
-    confirmed ones along the travel. A point of a stripe on which no two cameras agree well is also selected if there is
-    no skin around it, and the plane of the other laser is beyond the end. Cameras whose calibration does not say where
-    their laser plane lies are left as they are, unless the construction of a head says how far apart two lasers are.
+    confirmed ones along the travel. Stripes off the cap of a heel are selected whether they are confirmed or not.
+    Cameras whose calibration does not say where their laser plane lies are left as they are, unless the construction of
+    a head says how far apart two lasers are.
     """
     strange = np.zeros(len(points), np.bool_)
     views = _with_planes(views)
@@ -99,8 +98,7 @@ def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mappin
     confirmed = decided & ~strange
     doubtful = np.flatnonzero(~decided & ~strange)
     strange |= _met_other_laser(points, doubtful, confirmed, stripe, places, planes, ends)
-    if np.count_nonzero(sure) > MOSTLY * np.count_nonzero(confirmed):
-        strange |= _first_of_other_laser(points, np.flatnonzero(~sure & ~strange), sure, planes, ends)
+    strange |= is_off_cap(coordinates(points), ~strange, stripe, places)
     return strange
 
 
@@ -192,8 +190,10 @@ def _met_other_laser(
     is_alone = (np.bincount(stripe, confirmed) == 0.0)[stripe[doubtful]]
     is_alone &= stripe_step(points) < AROUND_MM  # otherwise a stripe without confirmed points has no skin around it
     for head_places, plane in zip(places, planes, strict=True):
+        # Without the tilt of the planes: with it, more right points were taken for wrong ones, and hardly a wrong one
+        # was found (`draw_assembled`, seeds 7001 to 7004).
         x = xyz[doubtful, 0] + plane[doubtful] - points["plane"][doubtful]
-        there = np.column_stack([x, head_places[doubtful]])
+        there = np.column_stack([x, head_places[doubtful, 1:]])
         way = np.linalg.norm(there - xyz[doubtful], axis=1)
         known = (way > LEAST_MM) & (way < FARTHEST_MM)  # false for NaN
         height = np.full(len(doubtful), np.inf)
@@ -201,26 +201,6 @@ def _met_other_laser(
         strange[doubtful] |= (height < CLOSE * way) & (height < own)
         is_off = (own > CLOSE * way) & _is_beyond(x, ends[:, doubtful])
         strange[doubtful] |= known & is_between & (is_off | (is_alone & np.isinf(own)))
-    return strange
-
-
-def _first_of_other_laser(
-    points: NDArray[np.void], unsure: NDArray[np.intp], sure: Mask, planes: Floats, ends: Floats
-) -> Mask:
-    """Select `unsure` points with no `sure` ones around that would lie beyond the end in the plane of another laser.
-
-    Where a laser first meets a heel, its stripe is a narrow ring. Cameras that see it at different moments hardly agree
-    on it in any plane, but by chance in their own one, where they make skin of their own.
-    """
-    strange = np.zeros(len(points), np.bool_)
-    if unsure.size:
-        xyz = coordinates(points)
-        is_apart = np.isinf(_heights(KDTree(xyz[sure]), xyz[unsure]))
-        x, ends = xyz[unsure, 0], ends[:, unsure]
-        way = planes[:, unsure] - points["plane"][unsure]
-        is_other = (np.abs(way) > LEAST_MM) & (np.abs(way) < FARTHEST_MM)  # false for NaN
-        is_first = (is_other & ((x + way < ends[0]) | (x + way > ends[1]))).any(axis=0)
-        strange[unsure] = is_apart & is_first & np.isfinite(ends[0]) & ~_is_beyond(x, ends)
     return strange
 
 
