@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cloud.outliers.contested import LEG_MM
 from footscan.robust import MAD_TO_SD, tukey_weights
 
 Floats = NDArray[np.float64]
@@ -17,8 +18,6 @@ Mask = NDArray[np.bool_]
 
 FIT_MM, JUDGED_MM = 8.0, 4.0
 """Part of an end to which the cap is fitted, and the part in which stripes are judged. Chosen by hand."""
-LEG_MM = 90.0
-"""Height above which there is no heel. Chosen by hand."""
 FEWEST, STRAYS = 200, 20
 """Points that make a cap, and points beyond an end that may be strays. Chosen by hand."""
 ORDER, UNIT_MM = 4, 20.0
@@ -70,7 +69,10 @@ def is_off_cap(xyz: Floats, kept: Mask, stripe: Ints, places: Floats) -> Mask:
             if cap is None:
                 break
             judged = left[depth < JUDGED_MM]
-            selected[judged] = _is_nearer_elsewhere(cap, xyz[judged], stripe[judged], places[:, judged])
+            off = _is_nearer_elsewhere(cap, xyz[judged], stripe[judged], places[:, judged])
+            if not off.any():
+                break
+            selected[judged[off]] = True
     return selected
 
 
