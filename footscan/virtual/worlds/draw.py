@@ -21,7 +21,7 @@ from schemas.world import (
     WorldSubject,
 )
 
-ROOM, LASER, HEADS, CAMERAS, GLASS, SUBJECT, ASSEMBLED = range(100, 107)
+ROOM, LASER, HEADS, CAMERAS, GLASS, SUBJECT, ASSEMBLED, MOVING = range(100, 108)
 """Numbers of the parts' generators."""
 HEAD_COUNT = 3
 TRAVEL_MM = 400.0
@@ -85,6 +85,21 @@ def draw_assembled(seed: int) -> World:
     cameras = WorldCameras(step_mm=2.0, frames=200, rolling_shutter_ms=_even(random, 0.0, 33.0))
     laser = WorldLaser(bend_mm=_even(random, -0.5, 0.5))
     return World(seed=seed, laser=laser, heads=(head(), head(), head()), cameras=cameras, subject=foot)
+
+
+def draw_moving(seed: int) -> World:
+    """Draw the scanner of `draw_assembled` with a foot that does not stand quite still.
+
+    It sways with an amplitude of up to 0.3 mm, and trembles by up to 0.15 mm (standard deviation).
+
+    Examples
+    --------
+    >>> draw_moving(7).heads == draw_assembled(7).heads, draw_moving(7).subject.sway_mm > 0.0
+    (True, True)
+    """
+    world, random = draw_assembled(seed), _generator(seed, MOVING)
+    moving = {"sway_mm": _even(random, 0.0, 0.3), "tremor_mm": _even(random, 0.0, 0.15)}
+    return world.model_copy(update={"subject": world.subject.model_copy(update=moving)})
 
 
 def as_designed(world: World) -> World:
