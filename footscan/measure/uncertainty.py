@@ -33,8 +33,10 @@ class SurfaceErrors:
 
     def __init__(self, vertices: Floats, fields: Sequence[ErrorField]) -> None:
         self.fields = [field for field in fields if field.deviations.any()]
-        different = {field.places: field.shares(vertices) for field in self.fields}
-        self._shares = [different[field.places] for field in self.fields]
+        at_places = {field.reach_mm: field.shares(vertices) for field in self.fields if field.along_mm is None}
+        self._shares = [
+            at_places[field.reach_mm] if field.along_mm is None else field.shares(vertices) for field in self.fields
+        ]
 
     def budget(self, quantity: Quantity) -> dict[ErrorCause, float] | None:
         """Standard deviation of a quantity from each cause by linear propagation; None where its derivatives are not

@@ -31,13 +31,9 @@ class ErrorField(NamedTuple):
     in which it displaces each"""
     reach_mm: float = 0.0
     """Distance over which vertices share their error; 0: each has its own."""
-    is_of_section: bool = False
-    """True if all vertices at about the same X share it, as where the whole foot moved while it was scanned"""
-
-    @property
-    def places(self) -> tuple[float, bool]:
-        """What `shares` depend on."""
-        return self.reach_mm, self.is_of_section
+    along_mm: Floats | None = None
+    """(V,) mm: all vertices at about the same one share their error, as where the whole foot moved while it was
+    scanned; None: those at about the same place"""
 
     def shares(self, vertices: Floats) -> csr_array:
         """(V, N) shares of N independent standard normal errors in that of each vertex, in its standard deviations.
@@ -46,11 +42,12 @@ class ErrorField(NamedTuple):
         """
         if not self.reach_mm:
             return csr_array(eye_array(len(vertices)))
-        return _shares(vertices[:, :1] if self.is_of_section else vertices, self.reach_mm)
+        return _shares(vertices if self.along_mm is None else self.along_mm[:, None], self.reach_mm)
 
     def of(self, source: NDArray[np.intp]) -> "ErrorField":
         """The errors of W other vertices; source : (W,) index of the vertex that each of them was."""
-        return self._replace(deviations=self.deviations[source])
+        along_mm = None if self.along_mm is None else self.along_mm[source]
+        return self._replace(deviations=self.deviations[source], along_mm=along_mm)
 
 
 def _shares(places: Floats, reach_mm: float) -> csr_array:

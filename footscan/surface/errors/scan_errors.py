@@ -39,10 +39,11 @@ OF_DISAGREEMENT = 0.5
 """Errors of the mean of all cameras, relative to their systematic disagreement, and as broad as a camera's view. Tuned
 on 80 films (`draw_assembled`, seeds 3559 to 3598 and 4000 to 4039). In six others (2503, 2506, 2604, 3516, 3568 and
 3582) the surface errs by 0.1 to 1.0 of the disagreement where cameras agree (root mean square)."""
-SWAY_MM, SWAY_STEPS = 0.07, 12.0
+SWAY_MM, SWAY_STEPS = 0.07, 7.0
 """Standard deviation of slow movement of the foot, along X and across, where nothing is known of it, as in
-`footscan.cloud.movement.sway`; and the steps of the travel over which it varies. Over a tenth of a metre it looks like
-the form of another foot. Chosen by hand, the second one for a sway of 0.7 Hz, which turns over in 13 frames."""
+`footscan.cloud.movement.sway`, chosen by hand; and the steps of the travel between independent movements. Landmarks
+move by its slope along X, which is that of a sway of 0.2 to 1 Hz (D. A. Winter, Gait & Posture 3(4), 1995) at 18 frames
+a second: 0.22 of the movement a step, root mean square."""
 FORM_MM, OF_TREMOR = 0.03, 2.0
 """Tremor that the form of a still foot looks like, and errors of X relative to what exceeds it where the foot was not
 moved back: heads that jitter also ripple, which no stripe shows. Chosen by hand: ideal scanners (`draw_assembled`,
@@ -85,6 +86,8 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     points, scatter_mm = around(vertices, normals, cloud)
     everywhere = np.ones(len(vertices))
     sway_mm = (evidence.movement and evidence.movement.sway_by_axis_mm) or (SWAY_MM, SWAY_MM)
+    # Heads pass the same skin at different times, and what one saw moves against what another one saw.
+    filmed_mm = vertices[:, 0] if points is None else points["frame"].mean(axis=1) * step_mm
     ends = find_ends(vertices, evidence)
     shift_mm = np.max([np.zeros(len(vertices)), *(end.shift_at(vertices[:, 0], step_mm) for end in ends)], axis=0)
     fields = [
@@ -94,14 +97,11 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
         ErrorField("filling", np.where(inside, ERROR_GROWS * gap_mm, 0.0), REACH_MM),
         *broad_and_narrow("filling", np.where(inside, FACING_GROWS * gap_mm * np.abs(normals[:, 0]), 0.0)),
         *broad_and_narrow("ends", END_GROWS * np.maximum(beyond_mm, 0.0)),
-        ErrorField("ends", WHOLE * shift_mm * normals[:, 0], WIDE_MM, is_of_section=True),
+        ErrorField("ends", WHOLE * shift_mm * normals[:, 0], WIDE_MM, vertices[:, 0]),
         ErrorField("ends", PATCHY * shift_mm, REACH_MM),
         ErrorField("cameras", everywhere * OF_DISAGREEMENT * systematic(points, evidence.agreement), WIDE_MM),
-        ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, is_of_section=True),
-        *(
-            ErrorField("sway", sway_mm[axis] * normals[:, axis], SWAY_STEPS * step_mm, is_of_section=True)
-            for axis in (0, 1)
-        ),
+        ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, filmed_mm),
+        *(ErrorField("sway", sway_mm[axis] * normals[:, axis], SWAY_STEPS * step_mm, filmed_mm) for axis in (0, 1)),
     ]
     return ScanErrors(fields, np.any([gap_mm > RELIABLE_MM, *(end.is_unseen(vertices[:, 0]) for end in ends)], axis=0))
 

@@ -49,7 +49,7 @@ def test_a_drawn_error_is_as_large_as_said_and_shared_by_neighbours() -> None:
     random = np.random.default_rng(0)
     places = random.uniform(0.0, 300.0, (20_000, 3))
     places[1] = places[0] + [0.0, 0.0, 0.1]
-    drawn = np.array([of_places(places, False).draw(random) for _ in range(200)])
+    drawn = np.array([of_places(places, None).draw(random) for _ in range(200)])
     assert drawn.std() == pytest.approx(SD_MM, rel=0.02)
     assert abs(drawn.mean()) < 0.05 * SD_MM
     assert np.corrcoef(drawn[:, 0], drawn[:, 1])[0, 1] > 0.99
@@ -58,15 +58,15 @@ def test_a_drawn_error_is_as_large_as_said_and_shared_by_neighbours() -> None:
 def test_all_of_a_section_move_together() -> None:
     random = np.random.default_rng(0)
     places = np.array([[100.0, -40, 0], [100, 40, 60], [160, 0, 0]])
-    drawn = np.array([of_places(places, True).draw(random) for _ in range(500)])
+    drawn = np.array([of_places(places, places[:, 0]).draw(random) for _ in range(500)])
     left, right, ahead = np.corrcoef(drawn.T)[0]
     assert left == pytest.approx(1.0)
     assert right == pytest.approx(1.0)
     assert abs(ahead) < 0.15
 
 
-def of_places(places: np.ndarray, is_of_section: bool) -> SurfaceErrors:
-    return SurfaceErrors(places, [ErrorField("sway", np.full(len(places), SD_MM), REACH_MM, is_of_section)])
+def of_places(places: np.ndarray, along_mm: np.ndarray | None) -> SurfaceErrors:
+    return SurfaceErrors(places, [ErrorField("sway", np.full(len(places), SD_MM), REACH_MM, along_mm)])
 
 
 def test_replicates_are_the_same_in_every_run(foot: Mesh) -> None:

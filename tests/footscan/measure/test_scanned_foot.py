@@ -178,6 +178,27 @@ def test_heads_that_jitter_widen_what_rests_on_x(foot: Mesh) -> None:
     assert parts[1][1] < 0.05
 
 
+def test_a_foot_sways_as_fast_as_people_do(foot: Mesh) -> None:
+    along = next(field for field in scan_errors(foot, Evidence()).fields if field.cause == "sway")
+    x = np.arange(0.0, 400.0, 0.1)
+    movements = along._replace(along_mm=x).shares(np.zeros((len(x), 3))).toarray()
+    slope = np.sqrt(np.mean(np.sum((np.diff(movements, axis=0) / 0.1) ** 2, axis=1)))  # of a movement of 1 mm
+    hertz, frames_per_second, step_mm = np.linspace(0.2, 1.0, 81), 18.0, 2.0
+    assert slope == pytest.approx(2.0 * np.pi * np.sqrt(np.mean(hertz**2)) / frames_per_second / step_mm, rel=0.1)
+
+
+def test_a_sway_moves_what_one_head_saw_against_what_another_saw(foot: Mesh) -> None:
+    parts = []
+    for later in (0, 4):
+        is_medial = foot.vertices[:, 1] > 0.0
+        frames = np.round(foot.vertices[:, 0] / 2.0).astype(np.int32) + np.where(is_medial, later, 0)
+        cloud = make_points(foot.vertices, camera=np.where(is_medial, 1, 2), frame=frames + 100)
+        evidence = Evidence(cloud=cloud, movement=MovementReport(sway_mm=0.1, sway_by_axis_mm=(0.07, 0.07)))
+        measures = measure_scanned_foot(foot, "right", GlassPlane(), evidence=evidence).measures
+        parts.append([(measures[name].budget or {})["sway"] for name in ("waist_girth", "instep_girth")])
+    assert np.all(np.array(parts[1]) > 2.0 * np.array(parts[0]))
+
+
 def test_heights_are_worth_less_where_the_glass_was_not_seen(foot: Mesh) -> None:
     seen = GlassPlane(below_foot_sd_mm=0.02, tilt_x_sd_deg=0.01, tilt_y_sd_deg=0.01)
     for glass, least, most in ((seen, 0.02, 0.03), (GlassPlane(), 0.5, 1.0)):
