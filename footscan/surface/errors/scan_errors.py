@@ -40,10 +40,10 @@ OF_DISAGREEMENT = 0.5
 on 80 films (`draw_assembled`, seeds 3559 to 3598 and 4000 to 4039). In six others (2503, 2506, 2604, 3516, 3568 and
 3582) the surface errs by 0.1 to 1.0 of the disagreement where cameras agree (root mean square)."""
 SWAY_MM, SWAY_STEPS = 0.07, 7.0
-"""Standard deviation of slow movement of the foot, along X and across, where nothing is known of it, as in
-`footscan.cloud.movement.sway`, chosen by hand; and the steps of the travel between independent movements. Landmarks
-move by its slope along X, which is that of a sway of 0.2 to 1 Hz (D. A. Winter, Gait & Posture 3(4), 1995) at 18 frames
-a second: 0.22 of the movement a step, root mean square."""
+"""Least standard deviation of slow movement of the foot, along X and across: heads that film the same skin a few frames
+apart do not tell a smaller one from none (`draw_moving`, seeds 7301 to 7305). The steps of the travel between
+independent movements: landmarks move by the slope of the sway along X, which is that of one of 0.2 to 1 Hz (D. A.
+Winter, Gait & Posture 3(4), 1995) at 18 frames a second, 0.22 of the movement a step, root mean square."""
 FORM_MM, OF_TREMOR = 0.03, 2.0
 """Tremor that the form of a still foot looks like, and errors of X relative to what exceeds it where the foot was not
 moved back: heads that jitter also ripple, which no stripe shows. Chosen by hand: ideal scanners (`draw_assembled`,
@@ -85,7 +85,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside], workers=cores())[0]
     points, scatter_mm = around(vertices, normals, cloud)
     everywhere = np.ones(len(vertices))
-    sway_mm = (evidence.movement and evidence.movement.sway_by_axis_mm) or (SWAY_MM, SWAY_MM)
+    sway_mm = np.maximum((evidence.movement and evidence.movement.sway_by_axis_mm) or 0.0, [SWAY_MM, SWAY_MM])
     # Heads pass the same skin at different times, and what one saw moves against what another one saw.
     filmed_mm = vertices[:, 0] if points is None else points["frame"].mean(axis=1) * step_mm
     ends = find_ends(vertices, evidence)
