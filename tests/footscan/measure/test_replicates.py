@@ -94,7 +94,7 @@ def test_the_turn_from_one_axis_to_the_other_counts_once() -> None:
     same, other = (scatter_of(values, 16, is_on_other_axis)["foot_breadth"] for is_on_other_axis in (False, True))
     budget = with_landmarks({}, other, 98.8)
     assert budget == {"landmarks": pytest.approx(0.75, abs=0.01)}
-    assert with_landmarks({}, same, 98.8) == {"landmarks": pytest.approx(0.5 * budget["landmarks"])}
+    assert with_landmarks({}, same, 98.8) == {"landmarks": pytest.approx(np.sqrt(0.5) * budget["landmarks"])}
 
 
 def test_a_measure_that_few_replicates_have_has_no_scatter() -> None:
