@@ -85,7 +85,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside], workers=cores())[0]
     points, scatter_mm = around(vertices, normals, cloud)
     everywhere = np.ones(len(vertices))
-    sway_mm = np.maximum((evidence.movement and evidence.movement.sway_by_axis_mm) or 0.0, [SWAY_MM, SWAY_MM])
+    sway_mm = np.maximum((evidence.movement and evidence.movement.sway_by_axis_mm) or (0.0, 0.0), SWAY_MM)
     # Heads pass the same skin at different times, and what one saw moves against what another one saw.
     filmed_mm = vertices[:, 0] if points is None else points["frame"].mean(axis=1) * step_mm
     ends = find_ends(vertices, evidence)

@@ -179,9 +179,9 @@ def test_heads_that_jitter_widen_what_rests_on_x(foot: Mesh) -> None:
 
 
 def test_a_foot_sways_as_fast_as_people_do(foot: Mesh) -> None:
-    along = next(field for field in scan_errors(foot, Evidence()).fields if field.cause == "sway")
+    sway = next(field for field in scan_errors(foot, Evidence()).fields if field.cause == "sway")
     x = np.arange(0.0, 400.0, 0.1)
-    movements = along._replace(along_mm=x).shares(np.zeros((len(x), 3))).toarray()
+    movements = sway._replace(along_mm=x).shares(np.zeros((len(x), 3))).toarray()
     slope = np.sqrt(np.mean(np.sum((np.diff(movements, axis=0) / 0.1) ** 2, axis=1)))  # of a movement of 1 mm
     hertz, frames_per_second, step_mm = np.linspace(0.2, 1.0, 81), 18.0, 2.0
     assert slope == pytest.approx(2.0 * np.pi * np.sqrt(np.mean(hertz**2)) / frames_per_second / step_mm, rel=0.1)
