@@ -23,9 +23,10 @@ class MovementReport(Document):
     """Way along X by which the foot was moved back, from `first_frame` on; empty if it was not."""
     sway_mm: Length = 0.0
     """Standard deviation of the slow movement, at 0.2 to 1 Hz: that of most feet, or larger where heads that film the
-    same skin at different times show it; 0 if no two heads film the same skin."""
+    same skin at different times show it; 0 if none do."""
     sway_by_axis_mm: tuple[Length, Length] | None = None
-    """The same along X and along Y; None if no two heads film the same skin."""
+    """The same along X and along Y; None if no two heads film the same skin at different times: what was not seen may
+    be there."""
     warnings: list[str] = Field(default_factory=list)
     doubt: str | None = None
     """Reason for which measures are uncertain, if the foot moved so that it cannot be moved back."""

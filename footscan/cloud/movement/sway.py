@@ -37,6 +37,9 @@ SHOWS = 0.2
 both cameras, are correlated. Chosen by hand, after two scanners (`draw_assembled`, seeds 501 and 502 with films)."""
 FEWEST = 200
 """Comparisons that show a movement."""
+LEAST_LAG_FRAMES = 0.5
+"""Frames between two heads at the same skin, root mean square, in which a foot moves enough to be seen: one that sways
+by 0.1 mm moves by 0.01 mm, which is less than the maps of the cameras differ by. Chosen by hand."""
 ROUNDS = 8
 """Iterations of the reweighted least squares: a bound of time."""
 SIZES_MM = 0.05 * 2.0 ** np.arange(6)
@@ -61,10 +64,10 @@ def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> tuple[float, float] |
 
     Returns
     -------
-    None where heads hardly see the same skin
+    None where heads hardly see the same skin, or all see it at the same moment
     """
     contradictions = _contradictions(stripes, heads)
-    if len(contradictions.distance) < FEWEST:
+    if len(contradictions.distance) < FEWEST or contradictions.lag_frames < LEAST_LAG_FRAMES:
         return None
     change, courses = _change(contradictions)
     shows = SHOWS * contradictions.stripes / len(contradictions.distance)
@@ -94,6 +97,11 @@ class _Contradictions(NamedTuple):
     """(M,) 1 if the other head has the larger number, or -1"""
     stripes: int
     """Number of stripes of one camera that were compared with another camera"""
+
+    @property
+    def lag_frames(self) -> float:
+        """Frames between the point and the other stripe, root mean square."""
+        return float(np.sqrt(np.mean(np.diff(self.frames) ** 2)))
 
 
 def _contradictions(stripes: Stripes, heads: Mapping[int, int]) -> _Contradictions:

@@ -44,6 +44,9 @@ SWAY_MM, SWAY_STEPS = 0.07, 7.0
 apart do not tell a smaller one from none (`draw_moving`, seeds 7301 to 7305). The steps of the travel between
 independent movements: landmarks move by the slope of the sway along X, which is that of one of 0.2 to 1 Hz (D. A.
 Winter, Gait & Posture 3(4), 1995) at 18 frames a second, 0.22 of the movement a step, root mean square."""
+UNSEEN_SWAY_MM = 0.12
+"""The same where heads do not show it, since none film the same skin, or all film it at the same moment: that of feet
+that sway by up to 0.3 mm (`draw_moving`). Chosen by hand."""
 FORM_MM, OF_TREMOR = 0.03, 2.0
 """Tremor that the form of a still foot looks like, and errors of X relative to what exceeds it where the foot was not
 moved back: heads that jitter also ripple, which no stripe shows. Chosen by hand: ideal scanners (`draw_assembled`,
@@ -85,7 +88,8 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside], workers=cores())[0]
     points, scatter_mm = around(vertices, normals, cloud)
     everywhere = np.ones(len(vertices))
-    sway_mm = np.maximum((evidence.movement and evidence.movement.sway_by_axis_mm) or (0.0, 0.0), SWAY_MM)
+    seen_mm = evidence.movement and evidence.movement.sway_by_axis_mm
+    sway_mm = np.full(2, UNSEEN_SWAY_MM) if seen_mm is None else np.maximum(seen_mm, SWAY_MM)
     # Heads pass the same skin at different times, and what one saw moves against what another one saw.
     filmed_mm = vertices[:, 0] if points is None else points["frame"].mean(axis=1) * step_mm
     ends = find_ends(vertices, evidence)

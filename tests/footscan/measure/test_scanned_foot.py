@@ -36,11 +36,16 @@ def with_filled(foot: Mesh, share: float) -> Mesh:
     return Mesh(foot.vertices, foot.faces, filled=down & (x <= np.quantile(x[down], share)))
 
 
+STILL = MovementReport(sway_mm=0.07, sway_by_axis_mm=(0.05, 0.05))
+"""Of a foot that heads saw standing still."""
+
+
 def apart_by(mm: float) -> Evidence:
     """Two cameras that disagree by `mm`."""
     apart = Disagreement(median_mm=0.0, deviation_mm=mm, rms_mm=mm + 0.03, systematic_mm=mm)
     return Evidence(
-        agreement=FusionReport(pairs=[PairDisagreement(cameras=(1, 2), points=1000, before=apart, after=apart)])
+        agreement=FusionReport(pairs=[PairDisagreement(cameras=(1, 2), points=1000, before=apart, after=apart)]),
+        movement=STILL,
     )
 
 
@@ -153,7 +158,7 @@ def test_lasers_so_close_that_their_stripes_are_one_widen_the_heights(
     wider = []
     for cameras in (1, 2):
         cloud["cameras"] = cameras
-        evidence = Evidence(cloud, FusionReport(heads={1: 1, 2: 2}), lasers=lasers)
+        evidence = Evidence(cloud, FusionReport(heads={1: 1, 2: 2}), movement=STILL, lasers=lasers)
         deviations = scan_errors(foot, evidence).deviations
         usual = scan_errors(foot, evidence._replace(lasers=UNKNOWN)).deviations
         assert widens or deviations == pytest.approx(usual)
@@ -197,6 +202,16 @@ def test_a_sway_moves_what_one_head_saw_against_what_another_saw(foot: Mesh) -> 
         measures = measure_scanned_foot(foot, "right", GlassPlane(), evidence=evidence).measures
         parts.append([(measures[name].budget or {})["sway"] for name in ("waist_girth", "instep_girth")])
     assert np.all(np.array(parts[1]) > 2.0 * np.array(parts[0]))
+
+
+def test_a_sway_that_no_heads_show_counts_more_than_a_small_one(foot: Mesh) -> None:
+    seen, *unseen = (
+        measure_scanned_foot(foot, "right", GlassPlane(), evidence=Evidence(movement=movement)).measures
+        for movement in (STILL, MovementReport(), None)
+    )
+    for measures in unseen:
+        for name in ("foot_length", "foot_breadth"):
+            assert (measures[name].budget or {})["sway"] > 1.3 * (seen[name].budget or {})["sway"]
 
 
 def test_heights_are_worth_less_where_the_glass_was_not_seen(foot: Mesh) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from footscan.cloud.fusion.stripes import sort_stripes
 from footscan.cloud.movement.steady import DOUBT_MM, steadied
-from footscan.cloud.movement.sway import RARER, SIZES_MM, sway_of
+from footscan.cloud.movement.sway import sway_of
 from tests.helpers.moving_foot import FRAMES, HEADS, scan
 
 STILL = np.zeros((2, FRAMES))
@@ -34,9 +34,10 @@ def test_heads_that_are_apart_as_a_whole_are_no_sway() -> None:
         assert max(sizes_of(points)) < 0.1
 
 
-def test_planes_that_coincide_leave_the_sway_of_most_feet() -> None:
-    expected = np.sqrt(np.sum(SIZES_MM ** (2.0 - RARER)) / np.sum(SIZES_MM**-RARER))
-    assert sizes_of(scan(STILL, SWAYING)) == pytest.approx((expected, expected), rel=0.2)
+def test_planes_that_coincide_show_no_sway() -> None:
+    points = scan(STILL, SWAYING)
+    assert sway_of(sort_stripes([points]), HEADS) is None
+    assert steadied(points, HEADS)[1].sway_by_axis_mm is None
 
 
 def test_a_foot_that_moved_slowly_is_reported_and_left_where_it_is() -> None:
