@@ -88,7 +88,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside], workers=cores())[0]
     points, scatter_mm = around(vertices, normals, cloud)
     everywhere = np.ones(len(vertices))
-    seen_mm = evidence.movement and evidence.movement.sway_by_axis_mm
+    seen_mm = None if evidence.movement is None else evidence.movement.sway_by_axis_mm
     sway_mm = np.full(2, UNSEEN_SWAY_MM) if seen_mm is None else np.maximum(seen_mm, SWAY_MM)
     # Heads pass the same skin at different times, and what one saw moves against what another one saw.
     filmed_mm = vertices[:, 0] if points is None else points["frame"].mean(axis=1) * step_mm
