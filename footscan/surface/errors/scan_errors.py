@@ -44,9 +44,9 @@ SWAY_MM, SWAY_STEPS = 0.07, 7.0
 apart do not tell a smaller one from none (`draw_moving`, seeds 7301 to 7305). The steps of the travel between
 independent movements: landmarks move by the slope of the sway along X, which is that of one of 0.2 to 1 Hz (D. A.
 Winter, Gait & Posture 3(4), 1995) at 18 frames a second, 0.22 of the movement a step, root mean square."""
-UNSEEN_SWAY_MM = 0.15
-"""The same where heads do not show it, since none film the same skin, or all film it at the same moment: a sway with an
-amplitude of 0.2 mm. Chosen by hand, after `draw_moving`, seeds 7413 and 7442."""
+UNSEEN_SWAY_MM = 0.12
+"""The same where heads do not show it, since none film the same skin, or all film it at the same moment: the root mean
+square of feet that sway with amplitudes of up to 0.3 mm. Chosen by hand, after `draw_moving`, seeds 7413 and 7442."""
 FORM_MM, OF_TREMOR = 0.03, 2.0
 """Tremor that the form of a still foot looks like, and errors of X relative to what exceeds it where the foot was not
 moved back: heads that jitter also ripple, which no stripe shows. Chosen by hand: ideal scanners (`draw_assembled`,
