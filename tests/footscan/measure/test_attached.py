@@ -2,6 +2,7 @@ from functools import lru_cache
 
 import numpy as np
 import open3d as o3d
+import pymeshlab
 import pytest
 
 from footscan.measure.measures import measure_foot
@@ -14,19 +15,22 @@ def foot() -> Foot:
     return make_foot(resolution_mm=2.0)
 
 
-def with_thing(thing: o3d.t.geometry.TriangleMesh) -> Measures:
+def with_thing(thing: o3d.geometry.TriangleMesh) -> Measures:
     """Measures of the foot and a thing, as one surface."""
-    bare = o3d.t.geometry.TriangleMesh(foot().vertices, foot().faces.astype(np.int64))
-    both = bare.boolean_union(thing).to_legacy().merge_close_vertices(0.001)
-    return measure_foot(np.asarray(both.vertices), np.asarray(both.triangles), "right")
+    meshes = pymeshlab.MeshSet()
+    meshes.add_mesh(pymeshlab.Mesh(foot().vertices, foot().faces))
+    meshes.add_mesh(pymeshlab.Mesh(np.asarray(thing.vertices), np.asarray(thing.triangles)))
+    meshes.generate_boolean_union(first_mesh=0, second_mesh=1)  # that of Open3D 0.20 ends some processes by SIGSEGV
+    both = meshes.current_mesh()
+    return measure_foot(both.vertex_matrix(), both.face_matrix(), "right")
 
 
-def box(size: tuple[float, float, float], place: tuple[float, float, float]) -> o3d.t.geometry.TriangleMesh:
-    return o3d.t.geometry.TriangleMesh.create_box(*size).translate(np.array(place))
+def box(size: tuple[float, float, float], place: tuple[float, float, float]) -> o3d.geometry.TriangleMesh:
+    return o3d.geometry.TriangleMesh.create_box(*size).translate(place)
 
 
-def cylinder(radius: float, height: float, place: tuple[float, float, float]) -> o3d.t.geometry.TriangleMesh:
-    return o3d.t.geometry.TriangleMesh.create_cylinder(radius, height, 60).translate(np.array(place))
+def cylinder(radius: float, height: float, place: tuple[float, float, float]) -> o3d.geometry.TriangleMesh:
+    return o3d.geometry.TriangleMesh.create_cylinder(radius, height, 60).translate(place)
 
 
 def widest(low: float, high: float) -> float:

@@ -91,8 +91,8 @@ def test_skin_that_one_camera_alone_saw_is_worth_less_where_cameras_err_grossly(
     cloud["cameras"], cloud["sigma"] = np.where(alone, 1, 2), 0.03
     apart = Disagreement(median_mm=0.0, deviation_mm=0.03, rms_mm=0.1)
     pairs = [PairDisagreement(cameras=(1, 2), points=1000, before=apart, after=apart)]
-    deviations = scan_errors(foot, Evidence(cloud, FusionReport(pairs=pairs))).deviations
-    usual = scan_errors(foot, Evidence(cloud, FusionReport())).deviations
+    deviations = scan_errors(foot, Evidence(cloud, FusionReport(pairs=pairs), movement=STILL)).deviations
+    usual = scan_errors(foot, Evidence(cloud, FusionReport(), movement=STILL)).deviations
     assert np.median(deviations[alone]) > 2.0 * np.median(usual[alone])
     np.testing.assert_allclose(np.median(deviations[~alone] - usual[~alone]), 0.0, atol=1e-9)
 
