@@ -19,6 +19,7 @@ from footscan.report.scan.fusion_tables import corrections_table, disagreement_t
 from footscan.report.scan.glass_facts import glass_facts
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
 from footscan.report.scan.mesh_facts import mesh_facts
+from footscan.report.scan.movement_facts import movement_facts
 from footscan.report.scan.removed import removed_pictures, removed_table
 from footscan.report.scan_warnings import warnings_of
 from footscan.report.size_table import size_table
@@ -124,6 +125,7 @@ def scan_page(
             corrections_table(quality.fusion),
         ),
         section("Glass", glass_facts(quality.glass)),
+        section("Movement of the foot", movement_facts(quality.movement)),
         section("Stripe coverage", _COVERAGE_NOTE, coverage_plot(cloud, quality.cameras)),
         section("Calibration", _calibration(calibration, quality)),
         section("Provenance", table(["", ""], ([text(name), text(value)] for name, value in provenance.items()))),

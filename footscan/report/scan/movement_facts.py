@@ -1,0 +1,26 @@
+"""Facts of the foot's movement while it was scanned, as heads that film the same skin show it."""
+
+from footscan.report.markup import facts, number
+from schemas.movement import MovementReport
+
+
+def movement_facts(movement: MovementReport) -> str:
+    """Tremor and slow movement, root mean squares, or that no heads show the latter.
+
+    >>> "was not seen" in movement_facts(MovementReport(tremor_mm=0.05))
+    True
+    """
+    tremor = f"{number(movement.tremor_mm, 2)} mm{', moved back' if movement.x_mm else ''}"
+    pairs = [("Tremor along X", tremor)]
+    if movement.agreement is not None:
+        pairs.append(("Correlation between heads", number(movement.agreement, 2)))
+    if movement.sway_by_axis_mm is None:
+        return facts(pairs) + _UNSEEN
+    by_axis = zip("XY", movement.sway_by_axis_mm, strict=True)
+    return facts([*pairs, *((f"Slow movement along {axis}", f"{number(size, 2)} mm") for axis, size in by_axis)])
+
+
+_UNSEEN = (
+    '<p class="note">Slow sway of the foot was not seen: no two heads passed the same skin at different times. '
+    "A small sway is assumed. Heads that start some millimetres apart show it.</p>"
+)
