@@ -125,7 +125,7 @@ class FootSurface:
         return self._places[name]
 
     def _landmark_gradient(self, name: str, landmark: Landmark) -> Floats:
-        """Returns (3, V) derivatives of the coordinates by the displacements of the vertices."""
+        """Returns (3, V) derivatives of the coordinates by the displacements of the vertices; NaN where unknown."""
         if self._no_derivatives is not None:
             return np.broadcast_to(self._no_derivatives, (3, len(self.normals)))
         vertices, normals, point, cap = self.mesh.vertices, self.normals, landmark.point, landmark.cap
@@ -135,7 +135,7 @@ class FootSurface:
             scale = min(1.0, self.length_mm / FULL_SIZE_MM)
             corner = np.array([CORNER_MM[0], 0.0, CORNER_MM[1]]) * scale
             return saddle_gradient(vertices, normals, point, corner, cap)
-        is_fixed = landmark.method == "geometric" and name == "landing_point"
+        is_fixed = landmark.method == "manual" or (landmark.method == "geometric" and name == "landing_point")
         return np.full((3, len(normals)), 0.0 if is_fixed else np.nan)
 
     def station(self, share: float) -> Quantity:

@@ -355,19 +355,19 @@ def _measure(
         doubts.append(f"it cannot be measured in {100 * scatter.missing:.0f} % of the ways in which the scan may err")
     budget = with_landmarks(surface_errors.budget(quantity), scatter, quantity.value)
     if budget is not None and glass_sd_mm:
-        budget["glass"] = glass_sd_mm * (quantity.by_lift(surface.normals) if PRINT in definition.text else 1.0)
+        lift = quantity.by_lift(surface.normals) if PRINT in definition.text else 1.0
+        budget = None if lift is None else {**budget, "glass": glass_sd_mm * lift}
     sd = None if budget is None else abs(factor) * math.hypot(*budget.values())
     largest = LARGEST_SD_MM if quantity.plane is None else LARGEST_GIRTH_SD_MM
     if sd is not None and sd > largest and definition.unit == "mm":
         doubts.append(f"its standard deviation exceeds {largest:g} mm")
     status: Status = "uncertain" if doubts else "ok"
-    notes = [*doubts, *([] if quantity.note is None else [quantity.note])]
     return Measure(
         value=round(offset + factor * quantity.value, digits),
         unit=definition.unit,
         status=status,
         definition=definition.text,
-        note="; ".join(notes) or None,
+        note="; ".join([*doubts, *([] if quantity.note is None else [quantity.note])]) or None,
         uncertainty=None if sd is None else round(sd, digits + 1),
         budget=None if budget is None else {cause: round(abs(factor) * sd, digits + 1) for cause, sd in budget.items()},
         surface_length=None if quantity.surface_length is None else round(quantity.surface_length, 3),

@@ -64,9 +64,13 @@ class Quantity(NamedTuple):
         total = float(weight.sum())
         return float(weight[of].sum()) / total if total > 0 else 0.0
 
-    def by_lift(self, normals: Floats) -> float:
-        """Change of the value, regardless of its sign, per mm by which the foot of `normals`, (V, 3), stands higher."""
-        return abs(float(self.gradient @ normals[:, 2]))
+    def by_lift(self, normals: Floats) -> float | None:
+        """Change of the value, regardless of its sign, per mm by which the foot of `normals`, (V, 3), stands higher.
+
+        None where it is unknown.
+        """
+        change = abs(float(self.gradient @ normals[:, 2]))
+        return change if np.isfinite(change) else None
 
     def minus(self, other: Self) -> "Quantity":
         """The difference of two quantities, with the doubts of both."""

@@ -220,9 +220,20 @@ def test_a_landmark_set_by_hand_counts() -> None:
     before = measured().measures["ball_length"].value or 0.0
     assert result.measures["ball_length"].value == pytest.approx(foot().measures["ball_length"] - 5.0, abs=0.05)
     assert before == pytest.approx(foot().measures["ball_length"], abs=0.3)
-    assert result.measures["ball_length"].uncertainty is None
+    exact, found = result.measures["ball_length"].uncertainty, measured().measures["ball_length"].uncertainty
+    assert 0.0 < (exact or 0.0) < 0.2 * (found or 0.0)  # what is left is the end that it is taken from
     assert result.landmarks["metatarsale_tibiale"].method == "manual"
     assert result.landmarks["metatarsale_tibiale"].point == pytest.approx(point, abs=1e-3)
+
+
+def test_what_the_glass_is_worth_to_a_print_measured_from_a_guessed_landmark_is_unknown() -> None:
+    frame = FootFrame(foot().vertices, foot().faces, foot().vertices, np.eye(4), "toe2", 262.0)
+    for method, is_known in (("manual", True), ("fallback", False)):
+        landmarks = {name: Landmark(point, "geometric", 1.0) for name, point in foot().landmarks.items()}
+        landmarks["metatarsale_tibiale"] = Landmark(foot().landmarks["metatarsale_tibiale"], method, 0.5)
+        angle = take_measures(frame, landmarks, glass_sd_mm=0.3)["clarke_angle"]
+        assert angle.value is not None
+        assert (angle.uncertainty is not None) == is_known
 
 
 def test_a_calibration_is_applied_and_told() -> None:

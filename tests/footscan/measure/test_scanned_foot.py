@@ -214,6 +214,14 @@ def test_a_sway_that_no_heads_show_counts_more_than_a_small_one(foot: Mesh) -> N
             assert (measures[name].budget or {})["sway"] > 1.3 * (seen[name].budget or {})["sway"]
 
 
+def test_a_landmark_set_by_hand_has_no_part_in_the_uncertainty(foot: Mesh) -> None:
+    found = measure_scanned_foot(foot, "right", GlassPlane())
+    by_hand = {"metatarsale_tibiale": np.array(found.landmarks["metatarsale_tibiale"].point)}
+    measures = measure_scanned_foot(foot, "right", GlassPlane(), manual=by_hand).measures
+    assert (measures["ball_length"].uncertainty or np.inf) < 0.5 * (found.measures["ball_length"].uncertainty or 0.0)
+    assert (measures["clarke_angle"].budget or {})["glass"] > 0.0
+
+
 def test_heights_are_worth_less_where_the_glass_was_not_seen(foot: Mesh) -> None:
     seen = GlassPlane(below_foot_sd_mm=0.02, tilt_x_sd_deg=0.01, tilt_y_sd_deg=0.01)
     for glass, least, most in ((seen, 0.02, 0.03), (GlassPlane(), 0.5, 1.0)):
