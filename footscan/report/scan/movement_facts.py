@@ -7,7 +7,7 @@ from schemas.movement import MovementReport
 def movement_facts(movement: MovementReport) -> str:
     """Tremor and slow movement, root mean squares, or that no heads show the latter.
 
-    >>> "was not seen" in movement_facts(MovementReport(tremor_mm=0.05))
+    >>> "is not known" in movement_facts(MovementReport(tremor_mm=0.05))
     True
     """
     tremor = f"{number(movement.tremor_mm, 2)} mm{', moved back' if movement.x_mm else ''}"
@@ -21,6 +21,7 @@ def movement_facts(movement: MovementReport) -> str:
 
 
 _UNSEEN = (
-    '<p class="note">Slow sway of the foot was not seen: no two heads passed the same skin at different times. '
-    "A small sway is assumed. Heads that start some millimetres apart show it.</p>"
+    '<p class="note">Whether the foot swayed slowly is not known: no two heads passed the same skin at different '
+    "times. The measures count with about 0.1 mm; a larger sway makes them wrong. Heads that start some millimetres "
+    "apart would show it.</p>"
 )
