@@ -28,6 +28,15 @@ def number(value: float, decimals: int = 0) -> str:
     return f"\N{MINUS SIGN}{digits}" if value < 0 and digits.strip("0.") else digits
 
 
+def plus_minus(deviation: float | None, decimals: int) -> str:
+    """Write one standard deviation as the cell beside a value with as many decimals.
+
+    >>> plus_minus(0.234, 1), plus_minus(None, 1)
+    ('± 0.23', '–')
+    """
+    return "–" if deviation is None else f"± {number(deviation, decimals + 1)}"
+
+
 def words(name: str) -> str:
     """Write the identifier `name` as a phrase.
 

@@ -10,7 +10,7 @@ from footscan.report.calibration.panels import calibration_panels
 from footscan.report.colours import colour_bar, colour_limit, distance_colours
 from footscan.report.comparison.figures import figures_facts, moved_note, regions_table
 from footscan.report.filled import filled_colours, filled_key
-from footscan.report.markup import UNITS, number, section, table, text, words
+from footscan.report.markup import UNITS, number, plus_minus, section, table, text, words
 from footscan.report.page import page
 from footscan.report.sample_frames import FRAMES_SCRIPT, FrameSample, sample_frames
 from footscan.report.scan.coverage import coverage_plot
@@ -192,15 +192,16 @@ def _measures(measures: Measures, drawings: Mapping[str, Drawing], turned: str) 
         [
             _name(name, measure, name in drawings),
             _value(measure),
+            plus_minus(measure.uncertainty, UNITS[measure.unit][1]),
             UNITS[measure.unit][0],
             f'<span class="status {measure.status}">{measure.status}</span>',
             text(measure.definition) + _note(measure, measures.own_note(name)),
         ]
         for name, measure in _ordered(measures)
     )
-    listed = table(["Measure", "Value", "Unit", "Status", "Definition"], rows, numeric=[1], kind="measures")
+    listed = table(["Measure", "Value", "± sd", "Unit", "Status", "Definition"], rows, numeric=[1, 2], kind="measures")
     hint = '<p class="note">A click on a measure shows where it was taken.</p>' if drawings else ""
-    return f'<div class="foot">{turned}<div class="list">{hint}{listed}</div></div>'
+    return f'<div class="foot">{turned}<div class="list">{hint}{listed}{_STATUS_NOTE}</div></div>'
 
 
 def _name(name: str, measure: Measure, is_drawn: bool) -> str:
@@ -214,16 +215,13 @@ def _name(name: str, measure: Measure, is_drawn: bool) -> str:
 
 
 def _note(measure: Measure, own: str | None) -> str:
-    """The note below the definition: the measure's own remark, the uncertainty of the value, and its ISO name."""
-    unit, decimals = UNITS[measure.unit]
-    sigma = None
-    if measure.uncertainty is not None:
-        sigma = f"standard deviation {number(measure.uncertainty, decimals + 1)} {unit}".rstrip()
-        causes = sorted((measure.budget or {}).items(), key=lambda cause: -cause[1])
-        shown = [f"{cause} {number(sd, decimals + 1)}" for cause, sd in causes if round(sd, decimals + 1) > 0]
-        sigma += f" ({', '.join(shown)})" if len(shown) > 1 else ""
+    """The note below the definition: its own remark, the causes of its standard deviation, and its ISO name."""
+    decimals = UNITS[measure.unit][1] + 1
+    causes = sorted((measure.budget or {}).items(), key=lambda cause: -cause[1])
+    shown = [f"{cause} {number(sd, decimals)}" for cause, sd in causes if round(sd, decimals) > 0]
+    origin = f"± from {', '.join(shown)}" if len(shown) > 1 else None
     iso = None if measure.convention is None else measure.convention.iso
-    note = "; ".join(part for part in (own, sigma, iso) if part)
+    note = "; ".join(part for part in (own, origin, iso) if part)
     return f'<p class="note">{text(note)}</p>' if note else ""
 
 
@@ -264,6 +262,10 @@ def _calibration(calibration: Calibration, quality: Quality) -> str:
     return table(["", ""], rows) + calibration_panels(calibration)
 
 
+_STATUS_NOTE = (
+    '<p class="note">± is one standard deviation. Do not rely on an uncertain measure alone: the reason is below its '
+    "definition. A length whose standard deviation exceeds 1 mm is uncertain, and a girth beyond 2 mm.</p>"
+)
 _GRID_NOTE = '<p class="note">The grid is 10 mm wide; its figures are mm from the rearmost heel point on the floor.</p>'
 _REMOVED_NOTE = (
     '<p class="note">Before the fusion; each point counts once, and a reason without a column removed nothing. The '

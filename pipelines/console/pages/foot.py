@@ -8,7 +8,7 @@ import numpy as np
 from footscan.mesh.formats.files import FARTHEST_MM, PARSERS
 from footscan.mesh.mesh import Mesh
 from footscan.report.filled import CUT, filled_colours, filled_key
-from footscan.report.markup import UNITS, key, number, section, table, text, words
+from footscan.report.markup import UNITS, key, number, plus_minus, section, table, text, words
 from footscan.report.quality_lights import Level, TrafficLight, quality_lights, worst
 from footscan.report.scan.foot_colours import CAMERAS
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
@@ -150,15 +150,15 @@ def _measures(measures: Measures, drawings: Mapping[str, Drawing], known: KnownM
     names = [*(name for name in FIRST if name in measures.measures), *sorted(measures.measures.keys() - set(FIRST))]
     if known is None or known.side != measures.side:
         rows = (_row(name, measures, name in drawings) for name in names)
-        return table(["Measure", "Value", "Unit", "Status"], rows, numeric=[1], kind="plain")
+        return table(["Measure", "Value", "± sd", "Unit", "Status"], rows, numeric=[1, 2], kind="plain")
     rows = (_row(name, measures, name in drawings, known) for name in names)
     note = f'<p class="note">{KNOWN}</p>'
-    columns = ["Measure", "Value", "Known", "Value minus known", "Unit", "Status"]
-    return table(columns, rows, numeric=[1, 2, 3], kind="plain") + note
+    columns = ["Measure", "Value", "± sd", "Known", "Value minus known", "Unit", "Status"]
+    return table(columns, rows, numeric=[1, 2, 3, 4], kind="plain") + note
 
 
 def _row(name: str, measures: Measures, is_drawn: bool, known: KnownMeasures | None = None) -> list[str]:
-    """The row of a measure; with `known`, what is known of it and how far the value is off follow the value."""
+    """The row of a measure; with `known`, what is known of it and how far the value is off follow."""
     measure, own = measures.measures[name], measures.own_note(name)
     unit, decimals = UNITS[measure.unit]
     value = "–" if measure.value is None else number(measure.value, decimals)
@@ -169,7 +169,8 @@ def _row(name: str, measures: Measures, is_drawn: bool, known: KnownMeasures | N
         label = f'<button type="button" {attributes}>{label}</button>'
     note = f'<p class="note">{text(own)}</p>' if own and measure.status != "ok" else ""
     compared = [] if known is None else _compared(measure.value, known.measures.get(name), decimals)
-    return [label + note, value, *compared, unit, f'<span class="status {measure.status}">{measure.status}</span>']
+    status = f'<span class="status {measure.status}">{measure.status}</span>'
+    return [label + note, value, plus_minus(measure.uncertainty, decimals), *compared, unit, status]
 
 
 def _compared(value: float | None, known: float | None, decimals: int) -> list[str]:

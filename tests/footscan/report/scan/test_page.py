@@ -59,7 +59,14 @@ def scan():
             axis="toe2",
             transform=IDENTITY,
             measures={
-                "foot_length": Measure(value=265.14, unit="mm", status="ok", definition="Heel to toe"),
+                "foot_length": Measure(
+                    value=265.14,
+                    unit="mm",
+                    status="ok",
+                    definition="Heel to toe",
+                    uncertainty=0.25,
+                    budget={"noise": 0.07, "sway": 0.24},
+                ),
                 "arch_index": Measure(value=0.2312, unit="1", status="uncertain", definition="Areas", note="No toes"),
                 "heel_girth": Measure(value=None, unit="mm", status="incomplete", definition="Taut", note="Cut off"),
             },
@@ -148,11 +155,11 @@ def facts_of(page):
     return dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", page))
 
 
-def test_every_measure_stands_with_value_unit_status_and_definition(scan):
+def test_every_measure_stands_with_value_deviation_unit_status_and_definition(scan):
     rows = rows_of(scan_page(**scan))
-    assert ["Foot length", "265.1", "mm", "ok", "Heel to toe"] in rows
-    assert ["Heel girth", "–", "mm", "incomplete", "Taut Cut off"] in rows
-    assert ["Arch index", "0.231", "", "uncertain", "Areas No toes"] in rows
+    assert ["Foot length", "265.1", "± 0.25", "mm", "ok", "Heel to toe ± from sway 0.24, noise 0.07"] in rows
+    assert ["Heel girth", "–", "–", "mm", "incomplete", "Taut Cut off"] in rows
+    assert ["Arch index", "0.231", "–", "", "uncertain", "Areas No toes"] in rows
 
 
 def test_the_cameras_table_adds_up(scan):

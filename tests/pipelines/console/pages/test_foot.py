@@ -1,5 +1,6 @@
 """The page of a foot: what is known of a virtual one stands beside what was measured."""
 
+import json
 import re
 from pathlib import Path
 
@@ -30,15 +31,19 @@ def rows_of(home: Path) -> dict[str, list[str]]:
 def test_known_measures_stand_beside_the_measured_ones(home: Path) -> None:
     known = KnownMeasures(side="right", measures={"foot_length": 262.4, "ball_girth": 243.0})
     (home / "archive/P1/S1/known.json").write_text(known.model_dump_json())
+    file = home / "results/P1/S1/measures.json"
+    measures = json.loads(file.read_text())
+    measures["measures"]["foot_length"]["uncertainty"] = 0.234
+    file.write_text(json.dumps(measures))
     rows = rows_of(home)
-    assert rows["Measure"][:3] == ["Value", "Known", "Value minus known"]
-    assert rows["Foot length"][:3] == ["262.0", "262.4", "−0.4"]
-    assert rows["Ball girth"][:3] == ["243.5", "243.0", "0.5"]
-    assert rows["Ball length"][:3] == ["194.0", "–", "–"]
+    assert rows["Measure"][:4] == ["Value", "± sd", "Known", "Value minus known"]
+    assert rows["Foot length"][:4] == ["262.0", "± 0.23", "262.4", "−0.4"]
+    assert rows["Ball girth"][:4] == ["243.5", "–", "243.0", "0.5"]
+    assert rows["Ball length"][:4] == ["194.0", "–", "–", "–"]
 
 
 @pytest.mark.parametrize("content", [None, "{}", '{"side": "left", "measures": {"foot_length": 262.4}}'])
 def test_without_known_measures_of_this_foot_there_is_no_such_column(home: Path, content: str | None) -> None:
     if content is not None:
         (home / "archive/P1/S1/known.json").write_text(content)
-    assert rows_of(home)["Measure"] == ["Value", "Unit", "Status"]
+    assert rows_of(home)["Measure"] == ["Value", "± sd", "Unit", "Status"]
