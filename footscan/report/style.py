@@ -123,7 +123,7 @@ summary { margin: 4px 0; color: var(--accent); font-size: 14px; cursor: pointer;
 
 .measures, .measures tbody { display: block; }
 .measures thead { display: none; }
-.measures tr { display: grid; grid-template-columns: 1fr max-content max-content max-content; gap: 0 8px;
+.measures tr { display: grid; grid-template-columns: 1fr repeat(4, max-content); gap: 0 8px;
   padding: 8px 0; border-top: 1px solid var(--rule); }
 .measures th, .measures td { padding: 0; border: 0; }
 .measures td:last-child { grid-column: 1 / -1; color: var(--soft); font-size: 13.5px; }
