@@ -32,9 +32,9 @@ def plus_minus(deviation: float | None, decimals: int) -> str:
     """Write one standard deviation as the cell beside a value with as many decimals.
 
     >>> plus_minus(0.234, 1), plus_minus(None, 1)
-    ('± 0.23', '–')
+    ('± 0.23', '')
     """
-    return "–" if deviation is None else f"± {number(deviation, decimals + 1)}"
+    return "" if deviation is None else f"± {number(deviation, decimals + 1)}"
 
 
 def words(name: str) -> str:
