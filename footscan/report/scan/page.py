@@ -264,7 +264,7 @@ def _calibration(calibration: Calibration, quality: Quality) -> str:
 
 _STATUS_NOTE = (
     '<p class="note">± is one standard deviation. Do not rely on an uncertain measure alone: the reason is below its '
-    "definition. A length whose standard deviation exceeds 1 mm is uncertain, and a girth beyond 2 mm.</p>"
+    "definition.</p>"
 )
 _GRID_NOTE = '<p class="note">The grid is 10 mm wide; its figures are mm from the rearmost heel point on the floor.</p>'
 _REMOVED_NOTE = (
