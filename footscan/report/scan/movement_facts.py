@@ -1,6 +1,7 @@
 """Facts of the foot's movement while it was scanned, as heads that film the same skin show it."""
 
 from footscan.report.markup import facts, number
+from footscan.surface.errors.scan_errors import UNSEEN_SWAY_MM
 from schemas.movement import MovementReport
 
 
@@ -22,6 +23,6 @@ def movement_facts(movement: MovementReport) -> str:
 
 _UNSEEN = (
     '<p class="note">Whether the foot swayed slowly is not known: no two heads passed the same skin at different '
-    "times. The measures count with about 0.1 mm; a larger sway makes them wrong. Heads that start some millimetres "
-    "apart would show it.</p>"
+    f"times. The measures count with {UNSEEN_SWAY_MM:g} mm; a much larger sway makes them wrong. Heads that start some "
+    "millimetres apart would show it.</p>"
 )
