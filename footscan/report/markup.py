@@ -28,6 +28,15 @@ def number(value: float, decimals: int = 0) -> str:
     return f"\N{MINUS SIGN}{digits}" if value < 0 and digits.strip("0.") else digits
 
 
+def number_or_dash(value: float | None, decimals: int = 0) -> str:
+    """Write `value` as `number` does, and a dash where there is none.
+
+    >>> number_or_dash(265.14, 1), number_or_dash(None)
+    ('265.1', '–')
+    """
+    return "–" if value is None else number(value, decimals)
+
+
 def plus_minus(deviation: float | None, decimals: int) -> str:
     """Write one standard deviation as the cell beside a value with as many decimals.
 

@@ -15,7 +15,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
-from footscan.report.markup import UNITS, number, words
+from footscan.report.markup import UNITS, number_or_dash, words
 from footscan.report.scan.measure_drawings import landmark_place
 from pipelines.archive.editing import Edit, ScanEditor
 from pipelines.console.guard import Guard, Rules
@@ -106,7 +106,7 @@ def _try(body: bytes, editor: ScanEditor) -> Response:
 def _compared(name: str, saved: Measures, now: Measures) -> dict[str, str]:
     measure, before = now.measures[name], saved.measures.get(name)
     unit, decimals = UNITS[measure.unit]
-    shown = "–" if measure.value is None else number(measure.value, decimals)
+    shown = number_or_dash(measure.value, decimals)
     change = ""
     if before is not None and measure.value is not None and before.value is not None:
         change = f"{measure.value - before.value:+.{decimals + 1}f}"

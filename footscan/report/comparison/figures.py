@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from footscan.report.markup import facts, number, table, text, words
+from footscan.report.markup import facts, number, number_or_dash, table, text, words
 from schemas.quality import Figures, Histogram, RegionFigures
 
 _FIGURES = {
@@ -47,8 +47,8 @@ def regions_table(regions: Sequence[RegionFigures]) -> str:
     rows = [
         [
             text(words(region.region)),
-            "–" if region.points is None else number(region.points),
-            *(_cell(getattr(region, name)) for name in _OF_REGIONS),
+            number_or_dash(region.points),
+            *(number_or_dash(getattr(region, name), 3) for name in _OF_REGIONS),
         ]
         for region in regions
     ]
@@ -87,7 +87,3 @@ def _classes_table(histogram: Histogram) -> str:
         for low, high, count, share in zip(edges, edges[1:], histogram.counts, histogram.shares, strict=False)
     ]
     return table(["From, mm", "To, mm", "Points", "Share, %"], rows, numeric=range(4))
-
-
-def _cell(value: float | None) -> str:
-    return "–" if value is None else number(value, 3)

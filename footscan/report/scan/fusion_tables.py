@@ -2,7 +2,7 @@
 
 import math
 
-from footscan.report.markup import number, table, text, words
+from footscan.report.markup import number, number_or_dash, table, text, words
 from schemas.calibration import view_name
 from schemas.fusion import CameraCorrection, FusionReport
 from schemas.heads import HeadsReport
@@ -57,7 +57,7 @@ def _row(correction: CameraCorrection, contradicted: int) -> list[str]:
         view_name(correction.camera),
         text(words(correction.kind)),
         number(correction.largest_mm, 3),
-        *("–" if value is None else number(value, 3) for value in held_out),
+        *(number_or_dash(value, 3) for value in held_out),
         number(contradicted),
     ]
 

@@ -10,7 +10,7 @@ from footscan.report.calibration.panels import calibration_panels
 from footscan.report.colours import colour_bar, colour_limit, distance_colours
 from footscan.report.comparison.figures import figures_facts, moved_note, regions_table
 from footscan.report.filled import filled_colours, filled_key
-from footscan.report.markup import UNITS, number, plus_minus, section, table, text, words
+from footscan.report.markup import UNITS, number, number_or_dash, plus_minus, section, table, text, words
 from footscan.report.page import page
 from footscan.report.sample_frames import FRAMES_SCRIPT, FrameSample, sample_frames
 from footscan.report.scan.coverage import coverage_plot
@@ -226,7 +226,7 @@ def _note(measure: Measure, own: str | None) -> str:
 
 
 def _value(measure: Measure) -> str:
-    return "–" if measure.value is None else number(measure.value, UNITS[measure.unit][1])
+    return number_or_dash(measure.value, UNITS[measure.unit][1])
 
 
 def _cameras_table(quality: Quality, cloud: NDArray[np.void]) -> str:

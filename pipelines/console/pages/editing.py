@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from footscan.mesh.mesh import Mesh
 from footscan.recordings.decisions import Decisions
 from footscan.report.filled import filled_colours
-from footscan.report.markup import UNITS, number, section, table, text, words
+from footscan.report.markup import UNITS, number_or_dash, section, table, text, words
 from footscan.report.scan.measure_drawings import landmark_place
 from footscan.report.surface_views import upright
 from footscan.report.viewer import Colouring, viewer
@@ -136,7 +136,7 @@ def _measures(measures: Measures) -> str:
     for name in sorted(measures.measures):
         one = measures.measures[name]
         unit, decimals = UNITS[one.unit]
-        value = "–" if one.value is None else number(one.value, decimals)
+        value = number_or_dash(one.value, decimals)
         cells = [text(words(name)), value, f'<b data-now="{name}"></b>', f'<span data-change="{name}"></span>', unit]
         rows.append([*cells, f'<span class="status {one.status}" data-status="{name}">{one.status}</span>'])
     return table(["Measure", "Saved", "Now", "Change", "Unit", "Status"], rows, numeric=[1, 2, 3], kind="plain")

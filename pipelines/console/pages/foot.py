@@ -8,7 +8,7 @@ import numpy as np
 from footscan.mesh.formats.files import FARTHEST_MM, PARSERS
 from footscan.mesh.mesh import Mesh
 from footscan.report.filled import CUT, filled_colours, filled_key
-from footscan.report.markup import UNITS, key, number, plus_minus, section, table, text, words
+from footscan.report.markup import UNITS, key, number, number_or_dash, plus_minus, section, table, text, words
 from footscan.report.quality_lights import Level, TrafficLight, quality_lights, worst
 from footscan.report.scan.foot_colours import CAMERAS
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
@@ -161,7 +161,7 @@ def _row(name: str, measures: Measures, is_drawn: bool, known: KnownMeasures | N
     """The row of a measure; with `known`, what is known of it and how far the value is off follow."""
     measure, own = measures.measures[name], measures.own_note(name)
     unit, decimals = UNITS[measure.unit]
-    value = "–" if measure.value is None else number(measure.value, decimals)
+    value = number_or_dash(measure.value, decimals)
     label = text(words(name))
     if is_drawn:
         caption = text(f"{words(name)} {value} {unit}: {measure.definition}")

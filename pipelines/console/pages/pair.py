@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from footscan.report.markup import UNITS, number, section, table, text, words
+from footscan.report.markup import UNITS, number_or_dash, section, table, text, words
 from footscan.report.size_table import size_table
 from footscan.sizing.pairs import compare_pair
 from footscan.sizing.table import read_table
@@ -49,9 +49,7 @@ def _sizes(pair: Pair) -> list[str]:
 
 def _row(row: PairRow) -> list[str]:
     unit, decimals = UNITS.get(row.unit, (row.unit, 3))
-    left, right, difference = (
-        "–" if value is None else number(value, decimals) for value in (row.left, row.right, row.difference)
-    )
+    left, right, difference = (number_or_dash(value, decimals) for value in (row.left, row.right, row.difference))
     note = f'<p class="note">{text(row.note)}</p>' if row.note else ""
     return [text(words(row.measure)) + note, left, right, difference, text(unit), text(row.larger or "–")]
 
