@@ -22,11 +22,17 @@ class MovementReport(Document):
     x_mm: list[Way] = Field(default_factory=list)
     """Way along X by which the foot was moved back, from `first_frame` on; empty if it was not."""
     sway_mm: Length = 0.0
-    """Standard deviation of the slow movement, at 0.2 to 1 Hz: that of most feet, or larger where heads that film the
-    same skin at different times show it; 0 if none do."""
+    """Standard deviation of the slow movement, at 0.2 to 1 Hz: that of most feet, or what heads show that film the same
+    skin at different times; 0 if none do."""
     sway_by_axis_mm: tuple[Length, Length] | None = None
     """The same along X and along Y; None if no two heads film the same skin at different times: what was not seen may
     be there."""
+    y_mm: list[Way] = Field(default_factory=list)
+    """Way along Y by which the foot was moved back, from frame 0 on; empty if it was not."""
+    left_by_axis_mm: tuple[Length, Length] | None = None
+    """Standard deviation of the slow movement that is left, along X and along Y; None if that is all of it."""
+    left_frames: tuple[Length, Length] | None = None
+    """Frames between independent movements of what is left; None for those of most feet."""
     warnings: list[str] = Field(default_factory=list)
     doubt: str | None = None
     """Reason for which measures are uncertain, if the foot moved so that it cannot be moved back."""

@@ -11,22 +11,24 @@ STEP_MM, FRAMES = 2.0, 90  # up to the toes, whose sections are several
 HEADS = {1: 1, 2: 2}
 
 
-def scan(x_mm: np.ndarray, y_mm: np.ndarray | None = None, ahead_mm: float = 0.0) -> np.ndarray:
+def scan(x_mm: np.ndarray, y_mm: np.ndarray | None = None, ahead_mm: float = 0.0, pitch: float = 0.0) -> np.ndarray:
     """Points of a foot that lies at `x_mm` (2, F) along and `y_mm` (2, F) across the travel for each of the cameras.
 
-    The laser plane of the second one is ahead of that of the first.
+    The laser plane of the second one is ahead of that of the first, and leans back by `pitch` mm per mm of height.
     """
     y_mm = np.zeros_like(x_mm) if y_mm is None else y_mm
     parts = []
     for camera, side in ((1, 1.0), (2, -1.0)):
         for frame in range(FRAMES):
             plane = 8.0 + STEP_MM * frame + (camera - 1) * ahead_mm
-            section = _section_at(plane - x_mm[camera - 1, frame])
+            leans = pitch * (camera - 1)
+            section = _section_at(plane - x_mm[camera - 1, frame], leans)
             section = section[side * (section[:, 0] - section[:, 0].mean()) > -10.0]
             angle = np.arctan2(section[:, 1] - section[:, 1].mean(), section[:, 0] - section[:, 0].mean())
             section = section[np.argsort(angle)] + [y_mm[camera - 1, frame], 0.0]
-            xyz = np.column_stack([np.full(len(section), plane), section])
-            parts.append(make_points(xyz, camera, frame, source=np.arange(len(section))))
+            xyz = np.column_stack([plane - leans * section[:, 1], section])
+            at = np.full(len(section), plane, np.float32)
+            parts.append(make_points(xyz, camera, frame, source=np.arange(len(section)), plane=at))
     return np.concatenate(parts)
 
 
@@ -39,10 +41,10 @@ def _foot_edges() -> tuple[np.ndarray, np.ndarray]:
     return foot.vertices[edges[:, 0]], foot.vertices[edges[:, 1]]
 
 
-def _section_at(x: float) -> np.ndarray:
-    """(N, 2) Y and Z where the edges of the foot cross the plane at X = x, mm."""
+def _section_at(x: float, pitch: float) -> np.ndarray:
+    """(N, 2) Y and Z where the edges of the foot cross the plane at X = x - pitch * Z, mm."""
     first, second = _foot_edges()
-    crosses = (first[:, 0] < x) != (second[:, 0] < x)
-    first, second = first[crosses], second[crosses]
-    share = (x - first[:, 0]) / (second[:, 0] - first[:, 0])
-    return np.asarray((first + share[:, None] * (second - first))[:, 1:])
+    ahead, beyond = (ends[:, 0] + pitch * ends[:, 2] - x for ends in (first, second))
+    crosses = (ahead < 0.0) != (beyond < 0.0)
+    first, second, ahead, beyond = first[crosses], second[crosses], ahead[crosses], beyond[crosses]
+    return np.asarray((first + (ahead / (ahead - beyond))[:, None] * (second - first))[:, 1:])

@@ -1,7 +1,7 @@
-"""Movement of the foot while it was scanned: a tremor is taken back, slow movement is reported."""
+"""Movement of the foot while it was scanned: a tremor, and a slow movement across the travel, are taken back."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,12 @@ DOUBT_MM = 0.3
 """Slow movement from which no measure is relied upon: its size is known to a factor of two. Chosen by hand, after feet
 that sway (`draw_assembled`, seeds 1101 to 1106)."""
 
+SWAYED_MM = 0.1
+"""Slow movement across the travel from which a person is asked to scan again. Chosen by hand."""
+
 
 def steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArray[np.void], MovementReport]:
-    """Move the points of a foot that trembles back to where it is on average, and estimate its slow movement.
+    """Move the points of a foot that trembles or sways back to where it is on average.
 
     Parameters
     ----------
@@ -27,28 +30,44 @@ def steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArra
     stripes = sort_stripes([points])
     report = find_tremor(stripes, heads)
     if report.x_mm:
-        points = _moved_back(points, report)
+        points = _moved_back(points, ("x", "plane"), np.array(report.x_mm), report.first_frame)
         stripes = sort_stripes([points])
-    sizes = sway_of(stripes, heads)
-    if sizes is None:
+    sway = sway_of(stripes, heads)
+    if sway is None:
         return points, report
-    sway = math.hypot(*sizes)
-    x, y = (round(size, 4) for size in sizes)
-    report = report.model_copy(update={"sway_mm": round(sway, 4), "sway_by_axis_mm": (x, y)})
-    if sway <= DOUBT_MM:
-        return points, report
-    # A head that loses steps shows the same skin at another place, too.
-    doubt = (
-        f"the foot moved slowly, by {sway:.1f} mm (root mean square), or a head lost steps: see that the foot stands "
-        "still and nothing brakes the heads, then scan again"
-    )
-    return points, report.model_copy(update={"warnings": [*report.warnings, doubt], "doubt": doubt})
+    x, y = (round(size, 4) for size in sway.sizes_mm)
+    size = math.hypot(*sway.sizes_mm)
+    report = report.model_copy(update={"sway_mm": round(size, 4), "sway_by_axis_mm": (x, y)})
+    if size > DOUBT_MM:
+        # A head that loses steps shows the same skin at another place, too.
+        doubt = (
+            f"the foot moved slowly, by {size:.1f} mm (root mean square), or a head lost steps: see that the foot "
+            "stands still and nothing brakes the heads, then scan again"
+        )
+        return points, report.model_copy(update={"warnings": [*report.warnings, doubt], "doubt": doubt})
+    warnings = list(report.warnings)
+    if len(sway.y_mm) and y >= SWAYED_MM:
+        warnings.append(
+            f"the foot swayed by {y:.2f} mm across the travel (root mean square), and was moved back: scan again if it "
+            "can be held still"
+        )
+    left = {
+        "warnings": warnings,
+        "y_mm": np.round(sway.y_mm, 4).tolist(),
+        "left_by_axis_mm": tuple(round(size, 4) for size in sway.left_mm),
+        "left_frames": tuple(round(frames, 2) for frames in sway.left_frames),
+    }
+    report = report.model_copy(update=left)
+    return _moved_back(points, ("y",), sway.y_mm, 0), report
 
 
-def _moved_back(points: NDArray[np.void], tremor: MovementReport) -> NDArray[np.void]:
-    moved, way = points.copy(), np.array(tremor.x_mm)
-    frame = points["frame"].astype(np.intp) - tremor.first_frame
+def _moved_back(
+    points: NDArray[np.void], names: Sequence[str], way: NDArray[np.float64], first_frame: int
+) -> NDArray[np.void]:
+    """The points without the `way` (F,) of each frame from the first one on, in the coordinates `names`."""
+    moved = points.copy()
+    frame = points["frame"].astype(np.intp) - first_frame
     is_near = (frame >= 0) & (frame < len(way))
-    for name in ("x", "plane"):
+    for name in names:
         moved[name][is_near] -= way[frame[is_near]].astype(np.float32)
     return moved

@@ -6,12 +6,14 @@ of the skin some frames after the first. The distance between the stripes there 
 Heads whose planes coincide show nothing.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
 
 from footscan.cloud.fusion.agreement import find_overlaps
 from footscan.cloud.fusion.stripes import Floats, Stripes
@@ -26,15 +28,21 @@ CENTRE = np.array([0.0, 50.0])
 """Y and Z, mm, about which heads are turned: the middle of the scan volume."""
 TURN_MM = 50.0
 """Distance from there at which a turn is counted in mm."""
-COURSE_FRAMES, LEAST_SHARE = 8.0, 1e-4
-"""Frames over which the foot stays about where it is: a sway at 0.5 Hz turns by a radian and a half in 8 frames at 18
-frames a second. Courses that have less than this share of the variance of the greatest one are left out. Chosen by
-hand."""
+COURSE_FRAMES, LEAST_SHARE = 4.5, 1e-4
+"""Frames over which the foot stays about where it is: the slope of a movement of 0.2 to 1 Hz at 18 frames a second is
+1 / 4.5 of the movement a frame, root mean square. Courses that have less than this share of the variance of the
+greatest one are left out. The latter chosen by hand."""
+FRAMES = math.sqrt(2.0) * COURSE_FRAMES
+"""Frames between independent movements, with straight lines between them, that have the same slope."""
 APART_MM = 1.0
 """Standard deviation of what the heads of a pair are apart. Chosen by hand."""
-SHOWS = 0.2
-"""Independent comparisons that a stripe and another camera make up: errors of neighbouring points, and of the maps of
-both cameras, are correlated. Chosen by hand, after two scanners (`draw_assembled`, seeds 501 and 502 with films)."""
+SHOWS_X = 0.2
+"""Share of the evidence for a movement along X that counts: maps and planes of two heads that differ look like one,
+since either displaces skin by its slope. Chosen by hand, after scanners with feet that stand still (`draw_assembled`,
+seeds 6228 to 6233)."""
+CLEAR = 3.0
+"""Logarithm of the odds for a movement along Y, against the smallest size, from which the foot is moved back. Chosen by
+hand, after the same feet and 17 that sway (`draw_moving`, seeds 7410 to 7449, 7523 and 7525)."""
 FEWEST = 200
 """Comparisons that show a movement."""
 LEAST_LAG_FRAMES = 0.5
@@ -42,18 +50,30 @@ LEAST_LAG_FRAMES = 0.5
 by 0.1 mm moves by 0.01 mm, which is less than the maps of the cameras differ by. Chosen by hand."""
 ROUNDS = 8
 """Iterations of the reweighted least squares: a bound of time."""
-SIZES_MM = 0.05 * 2.0 ** np.arange(6)
+SIZES_MM = 0.025 * 2.0 ** np.arange(7)
 """Standard deviations of the movement along an axis that are tried: those of a foot that stands on glass, to those of
 one that steps."""
-RARER = 3.0
-"""A size is rarer than half of it by two to the power of this: without any comparison 0.07 mm are expected. Chosen by
-hand."""
+USUAL_MM, FACTOR = 0.07, 2.0
+"""Sizes of most feet: log-normal about the first, with this factor as standard deviation. Chosen by hand."""
 
 
-def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> tuple[float, float] | None:
-    """Estimate the standard deviations of the slow movement of a foot, along X and Y, mm.
+class Sway(NamedTuple):
+    """The slow movement of a foot, along X and along Y."""
 
-    They are root mean squares over the probability of each size, given the comparisons; where these show little, the
+    sizes_mm: tuple[float, float]
+    """Standard deviations"""
+    y_mm: Floats
+    """(F,) way along Y from the first frame of a scan on; empty if it is not clear"""
+    left_mm: tuple[float, float]
+    """Standard deviations of what is left when the foot was moved back by it"""
+    left_frames: tuple[float, float]
+    """Frames between independent movements of what is left"""
+
+
+def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
+    """Estimate the slow movement of a foot.
+
+    Sizes are root mean squares over the probability of each size, given the comparisons; where these show little, the
     size is that of most feet. What a head that is shifted or turned as a whole adds to the distances is estimated along
     with the movement, for each pair of heads.
 
@@ -69,15 +89,31 @@ def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> tuple[float, float] |
     contradictions = _contradictions(stripes, heads)
     if len(contradictions.distance) < FEWEST or contradictions.lag_frames < LEAST_LAG_FRAMES:
         return None
-    change, courses = _change(contradictions)
-    shows = SHOWS * contradictions.stripes / len(contradictions.distance)
-    normal, right = _normal_equations(change, contradictions.distance, shows, _prior(change, courses, (1.0, 1.0)))
-    sizes = np.stack(np.meshgrid(SIZES_MM, SIZES_MM, indexing="ij"), axis=-1).reshape(-1, 2)
-    likely = np.array([_log_evidence(normal, right, _prior(change, courses, size)) for size in sizes])
-    likely -= RARER * np.log(sizes).sum(axis=1)
-    weights = np.exp(likely - likely.max())
-    x, y = np.sqrt(weights @ sizes**2 / weights.sum())
-    return float(x), float(y)
+    courses = _courses(int(contradictions.frames.max()) + 2)
+    change, count = _change(contradictions, courses), courses.shape[1]
+    # The points of a stripe err together: each stripe is one comparison with another camera.
+    shows = contradictions.stripes / len(contradictions.distance)
+    normal, right = _normal_equations(
+        change, contradictions.distance, shows, _prior(change, count, (USUAL_MM, USUAL_MM))
+    )
+    evidence = np.array(
+        [[_log_evidence(normal, right, _prior(change, count, (x, y))) for y in SIZES_MM] for x in SIZES_MM]
+    )
+    along_y = logsumexp(evidence, axis=0)
+    sizes = _expected_mm(SHOWS_X * logsumexp(evidence, axis=1)), _expected_mm(along_y)
+    is_clear = along_y.max() > along_y[0] + CLEAR
+    covariance = np.linalg.inv(normal + np.diag(_prior(change, count, sizes)))
+    of_y = slice(count, 2 * count)
+    mean, covariance = (covariance @ right)[of_y], covariance[of_y, of_y]
+    second = np.asarray(covariance if is_clear else covariance + np.outer(mean, mean))
+    compared = contradictions.frames[:, 0].astype(np.intp)
+    value, slope = (_deviation(one[compared], second) for one in (courses, np.diff(courses, axis=0)))
+    return Sway(
+        sizes_mm=sizes,
+        y_mm=courses @ mean if is_clear else np.zeros(0),
+        left_mm=(sizes[0], value),
+        left_frames=(FRAMES, math.sqrt(2.0) * value / slope),
+    )
 
 
 class _Contradictions(NamedTuple):
@@ -114,11 +150,10 @@ def _contradictions(stripes: Stripes, heads: Mapping[int, int]) -> _Contradictio
     between, slope = between[good], slope[good]
     point, own, other = overlaps.point[between], own[between], other[between]
     normals, away = stripes.normals[point], (stripes.yz[point] - CENTRE) / TURN_MM
-    frame, plane = stripes.points["frame"].astype(np.float64), stripes.points["plane"].astype(np.float64)
-    frames = np.column_stack([frame[point], np.zeros(len(point))])
-    for head in np.unique(other):
-        of_head, asked = head_of[stripes.camera] == head, other == head
-        frames[asked, 1] = _frames_at(plane[point[asked]], plane[of_head], frame[of_head])
+    frames = np.column_stack([stripes.points["frame"][point].astype(np.float64), np.zeros(len(point))])
+    for camera in np.unique(overlaps.other[between]):
+        asked = overlaps.other[between] == camera
+        frames[asked, 1] = _frames_at(stripes, point[asked], stripes.camera == camera)
     return _Contradictions(
         distance=overlaps.distance[between],
         change=np.column_stack([-slope, normals[:, 0]]),
@@ -126,36 +161,42 @@ def _contradictions(stripes: Stripes, heads: Mapping[int, int]) -> _Contradictio
         frames=frames,
         pair=np.unique(np.sort(np.column_stack([own, other])), axis=0, return_inverse=True)[1].reshape(-1),
         way=np.where(own < other, 1.0, -1.0),
-        stripes=len(np.unique(np.column_stack([stripes.camera[point], overlaps.other[between], frame[point]]), axis=0)),
+        stripes=len(np.unique(np.column_stack([stripes.camera[point], overlaps.other[between], frames[:, 0]]), axis=0)),
     )
 
 
-def _frames_at(x: Floats, plane: Floats, frame: Floats) -> Floats:
-    """(M,) frames in which a head was at `x` (M,) mm, from the planes (N,) of its points and their frames (N,)."""
-    frames, number = np.unique(frame, return_inverse=True)
+def _frames_at(stripes: Stripes, asked: Ints, of_camera: NDArray[np.bool_]) -> Floats:
+    """(M,) frames in which a camera filmed the skin at the points `asked` (M,), between its own frames.
+
+    Heads are turned against each other, so that a laser plane passes some of the skin earlier, and some later.
+    """
+    points, places = stripes.points[of_camera], np.column_stack([np.ones(len(stripes.x)), stripes.yz])
+    plane = points["plane"].astype(np.float64)
+    # How far ahead of its middle a laser plane meets the skin is linear in Y and Z.
+    ahead = np.linalg.lstsq(places[of_camera], stripes.x[of_camera] - plane)[0]
+    frames, number = np.unique(points["frame"], return_inverse=True)
     planes = np.bincount(number, plane) / np.bincount(number)
     order = np.argsort(planes)
-    return np.asarray(np.interp(x, planes[order], frames[order]))
+    return np.asarray(np.interp(stripes.x[asked] - places[asked] @ ahead, planes[order], frames[order]))
 
 
-def _change(contradictions: _Contradictions) -> tuple[Floats, int]:
-    """Derivatives (M, 2 C + 4 P) of the distances by C courses of the foot along X, by as many along Y, and by the
-    shift in X, Y and Z and the turn between the heads of P pairs; and C.
-
-    The courses are the principal components of smooth movements, each with the standard deviation that it has.
-    """
-    first = int(contradictions.frames.min())
-    number = np.arange(int(contradictions.frames.max()) + 2 - first)
-    alike = np.exp(-0.5 * ((number[:, None] - number) / COURSE_FRAMES) ** 2)
-    variances, courses = np.linalg.eigh(alike)
+def _courses(count: int) -> Floats:
+    """(F, C) the principal components of smooth movements in F frames, each with the standard deviation that it has."""
+    number = np.arange(count)
+    variances, courses = np.linalg.eigh(np.exp(-0.5 * ((number[:, None] - number) / COURSE_FRAMES) ** 2))
     much = variances > LEAST_SHARE * variances[-1]
-    courses = courses[:, much] * np.sqrt(variances[much])
-    own, other = (_at(courses, frames - first) for frames in contradictions.frames.T)
+    return np.asarray(courses[:, much] * np.sqrt(variances[much]))
+
+
+def _change(contradictions: _Contradictions, courses: Floats) -> Floats:
+    """Derivatives (M, 2 C + 4 P) of the distances by C courses (F, C) of the foot along X, by as many along Y, and by
+    the shift in X, Y and Z and the turn between the heads of P pairs."""
+    own, other = (_at(courses, frames) for frames in contradictions.frames.T)
     shifts = np.column_stack([contradictions.change, contradictions.across]) * contradictions.way[:, None]
     pairs = np.arange(contradictions.pair.max() + 1)
     of_pairs = [np.where((contradictions.pair == pair)[:, None], shifts, 0.0) for pair in pairs]
     moves = [change[:, None] * (other - own) for change in contradictions.change.T]
-    return np.concatenate([*moves, *of_pairs], axis=1), courses.shape[1]
+    return np.concatenate([*moves, *of_pairs], axis=1)
 
 
 def _at(courses: Floats, frames: Floats) -> Floats:
@@ -192,3 +233,15 @@ def _log_evidence(normal: Floats, right: Floats, prior: Floats) -> float:
     lower = np.linalg.cholesky(normal + np.diag(prior))
     explained = np.sum(solve_triangular(lower, right, lower=True) ** 2)
     return float(0.5 * (explained + np.log(prior).sum()) - np.log(np.diag(lower)).sum())
+
+
+def _expected_mm(evidence: Floats) -> float:
+    """Root mean square of the sizes over their probability, given the logarithms (S,) of their evidence."""
+    likely = evidence - 0.5 * (np.log(SIZES_MM / USUAL_MM) / math.log(FACTOR)) ** 2
+    weights = np.exp(likely - likely.max())
+    return float(np.sqrt(weights @ SIZES_MM**2 / weights.sum()))
+
+
+def _deviation(courses: Floats, covariance: Floats) -> float:
+    """Standard deviation of the movement by courses (F, C), root mean square of all frames."""
+    return float(np.sqrt(np.mean(np.einsum("fi,ij,fj->f", courses, covariance, courses))))

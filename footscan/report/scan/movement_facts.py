@@ -17,8 +17,10 @@ def movement_facts(movement: MovementReport) -> str:
         pairs.append(("Correlation between heads", number(movement.agreement, 2)))
     if movement.sway_by_axis_mm is None:
         return facts(pairs) + _UNSEEN
-    by_axis = zip("XY", movement.sway_by_axis_mm, strict=True)
-    return facts([*pairs, *((f"Slow movement along {axis}", f"{number(size, 2)} mm") for axis, size in by_axis)])
+    along, across = (f"{number(size, 2)} mm" for size in movement.sway_by_axis_mm)
+    if movement.y_mm and movement.left_by_axis_mm is not None:
+        across += f", moved back but for {number(movement.left_by_axis_mm[1], 2)} mm"
+    return facts([*pairs, ("Slow movement along X", along), ("Slow movement along Y", across)])
 
 
 _UNSEEN = (

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from footscan.cloud.movement.sway import FRAMES
 from footscan.cloud.points import stripe_step
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
@@ -39,14 +40,10 @@ OF_DISAGREEMENT = 0.5
 """Errors of the mean of all cameras, relative to their systematic disagreement, and as broad as a camera's view. Tuned
 on 80 films (`draw_assembled`, seeds 3559 to 3598 and 4000 to 4039). In six others (2503, 2506, 2604, 3516, 3568 and
 3582) the surface errs by 0.1 to 1.0 of the disagreement where cameras agree (root mean square)."""
-SWAY_MM, SWAY_STEPS = 0.07, 7.0
-"""Least standard deviation of slow movement of the foot, along X and across: heads that film the same skin a few frames
-apart do not tell a smaller one from none (`draw_moving`, seeds 7301 to 7305). The steps of the travel between
-independent movements: landmarks move by the slope of the sway along X, which is that of one of 0.2 to 1 Hz (D. A.
-Winter, Gait & Posture 3(4), 1995) at 18 frames a second, 0.22 of the movement a step, root mean square."""
 UNSEEN_SWAY_MM = 0.12
-"""The same where heads do not show it, since none film the same skin, or all film it at the same moment: the root mean
-square of feet that sway with amplitudes of up to 0.3 mm. Chosen by hand, after `draw_moving`, seeds 7413 and 7442."""
+"""Standard deviation of slow movement of the foot, along X and across, where heads do not show it, since none film the
+same skin, or all film it at the same moment: the root mean square of feet that sway with amplitudes of up to 0.3 mm.
+Chosen by hand, after `draw_moving`, seeds 7413 and 7442."""
 FORM_MM, OF_TREMOR = 0.03, 2.0
 """Tremor that the form of a still foot looks like, and errors of X relative to what exceeds it where the foot was not
 moved back: heads that jitter also ripple, which no stripe shows. Chosen by hand: ideal scanners (`draw_assembled`,
@@ -88,8 +85,6 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     gap_mm[inside] = KDTree(vertices[seen]).query(vertices[inside], workers=cores())[0]
     points, scatter_mm = around(vertices, normals, cloud)
     everywhere = np.ones(len(vertices))
-    seen_mm = None if evidence.movement is None else evidence.movement.sway_by_axis_mm
-    sway_mm = np.full(2, UNSEEN_SWAY_MM) if seen_mm is None else np.maximum(seen_mm, SWAY_MM)
     # Heads pass the same skin at different times, and what one saw moves against what another one saw.
     filmed_mm = vertices[:, 0] if points is None else points["frame"].mean(axis=1) * step_mm
     ends = find_ends(vertices, evidence)
@@ -105,7 +100,10 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
         ErrorField("ends", PATCHY * shift_mm, REACH_MM),
         ErrorField("cameras", everywhere * OF_DISAGREEMENT * systematic(points, evidence.agreement), WIDE_MM),
         ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, filmed_mm),
-        *(ErrorField("sway", sway_mm[axis] * normals[:, axis], SWAY_STEPS * step_mm, filmed_mm) for axis in (0, 1)),
+        *(
+            ErrorField("sway", sway_mm * normals[:, axis], frames * step_mm, filmed_mm)
+            for axis, (sway_mm, frames) in enumerate(_sway(evidence.movement))
+        ),
     ]
     return ScanErrors(fields, np.any([gap_mm > RELIABLE_MM, *(end.is_unseen(vertices[:, 0]) for end in ends)], axis=0))
 
@@ -117,3 +115,10 @@ def _moved_mm(movement: MovementReport | None) -> float:
     if movement.x_mm:
         return LEFT_OF_TREMOR * movement.tremor_mm
     return max(movement.tremor_mm, OF_TREMOR * math.sqrt(max(movement.tremor_mm**2 - FORM_MM**2, 0.0)))
+
+
+def _sway(movement: MovementReport | None) -> list[tuple[float, float]]:
+    """Standard deviation, mm, of the slow movement along X and along Y, and the frames between independent ones."""
+    seen = None if movement is None else movement.left_by_axis_mm or movement.sway_by_axis_mm
+    frames = None if movement is None else movement.left_frames
+    return list(zip(seen or (UNSEEN_SWAY_MM,) * 2, frames or (FRAMES,) * 2, strict=True))

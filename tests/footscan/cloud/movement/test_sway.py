@@ -11,12 +11,13 @@ from tests.helpers.moving_foot import FRAMES, HEADS, scan
 STILL = np.zeros((2, FRAMES))
 SWAYING = np.tile(0.7 * np.sin(0.17 * np.arange(FRAMES)), (2, 1))  # 0.5 Hz at 18 frames a second
 AHEAD_MM = 4.0
+INNER = np.s_[10 : FRAMES - 10]
 
 
 def sizes_of(points: np.ndarray) -> tuple[float, float]:
-    sizes = sway_of(sort_stripes([points]), HEADS)
-    assert sizes is not None
-    return sizes
+    sway = sway_of(sort_stripes([points]), HEADS)
+    assert sway is not None
+    return sway.sizes_mm
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -32,6 +33,29 @@ def test_heads_that_are_apart_as_a_whole_are_no_sway() -> None:
     apart = STILL + np.array([[0.0], [0.3]])
     for points in (scan(STILL, None, AHEAD_MM), scan(STILL, apart, AHEAD_MM), scan(apart, None, AHEAD_MM)):
         assert max(sizes_of(points)) < 0.1
+
+
+def test_heads_that_are_turned_pass_the_skin_at_other_times() -> None:
+    # The second plane is behind the first one at the sole, and ahead of it at the instep.
+    sway = sway_of(sort_stripes([scan(STILL, SWAYING, -AHEAD_MM, pitch=-AHEAD_MM / 48.0)]), HEADS)
+    assert sway is not None
+    assert sway.sizes_mm[0] < 0.2  # it does not look like a movement along the travel
+    assert np.corrcoef(sway.y_mm[INNER], SWAYING[0, INNER])[0, 1] > 0.75
+
+
+def test_a_foot_that_sways_a_little_is_moved_back_across_the_travel() -> None:
+    swaying = 0.4 * SWAYING  # 0.2 mm, root mean square
+    still, points = scan(STILL, None, AHEAD_MM), scan(STILL, swaying, AHEAD_MM)
+    moved, report = steadied(points, HEADS)
+    way = np.array(report.y_mm)[:FRAMES]
+    slopes = [np.sqrt(np.mean(np.diff(left[INNER]) ** 2)) for left in (swaying[0], swaying[0] - way)]
+    assert slopes[1] < 0.6 * slopes[0]
+    assert report.sway_by_axis_mm is not None
+    assert report.left_by_axis_mm is not None
+    assert report.left_by_axis_mm[1] < 0.7 * report.sway_by_axis_mm[1]
+    assert "swayed by 0." in report.warnings[-1]
+    np.testing.assert_allclose(moved["y"], points["y"] - way[points["frame"]], atol=1e-4)
+    assert steadied(still, HEADS)[1].y_mm == []
 
 
 def test_planes_that_coincide_show_no_sway() -> None:
