@@ -32,8 +32,11 @@ COURSE_FRAMES, LEAST_SHARE = 4.5, 1e-4
 """Frames over which the foot stays about where it is: the slope of a movement of 0.2 to 1 Hz at 18 frames a second is
 1 / 4.5 of the movement a frame, root mean square. Courses that have less than this share of the variance of the
 greatest one are left out. The latter chosen by hand."""
-FRAMES = math.sqrt(2.0) * COURSE_FRAMES
-"""Frames between independent movements, with straight lines between them, that have the same slope."""
+BETWEEN = 1.56
+"""Distance between independent movements, with straight lines between them and one standard deviation throughout, in
+standard deviations per slope: root mean square of 200 such movements."""
+FRAMES = BETWEEN * COURSE_FRAMES
+"""Frames between independent movements of most feet."""
 APART_MM = 1.0
 """Standard deviation of what the heads of a pair are apart. Chosen by hand."""
 SHOWS_X = 0.2
@@ -112,7 +115,7 @@ def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
         sizes_mm=sizes,
         y_mm=courses @ mean if is_clear else np.zeros(0),
         left_mm=(sizes[0], value),
-        left_frames=(FRAMES, math.sqrt(2.0) * value / slope),
+        left_frames=(FRAMES, BETWEEN * value / slope),
     )
 
 
