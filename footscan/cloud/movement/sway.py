@@ -32,9 +32,9 @@ COURSE_FRAMES, LEAST_SHARE = 4.5, 1e-4
 """Frames over which the foot stays about where it is: the slope of a movement of 0.2 to 1 Hz at 18 frames a second is
 1 / 4.5 of the movement a frame, root mean square. Courses that have less than this share of the variance of the
 greatest one are left out. The latter chosen by hand."""
-BETWEEN = 1.56
+BETWEEN = 1.6
 """Distance between independent movements, with straight lines between them and one standard deviation throughout, in
-standard deviations per slope: root mean square of 200 such movements."""
+standard deviations per slope: root mean square of 500 such movements."""
 FRAMES = BETWEEN * COURSE_FRAMES
 """Frames between independent movements of most feet."""
 APART_MM = 1.0

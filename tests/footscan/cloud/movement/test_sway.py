@@ -55,7 +55,7 @@ def test_a_foot_that_sways_a_little_is_moved_back_across_the_travel() -> None:
     assert report.left_by_axis_mm is not None
     assert report.left_frames is not None
     stated = [report.sway_by_axis_mm[1] / FEET_FRAMES, report.left_by_axis_mm[1] / report.left_frames[1]]
-    assert stated[1] < 0.7 * stated[0]
+    assert stated[1] < 0.8 * stated[0]
     assert "swayed by 0." in report.warnings[-1]
     np.testing.assert_allclose(moved["y"], points["y"] - way[points["frame"]], atol=1e-4)
     assert steadied(still, HEADS)[1].y_mm == []
