@@ -29,10 +29,8 @@ class MovementReport(Document):
     be there."""
     y_mm: list[Way] = Field(default_factory=list)
     """Way along Y by which the foot was moved back, from frame 0 on; empty if it was not."""
-    left_by_axis_mm: tuple[Length, Length] | None = None
-    """Standard deviation of the slow movement that is left, along X and along Y; None if that is all of it."""
-    left_frames: tuple[Length, Length] | None = None
-    """Frames between independent movements of what is left; None for those of most feet."""
+    left_y_mm: list[Length] = Field(default_factory=list)
+    """Standard deviation of the slow movement along Y that is left, from frame 0 on; empty if that is all of it."""
     warnings: list[str] = Field(default_factory=list)
     doubt: str | None = None
     """Reason for which measures are uncertain, if the foot moved so that it cannot be moved back."""

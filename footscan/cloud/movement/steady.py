@@ -54,8 +54,7 @@ def steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArra
     left = {
         "warnings": warnings,
         "y_mm": np.round(sway.y_mm, 4).tolist(),
-        "left_by_axis_mm": tuple(round(size, 4) for size in sway.left_mm),
-        "left_frames": tuple(round(frames, 2) for frames in sway.left_frames),
+        "left_y_mm": np.round(sway.left_y_mm, 4).tolist(),
     }
     report = report.model_copy(update=left)
     return _moved_back(points, ("y",), sway.y_mm, 0), report

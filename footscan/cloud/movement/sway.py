@@ -32,20 +32,20 @@ COURSE_FRAMES, LEAST_SHARE = 4.5, 1e-4
 """Frames over which the foot stays about where it is: the slope of a movement of 0.2 to 1 Hz at 18 frames a second is
 1 / 4.5 of the movement a frame, root mean square. Courses that have less than this share of the variance of the
 greatest one are left out. The latter chosen by hand."""
-BETWEEN = 1.6
-"""Distance between independent movements, with straight lines between them and one standard deviation throughout, in
-standard deviations per slope: root mean square of 500 such movements."""
-FRAMES = BETWEEN * COURSE_FRAMES
-"""Frames between independent movements of most feet."""
+FRAMES = 1.6 * COURSE_FRAMES
+"""Frames between independent movements that have this slope, with straight lines between them and one standard
+deviation throughout: 1.6 by 500 such movements, drawn at random."""
 APART_MM = 1.0
 """Standard deviation of what the heads of a pair are apart. Chosen by hand."""
 SHOWS_X = 0.2
 """Share of the evidence for a movement along X that counts: maps and planes of two heads that differ look like one,
 since either displaces skin by its slope. Chosen by hand, after scanners with feet that stand still (`draw_assembled`,
 seeds 6228 to 6233)."""
-CLEAR = 3.0
-"""Logarithm of the odds for a movement along Y, against the smallest size, from which the foot is moved back. Chosen by
-hand, after the same feet and 17 that sway (`draw_moving`, seeds 7410 to 7449, 7523 and 7525)."""
+CLEAR, DOUBTFUL = 6.0, 1.3
+"""Logarithm of the odds for a movement along Y, against the smallest size, from which the foot is moved back, and the
+factor by which what is left is larger than it seems. Chosen by hand, after the same feet, also filmed, and 17 that sway
+(`draw_moving`, seeds 7410 to 7449, 7523 and 7525): odds of a still foot reach 4, and the slope of what is left is 0.7
+to 1.9 of what it seems."""
 FEWEST = 200
 """Comparisons that show a movement."""
 LEAST_LAG_FRAMES = 0.5
@@ -67,10 +67,9 @@ class Sway(NamedTuple):
     """Standard deviations"""
     y_mm: Floats
     """(F,) way along Y from the first frame of a scan on; empty if it is not clear"""
-    left_mm: tuple[float, float]
-    """Standard deviations of what is left when the foot was moved back by it"""
-    left_frames: tuple[float, float]
-    """Frames between independent movements of what is left"""
+    left_y_mm: Floats
+    """(F,) standard deviations of what is left along Y when the foot was moved back: those of a movement with `FRAMES`
+    between independent ones that has the same slope"""
 
 
 def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
@@ -109,14 +108,9 @@ def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
     of_y = slice(count, 2 * count)
     mean, covariance = (covariance @ right)[of_y], covariance[of_y, of_y]
     second = np.asarray(covariance if is_clear else covariance + np.outer(mean, mean))
-    compared = contradictions.frames[:, 0].astype(np.intp)
-    value, slope = (_deviation(one[compared], second) for one in (courses, np.diff(courses, axis=0)))
-    return Sway(
-        sizes_mm=sizes,
-        y_mm=courses @ mean if is_clear else np.zeros(0),
-        left_mm=(sizes[0], value),
-        left_frames=(FRAMES, BETWEEN * value / slope),
-    )
+    slopes = np.gradient(courses, axis=0)
+    left = DOUBTFUL * COURSE_FRAMES * np.sqrt(np.einsum("fi,ij,fj->f", slopes, second, slopes))
+    return Sway(sizes, courses @ mean if is_clear else np.zeros(0), left)
 
 
 class _Contradictions(NamedTuple):
@@ -243,8 +237,3 @@ def _expected_mm(evidence: Floats) -> float:
     likely = evidence - 0.5 * (np.log(SIZES_MM / USUAL_MM) / math.log(FACTOR)) ** 2
     weights = np.exp(likely - likely.max())
     return float(np.sqrt(weights @ SIZES_MM**2 / weights.sum()))
-
-
-def _deviation(courses: Floats, covariance: Floats) -> float:
-    """Standard deviation of the movement by courses (F, C), root mean square of all frames."""
-    return float(np.sqrt(np.mean(np.einsum("fi,ij,fj->f", courses, covariance, courses))))

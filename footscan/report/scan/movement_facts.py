@@ -18,8 +18,8 @@ def movement_facts(movement: MovementReport) -> str:
     if movement.sway_by_axis_mm is None:
         return facts(pairs) + _UNSEEN
     along, across = (f"{number(size, 2)} mm" for size in movement.sway_by_axis_mm)
-    if movement.y_mm and movement.left_by_axis_mm is not None:
-        across += f", moved back but for {number(movement.left_by_axis_mm[1], 2)} mm"
+    if movement.y_mm:
+        across += ", moved back"
     return facts([*pairs, ("Slow movement along X", along), ("Slow movement along Y", across)])
 
 

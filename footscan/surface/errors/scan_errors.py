@@ -101,8 +101,8 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
         ErrorField("cameras", everywhere * OF_DISAGREEMENT * systematic(points, evidence.agreement), WIDE_MM),
         ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, filmed_mm),
         *(
-            ErrorField("sway", sway_mm * normals[:, axis], frames * step_mm, filmed_mm)
-            for axis, (sway_mm, frames) in enumerate(_sway(evidence.movement))
+            ErrorField("sway", size_mm * normals[:, axis], FRAMES * step_mm, filmed_mm)
+            for axis, size_mm in enumerate(_sway(evidence.movement, filmed_mm / step_mm))
         ),
     ]
     return ScanErrors(fields, np.any([gap_mm > RELIABLE_MM, *(end.is_unseen(vertices[:, 0]) for end in ends)], axis=0))
@@ -117,8 +117,10 @@ def _moved_mm(movement: MovementReport | None) -> float:
     return max(movement.tremor_mm, OF_TREMOR * math.sqrt(max(movement.tremor_mm**2 - FORM_MM**2, 0.0)))
 
 
-def _sway(movement: MovementReport | None) -> list[tuple[float, float]]:
-    """Standard deviation, mm, of the slow movement along X and along Y, and the frames between independent ones."""
-    seen = None if movement is None else movement.left_by_axis_mm or movement.sway_by_axis_mm
-    frames = None if movement is None else movement.left_frames
-    return list(zip(seen or (UNSEEN_SWAY_MM,) * 2, frames or (FRAMES,) * 2, strict=True))
+def _sway(movement: MovementReport | None, filmed: Floats) -> tuple[Floats | float, Floats | float]:
+    """Standard deviations, mm, of the slow movement along X and along Y, at the frames `filmed` (V,)."""
+    if movement is None or movement.sway_by_axis_mm is None:
+        return UNSEEN_SWAY_MM, UNSEEN_SWAY_MM
+    x, y = movement.sway_by_axis_mm
+    left = movement.left_y_mm
+    return x, np.interp(filmed, np.arange(len(left)), left) if left else y
