@@ -17,6 +17,7 @@ from scipy.special import logsumexp
 
 from footscan.cloud.fusion.agreement import find_overlaps
 from footscan.cloud.fusion.stripes import Floats, Stripes
+from footscan.cloud.movement.pace import PACE_FRAMES
 from footscan.cloud.movement.tremor import LEAST_MM, STEEPEST, chord_beside
 from footscan.robust import MAD_TO_SD, cauchy_weights
 
@@ -28,13 +29,8 @@ CENTRE = np.array([0.0, 50.0])
 """Y and Z, mm, about which heads are turned: the middle of the scan volume."""
 TURN_MM = 50.0
 """Distance from there at which a turn is counted in mm."""
-COURSE_FRAMES, LEAST_SHARE = 4.5, 1e-4
-"""Frames over which the foot stays about where it is: the slope of a movement of 0.2 to 1 Hz at 18 frames a second is
-1 / 4.5 of the movement a frame, root mean square. Courses that have less than this share of the variance of the
-greatest one are left out. The latter chosen by hand."""
-FRAMES = 1.6 * COURSE_FRAMES
-"""Frames between independent movements that have this slope, with straight lines between them and one standard
-deviation throughout: 1.6 by 500 such movements, drawn at random."""
+LEAST_SHARE = 1e-4
+"""Courses that have less than this share of the variance of the greatest one are left out. Chosen by hand."""
 APART_MM = 1.0
 """Standard deviation of what the heads of a pair are apart. Chosen by hand."""
 SHOWS_X = 0.2
@@ -68,8 +64,8 @@ class Sway(NamedTuple):
     y_mm: Floats
     """(F,) way along Y from the first frame of a scan on; empty if it is not clear"""
     left_y_mm: Floats
-    """(F,) standard deviations of what is left along Y when the foot was moved back: those of a movement with `FRAMES`
-    between independent ones that has the same slope"""
+    """(F,) standard deviations of what is left along Y when the foot was moved back: those of a movement at the usual
+    pace that has the same slope"""
 
 
 def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
@@ -109,7 +105,7 @@ def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
     mean, covariance = (covariance @ right)[of_y], covariance[of_y, of_y]
     second = np.asarray(covariance if is_clear else covariance + np.outer(mean, mean))
     slopes = np.gradient(courses, axis=0)
-    left = DOUBTFUL * COURSE_FRAMES * np.sqrt(np.einsum("fi,ij,fj->f", slopes, second, slopes))
+    left = DOUBTFUL * PACE_FRAMES * np.sqrt(np.einsum("fi,ij,fj->f", slopes, second, slopes))
     return Sway(sizes, courses @ mean if is_clear else np.zeros(0), left)
 
 
@@ -180,7 +176,7 @@ def _frames_at(stripes: Stripes, asked: Ints, of_camera: NDArray[np.bool_]) -> F
 def _courses(count: int) -> Floats:
     """(F, C) the principal components of smooth movements in F frames, each with the standard deviation that it has."""
     number = np.arange(count)
-    variances, courses = np.linalg.eigh(np.exp(-0.5 * ((number[:, None] - number) / COURSE_FRAMES) ** 2))
+    variances, courses = np.linalg.eigh(np.exp(-0.5 * ((number[:, None] - number) / PACE_FRAMES) ** 2))
     much = variances > LEAST_SHARE * variances[-1]
     return np.asarray(courses[:, much] * np.sqrt(variances[much]))
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from footscan.cloud.movement.sway import FRAMES
+from footscan.cloud.movement.pace import FRAMES_BETWEEN
 from footscan.cloud.points import stripe_step
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
@@ -101,7 +101,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
         ErrorField("cameras", everywhere * OF_DISAGREEMENT * systematic(points, evidence.agreement), WIDE_MM),
         ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, filmed_mm),
         *(
-            ErrorField("sway", size_mm * normals[:, axis], FRAMES * step_mm, filmed_mm)
+            ErrorField("sway", size_mm * normals[:, axis], FRAMES_BETWEEN * step_mm, filmed_mm)
             for axis, size_mm in enumerate(_sway(evidence.movement, filmed_mm / step_mm))
         ),
     ]
