@@ -7,7 +7,7 @@ Heads whose planes coincide show nothing.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +29,9 @@ CENTRE = np.array([0.0, 50.0])
 """Y and Z, mm, about which heads are turned: the middle of the scan volume."""
 TURN_MM = 50.0
 """Distance from there at which a turn is counted in mm."""
+PACES_FRAMES = np.geomspace(3.0, 10.0, 4)
+"""Paces that are tried: those of movements at 1 to 0.3 Hz at 18 frames a second. What is slower looks like errors of
+the cameras' maps, and hardly moves landmarks."""
 LEAST_SHARE = 1e-4
 """Courses that have less than this share of the variance of the greatest one are left out. Chosen by hand."""
 APART_MM = 1.0
@@ -39,15 +42,15 @@ since either displaces skin by its slope. Chosen by hand, after scanners with fe
 seeds 6228 to 6233)."""
 CLEAR, DOUBTFUL = 6.0, 1.3
 """Logarithm of the odds for a movement along Y, against the smallest size, from which the foot is moved back, and the
-factor by which what is left is larger than it seems. Chosen by hand, after the same feet, also filmed, and 17 that sway
-(`draw_moving`, seeds 7410 to 7449, 7523 and 7525): odds of a still foot reach 4, and the slope of what is left is 0.7
-to 1.9 of what it seems."""
+factor by which what is left is larger than it seems. Chosen by hand, after the same feet, also filmed, and 18 that sway
+(`draw_moving`, seeds 7410 to 7449, 7523, 7525 and 7594): odds of a still foot reach 4, and the slope of what is left is
+0.1 to 1.8 of what it seems."""
 FEWEST = 200
 """Comparisons that show a movement."""
 LEAST_LAG_FRAMES = 0.5
 """Frames between two heads at the same skin, root mean square, in which a foot moves enough to be seen: one that sways
 by 0.1 mm moves by 0.01 mm, which is less than the maps of the cameras differ by. Chosen by hand."""
-ROUNDS = 8
+ROUNDS = 6
 """Iterations of the reweighted least squares: a bound of time."""
 SIZES_MM = 0.025 * 2.0 ** np.arange(7)
 """Standard deviations of the movement along an axis that are tried: those of a foot that stands on glass, to those of
@@ -60,20 +63,19 @@ class Sway(NamedTuple):
     """The slow movement of a foot, along X and along Y."""
 
     sizes_mm: tuple[float, float]
-    """Standard deviations"""
+    """Standard deviations of a movement at the usual pace that has the same slope"""
     y_mm: Floats
     """(F,) way along Y from the first frame of a scan on; empty if it is not clear"""
     left_y_mm: Floats
-    """(F,) standard deviations of what is left along Y when the foot was moved back: those of a movement at the usual
-    pace that has the same slope"""
+    """(F,) those of what is left along Y when the foot was moved back"""
 
 
 def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
     """Estimate the slow movement of a foot.
 
-    Sizes are root mean squares over the probability of each size, given the comparisons; where these show little, the
-    size is that of most feet. What a head that is shifted or turned as a whole adds to the distances is estimated along
-    with the movement, for each pair of heads.
+    Sizes are root mean squares over the probability of each size and pace, given the comparisons; where these show
+    little, the size is that of most feet. What a head that is shifted or turned as a whole adds to the distances is
+    estimated along with the movement, for each pair of heads.
 
     Parameters
     ----------
@@ -87,26 +89,63 @@ def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
     contradictions = _contradictions(stripes, heads)
     if len(contradictions.distance) < FEWEST or contradictions.lag_frames < LEAST_LAG_FRAMES:
         return None
-    courses = _courses(int(contradictions.frames.max()) + 2)
+    at_paces = [_at_pace(contradictions, pace) for pace in PACES_FRAMES]
+    share_x = _probability(SHOWS_X * np.array([found.along_x for found in at_paces]))
+    along_y = np.array([found.along_y for found in at_paces])
+    share_y = _probability(along_y)
+    x, y = (math.sqrt(np.sum(share * SIZES_MM**2)) for share in (share_x, share_y))
+    of_pace = share_y.sum(axis=1)
+    way = of_pace @ [found.way for found in at_paces]
+    second = of_pace @ [found.slope_variance + np.gradient(found.way) ** 2 for found in at_paces]
+    is_clear = along_y.max() > CLEAR
+    left = DOUBTFUL * PACE_FRAMES * np.sqrt(second - np.gradient(way) ** 2 if is_clear else second)
+    return Sway((x, y), way if is_clear else np.zeros(0), left)
+
+
+class _AtPace(NamedTuple):
+    """What S sizes of a movement at one pace, along X and along Y, explain in F frames."""
+
+    along_x: Floats
+    """(S,) logarithms of their odds against the smallest size"""
+    along_y: Floats
+    way: Floats
+    """(F,) expected way along Y, mm"""
+    slope_variance: Floats
+    """(F,) variance of its slope, mm^2 by frame"""
+
+
+def _at_pace(contradictions: "_Contradictions", pace: float) -> _AtPace:
+    """Robust least squares for a movement at one pace, under all sizes."""
+    courses = _courses(int(contradictions.frames.max()) + 2, pace)
     change, count = _change(contradictions, courses), courses.shape[1]
     # The points of a stripe err together: each stripe is one comparison with another camera.
     shows = contradictions.stripes / len(contradictions.distance)
-    normal, right = _normal_equations(
-        change, contradictions.distance, shows, _prior(change, count, (USUAL_MM, USUAL_MM))
-    )
+    prior = _prior(change, count, (USUAL_MM, USUAL_MM))
+    normal, right = _normal_equations(change, contradictions.distance, shows, prior)
     evidence = np.array(
         [[_log_evidence(normal, right, _prior(change, count, (x, y))) for y in SIZES_MM] for x in SIZES_MM]
     )
-    along_y = logsumexp(evidence, axis=0)
-    sizes = _expected_mm(SHOWS_X * logsumexp(evidence, axis=1)), _expected_mm(along_y)
-    is_clear = along_y.max() > along_y[0] + CLEAR
-    covariance = np.linalg.inv(normal + np.diag(_prior(change, count, sizes)))
-    of_y = slice(count, 2 * count)
-    mean, covariance = (covariance @ right)[of_y], covariance[of_y, of_y]
-    second = np.asarray(covariance if is_clear else covariance + np.outer(mean, mean))
-    slopes = np.gradient(courses, axis=0)
-    left = DOUBTFUL * PACE_FRAMES * np.sqrt(np.einsum("fi,ij,fj->f", slopes, second, slopes))
-    return Sway(sizes, courses @ mean if is_clear else np.zeros(0), left)
+    along_x, along_y = logsumexp(evidence, axis=1), logsumexp(evidence, axis=0)
+    sizes = _expected_mm(SHOWS_X * along_x), _expected_mm(along_y)
+    covariance = np.asarray(np.linalg.inv(normal + np.diag(_prior(change, count, sizes))))
+    of_y, slopes = slice(count, 2 * count), np.gradient(courses, axis=0)
+    return _AtPace(
+        along_x=along_x - along_x[0],
+        along_y=along_y - along_y[0],
+        way=courses @ (covariance @ right)[of_y],
+        slope_variance=np.einsum("fi,ij,fj->f", slopes, covariance[of_y, of_y], slopes),
+    )
+
+
+def _expected_mm(evidence: Floats) -> float:
+    """Root mean square of the sizes over their probability, given the logarithms (S,) of their evidence."""
+    return math.sqrt(_probability(evidence) @ SIZES_MM**2)
+
+
+def _probability(evidence: Floats) -> Floats:
+    """Probabilities (..., S) of sizes by the logarithms of their evidence; their sum is 1."""
+    likely = evidence - 0.5 * (np.log(SIZES_MM / USUAL_MM) / math.log(FACTOR)) ** 2
+    return np.asarray(np.exp(likely - logsumexp(likely)))
 
 
 class _Contradictions(NamedTuple):
@@ -173,12 +212,13 @@ def _frames_at(stripes: Stripes, asked: Ints, of_camera: NDArray[np.bool_]) -> F
     return np.asarray(np.interp(stripes.x[asked] - places[asked] @ ahead, planes[order], frames[order]))
 
 
-def _courses(count: int) -> Floats:
-    """(F, C) the principal components of smooth movements in F frames, each with the standard deviation that it has."""
+def _courses(count: int, pace: float) -> Floats:
+    """(F, C) principal components of movements at a pace in F frames, each with the standard deviation
+    that it has if the slope is that of 1 mm at the usual pace."""
     number = np.arange(count)
-    variances, courses = np.linalg.eigh(np.exp(-0.5 * ((number[:, None] - number) / PACE_FRAMES) ** 2))
+    variances, courses = np.linalg.eigh(np.exp(-0.5 * ((number[:, None] - number) / pace) ** 2))
     much = variances > LEAST_SHARE * variances[-1]
-    return np.asarray(courses[:, much] * np.sqrt(variances[much]))
+    return np.asarray(courses[:, much] * np.sqrt(variances[much]) * pace / PACE_FRAMES)
 
 
 def _change(contradictions: _Contradictions, courses: Floats) -> Floats:
@@ -199,10 +239,10 @@ def _at(courses: Floats, frames: Floats) -> Floats:
     return np.asarray((1.0 - share) * courses[number] + share * courses[number + 1])
 
 
-def _prior(change: Floats, courses: int, sizes: Sequence[float] | Floats) -> Floats:
+def _prior(change: Floats, courses: int, sizes: tuple[float, float]) -> Floats:
     """Inverse variances of all unknowns, for movements of `sizes` along X and Y, mm."""
     pairs = change.shape[1] - 2 * courses
-    return np.repeat([*sizes, APART_MM], [courses, courses, pairs]) ** -2.0
+    return np.asarray(np.repeat([*sizes, APART_MM], [courses, courses, pairs]) ** -2.0)
 
 
 def _normal_equations(change: Floats, distance: Floats, shows: float, prior: Floats) -> tuple[Floats, Floats]:
@@ -226,10 +266,3 @@ def _log_evidence(normal: Floats, right: Floats, prior: Floats) -> float:
     lower = np.linalg.cholesky(normal + np.diag(prior))
     explained = np.sum(solve_triangular(lower, right, lower=True) ** 2)
     return float(0.5 * (explained + np.log(prior).sum()) - np.log(np.diag(lower)).sum())
-
-
-def _expected_mm(evidence: Floats) -> float:
-    """Root mean square of the sizes over their probability, given the logarithms (S,) of their evidence."""
-    likely = evidence - 0.5 * (np.log(SIZES_MM / USUAL_MM) / math.log(FACTOR)) ** 2
-    weights = np.exp(likely - likely.max())
-    return float(np.sqrt(weights @ SIZES_MM**2 / weights.sum()))

@@ -49,7 +49,7 @@ def test_a_foot_that_sways_a_little_is_moved_back_across_the_travel() -> None:
     moved, report = steadied(points, HEADS)
     way = np.array(report.y_mm)[:FRAMES]
     slopes = [np.sqrt(np.mean(np.diff(left[INNER]) ** 2)) for left in (swaying[0], swaying[0] - way)]
-    assert slopes[1] < 0.6 * slopes[0]
+    assert slopes[1] < 0.7 * slopes[0]
     assert report.sway_by_axis_mm is not None
     assert np.mean(report.left_y_mm[INNER]) < report.sway_by_axis_mm[1]
     assert "swayed by 0." in report.warnings[-1]
