@@ -29,8 +29,11 @@ class MovementReport(Document):
     be there."""
     y_mm: list[Way] = Field(default_factory=list)
     """Way along Y by which the foot was moved back, from frame 0 on; empty if it was not."""
+    left_x_mm: Length | None = None
+    """Standard deviation of a movement along X at 0.2 to 1 Hz that has the same slope as the slow one; None if it is
+    not known."""
     left_y_mm: list[Length] = Field(default_factory=list)
-    """Standard deviation of the slow movement along Y that is left, from frame 0 on; empty if that is all of it."""
+    """The same of what is left along Y, from frame 0 on; empty if it is not known."""
     warnings: list[str] = Field(default_factory=list)
     doubt: str | None = None
     """Reason for which measures are uncertain, if the foot moved so that it cannot be moved back."""

@@ -53,8 +53,8 @@ by 0.1 mm moves by 0.01 mm, which is less than the maps of the cameras differ by
 ROUNDS = 6
 """Iterations of the reweighted least squares: a bound of time."""
 SIZES_MM = 0.025 * 2.0 ** np.arange(7)
-"""Standard deviations of the movement along an axis that are tried: those of a foot that stands on glass, to those of
-one that steps."""
+"""Standard deviations of the movement along an axis that are tried, at the usual pace, and at others with the same
+slope: those of a foot that stands on glass, to those of one that steps."""
 USUAL_MM, FACTOR = 0.07, 2.0
 """Sizes of most feet: log-normal about the first, with this factor as standard deviation. Chosen by hand."""
 
@@ -63,11 +63,13 @@ class Sway(NamedTuple):
     """The slow movement of a foot, along X and along Y."""
 
     sizes_mm: tuple[float, float]
-    """Standard deviations of a movement at the usual pace that has the same slope"""
+    """Standard deviations"""
     y_mm: Floats
     """(F,) way along Y from the first frame of a scan on; empty if it is not clear"""
+    left_x_mm: float
+    """Standard deviation of a movement along X at the usual pace that has the same slope"""
     left_y_mm: Floats
-    """(F,) those of what is left along Y when the foot was moved back"""
+    """(F,) the same of what is left along Y when the foot was moved back"""
 
 
 def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
@@ -93,13 +95,15 @@ def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
     share_x = _probability(SHOWS_X * np.array([found.along_x for found in at_paces]))
     along_y = np.array([found.along_y for found in at_paces])
     share_y = _probability(along_y)
-    x, y = (math.sqrt(np.sum(share * SIZES_MM**2)) for share in (share_x, share_y))
+    # A movement that seems fast is not taken for a smaller one.
+    at_pace = SIZES_MM * np.maximum(PACES_FRAMES[:, None] / PACE_FRAMES, 1.0)
+    sizes = math.sqrt(np.sum(share_x * at_pace**2)), math.sqrt(np.sum(share_y * at_pace**2))
     of_pace = share_y.sum(axis=1)
     way = of_pace @ [found.way for found in at_paces]
     second = of_pace @ [found.slope_variance + np.gradient(found.way) ** 2 for found in at_paces]
     is_clear = along_y.max() > CLEAR
     left = DOUBTFUL * PACE_FRAMES * np.sqrt(second - np.gradient(way) ** 2 if is_clear else second)
-    return Sway((x, y), way if is_clear else np.zeros(0), left)
+    return Sway(sizes, way if is_clear else np.zeros(0), math.sqrt(np.sum(share_x * SIZES_MM**2)), left)
 
 
 class _AtPace(NamedTuple):

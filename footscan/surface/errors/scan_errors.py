@@ -122,5 +122,5 @@ def _sway(movement: MovementReport | None, filmed: Floats) -> tuple[Floats | flo
     if movement is None or movement.sway_by_axis_mm is None:
         return UNSEEN_SWAY_MM, UNSEEN_SWAY_MM
     x, y = movement.sway_by_axis_mm
-    left = movement.left_y_mm
-    return x, np.interp(filmed, np.arange(len(left)), left) if left else y
+    left_x, left_y = movement.left_x_mm, movement.left_y_mm
+    return x if left_x is None else left_x, np.interp(filmed, np.arange(len(left_y)), left_y) if left_y else y
