@@ -206,14 +206,15 @@ def _frames_at(stripes: Stripes, asked: Ints, of_camera: NDArray[np.bool_]) -> F
 
     Heads are turned against each other, so that a laser plane passes some of the skin earlier, and some later.
     """
-    points, places = stripes.points[of_camera], np.column_stack([np.ones(len(stripes.x)), stripes.yz])
+    points = stripes.points[of_camera]
     plane = points["plane"].astype(np.float64)
     # How far ahead of its middle a laser plane meets the skin is linear in Y and Z.
-    ahead = np.linalg.lstsq(places[of_camera], stripes.x[of_camera] - plane)[0]
+    terms, terms_asked = (np.insert(stripes.yz[rows], 0, 1.0, axis=1) for rows in (of_camera, asked))
+    ahead = np.linalg.lstsq(terms, stripes.x[of_camera] - plane)[0]
     frames, number = np.unique(points["frame"], return_inverse=True)
     planes = np.bincount(number, plane) / np.bincount(number)
     order = np.argsort(planes)
-    return np.asarray(np.interp(stripes.x[asked] - places[asked] @ ahead, planes[order], frames[order]))
+    return np.asarray(np.interp(stripes.x[asked] - terms_asked @ ahead, planes[order], frames[order]))
 
 
 def _courses(count: int, pace: float) -> Floats:
