@@ -37,6 +37,9 @@ AT_ONCE = 8192
 """Places whose surroundings are in the memory at once, some 20 MB: a bound of space."""
 FEWEST_AT_END = 20
 """Confirmed points that make an end of the skin along the travel. Chosen by hand."""
+STRIP_MM, BESIDE_MM = 1.0, 4.0
+"""Breadth of the strips along the travel that have ends of their own, and how far beside a strip points make its ends:
+together less than a small toe. Chosen by hand."""
 EXTRAPOLATED = 0.15
 """Largest usual error of an end of the foot that is extrapolated, in mm per mm. Chosen by hand."""
 FEW = 0.1
@@ -92,9 +95,9 @@ def _assigned(points: NDArray[np.void], views: Mapping[int, View], heads: Mappin
     strange |= ~decided & _vote(strange, decided, stripe)
     strange |= _not_yet_met(points, own, decided & ~strange, at_own > elsewhere + BETTER)
     decided |= strange
-    sure = decided & ~strange & (np.bincount(stripe, at_own > SURE) > 0)[stripe]
-    ends = _confirmed_ends(points, own, sure)
-    strange |= ~sure & _beyond_ends(points, ends, planes)
+    makes_end = (np.bincount(stripe, at_own > SURE) > 0)[stripe]
+    ends = _confirmed_ends(points, own, decided & ~strange & makes_end)
+    strange |= ~makes_end & _beyond_ends(points, ends, planes)
     confirmed = decided & ~strange
     doubtful = np.flatnonzero(~decided & ~strange)
     strange |= _met_other_laser(points, doubtful, confirmed, stripe, places, planes, ends)
@@ -132,15 +135,30 @@ def _not_yet_met(points: NDArray[np.void], head: Ints, confirmed: Mask, certain:
 
 
 def _confirmed_ends(points: NDArray[np.void], head: Ints, confirmed: Mask) -> Floats:
-    """X of the first and of the last confirmed place, (2, N) mm, for points of each head; infinite for points of heads
-    of which hardly any is confirmed, as with a single camera."""
-    x = np.sort(points["x"][confirmed])
+    """X of the first and of the last confirmed place beside each point, (2, N) mm, as each toe has an end of its own;
+    infinite for points of heads of which hardly any is confirmed, as with a single camera."""
     ends = np.repeat([[-np.inf], [np.inf]], len(points), axis=1)
-    if len(x) >= 2 * FEWEST_AT_END:
-        counts = np.bincount(head[confirmed], minlength=int(head.max()) + 1)
-        says = (counts > FEW * counts.max())[head]
-        ends[:, says] = x[[FEWEST_AT_END - 1, -FEWEST_AT_END], None]
+    sure = np.flatnonzero(confirmed)
+    if len(sure) < 2 * FEWEST_AT_END:
+        return ends
+    counts = np.bincount(head[sure], minlength=int(head.max()) + 1)
+    says = (counts > FEW * counts.max())[head]
+    sure = sure[np.argsort(points["y"][sure], kind="stable")]
+    x, y = points["x"][sure], points["y"][sure]
+    whole = _outermost(x)
+    strips = np.floor(points["y"] / STRIP_MM).astype(np.int64)
+    for strip in np.unique(strips[says]):
+        first, last = np.searchsorted(y, STRIP_MM * strip + [-BESIDE_MM, STRIP_MM + BESIDE_MM])
+        beside = x[first:last]
+        rows = says & (strips == strip)
+        ends[:, rows] = (_outermost(beside) if len(beside) >= 2 * FEWEST_AT_END else whole)[:, None]
     return ends
+
+
+def _outermost(x: Floats) -> Floats:
+    """The first and the last of `x` (N,) but for strays, (2,)."""
+    ordered = np.partition(x, [FEWEST_AT_END - 1, -FEWEST_AT_END])
+    return np.array([ordered[FEWEST_AT_END - 1], ordered[-FEWEST_AT_END]], np.float64)
 
 
 def _is_beyond(x: Floats, ends: Floats) -> Mask:

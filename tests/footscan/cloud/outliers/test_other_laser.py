@@ -142,10 +142,18 @@ def test_cameras_of_one_head_do_not_confirm_each_other_in_the_stripe_of_another_
     np.testing.assert_array_equal(found, np.repeat([True, True, False], len(y)))
 
 
+@pytest.mark.parametrize("next_toe_is_longer", [False, True])
 @pytest.mark.parametrize(("apart_mm", "is_dropped"), [(0.02, False), (0.15, True)])
-def test_a_stripe_on_which_cameras_hardly_agree_makes_no_end(apart_mm: float, is_dropped: bool) -> None:
-    """Cameras of two heads meet by chance in the plane of one of them, beyond the foot."""
+def test_a_stripe_on_which_cameras_hardly_agree_makes_no_end(
+    apart_mm: float, is_dropped: bool, next_toe_is_longer: bool
+) -> None:
+    """Cameras of two heads meet by chance in the plane of one of them, beyond the foot, or beyond one of its toes."""
     points, _ = scene()
+    if next_toe_is_longer:
+        longer = points[points["y"] > 15.0]
+        for name, way in (("frame", 18), ("x", 36.0), ("plane", 36.0)):
+            longer[name] += way
+        points = np.concatenate([points, longer])
     y = np.arange(-6.0, 6.0, 0.3)
     own_plane, plane = 44.0 + UPPER.offset_mm, 44.0 + LOWER.offset_mm
     beyond = np.column_stack([np.full(len(y), own_plane), y, np.full(len(y), 35.0)])
