@@ -54,8 +54,8 @@ def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Ma
 
     A point that no other camera confirms is of the laser of most points of its stripe, or of another head if hardly
     anything is confirmed of its own one in this frame. Where that says nothing, it is selected if it lies on the skin
-    that the confirmed points make in the plane of the other laser, and off it in its own one, or if it lies beyond all
-    confirmed ones along the travel. Stripes off the cap of a heel are selected whether they are confirmed or not.
+    that the confirmed points make in the plane of the other laser, and off it in its own one. Stripes on which cameras
+    hardly agree are selected beyond the end of the heel, or of their toe, and stripes off the cap of a heel always.
     Cameras whose calibration does not say where their laser plane lies are left as they are, unless the construction of
     a head says how far apart two lasers are.
     """
