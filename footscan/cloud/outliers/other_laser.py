@@ -145,13 +145,14 @@ def _confirmed_ends(points: NDArray[np.void], head: Ints, confirmed: Mask) -> Fl
     says = (counts > FEW * counts.max())[head]
     sure = sure[np.argsort(points["y"][sure], kind="stable")]
     x, y = points["x"][sure], points["y"][sure]
+    strip = np.floor(points["y"] / STRIP_MM).astype(np.intp)
+    strips = np.arange(strip.min(), strip.max() + 1)
+    first = np.searchsorted(y, STRIP_MM * strips - BESIDE_MM)
+    last = np.searchsorted(y, STRIP_MM * (strips + 1) + BESIDE_MM)
+    beside = [x[start:end] for start, end in zip(first, last, strict=True)]
     whole = _outermost(x)
-    strips = np.floor(points["y"] / STRIP_MM).astype(np.int64)
-    for strip in np.unique(strips[says]):
-        first, last = np.searchsorted(y, STRIP_MM * strip + [-BESIDE_MM, STRIP_MM + BESIDE_MM])
-        beside = x[first:last]
-        rows = says & (strips == strip)
-        ends[:, rows] = (_outermost(beside) if len(beside) >= 2 * FEWEST_AT_END else whole)[:, None]
+    of_strips = np.array([_outermost(one) if len(one) >= 2 * FEWEST_AT_END else whole for one in beside])
+    ends[:, says] = of_strips[strip[says] - strips[0]].T
     return ends
 
 
