@@ -22,14 +22,14 @@ GAP_STEPS = 2.5
 """Steps of the travel between two stripes up to which the second continues the first. Chosen by hand."""
 
 
-def ends_of(x: NDArray[np.floating]) -> tuple[float, float]:
-    """Least and greatest of N coordinates, N >= 5, that a few strays beyond do not move.
+def ends_of(x: NDArray[np.floating], fewest: int = FEWEST_AT_END) -> tuple[float, float]:
+    """Least and greatest of N coordinates, N >= `fewest`, that fewer strays beyond do not move.
 
     >>> ends_of(np.arange(100.0))
     (4.0, 95.0)
     """
-    ordered = np.sort(x.astype(np.float64))
-    return float(ordered[FEWEST_AT_END - 1]), float(ordered[-FEWEST_AT_END])
+    ordered = np.partition(x.astype(np.float64), [fewest - 1, -fewest])
+    return float(ordered[fewest - 1]), float(ordered[-fewest])
 
 
 def contested_ends(

@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from footscan.cloud.lasers.moments import renumbered
 from footscan.cloud.lasers.seen import BETTER, FARTHEST_MM, LEAST_MM, lasers_seen, stripe_numbers
+from footscan.cloud.outliers.contested import ends_of
 from footscan.cloud.outliers.heel_cap import is_off_cap
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.cloud.views import View
@@ -150,16 +151,10 @@ def _confirmed_ends(points: NDArray[np.void], head: Ints, confirmed: Mask) -> Fl
     first = np.searchsorted(y, STRIP_MM * strips - BESIDE_MM)
     last = np.searchsorted(y, STRIP_MM * (strips + 1) + BESIDE_MM)
     beside = [x[start:end] for start, end in zip(first, last, strict=True)]
-    whole = _outermost(x)
-    of_strips = np.array([_outermost(one) if len(one) >= 2 * FEWEST_AT_END else whole for one in beside])
+    whole = ends_of(x, FEWEST_AT_END)
+    of_strips = np.array([ends_of(one, FEWEST_AT_END) if len(one) >= 2 * FEWEST_AT_END else whole for one in beside])
     ends[:, says] = of_strips[strip[says] - strips[0]].T
     return ends
-
-
-def _outermost(x: Floats) -> Floats:
-    """The first and the last of `x` (N,) but for strays, (2,)."""
-    ordered = np.partition(x, [FEWEST_AT_END - 1, -FEWEST_AT_END])
-    return np.array([ordered[FEWEST_AT_END - 1], ordered[-FEWEST_AT_END]], np.float64)
 
 
 def _is_beyond(x: Floats, ends: Floats) -> Mask:
