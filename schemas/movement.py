@@ -33,7 +33,9 @@ class MovementReport(Document):
     """Standard deviation of a movement along X at 0.2 to 1 Hz that has the same slope as the slow one; None if it is
     not known."""
     left_y_mm: list[Length] = Field(default_factory=list)
-    """The same of what is left along Y, from frame 0 on; empty if it is not known."""
+    """Standard deviation of what is left along Y, from frame 0 on; empty if it is not known."""
+    left_y_frames: Annotated[float, Field(gt=0, le=1e3)] | None = None
+    """How slowly that varies: its standard deviation relative to that of its slope by frame; None if not known."""
     warnings: list[str] = Field(default_factory=list)
     doubt: str | None = None
     """Reason for which measures are uncertain, if the foot moved so that it cannot be moved back."""

@@ -56,6 +56,7 @@ def steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArra
         "y_mm": np.round(sway.y_mm, 4).tolist(),
         "left_x_mm": round(sway.left_x_mm, 4),
         "left_y_mm": np.round(sway.left_y_mm, 4).tolist(),
+        "left_y_frames": round(sway.left_y_frames, 3),
     }
     report = report.model_copy(update=left)
     return _moved_back(points, ("y",), sway.y_mm, 0), report

@@ -69,7 +69,9 @@ class Sway(NamedTuple):
     left_x_mm: float
     """Standard deviation of a movement along X at the usual pace that has the same slope"""
     left_y_mm: Floats
-    """(F,) the same of what is left along Y when the foot was moved back"""
+    """(F,) standard deviations of what is left along Y when the foot was moved back"""
+    left_y_frames: float
+    """Its pace: a standard deviation of it, relative to that of its slope by frame"""
 
 
 def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
@@ -100,10 +102,30 @@ def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
     sizes = math.sqrt(np.sum(share_x * at_pace**2)), math.sqrt(np.sum(share_y * at_pace**2))
     of_pace = share_y.sum(axis=1)
     way = of_pace @ [found.way for found in at_paces]
-    second = of_pace @ [found.slope_variance + np.gradient(found.way) ** 2 for found in at_paces]
+    moments = np.tensordot(of_pace, [found.covariance + np.outer(found.way, found.way) for found in at_paces], 1)
     is_clear = along_y.max() > CLEAR
-    left = DOUBTFUL * PACE_FRAMES * np.sqrt(second - np.gradient(way) ** 2 if is_clear else second)
-    return Sway(sizes, way if is_clear else np.zeros(0), math.sqrt(np.sum(share_x * SIZES_MM**2)), left)
+    if is_clear:
+        moments -= np.outer(way, way)
+    slope_mm = _deviations(moments, np.asarray(np.gradient(np.eye(len(way)), axis=0)))
+    left_mm, pace = PACE_FRAMES * slope_mm, PACE_FRAMES
+    if is_clear:
+        # What is left drifts: each error of the slope moves all later frames against all earlier ones.
+        compared = contradictions.frames.astype(np.intp)
+        is_compared = np.isin(np.arange(len(way)), compared)
+        left_mm = _deviations(moments, np.eye(len(way)) - is_compared / is_compared.sum())
+        pace = math.sqrt(np.mean(left_mm[is_compared] ** 2) / np.mean(slope_mm[is_compared] ** 2))
+    return Sway(
+        sizes_mm=sizes,
+        y_mm=way if is_clear else np.zeros(0),
+        left_x_mm=math.sqrt(np.sum(share_x * SIZES_MM**2)),
+        left_y_mm=DOUBTFUL * left_mm,
+        left_y_frames=pace,
+    )
+
+
+def _deviations(moments: Floats, terms: Floats) -> Floats:
+    """(T,) standard deviations of linear `terms` (T, F) of F values that have these second moments (F, F)."""
+    return np.asarray(np.sqrt(np.einsum("ti,ij,tj->t", terms, moments, terms, optimize=True)))
 
 
 class _AtPace(NamedTuple):
@@ -114,8 +136,8 @@ class _AtPace(NamedTuple):
     along_y: Floats
     way: Floats
     """(F,) expected way along Y, mm"""
-    slope_variance: Floats
-    """(F,) variance of its slope, mm^2 by frame"""
+    covariance: Floats
+    """(F, F) of that way, mm^2"""
 
 
 def _at_pace(contradictions: "_Contradictions", pace: float) -> _AtPace:
@@ -132,12 +154,12 @@ def _at_pace(contradictions: "_Contradictions", pace: float) -> _AtPace:
     along_x, along_y = logsumexp(evidence, axis=1), logsumexp(evidence, axis=0)
     sizes = _expected_mm(SHOWS_X * along_x), _expected_mm(along_y)
     covariance = np.asarray(np.linalg.inv(normal + np.diag(_prior(change, count, sizes))))
-    of_y, slopes = slice(count, 2 * count), np.gradient(courses, axis=0)
+    of_y = slice(count, 2 * count)
     return _AtPace(
         along_x=along_x - along_x[0],
         along_y=along_y - along_y[0],
         way=courses @ (covariance @ right)[of_y],
-        slope_variance=np.einsum("fi,ij,fj->f", slopes, covariance[of_y, of_y], slopes),
+        covariance=courses @ covariance[of_y, of_y] @ courses.T,
     )
 
 

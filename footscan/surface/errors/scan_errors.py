@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from footscan.cloud.movement.pace import FRAMES_BETWEEN
+from footscan.cloud.movement.pace import PACE_FRAMES, PACES_BETWEEN
 from footscan.cloud.points import stripe_step
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
@@ -101,8 +101,8 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
         ErrorField("cameras", everywhere * OF_DISAGREEMENT * systematic(points, evidence.agreement), WIDE_MM),
         ErrorField("tremor", _moved_mm(evidence.movement) * normals[:, 0], REACH_MM, filmed_mm),
         *(
-            ErrorField("sway", size_mm * normals[:, axis], FRAMES_BETWEEN * step_mm, filmed_mm)
-            for axis, size_mm in enumerate(_sway(evidence.movement, filmed_mm / step_mm))
+            ErrorField("sway", size_mm * normals[:, axis], PACES_BETWEEN * pace * step_mm, filmed_mm)
+            for axis, (size_mm, pace) in enumerate(_sway(evidence.movement, filmed_mm / step_mm))
         ),
     ]
     return ScanErrors(fields, np.any([gap_mm > RELIABLE_MM, *(end.is_unseen(vertices[:, 0]) for end in ends)], axis=0))
@@ -117,10 +117,13 @@ def _moved_mm(movement: MovementReport | None) -> float:
     return max(movement.tremor_mm, OF_TREMOR * math.sqrt(max(movement.tremor_mm**2 - FORM_MM**2, 0.0)))
 
 
-def _sway(movement: MovementReport | None, filmed: Floats) -> tuple[Floats | float, Floats | float]:
-    """Standard deviations, mm, of the slow movement along X and along Y, at the frames `filmed` (V,)."""
+def _sway(movement: MovementReport | None, filmed: Floats) -> tuple[tuple[Floats | float, float], ...]:
+    """Standard deviations, mm, at the frames `filmed` (V,), and pace in frames, of the slow movement along X and Y."""
     if movement is None or movement.sway_by_axis_mm is None:
-        return UNSEEN_SWAY_MM, UNSEEN_SWAY_MM
+        return ((UNSEEN_SWAY_MM, PACE_FRAMES),) * 2
     x, y = movement.sway_by_axis_mm
-    left_x, left_y = movement.left_x_mm, movement.left_y_mm
-    return x if left_x is None else left_x, np.interp(filmed, np.arange(len(left_y)), left_y) if left_y else y
+    left_x, left_y, left_y_frames = movement.left_x_mm, movement.left_y_mm, movement.left_y_frames
+    return (
+        (x if left_x is None else left_x, PACE_FRAMES),
+        (np.interp(filmed, np.arange(len(left_y)), left_y) if left_y else y, left_y_frames or PACE_FRAMES),
+    )

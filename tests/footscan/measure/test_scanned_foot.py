@@ -10,6 +10,7 @@ from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
 from footscan.surface.errors.ends import confirmed_ends
 from footscan.surface.errors.evidence import Evidence
+from footscan.surface.errors.field import ErrorField
 from footscan.surface.errors.scan_errors import scan_errors
 from footscan.virtual.foot.foot import make_foot
 from schemas.fusion import Disagreement, FusionReport, PairDisagreement
@@ -183,13 +184,26 @@ def test_heads_that_jitter_widen_what_rests_on_x(foot: Mesh) -> None:
     assert parts[1][1] < 0.05
 
 
-def test_a_foot_sways_as_fast_as_people_do(foot: Mesh) -> None:
-    sway = next(field for field in scan_errors(foot, Evidence()).fields if field.cause == "sway")
+def slope_of(sway: ErrorField) -> float:
+    """Slope along the travel, per mm, root mean square, of movements with a standard deviation of 1."""
     x = np.arange(0.0, 400.0, 0.1)
     movements = sway._replace(along_mm=x).shares(np.zeros((len(x), 3))).toarray()
-    slope = np.sqrt(np.mean(np.sum((np.diff(movements, axis=0) / 0.1) ** 2, axis=1)))  # of a movement of 1 mm
+    return float(np.sqrt(np.mean(np.sum((np.diff(movements, axis=0) / 0.1) ** 2, axis=1))))
+
+
+def test_a_foot_sways_as_fast_as_people_do(foot: Mesh) -> None:
+    sway = next(field for field in scan_errors(foot, Evidence()).fields if field.cause == "sway")
     hertz, frames_per_second, step_mm = np.linspace(0.2, 1.0, 81), 18.0, 2.0
-    assert slope == pytest.approx(2.0 * np.pi * np.sqrt(np.mean(hertz**2)) / frames_per_second / step_mm, rel=0.1)
+    expected = 2.0 * np.pi * np.sqrt(np.mean(hertz**2)) / frames_per_second / step_mm
+    assert slope_of(sway) == pytest.approx(expected, rel=0.1)
+
+
+def test_what_is_left_of_a_sway_drifts_as_slowly_as_the_report_says(foot: Mesh) -> None:
+    movement = STILL.model_copy(update={"left_y_mm": [0.1] * 300, "left_y_frames": 12.0})
+    along_x, along_y = (
+        field for field in scan_errors(foot, Evidence(movement=movement)).fields if field.cause == "sway"
+    )
+    assert slope_of(along_y) == pytest.approx(4.5 / 12.0 * slope_of(along_x), rel=0.1)
 
 
 def test_a_sway_moves_what_one_head_saw_against_what_another_saw(foot: Mesh) -> None:

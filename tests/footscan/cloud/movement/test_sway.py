@@ -52,6 +52,10 @@ def test_a_foot_that_sways_a_little_is_moved_back_across_the_travel() -> None:
     assert slopes[1] < 0.7 * slopes[0]
     assert report.sway_by_axis_mm is not None
     assert np.mean(report.left_y_mm[INNER]) < report.sway_by_axis_mm[1]
+    drift = (swaying[0] - way)[INNER][16:] - (swaying[0] - way)[INNER][:-16]
+    assert 0.4 < np.sqrt(np.mean(drift**2)) / (np.sqrt(2.0) * np.mean(report.left_y_mm[INNER])) < 1.6
+    assert report.left_y_frames is not None
+    assert 2.0 < report.left_y_frames < 8.0
     assert "swayed by 0." in report.warnings[-1]
     np.testing.assert_allclose(moved["y"], points["y"] - way[points["frame"]], atol=1e-4)
     assert steadied(still, HEADS)[1].y_mm == []
