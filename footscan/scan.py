@@ -12,13 +12,12 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cloud.clean import Cleaned, clean
 from footscan.cloud.fusion.fuse import Fusion, fuse
 from footscan.cloud.heads.find import find_heads
 from footscan.cloud.heads.planes import corrected, heads_of
 from footscan.cloud.mapping import map_stripe, refuse_other_size
-from footscan.cloud.movement.steady import steadied
 from footscan.cloud.normals import estimate_normals
-from footscan.cloud.outliers.remove import Removed, remove_outliers
 from footscan.cloud.points import POINT_DTYPE, of_cameras
 from footscan.cloud.views import View, views_of
 from footscan.frames.film import open_background, open_film
@@ -110,27 +109,20 @@ class OpenScan:
     @cached_property
     def _fused(self) -> Fusion:
         """`cloud` with the numbers of views, and how the cameras agree."""
-        return fuse(self._steadied[0], self.parameters.fusion, heads_of(self._views))
+        return fuse(self._cleaned.points, self.parameters.fusion, heads_of(self._views))
 
     @property
     def movement(self) -> MovementReport:
         """How far the foot moved during the scan; the points of `cloud` are moved back."""
-        return self._steadied[1]
-
-    @cached_property
-    def _steadied(self) -> tuple[NDArray[np.void], MovementReport]:
-        kept, _ = self._cleaned
-        if not len(kept):
-            raise Finding("every point is an outlier, expected a foot in the control volume")
-        return steadied(kept, heads_of(self._views))
+        return self._cleaned.movement
 
     @property
     def glass(self) -> GlassPlane:
         """The glass during the scan, from the skin on it; Finding where there are no points."""
-        return self._cleaned[1].glass
+        return self._cleaned.removed.glass
 
     @cached_property
-    def _cleaned(self) -> tuple[NDArray[np.void], Removed]:
+    def _cleaned(self) -> Cleaned:
         together = np.concatenate(list(self.points.values()))
         if not len(together):
             raise Finding("no stripe in any camera, expected a foot in the films")
@@ -139,7 +131,7 @@ class OpenScan:
             placed[camera][lost] = np.nan
         filmed = {one.view: placed[one.camera] + one.ahead_mm for one in self._used.cameras}
         together, views = corrected(together, self._views, self.heads)
-        return remove_outliers(together, views, self.parameters.outliers, filmed)
+        return clean(together, views, self.parameters.outliers, filmed)
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:
@@ -163,12 +155,12 @@ class OpenScan:
             doubts,
             Evidence(
                 cloud=self._fused.cloud,
-                seen=self._steadied[0],
-                parted_mm=self._cleaned[1].parted_mm,
+                seen=self._cleaned.points,
+                parted_mm=self._cleaned.removed.parted_mm,
                 agreement=self._fused.report,
                 movement=self.movement,
-                lasers=self._cleaned[1].lasers,
-                contested_mm=self._cleaned[1].contested_mm,
+                lasers=self._cleaned.removed.lasers,
+                contested_mm=self._cleaned.removed.contested_mm,
                 tip_doubts_mm=tip_doubts_mm(self.mesh),
             ),
         )

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cloud.clean import clean
 from footscan.cloud.heads.planes import corrected, heads_of
-from footscan.cloud.movement.steady import steadied
-from footscan.cloud.outliers.remove import remove_outliers
 from footscan.cloud.views import views_of
 from pipelines.arrays import pack, unpack
 from schemas.base.errors import Finding
@@ -42,11 +41,7 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
         raise Finding("no stripe in any camera, expected a foot in the films")
     filmed = {one.view: mapped[one.camera]["x_of_frame"] + one.ahead_mm for one in calibrated if one.camera in mapped}
     points, views = corrected(points, views, HeadsReport.model_validate_json(inputs["heads"]))
-    kept, removed = remove_outliers(points, views, parameters, filmed)
-    if not len(kept):
-        raise Finding("every point is an outlier, expected a foot in the control volume")
-    heads = heads_of(views)
-    kept, movement = steadied(kept, heads)
+    kept, removed, movement = clean(points, views, parameters, filmed)
     counts = {str(camera): reasons for camera, reasons in removed.counts.items()}
     return pack(
         points=kept,
@@ -58,7 +53,7 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
         lasers=removed.lasers,
         contested=np.array(removed.contested_mm),
         parted=removed.parted_mm,
-        heads=_json(heads),
+        heads=_json(heads_of(views)),
     )
 
 

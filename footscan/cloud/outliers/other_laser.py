@@ -1,6 +1,6 @@
 """Points of another head's laser, which a camera sees beside its own stripe where two planes are millimetres apart."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -10,8 +10,8 @@ from scipy.spatial import KDTree
 
 from footscan.cloud.lasers.moments import renumbered
 from footscan.cloud.lasers.seen import BETTER, FARTHEST_MM, LEAST_MM, lasers_seen, stripe_numbers
-from footscan.cloud.outliers.contested import ends_of
-from footscan.cloud.outliers.heel_cap import is_off_cap
+from footscan.cloud.outliers.contested import LEG_MM, ends_of
+from footscan.cloud.outliers.heel_cap import FIT_MM, is_off_cap
 from footscan.cloud.points import coordinates, stripe_step
 from footscan.cloud.views import View
 from footscan.side_by_side import together
@@ -60,6 +60,25 @@ def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Ma
     Cameras whose calibration does not say where their laser plane lies are left as they are, unless the construction of
     a head says how far apart two lasers are.
     """
+    return _selected(points, views, _assigned)
+
+
+def is_off_heel(points: NDArray[np.void], views: Mapping[int, View]) -> Mask:
+    """Select the points (N,) of `POINT_DTYPE` of stripes of other lasers on the heel of a foot that is held still."""
+    off, low = np.zeros(len(points), np.bool_), points["z"] < LEG_MM
+    if np.count_nonzero(low) > FEWEST_AT_END:
+        first, last = ends_of(points["x"][low], FEWEST_AT_END)
+        at_end = np.flatnonzero(low & ((points["x"] < first + FIT_MM) | (points["x"] > last - FIT_MM)))
+        off[at_end] = _selected(points[at_end], views, _off_cap)
+    return off
+
+
+def _selected(
+    points: NDArray[np.void],
+    views: Mapping[int, View],
+    select: Callable[[NDArray[np.void], Mapping[int, View], Mapping[int, int]], Mask],
+) -> Mask:
+    """What is selected of those points (N,) whose laser planes are known, by frame, camera and source."""
     strange = np.zeros(len(points), np.bool_)
     views = _with_planes(views)
     heads = {number: _sheet(number, view.plane.head) for number, view in views.items() if view.plane is not None}
@@ -68,8 +87,14 @@ def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Ma
         return strange
     of_moment = renumbered(points[known], views)
     order = np.lexsort([of_moment[name] for name in ("source", "camera", "frame")])
-    strange[known[order]] = _assigned(of_moment[order], views, heads)
+    strange[known[order]] = select(of_moment[order], views, heads)
     return strange
+
+
+def _off_cap(points: NDArray[np.void], views: Mapping[int, View], heads: Mapping[int, int]) -> Mask:
+    """Select the points of stripes off the cap of a heel, of points by frame, camera and source."""
+    seen = lasers_seen(points, views, heads)
+    return is_off_cap(coordinates(points), np.ones(len(points), np.bool_), stripe_numbers(seen.linked), seen.places)
 
 
 def _with_planes(views: Mapping[int, View]) -> Mapping[int, View]:

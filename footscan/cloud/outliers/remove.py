@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,13 @@ class Removed:
     """As of `lasers_of`."""
     contested_mm: tuple[float, float] = NOT_CONTESTED
     """As of `contested_ends`; nothing is contested where no other cameras were asked."""
+
+    def without(self, points: NDArray[np.void], selected: Mask, reason: str) -> "Removed":
+        """The report if of the `points` (N,) those kept ones (K,) that are `selected` are dropped, too."""
+        codes = self.codes.copy()
+        codes[np.flatnonzero(codes == KEPT)[selected]] = 1 + REASONS.index(reason)
+        counts = _count(camera_numbers(points), codes)
+        return replace(self, codes=codes, counts=counts, parted_mm=self.parted_mm[~selected])
 
 
 def remove_outliers(
