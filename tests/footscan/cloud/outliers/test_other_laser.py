@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from footscan.cloud.outliers.other_laser import is_of_other_laser
+from footscan.cloud.outliers.other_laser import is_of_other_laser, is_off_heel
 from footscan.cloud.points import make_points
 from footscan.cloud.views import View
 from schemas.calibration import LaserPlane
@@ -194,6 +194,32 @@ def test_a_stripe_that_nobody_else_sees_counts_where_it_continues_one_that_other
     points, _ = scene(LOWER_PAIR)
     np.testing.assert_array_equal(found_in(points, alone(11, y=(-3.0, 3.0), z=(60.0, 60.0))), True)
     np.testing.assert_array_equal(found_in(points, alone(11, y=(30.0, 36.0), z=(24.2, 28.0))), False)
+
+
+@pytest.mark.parametrize("tremor_mm", [0.0, 0.4])
+def test_the_stripe_of_another_laser_on_a_heel_is_found_when_the_foot_is_held_still(tremor_mm: float) -> None:
+    """Camera 3 sees the first ring of head 1 before its own laser meets the heel, a sphere that begins at X = 2 mm."""
+    angles, radius = np.linspace(0.0, 2.0 * np.pi, 150, endpoint=False), 30.0
+    parts = []
+    for frame in range(1, 8):
+        for camera, plane in ((1, UPPER), (2, UPPER), (3, LOWER)):
+            x = 2.0 * frame + plane.offset_mm
+            if x > 2.0:
+                across = np.sqrt(2.0 * radius * (x - 2.0) - (x - 2.0) ** 2)
+                ring = np.column_stack([np.full(150, x), across * np.cos(angles), 40.0 + across * np.sin(angles)])
+                parts.append(make_points(ring, camera, frame, plane=ring[:, 0]))
+    first = parts[0]
+    there = np.column_stack([first["x"], first["y"], first["z"]]).astype(np.float64)
+    own_plane = 2.0 + LOWER.offset_mm
+    eye = VIEWS[3].centre + np.array([own_plane, 0.0, 0.0])
+    seen = there + ((own_plane - there[0, 0]) / (eye[0] - there[0, 0])) * (eye - there)
+    points = np.concatenate([*parts, make_points(seen, 3, 1, plane=seen[:, 0])])
+    shift = tremor_mm * (-1.0) ** points["frame"]
+    points["x"] += shift
+    points["plane"] += shift
+    found = is_off_heel(points, VIEWS)
+    assert not found[: -len(seen)].any()
+    np.testing.assert_array_equal(found[-len(seen) :], tremor_mm == 0.0)
 
 
 def alone(frame: int, y: tuple[float, float], z: tuple[float, float]) -> np.ndarray:
