@@ -12,7 +12,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.clean import Cleaned, clean
+from footscan.clean import Cleaned, clean
 from footscan.cloud.fusion.fuse import Fusion, fuse
 from footscan.cloud.heads.find import find_heads
 from footscan.cloud.heads.planes import corrected, heads_of

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.clean import clean
+from footscan.clean import clean
 from footscan.cloud.heads.planes import corrected, heads_of
 from footscan.cloud.views import views_of
 from pipelines.arrays import pack, unpack

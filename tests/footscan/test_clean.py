@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from footscan.cloud import clean as module
-from footscan.cloud.clean import clean
+from footscan import clean as module
+from footscan.clean import clean
 from footscan.cloud.outliers.remove import KEPT, REASONS
 from schemas.base.errors import Finding
 from schemas.parameters.outliers import OutlierParameters
