@@ -64,7 +64,10 @@ def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Ma
 
 
 def is_off_heel(points: NDArray[np.void], views: Mapping[int, View]) -> Mask:
-    """Select the points (N,) of `POINT_DTYPE` of stripes of other lasers on the heel of a foot that is held still."""
+    """Select the points (N,) of `POINT_DTYPE` of stripes of other lasers on the heel of a foot that is held still.
+
+    Lasers are looked for at both ends alone: which one is the heel is not known, and the whole foot takes longer.
+    """
     off, low = np.zeros(len(points), np.bool_), points["z"] < LEG_MM
     if np.count_nonzero(low) > FEWEST_AT_END:
         first, last = ends_of(points["x"][low], FEWEST_AT_END)
