@@ -34,8 +34,8 @@ class Measure(Document):
     """None if it could not be measured."""
     unit: Unit
     status: Status
-    """"uncertain" has a value that rests on a fallback or on filled surface; "incomplete" has none, and a note that
-    says why."""
+    """"uncertain" has a value and a note with the reason, such as a fallback, filled surface, a large standard
+    deviation or a doubt about the whole scan; "incomplete" has no value, and a note that says why."""
     definition: str
     convention: Convention | None = None
     """The definition that it follows; None in files of earlier versions."""

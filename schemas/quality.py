@@ -126,7 +126,7 @@ class Quality(Document):
     """Whether it still held when it was last checked before the scan; null if it was not checked."""
     cameras: list[CameraQuality]
     warnings: list[str] = Field(default_factory=list)
-    """Sentences on cameras much of whose points are not the foot."""
+    """Sentences on points that were dropped, on a glass plate that was moved, and on movement of the foot."""
     heads: HeadsReport = Field(default_factory=HeadsReport)
     """Places of the heads along the travel, from the skin that cameras of two heads saw."""
     movement: MovementReport = Field(default_factory=MovementReport)

@@ -102,8 +102,8 @@ class FootSurface:
     def place(self, name: str) -> LandmarkQuantities:
         """The landmark `name`, with its derivatives by the displacements of the vertices.
 
-        The derivatives are known for summits and for the junction of foot and leg. Those of the landing point are 0,
-        since it hardly follows the surface. Those of all others, such as landmarks set by hand, are NaN.
+        The derivatives are known for summits and for the junction of foot and leg. Those of landmarks set by hand are
+        0, and so are those of the landing point, which hardly follows the surface. Those of all others are NaN.
 
         Raises
         ------

@@ -35,7 +35,7 @@ FILLED_SHARE = 0.05
 LARGEST_SD_MM, LARGEST_GIRTH_SD_MM = 1.0, 2.0
 """Standard deviations from which a length and a girth are uncertain: half of what ISO 20685-1:2018 allows a scanner to
 be off, 2 mm for the foot and 4 mm for small circumferences."""
-NO_SECOND_TOE = "the axis runs through the ball, since the second toe was not found"
+NO_SECOND_TOE = "the axis runs through the ball, since the second toe was not found: set toe_2_tip by footscan edit"
 HEIGHT, PRINT = "_height", "footprint"
 """Ending of the names of measures that count from the glass, and a word in the texts of those on the print."""
 ROUGH_MM = 0.05
@@ -352,7 +352,7 @@ def _measure(
         doubts.append(f"{100 * share:.0f} % of it rests on surface that was filled, or that one camera alone saw")
     surface_errors, scatter, glass_sd_mm = errors
     if scatter is not None and scatter.missing > MISSING_SHARE:
-        doubts.append(f"it cannot be measured in {100 * scatter.missing:.0f} % of the ways in which the scan may err")
+        doubts.append(f"{100 * scatter.missing:.0f} % of the replicates, displaced as the scan may err, do not have it")
     budget = with_landmarks(surface_errors.budget(quantity), scatter, quantity.value)
     if budget is not None and glass_sd_mm:
         lift = quantity.by_lift(surface.normals) if PRINT in definition.text else 1.0

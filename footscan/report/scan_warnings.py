@@ -30,7 +30,11 @@ def scan_warnings(measures: Measures, quality: Quality, recording: Recording | N
         *_latencies(filmed),
         *_agreement(quality),
         *_surface(quality),
-        *map(_sentence, [*quality.warnings, *quality.heads.warnings, *quality.fusion.warnings]),
+        *(
+            _sentence(warning)
+            for warning in (*quality.warnings, *quality.heads.warnings, *quality.fusion.warnings)
+            if warning not in measures.doubts
+        ),
         *_not_taken(measures),
         *_uncertain(measures),
     ]
@@ -64,7 +68,7 @@ def _doubts(measures: Measures, quality: Quality) -> Iterator[str]:
     check, heads = quality.calibration_check, quality.heads.doubt
     remedies: dict[str, str] = {}
     if heads is not None:
-        remedies[heads] = "Then scan again."
+        remedies[heads] = "" if "scan again" in heads else "Then scan again."
     if check is not None and check.doubt is not None:
         again = "'footscan calibrate capture', then scan again" if check.drifted else "'footscan calibrate check' again"
         remedies[check.doubt] = f"Put the reference object onto the glass and run {again}."
@@ -116,7 +120,10 @@ def _surface(quality: Quality) -> Iterator[str]:
     mesh = quality.mesh
     if mesh.holes:
         longest = f", the largest {number(mesh.largest_hole_mm)} mm around" if mesh.largest_hole_mm else ""
-        yield f"The surface is open ({mesh.holes} holes{longest}). Scan again."
+        yield (
+            f"The surface is open ({mesh.holes} holes{longest}): see that no camera is left out or covered, then scan "
+            "again."
+        )
     elif mesh.filled_share is not None and mesh.filled_share > FILLED_SHARES[1]:
         sparsest = min(quality.cameras, key=lambda camera: camera.points, default=None)
         fewest = "" if sparsest is None else f" Camera {sparsest.camera} gave the fewest points."
@@ -138,7 +145,10 @@ def _uncertain(measures: Measures) -> Iterator[str]:
     own = {n: measures.own_note(n) for n, m in measures.measures.items() if m.status == "uncertain"}
     uncertain = {name: note for name, note in own.items() if note or not in_common}
     if uncertain:
-        todo = "Do not rely on them alone, or set the landmarks by hand (footscan edit)."
+        todo = (
+            "Do not rely on them alone: the report shows what errs most. Mend that and scan again, or set a landmark "
+            "that a note names by hand (footscan edit)."
+        )
         yield f"Uncertain: {_named(uncertain)}. {todo}"
 
 

@@ -43,8 +43,8 @@ seeds 6228 to 6233)."""
 CLEAR, DOUBTFUL = 6.0, 1.3
 """Logarithm of the odds for a movement along Y, against the smallest size, from which the foot is moved back, and the
 factor by which what is left is larger than it seems. Chosen by hand, after the same feet, also filmed, and 18 that sway
-(`draw_moving`, seeds 7410 to 7449, 7523, 7525 and 7594): odds of a still foot reach 4, and the slope of what is left is
-0.1 to 1.8 of what it seems."""
+(`draw_moving`, seeds 7410 to 7449, 7523, 7525 and 7594): the logarithm for a still foot reaches 4, and the true slope
+of what is left is 0.1 to 1.8 times the estimated one."""
 FEWEST = 200
 """Comparisons that show a movement."""
 LEAST_LAG_FRAMES = 0.5
@@ -84,7 +84,7 @@ def sway_of(stripes: Stripes, heads: Mapping[int, int]) -> Sway | None:
     Parameters
     ----------
     stripes : of all cameras, without outliers, mm, scanner frame
-    heads : camera -> number of its head; frames of all heads with one number are of one moment
+    heads : camera -> number of its head; frames with one number are of one moment
 
     Returns
     -------

@@ -64,7 +64,7 @@ def is_of_other_laser(points: NDArray[np.void], views: Mapping[int, View]) -> Ma
 
 
 def is_off_heel(points: NDArray[np.void], views: Mapping[int, View]) -> Mask:
-    """Select the points (N,) of `POINT_DTYPE` of stripes of other lasers on the heel of a foot that is held still.
+    """Select the points (N,) of `POINT_DTYPE` of other lasers' stripes on a heel whose movement was taken back.
 
     Lasers are looked for at both ends alone: which one is the heel is not known, and the whole foot takes longer.
     """

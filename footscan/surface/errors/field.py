@@ -13,7 +13,7 @@ from schemas.measures import ErrorCause
 Floats = NDArray[np.float64]
 
 REACH_MM = 10.0
-"""Distance over which vertices share their error. Tuned on virtual feet: docs/surface.md."""
+"""Distance over which vertices share their error. Tuned on feet of the virtual scanner."""
 NARROW_MM = 3.0
 """The smaller distance over which vertices share noise, and what is filled at the ends: the tip of a toe moves to its
 side if one half of its cap errs. Chosen by hand, after scanners (`draw_assembled`, seeds 805 and 806) whose axes

@@ -79,7 +79,9 @@ def test_holes_and_what_was_filled() -> None:
     [line] = told(measures_of("right"), quality)
     assert line.startswith("31 % of the surface was seen by no camera. Camera 7 gave the fewest points.")
     quality["mesh"] |= {"holes": 2, "open_edges": 60}
-    assert told(measures_of("right"), quality) == ["The surface is open (2 holes). Scan again."]
+    assert told(measures_of("right"), quality) == [
+        "The surface is open (2 holes): see that no camera is left out or covered, then scan again."
+    ]
 
 
 def test_measures_that_were_not_taken_are_named_with_their_reasons() -> None:
@@ -129,8 +131,8 @@ def test_uncertain_measures_are_named_unless_all_are_for_one_reason() -> None:
         measures["measures"][name] |= {"status": "uncertain", "note": "ball by a fallback"}
     [line] = told(measures, quality_of())
     assert line == (
-        "Uncertain: Foot breadth, Ball girth: ball by a fallback. Do not rely on them alone, or set the landmarks by "
-        "hand (footscan edit)."
+        "Uncertain: Foot breadth, Ball girth: ball by a fallback. Do not rely on them alone: the report shows what "
+        "errs most. Mend that and scan again, or set a landmark that a note names by hand (footscan edit)."
     )
     measures["measures"]["ball_girth"]["note"] = "tilted by 9 degrees"
     [line] = told(measures, quality_of())
@@ -139,6 +141,12 @@ def test_uncertain_measures_are_named_unless_all_are_for_one_reason() -> None:
         measure |= {"status": "uncertain", "note": "a hand at the heel"}
     [line] = told(measures | {"things": ["a hand at the heel"]}, quality_of())
     assert line.startswith("A hand at the heel. All measures are uncertain. Take everything away")
+
+
+def test_a_doubt_about_the_whole_scan_is_listed_once() -> None:
+    doubt = "the foot moved slowly, by 0.5 mm (root mean square): scan again"
+    [line] = told(measures_of("right") | {"doubts": [doubt]}, quality_of() | {"warnings": [doubt]})
+    assert line == f"T{doubt[1:]}. All measures are uncertain."
 
 
 def test_the_stored_list_is_shown_and_an_older_file_gets_one() -> None:
