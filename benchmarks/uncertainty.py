@@ -1,12 +1,12 @@
 """Are the uncertainties true? |error| / sd of measures in worlds drawn at random, and how many stay `ok`.
 
-    .venv/bin/python -m benchmarks.uncertainty [FIRST COUNT [FOLDER [drawn | assembled | moving [points | films]]]]
+    .venv/bin/python -m benchmarks.uncertainty [FIRST COUNT [FOLDER [drawn | assembled | moving | passing [KIND]]]]
 
 The baseline is the standard normal: 68 % within one standard deviation, 99.7 % within three. `drawn` worlds have all
 faults at once (`draw_world`), most of them heads that the calibration has never seen: what counts are silent errors.
 `assembled` scanners (`draw_assembled`) are calibrated by a chart and the film of a body; their data allow all measures,
-so most should stay `ok`. `moving` ones (`draw_moving`) film a foot that sways and trembles by tenths of a millimetre.
-FOLDER keeps what came of each world.
+so most should stay `ok`. `moving` ones (`draw_moving`) film a foot that sways and trembles by tenths of a millimetre,
+`passing` ones (`draw_passing`) film it in two passes. KIND is points or films. FOLDER keeps what came of each world.
 """
 
 import sys
@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from footscan.calibration.travel.body import standard_body
-from footscan.virtual.worlds.draw import draw_assembled, draw_moving, draw_world
+from footscan.virtual.worlds.draw import draw_assembled, draw_moving, draw_passing, draw_world
 from pipelines.engine.pool import cores, local_cluster
 from pipelines.worlds.campaign import run_worlds
 from pipelines.worlds.sums import silent_by_name, sum_up
@@ -27,7 +27,7 @@ from schemas.parameters.scan import ScanParameters
 FIRST, COUNT = 5001, 60
 MAIN = ("foot_length", "foot_breadth", "ball_girth")
 """The measures that a world should keep `ok`."""
-DRAW = {"drawn": draw_world, "assembled": draw_assembled, "moving": draw_moving}
+DRAW = {"drawn": draw_world, "assembled": draw_assembled, "moving": draw_moving, "passing": draw_passing}
 
 
 def main() -> None:

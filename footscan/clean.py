@@ -1,12 +1,14 @@
-"""The points of a foot that is held still, without outliers."""
+"""The points of a foot without outliers, and with the movement of the foot taken back."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.heads.planes import heads_of
+from footscan.cloud.movement.passes import find_first_moments, heads_in_passes
 from footscan.cloud.movement.steady import steadied
 from footscan.cloud.outliers.other_laser import is_off_heel
 from footscan.cloud.outliers.remove import Removed, remove_outliers
@@ -30,8 +32,14 @@ def clean(
     views: Mapping[int, View],
     parameters: OutlierParameters,
     filmed: Mapping[int, NDArray[np.float64]] | None = None,
+    passes: Mapping[int, int] = MappingProxyType({}),
 ) -> Cleaned:
-    """Drop the outliers, and move the foot back to where it was on average; parameters as of `remove_outliers`.
+    """Drop the outliers, and move the foot back to where it was on average.
+
+    Parameters
+    ----------
+    points, views, parameters, filmed : as of `remove_outliers`
+    passes : camera -> number of the pass in which it filmed; 1 of all others
 
     Raises
     ------
@@ -41,7 +49,7 @@ def clean(
     kept, removed = remove_outliers(points, views, parameters, filmed)
     if not len(kept):
         raise Finding("every point is an outlier, expected a foot in the control volume")
-    kept, movement = steadied(kept, heads_of(views))
+    kept, movement = steadied(kept, heads_in_passes(heads_of(views), passes), find_first_moments(kept, passes))
     if movement.x_mm and parameters.method != "levels":
         # The heel of a foot that trembles has no smooth cap that shows the stripes of other lasers.
         off = is_off_heel(kept, views)

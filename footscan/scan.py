@@ -131,7 +131,7 @@ class OpenScan:
             placed[camera][lost] = np.nan
         filmed = {one.view: placed[one.camera] + one.ahead_mm for one in self._used.cameras}
         together, views = corrected(together, self._views, self.heads)
-        return clean(together, views, self.parameters.outliers, filmed)
+        return clean(together, views, self.parameters.outliers, filmed, self.recorded.document.later_passes)
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:

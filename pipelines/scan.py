@@ -164,7 +164,10 @@ def scan_steps(
     posture = choices.posture or scan.document.posture
     measured = _measure_parameters(scan.document.side, posture, choices.axis or "toe2")
     doubt = None if check is None else check.doubt
-    made = reconstruction_steps(scan.name, points, maps, parameters, measured, steps, doubt, _landmarks(decided))
+    passes = scan.document.later_passes
+    made = reconstruction_steps(
+        scan.name, points, maps, parameters, measured, steps, doubt, _landmarks(decided), passes
+    )
     heads, cleaned, fused, oriented, mesh, measures = made
     verified: dict[str, Output] = {}
     if (truth := scan.truth) is not None:
@@ -237,11 +240,13 @@ def reconstruction_steps(
     steps: list[Step],
     calibration_doubt: str | None = None,
     landmarks: Value | None = None,
+    passes: Mapping[int, int] | None = None,
 ) -> Reconstruction:
     """Add to `steps` those from the world points of all cameras, `points-N`, to measures.
 
     `name` is the name of the graph's scan, `maps` the calibration of its cameras, `calibration_doubt` a reason not to
-    rely on it, `landmarks` those that a person has set.
+    rely on it, `landmarks` those that a person has set, `passes` the number of the pass of each camera that did not
+    film in the first one.
     """
 
     def add(kind: str, own: Document, inputs: Mapping[str, Input]) -> Output:
@@ -250,7 +255,10 @@ def reconstruction_steps(
         return Output(steps[-1].name)
 
     heads = add("heads", parameters.heads, {**points, "calibration": maps})
-    cleaned = add("clean", parameters.outliers, {**points, "calibration": maps, "heads": heads})
+    clean_inputs: dict[str, Input] = {**points, "calibration": maps, "heads": heads}
+    if passes:
+        clean_inputs["passes"] = Value(canonical_json(passes).encode())
+    cleaned = add("clean", parameters.outliers, clean_inputs)
     fused = add("fuse", parameters.fusion, {"clean": cleaned})
     oriented = add("orient", parameters.normals, {"fused": fused, "calibration": maps})
     surface = add("surface", parameters.surface, {"oriented": oriented})

@@ -40,6 +40,8 @@ class CameraFilm(CameraSource):
     """The camera's own travel; default: the scan's."""
     positions: RelativePath | None = None
     """CSV with columns frame, x_mm for uneven steps; it wins over `travel`."""
+    pass_number: Annotated[int, Field(ge=1, le=MOST_CAMERA)] = 1
+    """Pass of the heads in which the camera filmed: a foot that moves is at one place for the cameras of one pass."""
 
 
 class Scan(Document):
@@ -76,6 +78,11 @@ class Scan(Document):
             if self.travel is None and camera.travel is None and camera.positions is None:
                 raise ValueError(f"camera {camera.id} has no travel, expected travel or positions")
         return self
+
+    @property
+    def later_passes(self) -> dict[int, int]:
+        """Camera -> number of its pass, of those that did not film in the first one."""
+        return {camera.id: camera.pass_number for camera in self.cameras if camera.pass_number > 1}
 
     @property
     def day(self) -> datetime.date | None:

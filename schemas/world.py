@@ -203,6 +203,8 @@ class WorldSubject(Document):
     """Amplitude of slow movement, 0.2 to 0.8 Hz."""
     shift_mm: tuple[Signed, Signed] = (0.0, 0.0)
     """X and Y by which the foot has moved before the pass of the lower head."""
+    wait_s: NotNegative = 0.0
+    """Time from the pass of the upper heads to that of the lower one; 0: all film at the same time."""
 
 
 class World(Document):

@@ -89,7 +89,7 @@ def store_films(
     films: dict[int, FilmFrames] = {}
     left_out: dict[int, str] = {}
     entries = []
-    for filmed in story.filmed:
+    for number, filmed in enumerate(story.filmed, start=1):
         for camera in (camera for camera in rig.cameras if camera.id in filmed.cameras):
             try:
                 film = _placed(story, camera, filmed, heads)
@@ -100,7 +100,8 @@ def store_films(
                 left_out[camera.id] = film.problem
                 continue
             films[camera.id] = film
-            entries.append(_store_camera(camera, film, filmed, heads, story, recording))
+            entry = _store_camera(camera, film, filmed, heads, story, recording)
+            entries.append(entry if number == 1 else {**entry, "pass_number": number})
     if left_out and (not keep_partial or not films):
         problems = "; ".join(f"camera {camera}: {problem}" for camera, problem in sorted(left_out.items()))
         raise Finding(f"the scan is incomplete: {problems}")

@@ -20,8 +20,9 @@ from schemas.parameters.outliers import OutlierParameters
 def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapping[str, Path]) -> bytes:
     """Remove the outliers from the points of all cameras.
 
-    `inputs`: `points-N` of each camera, the `calibration` of all, and `heads`, where they were. The result holds the
-    kept `points`, with the foot held still, the `codes` of all points, the counts of `removed` points by camera and
+    `inputs`: `points-N` of each camera, the `calibration` of all, `heads`, where they were, and `passes`, the number of
+    the pass of each camera that did not film in the first one, if there is any. The result holds the kept `points`,
+    with the movement of the foot taken back, the `codes` of all points, the counts of `removed` points by camera and
     reason, `warnings`, the `glass` below the foot, its `movement`, where the planes of its `lasers` lie, how far the
     ends are `contested`, X in mm, how far the stripes of other lasers are `parted` from the kept points, mm, and the
     `heads` of the cameras.
@@ -41,7 +42,8 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
         raise Finding("no stripe in any camera, expected a foot in the films")
     filmed = {one.view: mapped[one.camera]["x_of_frame"] + one.ahead_mm for one in calibrated if one.camera in mapped}
     points, views = corrected(points, views, HeadsReport.model_validate_json(inputs["heads"]))
-    kept, removed, movement = clean(points, views, parameters, filmed)
+    passes = {int(camera): number for camera, number in json.loads(inputs.get("passes", b"{}")).items()}
+    kept, removed, movement = clean(points, views, parameters, filmed, passes)
     counts = {str(camera): reasons for camera, reasons in removed.counts.items()}
     return pack(
         points=kept,

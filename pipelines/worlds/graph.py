@@ -137,7 +137,9 @@ def point_steps(world: World, parameters: ScanParameters, body: Body | None = No
         points[f"points-{camera}"] = graph.add("map", "map_points", mapped, parameters.mapping, camera)
     maps = graph.cameras(frozenset(machine.cameras))
     foot = MeasureParameters(side=world.subject.side)
-    made = reconstruction_steps(graph.name, points, maps, parameters, foot, graph.steps)
+    passes = {camera: machine.pass_number(head) for camera, head in machine.head_of.items()}
+    later = {camera: number for camera, number in passes.items() if number > 1}
+    made = reconstruction_steps(graph.name, points, maps, parameters, foot, graph.steps, passes=later)
     return graph.compare("points", {name: getattr(made, name) for name in RESULTS})
 
 

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.fusion.stripes import sort_stripes
+from footscan.cloud.movement.passes import first_moment
 from footscan.cloud.movement.sway import sway_of
 from footscan.cloud.movement.tremor import find_tremor
 from schemas.movement import MovementReport
@@ -19,14 +21,27 @@ SWAYED_MM = 0.1
 """Slow movement across the travel from which a person is asked to scan again. Chosen by hand."""
 
 
-def steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArray[np.void], MovementReport]:
+def steadied(
+    points: NDArray[np.void], heads: Mapping[int, int], first_moments: Mapping[int, int] = MappingProxyType({})
+) -> tuple[NDArray[np.void], MovementReport]:
     """Move the points of a foot that trembles or sways back to where it is on average.
 
     Parameters
     ----------
     points : (N,) of `POINT_DTYPE`, mm, scanner frame, of all cameras, without outliers
-    heads : camera -> number of its head; frames of all heads with one number are of one moment
+    heads : camera -> number of its head, another one in each pass
+    first_moments : camera -> moment of its frame 0; default: 0
     """
+    first = {camera: moment for camera, moment in first_moments.items() if moment}
+    of_moment = points.copy()
+    of_moment["frame"] += first_moment(points, first)
+    steady, report = _steadied(of_moment, heads)
+    steady["frame"] = points["frame"]
+    return steady, report.model_copy(update={"first_moments": first})
+
+
+def _steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArray[np.void], MovementReport]:
+    """`steadied`, of points whose frames are moments."""
     stripes = sort_stripes([points])
     report = find_tremor(stripes, heads)
     if report.x_mm:
@@ -48,8 +63,8 @@ def steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArra
     warnings = list(report.warnings)
     if len(sway.y_mm) and y >= SWAYED_MM:
         warnings.append(
-            f"the foot swayed by {y:.2f} mm across the travel (root mean square), and was moved back: scan again if it "
-            "can be held still"
+            f"the foot swayed by {y:.2f} mm across the travel (root mean square), and was moved back: if a measure is "
+            "uncertain, let the person sit or hold on to something, then scan again"
         )
     left = {
         "warnings": warnings,

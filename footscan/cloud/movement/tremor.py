@@ -15,6 +15,7 @@ from scipy.linalg import solveh_banded
 
 from footscan.cloud.fusion.agreement import GAP_STEPS
 from footscan.cloud.fusion.stripes import Floats, Stripes, traces_of, ways_to_neighbours
+from footscan.cloud.movement.passes import BETWEEN_PASSES
 from footscan.cloud.points import stripe_step
 from footscan.compiled import compiled
 from footscan.robust import MAD_TO_SD, cauchy_weights, huber_weights
@@ -68,7 +69,7 @@ def find_tremor(stripes: Stripes, heads: Mapping[int, int]) -> MovementReport:
     Parameters
     ----------
     stripes : of all cameras, without outliers, mm, scanner frame
-    heads : camera -> number of its head; frames of all heads with one number are of one moment
+    heads : camera -> number of its head; frames with one number are of one moment
     """
     comparisons = _compare(stripes)
     every = _moves(comparisons, np.ones(len(comparisons.frame), np.bool_))
@@ -82,15 +83,19 @@ def find_tremor(stripes: Stripes, heads: Mapping[int, int]) -> MovementReport:
     agreement = _agreement(comparisons, heads)
     report = report.model_copy(update={"agreement": agreement})
     if agreement is not None and agreement < LEAST_AGREEMENT:
-        return report
+        shaken = (
+            f"stripes jump by {tremor:.2f} mm (root mean square) from frame to frame, and heads do not agree on it: "
+            "look for play in rails and belts, then scan again"
+        )
+        return report.model_copy(update={"warnings": [shaken]})
     way = _continued(x, known)
     return report.model_copy(
         update={
             "first_frame": max(every.first - CONTINUED, 0),
             "x_mm": np.round(way[max(CONTINUED - every.first, 0) :], 4).tolist(),
             "warnings": [
-                f"the foot trembled by {tremor:.2f} mm (root mean square), and was moved back: scan again if it can be "
-                "held still"
+                f"the foot trembled by {tremor:.2f} mm (root mean square), and was moved back: if a measure is "
+                "uncertain, let the person sit or hold on to something, then scan again"
             ],
         }
     )
@@ -209,7 +214,7 @@ def _integrated(moves: FrameMoves) -> Floats:
 
 def _continued(x: Floats, known: NDArray[np.bool_]) -> Floats:
     """(F + 2 `CONTINUED`,) the movement x (F,) up to `CONTINUED` frames before and after, and at the ends of what is
-    known: each frame by the two that follow it inwards. That is exact for a tremor of one frequency.
+    known of a pass: each frame by the two that follow it inwards. That is exact for a tremor of one frequency.
 
     >>> tremor = np.sin(2.5 * np.arange(40.0))
     >>> found = _continued(tremor, np.ones(40, np.bool_))
@@ -217,9 +222,16 @@ def _continued(x: Floats, known: NDArray[np.bool_]) -> Floats:
     0.0
     """
     way = np.concatenate([np.zeros(CONTINUED), np.where(known, x, 0.0), np.zeros(CONTINUED)])
-    first, last = np.flatnonzero(known)[[0, -1]] + CONTINUED + np.array([POOR, -POOR])
+    shown = np.flatnonzero(known) + CONTINUED
+    for of_pass in np.split(shown, np.flatnonzero(np.diff(shown) > BETWEEN_PASSES // 2) + 1):
+        _continue(way, int(of_pass[0]) + POOR, int(of_pass[-1]) - POOR)
+    return way
+
+
+def _continue(way: Floats, first: int, last: int) -> None:
+    """Continue the movement of the frames from `first` to `last` to both sides, in place."""
     if last - first < FEWEST:
-        return way
+        return
     inner = way[first : last + 1]
     pairs = np.column_stack([inner[1:-1], inner[2:]]), np.column_stack([inner[1:-1], inner[:-2]])
     ends = np.concatenate([inner[:-2], inner[2:]])
@@ -228,7 +240,6 @@ def _continued(x: Floats, known: NDArray[np.bool_]) -> Floats:
         way[k] = near * way[k + 1] + far * way[k + 2]
     for k in range(last + 1, min(last + POOR + CONTINUED, len(way) - 1) + 1):
         way[k] = near * way[k - 1] + far * way[k - 2]
-    return way
 
 
 def _agreement(comparisons: _Comparisons, heads: Mapping[int, int]) -> float | None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from footscan.cloud.movement.pace import PACE_FRAMES, PACES_BETWEEN
+from footscan.cloud.movement.passes import first_moment
 from footscan.cloud.points import stripe_step
 from footscan.mesh.mesh import Mesh
 from footscan.mesh.topology import vertex_normals
@@ -21,7 +22,7 @@ from schemas.movement import MovementReport
 Floats = NDArray[np.float64]
 
 ERROR_GROWS = 0.04
-"""Growth of the standard deviation per mm into filled surface. Tuned on virtual feet: docs/surface.md."""
+"""Growth of the standard deviation per mm into filled surface. Tuned on feet of the virtual scanner."""
 COMMON_MM = 0.01
 """Standard deviation that a whole part of the foot, as broad as `WIDE_MM`, has in common: stripes and surfaces that are
 a little too far in make a girth too small all around. Tuned on 40 scanners without pictures (`draw_assembled`, seeds
@@ -86,7 +87,7 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
     points, scatter_mm = around(vertices, normals, cloud)
     everywhere = np.ones(len(vertices))
     # Heads pass the same skin at different times, and what one saw moves against what another one saw.
-    filmed_mm = vertices[:, 0] if points is None else points["frame"].mean(axis=1) * step_mm
+    filmed_mm = vertices[:, 0] if points is None else _moments(points, evidence.movement) * step_mm
     ends = find_ends(vertices, evidence)
     shift_mm = np.max([np.zeros(len(vertices)), *(end.shift_at(vertices[:, 0], step_mm) for end in ends)], axis=0)
     fields = [
@@ -106,6 +107,12 @@ def scan_errors(mesh: Mesh, evidence: Evidence) -> ScanErrors:
         ),
     ]
     return ScanErrors(fields, np.any([gap_mm > RELIABLE_MM, *(end.is_unseen(vertices[:, 0]) for end in ends)], axis=0))
+
+
+def _moments(points: NDArray[np.void], movement: MovementReport | None) -> Floats:
+    """(V,) moments at which skin was filmed, by the points (V, K) around it, the nearest first."""
+    of_nearest = first_moment(points[:, 0], {} if movement is None else movement.first_moments)
+    return np.asarray(points["frame"].mean(axis=1) + of_nearest)
 
 
 def _moved_mm(movement: MovementReport | None) -> float:

@@ -2,7 +2,7 @@
 
 The ranges are wider than any scanner is built for, and none follows from what the reconstruction assumes. Each part of
 a world has a generator of its own: a new quantity in one part changes no other part of the worlds that exist.
-`docs/worlds.md` lists each range with its reason.
+`docs/worlds.md` lists the main ranges with their reasons.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ from schemas.world import (
     WorldSubject,
 )
 
-ROOM, LASER, HEADS, CAMERAS, GLASS, SUBJECT, ASSEMBLED, MOVING = range(100, 108)
+ROOM, LASER, HEADS, CAMERAS, GLASS, SUBJECT, ASSEMBLED, MOVING, PASSING = range(100, 109)
 """Numbers of the parts' generators."""
 HEAD_COUNT = 3
 TRAVEL_MM = 400.0
@@ -100,6 +100,19 @@ def draw_moving(seed: int) -> World:
     world, random = draw_assembled(seed), _generator(seed, MOVING)
     moving = {"sway_mm": _even(random, 0.0, 0.3), "tremor_mm": _even(random, 0.0, 0.15)}
     return world.model_copy(update={"subject": world.subject.model_copy(update=moving)})
+
+
+def draw_passing(seed: int) -> World:
+    """Draw the scanner of `draw_moving` whose lower head films in a second pass, 15 to 60 s later.
+
+    Examples
+    --------
+    >>> 15.0 < draw_passing(7).subject.wait_s < 60.0
+    True
+    """
+    world = draw_moving(seed)
+    wait_s = _even(_generator(seed, PASSING), 15.0, 60.0)
+    return world.model_copy(update={"subject": world.subject.model_copy(update={"wait_s": wait_s})})
 
 
 def as_designed(world: World) -> World:

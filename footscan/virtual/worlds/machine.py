@@ -126,17 +126,17 @@ class Machine:
         """X that the travel says the head has."""
         return self.step_mm(head) * seconds * self.world.cameras.frames_per_second
 
-    def pose(self, head: int, seconds: float) -> Pose:
-        """Head frame to plate frame at a time."""
+    def pose(self, head: int, seconds: float, pass_number: int | None = None) -> Pose:
+        """Head frame to plate frame at a time of a pass, by default that in which its cameras film."""
         to_scanner = self._head_pose(head, seconds)
-        moved = self._subject_moved(head, seconds)
+        moved = self._subject_moved(pass_number or self.pass_number(head), seconds)
         turn = self.plate.turn.T @ to_scanner.turn
         return Pose(turn, self.plate.turn.T @ (to_scanner.shift - self.plate.shift) - moved)
 
-    def exposure(self, head: int, seconds: float) -> Exposure:
-        """The exposure of the frame that begins at a time."""
-        first = self.pose(head, seconds)
-        last = self.pose(head, seconds + self.world.cameras.rolling_shutter_ms / 1000.0)
+    def exposure(self, head: int, seconds: float, pass_number: int | None = None) -> Exposure:
+        """The exposure of the frame that begins at a time; parameters as of `pose`."""
+        first = self.pose(head, seconds, pass_number)
+        last = self.pose(head, seconds + self.world.cameras.rolling_shutter_ms / 1000.0, pass_number)
         return Exposure(seconds, first, last.shift - first.shift)
 
     def sheets_near(self, head: int, seconds: float) -> list[int]:
@@ -146,15 +146,20 @@ class Machine:
         heads = [head] if self.one_by_one else near
         return [number for number, sheet in enumerate(self.sheets) if sheet.head in heads]
 
-    def sheet(self, number: int, seconds: float) -> Exposure:
-        """The exposure of the frame that begins at a time, for a sheet: that of its head, ahead of it."""
+    def sheet(self, number: int, seconds: float, pass_number: int) -> Exposure:
+        """The exposure of the frame that begins at a time of a pass, for a sheet: that of its head, ahead of it."""
         sheet = self.sheets[number]
-        exposure = self.exposure(sheet.head, seconds)
+        exposure = self.exposure(sheet.head, seconds, pass_number)
         return exposure._replace(pose=sheet.pose(exposure.pose))
 
     def sheets_of(self, camera: int) -> list["Sheet"]:
         """The sheets of a camera's own head."""
         return [sheet for sheet in self.sheets if sheet.head == self.head_of[camera]]
+
+    def pass_number(self, head: int) -> int:
+        """The pass in which the cameras of a head film the subject."""
+        subject = self.world.subject
+        return 2 if head == LOWER_HEAD and (subject.wait_s or any(subject.shift_mm)) else 1
 
     def calibration_pose(self, head: int) -> Pose:
         """Head frame to scanner frame when the reference object was filmed, at X = 0 by the travel."""
@@ -195,13 +200,15 @@ class Machine:
         lost = errors.lost_mm if x > errors.lost_at * TRAVEL_MM else 0.0
         return float(x * (1.0 + errors.travel_scale) + ripple + self.jitter[head, frame] - lost)
 
-    def _subject_moved(self, head: int, seconds: float) -> Floats:
+    def _subject_moved(self, pass_number: int, seconds: float) -> Floats:
         """How far the subject has moved from its place, (3,), plate frame."""
         subject = self.world.subject
+        if pass_number > 1:
+            seconds += subject.wait_s
         tremor = subject.tremor_mm * np.sqrt(2.0) * np.sin(2.0 * np.pi * self.phases[5] * seconds + self.phases[3])
         sway = subject.sway_mm * np.sin(2.0 * np.pi * self.phases[6] * seconds + self.phases[4])
         angle = self.phases[7]
-        shift = subject.shift_mm if head == LOWER_HEAD else (0.0, 0.0)
+        shift = subject.shift_mm if pass_number > 1 else (0.0, 0.0)
         return np.array([tremor + sway * np.cos(angle) + shift[0], sway * np.sin(angle) + shift[1], 0.0])
 
 

@@ -85,7 +85,7 @@ def world_stripes(machine: Machine, subject: Subject) -> dict[int, NDArray[np.vo
     parts: dict[int, list[NDArray[np.void]]] = {camera: [] for camera in machine.cameras}
     random = {camera: np.random.default_rng([machine.world.seed, 300 + camera]) for camera in machine.cameras}
     for frame in range(max(machine.frames(head) for head in range(3))):
-        lit: dict[int, _Lit] = {}
+        lit: dict[tuple[int, int], _Lit] = {}
         for camera in machine.cameras:
             if frame < machine.frames(machine.head_of[camera]):
                 seen = _seen_in_frame(machine, camera, frame, cut_mesh, scene, lit)
@@ -99,26 +99,27 @@ def world_stripes(machine: Machine, subject: Subject) -> dict[int, NDArray[np.vo
 
 
 def _seen_in_frame(
-    machine: Machine, camera_id: int, frame: int, cut_mesh: CutMesh, scene: Scene, lit: dict[int, _Lit]
+    machine: Machine, camera_id: int, frame: int, cut_mesh: CutMesh, scene: Scene, lit: dict[tuple[int, int], _Lit]
 ) -> _Seen:
     """All stripes in one frame; rows that are exposed later see heads that have travelled on.
 
-    `lit` keeps the stripes of each sheet for the other cameras, where all rows are of one moment.
+    `lit` keeps the stripes of each sheet and pass for the other cameras, where all rows are of one moment.
     """
     head = machine.head_of[camera_id]
+    in_pass = machine.pass_number(head)
     own = machine.exposure(head, machine.seconds(frame))
     camera = moved_camera(machine.cameras[camera_id], own.middle)
     parts = []
     for other in machine.sheets_near(head, own.seconds):
-        sheet = machine.sheet(other, own.seconds)
+        sheet = machine.sheet(other, own.seconds, in_pass)
         if max(np.abs(own.way).max(), np.abs(sheet.way).max()) > ONE_MOMENT_MM:
             cut = _cut_row_by_row(machine, camera, own.way, sheet, cut_mesh)
             stripe = _lit_stripe(machine, other, sheet, cut, scene)
         else:
-            if other not in lit:
+            if (other, in_pass) not in lit:
                 cut = cut_mesh.cut(*_distance(machine, sheet, cut_mesh))
-                lit[other] = _lit_stripe(machine, other, sheet, cut, scene)
-            stripe = lit[other]
+                lit[other, in_pass] = _lit_stripe(machine, other, sheet, cut, scene)
+            stripe = lit[other, in_pass]
         parts.append(_seen_by(machine, camera, own.way, stripe, scene))
     return _Seen(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 

@@ -92,6 +92,7 @@ class CameraFilm:
     def __init__(self, machine: Machine, subject: Subject, camera_id: int, scene: Scene | None = None) -> None:
         self._machine, self._subject, self._id = machine, subject, camera_id
         self._camera = machine.cameras[camera_id]
+        self._pass = machine.pass_number(machine.head_of[camera_id])
         self._scene = scene or Scene(subject.mesh, SKIN)
         mesh = subject.mesh
         corners = mesh.vertices[mesh.faces]
@@ -211,7 +212,7 @@ class CameraFilm:
             draw_marks(self._marks, camera, light)
         caught = np.zeros((*machine.size, 1), np.float32)
         for number in machine.sheets_near(machine.head_of[self._id], moment.seconds):
-            pose = machine.sheet(number, moment.seconds).pose
+            pose = machine.sheet(number, moment.seconds, self._pass).pose
             lit_hairs(hairs, pose, camera, machine.world.laser.power, caught)
             sparkle(self._marks, pose, camera, machine.world.laser.power, raster, caught)
         add_light(light, caught[:, :, 0], self._laser_colour)
@@ -243,7 +244,7 @@ class CameraFilm:
         row_share = (pixels.flat // columns) / rows
         reach = REACH_SIGMAS * float(np.hypot(world.laser.sigma_mm, 0.3)) + 1.0
         for number in machine.sheets_near(machine.head_of[self._id], moment.seconds):
-            sheet = machine.sheet(number, moment.seconds)
+            sheet = machine.sheet(number, moment.seconds, self._pass)
             distance = machine.sheet_distance(pixels.points, sheet, row_share)
             near = np.flatnonzero(np.abs(distance) < reach)
             if len(near):

@@ -62,7 +62,12 @@ def record_world(
         if progress is not None:
             progress(done, total)
     cameras = [
-        {"id": camera, "file": film_name(camera), "travel": {"start_mm": 0.0, "step_mm": machine.step_mm(head)}}
+        {
+            "id": camera,
+            "file": film_name(camera),
+            "travel": {"start_mm": 0.0, "step_mm": machine.step_mm(head)},
+            "pass_number": machine.pass_number(head),
+        }
         for camera, head in machine.head_of.items()
     ]
     scan = {

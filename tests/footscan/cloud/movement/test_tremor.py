@@ -41,6 +41,8 @@ def test_heads_that_run_unevenly_are_no_tremor() -> None:
     assert report.agreement is not None
     assert report.agreement < 0.5
     assert report.tremor_mm > 0.1  # it counts as an error of the measures
+    [warning] = report.warnings
+    assert "heads do not agree on it" in warning
 
 
 def test_points_that_show_nothing_are_left() -> None:

@@ -70,6 +70,22 @@ def test_a_subject_that_moved_before_the_lower_pass() -> None:
     machine = machine_of(NOMINAL.model_copy(update={"subject": WorldSubject(shift_mm=(1.0, -0.5))}))
     assert machine.pose(0, 0.0).shift == pytest.approx([0.0, 0.0, 0.0])
     assert machine.pose(2, 0.0).shift == pytest.approx([-1.0, 0.5, 0.0])
+    assert [machine.pass_number(head) for head in range(3)] == [1, 1, 2]
+
+
+def test_a_subject_moves_on_while_the_lower_pass_is_waited_for() -> None:
+    swaying = WorldSubject(sway_mm=0.3)
+    together, later = (
+        machine_of(NOMINAL.model_copy(update={"subject": subject}))
+        for subject in (swaying, swaying.model_copy(update={"wait_s": 20.0}))
+    )
+    assert [together.pass_number(head) for head in range(3)] == [1, 1, 1]
+    np.testing.assert_array_equal(later.pose(0, 1.0).shift, together.pose(0, 1.0).shift)
+    seen = later.pose(2, 1.0).shift - [later.reported_x(2, 1.0), 0.0, 0.0]
+    assert seen == pytest.approx(together.pose(2, 21.0).shift - [together.reported_x(2, 21.0), 0.0, 0.0])
+    # In a pass, the lasers of all heads shine on the foot where it is then.
+    lower, upper = later.sheet(2, 1.0, pass_number=2), later.sheet(0, 1.0, pass_number=2)
+    assert lower.pose.shift[1] == pytest.approx(upper.pose.shift[1])
 
 
 def test_a_knock_comes_after_the_calibration() -> None:
