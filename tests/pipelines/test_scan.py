@@ -9,15 +9,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from made_up_scan import recorded
 
 from footscan.recordings.scans import read_scan
+from footscan.scan import open_scan
 from pipelines.engine.actions.step import Output
 from pipelines.engine.files.file_digests import FileDigests
 from pipelines.scan import DELIVERED, CalibrationFile, scan_steps, source_files
 from schemas.base.errors import RefusedInput
 from schemas.calibration import Calibration
 from schemas.parameters.scan import ScanParameters
+from schemas.quality import Quality
 from tests.helpers.stored_frames import frame_bytes, put_frame
 
 FROM_CLEAN = {
@@ -96,6 +99,22 @@ def test_another_calibration_leaves_the_extraction_alone(done: Any, calibration:
     _, reasons = done.plan()
     assert "map-1" in reasons
     assert "map-5" not in reasons
+
+
+def test_another_pass_runs_from_the_filter_on(done: Any) -> None:
+    document = done.scan / "scan.yaml"
+    content = yaml.safe_load(document.read_text())
+    content["cameras"][1]["pass_number"] = 2
+    document.write_text(yaml.safe_dump(content))
+    _, reasons = done.plan()
+    assert set(reasons) == FROM_CLEAN
+    [scan], _ = done.run()
+    assert scan.problem is None
+    quality = Quality.model_validate_json((done.results / "quality.json").read_text())
+    assert quality.movement is not None
+    assert quality.movement.first_moments.keys() == {5}
+    opened = open_scan(done.scan, done.root / "calibration.json")
+    assert opened.movement == quality.movement
 
 
 def test_changed_byte_runs_its_camera_and_what_follows(done: Any) -> None:

@@ -15,6 +15,7 @@ from waiting import wait_until
 
 from footscan.calibration.travel.body import standard_body
 from footscan.capture import frame_positions, latency
+from footscan.capture.cameras.usb_bus import Pass
 from footscan.frames.film import open_film
 from footscan.frames.travel import read_positions
 from footscan.recordings.calibration_checks import check_of_scan, checks_of
@@ -22,7 +23,7 @@ from footscan.recordings.scans import read_scan
 from pipelines.archive.job import Job
 from pipelines.archive.planning import PlannedJob, Waiting, plan_job
 from pipelines.calibration_check import store_check
-from pipelines.live import measuring, storing
+from pipelines.live import measuring, scanner, storing
 from pipelines.live.calibrating.body_film import film_body
 from pipelines.live.calibrating.live import LiveStanding
 from pipelines.live.calibrating.stills import live_stills
@@ -113,6 +114,18 @@ def test_two_cameras_on_two_heads_leave_the_third_axis_where_it_is(pristine: Pat
         assert bench.scanner.jog(3.0, 50.0, 2)[1] == pytest.approx(bench.scanner.heads.position_mm()[0] + 3.0, abs=0.1)
         with pytest.raises(RefusedInput, match="head: expected 1 to 2, found 3"):
             bench.scanner.jog(3.0, 50.0, 3)
+
+
+@pytest.mark.usefixtures("lenient")
+def test_cameras_that_film_in_a_second_pass_say_so(
+    pristine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    passes = [Pass((2,), "the bus carries one"), Pass((1,), "the other one")]
+    with open_bench(pristine, tmp_path, (RigHead(), RigHead()), {1: 1, 2: 2}) as bench:
+        monkeypatch.setattr(scanner, "passes_of", lambda *_: passes)
+        place = bench.scanner.scan(bench.order()).stored.place
+    assert read_scan(place).document.later_passes == {1: 2}
+    assert [one.cameras for one in read_json(place / "recording.json", Recording).passes] == [[2], [1]]
 
 
 @pytest.mark.usefixtures("lenient")
