@@ -5,6 +5,7 @@ A folder with `workflow.yaml`, `calibration.json` and the scan `archive/P0001/S1
 
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -126,6 +127,7 @@ def _to_plane(camera: int) -> NDArray[np.float64]:
     return about_middle @ np.linalg.inv(from_plane)
 
 
+@cache  # many tests have the same few feet
 def _frame(camera: int, half_breadth: float, height: float, depth: float) -> bytes:
     """A red line of Gaussian profile around a section, as far as the camera sees it."""
     j, i = np.mgrid[0:480, 0:640].astype(np.float64)
