@@ -69,6 +69,9 @@ def _doubts(measures: Measures, quality: Quality) -> Iterator[str]:
     remedies: dict[str, str] = {}
     if heads is not None:
         remedies[heads] = "" if "scan again" in heads else "Then scan again."
+        if quality.movement is not None and quality.movement.first_moments:
+            # A foot that has moved from one pass to the next looks like a head that is elsewhere.
+            remedies[heads] = "If the foot moved between the passes, scan again first."
     if check is not None and check.doubt is not None:
         again = "'footscan calibrate capture', then scan again" if check.drifted else "'footscan calibrate check' again"
         remedies[check.doubt] = f"Put the reference object onto the glass and run {again}."

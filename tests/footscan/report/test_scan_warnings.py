@@ -143,6 +143,23 @@ def test_uncertain_measures_are_named_unless_all_are_for_one_reason() -> None:
     assert line.startswith("A hand at the heel. All measures are uncertain. Take everything away")
 
 
+@pytest.mark.parametrize(
+    ("doubt", "first_moments", "todo"),
+    [
+        (HEADS, {}, "Then scan again."),
+        ("a head lost steps: home it, then scan again", {}, ""),
+        (HEADS, {"5": 260}, "If the foot moved between the passes, scan again first."),
+    ],
+)
+def test_heads_that_are_elsewhere(doubt: str, first_moments: dict[str, int], todo: str) -> None:
+    quality = quality_of() | {
+        "heads": {"points": 9, "comparisons": 9, "doubt": doubt},
+        "movement": {"first_moments": first_moments},
+    }
+    [line] = told(measures_of("right") | {"doubts": [doubt]}, quality)
+    assert line == f"{doubt[0].upper()}{doubt[1:]}. All measures are uncertain. {todo}".rstrip()
+
+
 def test_a_doubt_about_the_whole_scan_is_listed_once() -> None:
     doubt = "the foot moved slowly, by 0.5 mm (root mean square): scan again"
     [line] = told(measures_of("right") | {"doubts": [doubt]}, quality_of() | {"warnings": [doubt]})
