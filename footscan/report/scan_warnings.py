@@ -67,11 +67,11 @@ def _doubts(measures: Measures, quality: Quality) -> Iterator[str]:
     """The reasons for which all measures are uncertain."""
     check, heads = quality.calibration_check, quality.heads.doubt
     remedies: dict[str, str] = {}
-    if heads is not None:
+    if heads is not None and quality.movement.first_moments:
+        # A foot that has moved from one pass to the next looks like a head that is elsewhere.
+        remedies[heads] = "If the foot moved between the passes, scan again first."
+    elif heads is not None:
         remedies[heads] = "" if "scan again" in heads else "Then scan again."
-        if quality.movement is not None and quality.movement.first_moments:
-            # A foot that has moved from one pass to the next looks like a head that is elsewhere.
-            remedies[heads] = "If the foot moved between the passes, scan again first."
     if check is not None and check.doubt is not None:
         again = "'footscan calibrate capture', then scan again" if check.drifted else "'footscan calibrate check' again"
         remedies[check.doubt] = f"Put the reference object onto the glass and run {again}."

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from footscan.cloud.fusion.stripes import sort_stripes
 from footscan.cloud.movement.passes import first_moment
 from footscan.cloud.movement.sway import sway_of
-from footscan.cloud.movement.tremor import find_tremor
+from footscan.cloud.movement.tremor import MOVED_BACK, find_tremor
 from schemas.movement import MovementReport
 
 DOUBT_MM = 0.4
@@ -62,10 +62,7 @@ def _steadied(points: NDArray[np.void], heads: Mapping[int, int]) -> tuple[NDArr
         return points, report.model_copy(update={"warnings": [*report.warnings, doubt], "doubt": doubt})
     warnings = list(report.warnings)
     if len(sway.y_mm) and y >= SWAYED_MM:
-        warnings.append(
-            f"the foot swayed by {y:.2f} mm across the travel (root mean square), and was moved back: if a measure is "
-            "uncertain, let the person sit or hold on to something, then scan again"
-        )
+        warnings.append(f"the foot swayed by {y:.2f} mm across the travel {MOVED_BACK}")
     left = {
         "warnings": warnings,
         "y_mm": np.round(sway.y_mm, 4).tolist(),

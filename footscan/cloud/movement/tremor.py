@@ -50,6 +50,11 @@ ROUNDS = 8
 LEAST_TREMOR_MM, LEAST_AGREEMENT = 0.1, 0.5
 """Tremor from which the foot is moved back, and correlation between heads that it has at least. The form of a still
 foot looks like 0.04 mm, heads that jitter like 0.08 mm. Tuned as `NOISE_MM`."""
+MOVED_BACK = (
+    "(root mean square), and was moved back: if a measure is uncertain, let the person sit or hold on to something, "
+    "then scan again"
+)
+"""What a warning says of any movement that was taken back, after its size."""
 
 
 class FrameMoves(NamedTuple):
@@ -93,10 +98,7 @@ def find_tremor(stripes: Stripes, heads: Mapping[int, int]) -> MovementReport:
         update={
             "first_frame": max(every.first - CONTINUED, 0),
             "x_mm": np.round(way[max(CONTINUED - every.first, 0) :], 4).tolist(),
-            "warnings": [
-                f"the foot trembled by {tremor:.2f} mm (root mean square), and was moved back: if a measure is "
-                "uncertain, let the person sit or hold on to something, then scan again"
-            ],
+            "warnings": [f"the foot trembled by {tremor:.2f} mm {MOVED_BACK}"],
         }
     )
 

@@ -16,8 +16,8 @@ ERROR_MM = 0.006
 """Standard deviation of a measured vertex. Tuned on eight scanners without pictures whose feet have edges of 1 mm
 (`draw_assembled`, seeds 4514 to 4521), and on ten films (5401 to 5410)."""
 USUAL_SCATTER_MM = 0.015
-"""Mean distance of points from the surface that says nothing of its errors. Tuned on feet of
-the virtual scanner."""
+"""Mean distance of points from the surface that says nothing of its errors. Tuned on feet of the virtual
+scanner."""
 USUAL_STEP_MM = 2.0
 """Distance of stripes at which both hold. Of distant stripes both grow as the sagitta of the skin between two, with the
 square of their distance; that of 2 mm is about `USUAL_SCATTER_MM`."""
