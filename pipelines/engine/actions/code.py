@@ -29,6 +29,8 @@ ROOMS = ("schemas", "footscan", "pipelines")
 """The packages of this project."""
 MEMORY = Path(__file__).parent / "__pycache__" / f"code.{sys.implementation.cache_tag}.json"
 """File that remembers the digests and imports of modules between processes."""
+TEXTS = MEMORY.with_name(f"code_texts.{sys.implementation.cache_tag}.json")
+"""File that remembers their texts by their digests: a new store needs all of them, and to make them takes a second."""
 
 _PARSING = threading.Lock()
 """Lock for building syntax trees. With Python 3.11 a thread that builds one can fail if another thread builds one too,
@@ -69,7 +71,8 @@ def code_identity(module: str) -> CodeIdentity:
 def code_text(module: str) -> bytes:
     """Return the source text of a module's syntax tree, without docstrings; its digest is that of this text."""
     with _parsing():
-        return _text(module, file_state(_file(module))).encode()
+        text = _remembered_texts().get(_source(module).digest)
+        return (_text(module, file_state(_file(module))) if text is None else text).encode()
 
 
 _IDENTITIES: dict[str, CodeIdentity] = {}
@@ -119,9 +122,11 @@ def _source(name: str) -> _Source:
     remembered = _remembered().get(name)
     if remembered is not None and remembered[0] == list(state):
         return _Source(remembered[1], frozenset(remembered[2]))
-    source = _Source(sha256(_text(name, state).encode()), frozenset(_imports(_tree(name))))
+    text = _text(name, state)
+    source = _Source(sha256(text.encode()), frozenset(_imports(_tree(name))))
     if name.split(".", maxsplit=1)[0] in ROOMS and is_settled(state):
         _remembered()[name] = [list(state), source.digest, sorted(source.imports)]
+        _remembered_texts()[source.digest] = text
         _CHANGED.add(name)
     return source
 
@@ -135,14 +140,26 @@ def _remembered() -> dict[str, list[Any]]:
         return {}
 
 
+@cache
+def _remembered_texts() -> dict[str, str]:
+    """Read the texts of modules by their digests from `TEXTS`."""
+    try:
+        return dict(unsealed(TEXTS.read_bytes())["texts"])
+    except (OSError, *UNSEALING_ERRORS):
+        return {}
+
+
 _CHANGED: set[str] = set()
 
 
 def _save_memory() -> None:
     if _CHANGED:
         _CHANGED.clear()
+        used = {digest for _, digest, _ in _remembered().values()}
+        texts = {digest: text for digest, text in _remembered_texts().items() if digest in used}
         with contextlib.suppress(Fault):
             write_atomically(MEMORY, sealed({"modules": _remembered()}))
+            write_atomically(TEXTS, sealed({"texts": texts}))
 
 
 @cache

@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 
 from pipelines.engine.actions import libraries
-from pipelines.engine.actions.code import CodeIdentity, code_identity
+from pipelines.engine.actions.code import CodeIdentity, code_identity, code_text
+from pipelines.engine.files.digest import sha256
 
 STEP = """
 from PACKAGE.first import prepare
@@ -111,3 +112,8 @@ def test_libraries_of_the_projects_own_steps() -> None:
     assert "footscan.stripe.ridge" in code_identity("pipelines.steps.extract").modules
     assert "footscan.cloud.fusion.fuse" not in code_identity("pipelines.steps.extract").modules
     assert "footscan.report.scan.page" in code_identity("pipelines.steps.report").modules
+
+
+def test_the_texts_of_a_step_have_the_digests_of_its_identity() -> None:
+    modules = code_identity("pipelines.steps.fuse").modules
+    assert {module: sha256(code_text(module)) for module in modules} == modules
