@@ -133,7 +133,12 @@ def _source(name: str) -> _Source:
 
 @cache
 def _remembered() -> dict[str, list[Any]]:
-    """Read state, digest and imports of each module from `MEMORY`; an entry is valid while the state is the same."""
+    """Read state, digest and imports of each module from `MEMORY`; an entry is valid while the state is the same.
+
+    Nothing is remembered where `TEXTS` is missing, so that both files are written again.
+    """
+    if not TEXTS.exists():
+        return {}
     try:
         return dict(unsealed(MEMORY.read_bytes())["modules"])
     except (OSError, *UNSEALING_ERRORS):
