@@ -2,7 +2,7 @@
 export PYTHON
 BIN := .venv/bin
 
-.PHONY: help setup compiled demo test test-slow lint format clean
+.PHONY: help setup compiled demo browser ready-to-test test test-slow lint format clean
 
 help:     ## this list
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1	\2/p' $(MAKEFILE_LIST)
@@ -17,15 +17,23 @@ compiled: setup
 demo: compiled ## films, calibrates, scans and measures a foot; the result is in demo/
 	@$(BIN)/footscan demo
 
-test: lint compiled ## lint, then the tests, in the end those that keep time; pages in Debian's Chromium; films are kept in .pytest_cache
+browser: setup
 	@scripts/browser.sh
-	$(BIN)/pytest -n 2 --dist worksteal -m "not real_time and not slow"
-	$(BIN)/pytest -n 2 --dist worksteal -m "real_time and not slow" --reruns 2 -r fER
 
-test-slow: lint compiled ## the tests that repeat whole runs or draw many samples
-	@scripts/browser.sh
-	$(BIN)/pytest -n 2 --dist worksteal -m "slow and not real_time"
-	$(BIN)/pytest -n 2 --dist worksteal -m "slow and real_time" --reruns 2 -r fER
+ready-to-test: setup
+	@$(MAKE) --no-print-directory --jobs=3 lint compiled browser
+
+# Byte code of the test modules is kept even where PYTHONDONTWRITEBYTECODE is set: pytest takes 16 s to make it.
+test test-slow: export PYTHONDONTWRITEBYTECODE =
+test test-slow: PYTEST := $(BIN)/pytest --dist worksteal
+
+test: ready-to-test ## lint, then the tests, in the end those that keep time; pages in Debian's Chromium; films are kept in .pytest_cache
+	$(PYTEST) -n 2 -m "not real_time and not slow"
+	$(PYTEST) -n 3 -m "real_time and not slow" --reruns 2 -r fER  # they mostly wait
+
+test-slow: ready-to-test ## the tests that repeat whole runs or draw many samples
+	$(PYTEST) -n 2 -m "slow and not real_time"
+	$(PYTEST) -n 3 -m "slow and real_time" --reruns 2 -r fER
 
 lint: setup   ## style, layout and types
 	$(BIN)/ruff check
