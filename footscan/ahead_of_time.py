@@ -4,16 +4,18 @@ Compiled one after the other as they are first called, they take a minute and mo
 processes share them. What is compiled is kept where `footscan.compiled` keeps it, so it is never stale; the list of
 argument types is only a matter of speed: what it lacks is compiled when it is called.
 
-    python -m footscan.ahead_of_time [SHARE OF]
+    python -m footscan.ahead_of_time
 """
 
 import importlib
 import json
-import subprocess
+import logging
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from hashlib import sha256
 from importlib.resources import files
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +23,12 @@ import numba
 from llvmlite import binding
 from numba import types
 
+from footscan.child_process import end_with_parent
 from footscan.compiled import code_folder, code_place
 from footscan.side_by_side import cores
 
-MODULE = "footscan.ahead_of_time"
+log = logging.getLogger("footscan.compiled")
+
 LIST = "loops.json"
 """Module, name and argument types of each loop of a scan that Python calls, the slowest to compile first."""
 
@@ -36,25 +40,20 @@ def compile_ahead() -> None:
     mark = _mark()
     if mark is None or mark.exists():
         return
-    shares = cores()
-    started = [subprocess.Popen([sys.executable, "-m", MODULE, str(share), str(shares)]) for share in range(shares)]
-    ended = [process.wait() for process in started]
-    if not any(ended):
-        with suppress(OSError):
-            mark.touch()
+    with ProcessPoolExecutor(cores(), get_context("spawn"), end_with_parent) as processes:
+        compiled = [processes.submit(_compile, *loop) for loop in _listed()]
+    problems = [repr(problem) for loop in compiled if (problem := loop.exception()) is not None]
+    if problems:
+        log.warning("%d of %d loops were not compiled ahead: %s", len(problems), len(compiled), problems[0])
+        return
+    with suppress(OSError):
+        mark.touch()
 
 
 def is_compiled() -> bool:
     """True if `compile_ahead` has nothing to do."""
     mark = _mark()
     return mark is None or mark.exists()
-
-
-def compile_share(share: int, of: int) -> None:
-    """Compile each `of`-th loop of the list, beginning with number `share`."""
-    for module, name, arguments in _listed()[share::of]:
-        loop = getattr(importlib.import_module(module), name)
-        loop.compile(tuple(type_of(argument) for argument in arguments))
 
 
 def spec_of(argument: types.Type) -> Spec:
@@ -92,6 +91,11 @@ def type_of(spec: Spec) -> types.Type:
     return types.BaseTuple.from_types(parts, getattr(importlib.import_module(module), name))
 
 
+def _compile(module: str, name: str, arguments: list[Spec]) -> None:
+    loop = getattr(importlib.import_module(module), name)
+    loop.compile(tuple(type_of(argument) for argument in arguments))
+
+
 def _listed() -> list[tuple[str, str, list[Spec]]]:
     return [tuple(entry) for entry in json.loads(files("footscan").joinpath(LIST).read_text("utf-8"))]
 
@@ -109,7 +113,4 @@ def _mark() -> Path | None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        compile_share(int(sys.argv[1]), int(sys.argv[2]))
-    else:
-        compile_ahead()
+    compile_ahead()
