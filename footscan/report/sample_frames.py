@@ -1,6 +1,6 @@
 """Frames of each camera along the travel with their stripe points, browsed by a slider."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,18 +22,35 @@ _DOTS_ACROSS = 160
 """Width of a cut in dots; the dots scale with the cut. Chosen by hand."""
 
 
+Cut = tuple[int, int, int, int]
+"""First row, number of rows, first column and number of columns of a part of an image."""
+
+
 @dataclass(frozen=True)
 class FrameSample:
-    """A frame and its stripe points."""
+    """A cut of a frame and its stripe points. The frame itself is not kept: a hundred of them take 90 MB."""
 
     camera: int
     frame: int
-    image: NDArray[np.uint8]
-    """(rows, columns, 3), RGB."""
+    cut: Cut
+    """The same in all samples of a camera, so that the picture does not move from frame to frame."""
+    jpeg: bytes
+    """The pixels of the cut, at most `_SHOWN_PX` wide."""
     i: NDArray[np.floating]
-    """(N,) columns of the stripe points; the centre of the top-left pixel is (0, 0)."""
+    """(N,) columns of the stripe points; the centre of the frame's top-left pixel is (0, 0)."""
     j: NDArray[np.floating]
     """(N,) rows."""
+
+
+def cut_out(image: NDArray[np.uint8], cut: Cut) -> bytes:
+    """The JPEG of a cut of `image`, (rows, columns, 3) RGB, as `FrameSample` has it."""
+    first_row, rows, first_column, columns = cut
+    pixels = np.ascontiguousarray(image[first_row : first_row + rows, first_column : first_column + columns])
+    if columns > _SHOWN_PX:
+        size = _SHOWN_PX, max(1, round(rows * _SHOWN_PX / columns))
+        pixels = np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX, reducing_gap=1.0))
+    # A camera's own JPEG is no sharper than this one; chroma is kept, for a red stripe is little else.
+    return bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(pixels), quality=75, colorsubsampling="444"))
 
 
 def sample_frames(samples: Sequence[FrameSample]) -> str:
@@ -41,11 +58,10 @@ def sample_frames(samples: Sequence[FrameSample]) -> str:
 
     Each figure is a cut around all stripes of its camera, as SVG with the points drawn over the pixels.
     """
-    cuts = {camera: _cut_of(samples, camera) for camera in {sample.camera for sample in samples}}
     numbers = sorted({sample.frame for sample in samples})
     groups = "".join(
         f'<div class="frames" data-frame="{frame}">\n'
-        + "\n".join(_figure(sample, cuts[sample.camera]) for sample in samples if sample.frame == frame)
+        + "\n".join(_figure(sample) for sample in samples if sample.frame == frame)
         + "\n</div>"
         for frame in numbers
     )
@@ -71,20 +87,8 @@ FRAMES_SCRIPT = """\
 """
 
 
-def _cut_of(samples: Iterable[FrameSample], camera: int) -> tuple[int, int, int, int]:
-    """The cut around the stripes of all samples of a camera, so that the picture does not move from frame to frame."""
-    of_camera = [sample for sample in samples if sample.camera == camera]
-    return crop(of_camera[0].image.shape, *(np.concatenate([getattr(s, axis) for s in of_camera]) for axis in "ij"))
-
-
-def _figure(sample: FrameSample, cut: tuple[int, int, int, int]) -> str:
-    first_row, rows, first_column, columns = cut
-    pixels = np.ascontiguousarray(sample.image[first_row : first_row + rows, first_column : first_column + columns])
-    if columns > _SHOWN_PX:
-        size = _SHOWN_PX, max(1, round(rows * _SHOWN_PX / columns))
-        pixels = np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX, reducing_gap=1.0))
-    # A camera's own JPEG is no sharper than this one; chroma is kept, for a red stripe is little else.
-    jpeg = simplejpeg.encode_jpeg(np.ascontiguousarray(pixels), quality=75, colorsubsampling="444")
+def _figure(sample: FrameSample) -> str:
+    first_row, rows, first_column, columns = sample.cut
     # A dot of no length with round ends; pixel (0, 0) covers -0.5 to 0.5.
     step = -(-len(sample.i) // _MOST_DOTS) or 1
     drawn = zip(sample.i[::step].tolist(), sample.j[::step].tolist(), strict=True)
@@ -95,13 +99,13 @@ def _figure(sample: FrameSample, cut: tuple[int, int, int, int]) -> str:
         f"<figure><figcaption><b>Camera {sample.camera:d}</b> frame {sample.frame:d}, {count}</figcaption>"
         f'<svg viewBox="{first_column - 0.5} {first_row - 0.5} {columns} {rows}" role="img" aria-label="{name}">'
         f'<image x="{first_column - 0.5}" y="{first_row - 0.5}" width="{columns}" height="{rows}" '
-        f'href="{data_uri("image/jpeg", jpeg)}"/><path class="dots" style="stroke-width:{columns / _DOTS_ACROSS:.1f}" '
-        f'd="{dots}"/></svg></figure>'
+        f'href="{data_uri("image/jpeg", sample.jpeg)}"/>'
+        f'<path class="dots" style="stroke-width:{columns / _DOTS_ACROSS:.1f}" d="{dots}"/></svg></figure>'
     )
 
 
-def crop(shape: tuple[int, ...], i: NDArray[np.floating], j: NDArray[np.floating]) -> tuple[int, int, int, int]:
-    """First row, number of rows, first column and number of columns of the cut around the points (i, j), px.
+def crop(shape: tuple[int, ...], i: NDArray[np.floating], j: NDArray[np.floating]) -> Cut:
+    """The cut around the points (i, j), px, of an image of (rows, columns, ...).
 
     Its aspect is 4:3 as far as the image allows. Without points it is the whole image.
 

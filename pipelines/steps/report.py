@@ -13,7 +13,7 @@ from footscan.cloud.points import of_cameras
 from footscan.frames.array import IngestedFrames
 from footscan.frames.reader import pixel_frames
 from footscan.mesh.mesh import Mesh
-from footscan.report.sample_frames import FrameSample
+from footscan.report.sample_frames import FrameSample, crop, cut_out
 from footscan.report.scan.foot_colours import FootSurface
 from footscan.report.scan.page import ScanPoints, ScanTitle, scan_page
 from footscan.side_by_side import together
@@ -91,9 +91,11 @@ def _of_camera(
     manifest = FrameManifest.model_validate_json(inputs[f"manifest-{camera}"])
     frames = IngestedFrames(places[f"array-{camera}"], manifest)
     filmed = [number for number in numbers if number < frames.count]
+    shown = stripe[np.isin(stripe["frame"], filmed)]
+    cut = crop(frames.size, shown["i"], shown["j"])
     samples = []
     for number, image in zip(filmed, pixel_frames(frames, filmed), strict=True):
         if image is not None:
-            points = stripe[stripe["frame"] == number]
-            samples.append(FrameSample(camera, number, image.copy(), points["i"], points["j"]))
+            points = shown[shown["frame"] == number]
+            samples.append(FrameSample(camera, number, cut, cut_out(image, cut), points["i"], points["j"]))
     return samples

@@ -234,6 +234,14 @@ def test_a_posture_is_in_the_measures_and_only_they_are_taken_again(done: Any) -
     assert json.loads((done.results / "measures.json").read_bytes()) == before | {"posture": "half_weight"}
 
 
+def test_the_pictures_of_a_camera_show_one_cut(done: Any) -> None:
+    page = (done.results / "report.html").read_text()
+    shown = re.findall(r'<b>Camera (\d+)</b> frame (\d+), .*?viewBox="([^"]*)"', page)
+    assert len({frame for _, frame, _ in shown}) > 5
+    cuts = {(camera, cut) for camera, _, cut in shown}
+    assert sorted(camera for camera, _ in cuts) == sorted({camera for camera, _, _ in shown})
+
+
 def test_the_recording_of_a_scan_adds_to_its_warnings(done: Any) -> None:
     """How a scan was filmed is read by the step that collects the warnings, and by no other."""
     recording = done.scan / "recording.json"

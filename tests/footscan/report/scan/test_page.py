@@ -8,7 +8,7 @@ import pytest
 
 from footscan.cloud.outliers.remove import REASONS
 from footscan.cloud.points import make_points
-from footscan.report.sample_frames import FrameSample
+from footscan.report.sample_frames import FrameSample, cut_out
 from footscan.report.scan.foot_colours import FootSurface
 from footscan.report.scan.page import ScanPoints, ScanTitle, scan_page
 from footscan.report.surface_views import upright
@@ -27,6 +27,10 @@ HOSTILE = '<script>alert("x")</script>'
 
 def identity_map():
     return PolynomialMap(order=1, centre_px=(0, 0), scale_px=1, alpha_y=[0, 1, 0], alpha_z=[0, 0, 1])
+
+
+WHOLE = 0, 48, 0, 64
+"""The cut of the frames."""
 
 
 def apart(median, rms):
@@ -138,7 +142,7 @@ def scan():
                 worst_triangles=0.456,
             ),
         ),
-        "samples": [FrameSample(camera, 1, image, *point) for camera in (1, 2)],
+        "samples": [FrameSample(camera, 1, WHOLE, cut_out(image, WHOLE), *point) for camera in (1, 2)],
         "provenance": {"extraction.method": "ridge", "footscan": "0.1.0"},
     }
 
