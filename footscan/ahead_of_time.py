@@ -7,6 +7,7 @@ argument types is only a matter of speed: what it lacks is compiled when it is c
     python -m footscan.ahead_of_time
 """
 
+import gc
 import importlib
 import json
 import logging
@@ -40,7 +41,7 @@ def compile_ahead() -> None:
     mark = _mark()
     if mark is None or mark.exists():
         return
-    with ProcessPoolExecutor(cores(), get_context("spawn"), end_with_parent) as processes:
+    with ProcessPoolExecutor(cores(), get_context("spawn"), _begin) as processes:
         compiled = [processes.submit(_compile, *loop) for loop in _listed()]
     problems = [repr(problem) for loop in compiled if (problem := loop.exception()) is not None]
     if problems:
@@ -89,6 +90,11 @@ def type_of(spec: Spec) -> types.Type:
         return types.BaseTuple.from_types(parts)
     module, name = spec["class"].split()
     return types.BaseTuple.from_types(parts, getattr(importlib.import_module(module), name))
+
+
+def _begin() -> None:
+    end_with_parent()
+    gc.disable()  # numba's many small objects: collecting takes an eighth of the time, and saves 600 MB of 1400 in all
 
 
 def _compile(module: str, name: str, arguments: list[Spec]) -> None:
