@@ -8,5 +8,5 @@ def compile_loops() -> None:
     from footscan.ahead_of_time import compile_ahead, is_compiled
 
     if not is_compiled():
-        note("compiling for this machine, once; on two cores that takes about half a minute")
+        note("compiling for this machine, once; on two cores that takes some 40 s")
         compile_ahead()
