@@ -2,8 +2,10 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 COMPILE = """
@@ -41,3 +43,17 @@ def test_a_loop_that_is_not_compiled_is_reported(tmp_path: Path) -> None:
     done = compile_list(loops, tmp_path / "cache")
     assert done.stdout == "False False\n"
     assert done.stderr.startswith("1 of 1 loops were not compiled ahead: AttributeError(")
+
+
+def test_an_interrupt_ends_it_while_loops_wait(tmp_path: Path) -> None:
+    listed = Path(__file__).parents[2] / "footscan/loops.json"
+    line = [sys.executable, "-c", COMPILE, str(listed)]
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    with subprocess.Popen(line, stderr=subprocess.PIPE, env=environment, start_new_session=True) as compiling:
+        while not list(tmp_path.glob("cache/**/*.nbi")):
+            time.sleep(0.1)
+        os.killpg(compiling.pid, signal.SIGINT)
+        said = compiling.communicate(timeout=20)[1].decode()
+    assert compiling.returncode == -signal.SIGINT
+    assert said.count("Traceback") == 1, said
+    assert not list(tmp_path.glob("cache/ahead-*"))

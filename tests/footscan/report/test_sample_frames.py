@@ -10,8 +10,8 @@ from footscan.report.sample_frames import FrameSample, crop, cut_out, sample_fra
 SHAPE = 480, 640, 3
 
 
-def sample_of(camera, frame, image, i, j, cut=None):
-    cut = cut or crop(image.shape, i, j)
+def sample_of(camera, frame, image, i, j):
+    cut = crop(image.shape, i, j)
     return FrameSample(camera, frame, cut, cut_out(image, cut), i, j)
 
 
