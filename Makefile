@@ -20,7 +20,7 @@ demo: compiled ## films, calibrates, scans and measures a foot; the result is in
 browser: setup
 	@scripts/browser.sh
 
-ready-to-test: setup
+ready-to-test:
 	@$(MAKE) --no-print-directory --jobs=3 lint compiled browser
 
 # Byte code of the test modules is kept even where PYTHONDONTWRITEBYTECODE is set: pytest takes 16 s to make it.

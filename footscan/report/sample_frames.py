@@ -50,7 +50,7 @@ def cut_out(image: NDArray[np.uint8], cut: Cut) -> bytes:
         size = _SHOWN_PX, max(1, round(rows * _SHOWN_PX / columns))
         pixels = np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX, reducing_gap=1.0))
     # A camera's own JPEG is no sharper than this one; chroma is kept, for a red stripe is little else.
-    return bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(pixels), quality=75, colorsubsampling="444"))
+    return bytes(simplejpeg.encode_jpeg(pixels, quality=75, colorsubsampling="444"))
 
 
 def sample_frames(samples: Sequence[FrameSample]) -> str:

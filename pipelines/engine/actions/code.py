@@ -71,8 +71,8 @@ def code_identity(module: str) -> CodeIdentity:
 def code_text(module: str) -> bytes:
     """Return the source text of a module's syntax tree, without docstrings; its digest is that of this text."""
     with _parsing():
-        text = _remembered_texts().get(_source(module).digest)
-        return (_text(module, file_state(_file(module))) if text is None else text).encode()
+        text = _remembered_texts().get(_source(module).digest) or _text(module, file_state(_file(module)))
+        return text.encode()
 
 
 _IDENTITIES: dict[str, CodeIdentity] = {}
