@@ -1,8 +1,8 @@
-"""Compile the loops of a scan before they are called, on all cores.
+"""Compile the loops of a scan, and those of the virtual scanner, before they are called, on all cores.
 
 Compiled one after the other as they are first called, they take a minute and more on a machine that is new. Here
-processes share them. What is compiled is kept where `footscan.compiled` keeps it, so it is never stale; the list of
-argument types is only a matter of speed: what it lacks is compiled when it is called.
+processes share them, while the program goes on. What is compiled is kept where `footscan.compiled` keeps it, so it is
+never stale; the lists of argument types are only a matter of speed: what they lack is compiled when it is called.
 
     python -m footscan.ahead_of_time
 """
@@ -13,13 +13,15 @@ import json
 import logging
 import signal
 import sys
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import suppress
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor, wait
+from contextlib import ExitStack, suppress
 from hashlib import sha256
 from importlib.resources import files
 from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numba
 from llvmlite import binding
@@ -31,33 +33,62 @@ from footscan.side_by_side import cores
 
 log = logging.getLogger("footscan.compiled")
 
-LIST = "loops.json"
-"""Module, name and argument types of each loop of a scan that Python calls, the slowest to compile first."""
+SCAN, VIRTUAL = "loops.json", "virtual/loops.json"
+"""The lists, relative to this package: module, name and argument types of each loop that Python calls, the slowest to
+compile first."""
+LOOK_SECONDS = 0.1
+"""Interval at which `Compilation.wait` calls its caller; chosen by hand."""
 
 Spec = str | dict[str, Any]
 
 
-def compile_ahead() -> None:
-    """Compile the listed loops on all cores, unless that was done on this machine for these sources."""
-    mark = _mark()
-    if mark is None or mark.exists():
-        return
-    processes = ProcessPoolExecutor(cores(), get_context("spawn"), _begin)
-    try:
-        compiled = [processes.submit(_compile, *loop) for loop in _listed()]
-        problems = [repr(problem) for loop in compiled if (problem := loop.exception()) is not None]
-    finally:
-        processes.shutdown(cancel_futures=True)  # after an interrupt, what has begun ends, and no more begins
-    if problems:
-        log.warning("%d of %d loops were not compiled ahead: %s", len(problems), len(compiled), problems[0])
-        return
-    with suppress(OSError):
-        mark.touch()
+class Compilation:
+    """Compiles the loops of lists on all cores, unless that was done on this machine for these sources.
+
+    A context manager, which ends what is not compiled then.
+    """
+
+    def __init__(self, *lists: str) -> None:
+        self._open = ExitStack()
+        self._lists = [name for name in lists if not is_compiled(name)]
+        self._loops: list[Future[None]] = []
+        if self._lists:
+            context = get_context("spawn")
+            childrens_end, own_end = context.Pipe(duplex=False)
+            self._open.enter_context(childrens_end)
+            processes = self._open.enter_context(ProcessPoolExecutor(cores(), context, _begin, (childrens_end,)))
+            self._open.enter_context(own_end)
+            self._loops = [processes.submit(_compile, *loop) for name in self._lists for loop in _listed(name)]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._open.close()
+
+    @property
+    def is_done(self) -> bool:
+        """True if `wait` returns at once."""
+        return not self._lists
+
+    def wait(self, on_look: Callable[[], None] = lambda: None) -> None:
+        """Wait until all loops are compiled; `on_look` is called meanwhile, and may end the wait by an exception."""
+        while wait(self._loops, LOOK_SECONDS).not_done:
+            on_look()
+        problems = [repr(problem) for loop in self._loops if (problem := loop.exception()) is not None]
+        if problems:
+            log.warning("%d of %d loops were not compiled ahead: %s", len(problems), len(self._loops), problems[0])
+        for mark in [] if problems else map(_mark, self._lists):
+            if mark is not None:
+                with suppress(OSError):
+                    mark.touch()
+        self._lists, self._loops = [], []
+        self._open.close()
 
 
-def is_compiled() -> bool:
-    """True if `compile_ahead` has nothing to do."""
-    mark = _mark()
+def is_compiled(name: str) -> bool:
+    """True if a list is compiled on this machine for these sources, or if nothing can be kept."""
+    mark = _mark(name)
     return mark is None or mark.exists()
 
 
@@ -96,8 +127,8 @@ def type_of(spec: Spec) -> types.Type:
     return types.BaseTuple.from_types(parts, getattr(importlib.import_module(module), name))
 
 
-def _begin() -> None:
-    end_with_parent()
+def _begin(pipe: "Connection[object, object]") -> None:
+    end_with_parent(pipe)
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C in a terminal ends it at once and without a traceback
     gc.disable()  # numba's many small objects: collecting takes an eighth of the time, and saves 600 MB of 1400 in all
 
@@ -107,21 +138,22 @@ def _compile(module: str, name: str, arguments: list[Spec]) -> None:
     loop.compile(tuple(type_of(argument) for argument in arguments))
 
 
-def _listed() -> list[tuple[str, str, list[Spec]]]:
-    return [tuple(entry) for entry in json.loads(files("footscan").joinpath(LIST).read_text("utf-8"))]
+def _listed(name: str) -> list[tuple[str, str, list[Spec]]]:
+    return [tuple(entry) for entry in json.loads(files("footscan").joinpath(name).read_text("utf-8"))]
 
 
-def _mark() -> Path | None:
-    """The file that says that all is compiled for these sources, numba and processor; None without a place for it."""
+def _mark(name: str) -> Path | None:
+    """The file that says that a list is compiled for these sources, numba and processor; None without a place."""
     place = code_place()
     if place is None:
         return None
     root = Path(__file__).parents[1]
-    modules = sorted({module for module, _, _ in _listed()})
+    modules = sorted({module for module, _, _ in _listed(name)})
     folders = [code_folder(module, root.joinpath(*module.split(".")).with_suffix(".py")) for module in modules]
     about = [numba.__version__, binding.get_host_cpu_name(), sys.version, *map(str, folders)]
     return place / f"ahead-{sha256(' '.join(about).encode()).hexdigest()[:16]}"
 
 
 if __name__ == "__main__":
-    compile_ahead()
+    with Compilation(SCAN, VIRTUAL) as compilation:
+        compilation.wait()

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cholesky import factorise, solve_lower
 from footscan.compiled import compiled
 
 Floats = NDArray[np.float64]
@@ -96,7 +97,8 @@ def _fits(vertices: Floats, normals: Floats, faces: Ints, starts: Ints, around: 
         if covered[vertex]:
             continue
         near, count = _patch(vertex, faces, starts, around, seen, patch)
-        covered[patch[:near]] = True
+        for k in range(near):
+            covered[patch[k]] = True
         is_smooth = count > CUBIC
         for k in range(count):
             is_smooth = is_smooth and _dot(normals[patch[k]], normals[vertex]) > SMOOTH
@@ -104,12 +106,15 @@ def _fits(vertices: Floats, normals: Floats, faces: Ints, starts: Ints, around: 
             continue
         quadratic, cubic = _residual_variances(vertices, vertex, normals[vertex], patch[:count])
         if cubic >= 0:
-            variance[patch[:count]] += cubic
-            patches[patch[:count]] += 1
+            for k in range(count):
+                variance[patch[k]] += cubic
+                patches[patch[k]] += 1
             if cubic > 0:
                 ratios[fitted] = quadratic / cubic
                 fitted += 1
-    return np.where(patches > 0, variance / np.maximum(patches, 1), -1.0), ratios[:fitted]
+    for vertex in range(len(vertices)):
+        variance[vertex] = variance[vertex] / patches[vertex] if patches[vertex] > 0 else -1.0
+    return variance, ratios[:fitted]
 
 
 @compiled
@@ -138,12 +143,7 @@ def _patch(vertex: int, faces: Ints, starts: Ints, around: Ints, seen: Ints, pat
 @compiled
 def _residual_variances(vertices: Floats, vertex: int, normal: Floats, patch: Ints) -> tuple[float, float]:
     """Returns the variances of a patch about its quadratic and its cubic, mm²; -1 if they are undetermined."""
-    axis = np.argmin(np.abs(normal))
-    across = np.zeros(3)
-    across[axis] = 1.0
-    across -= normal[axis] * normal
-    across /= np.sqrt(_dot(across, across))
-    up = np.cross(normal, across)
+    across, up = _tangents(normal)
     away, scale = np.empty((len(patch), 3)), 0.0
     for k in range(len(patch)):
         for i in range(3):
@@ -163,12 +163,36 @@ def _residual_variances(vertices: Floats, vertex: int, normal: Floats, patch: In
             right[i] += terms[i] * height
             for j in range(i + 1):
                 matrix[i, j] += terms[i] * terms[j]
-    if not _eliminated(matrix, right):
+    if not factorise(matrix):
         return -1.0, -1.0
-    # Cholesky's method makes the terms orthogonal: each reduces the sum of squares by its own square.
-    quadratic = squares - np.sum(right[:QUADRATIC] ** 2)
-    cubic = max(quadratic - np.sum(right[QUADRATIC:] ** 2), 0.0)
-    return quadratic / (len(patch) - QUADRATIC), cubic / (len(patch) - CUBIC)
+    solve_lower(matrix, right)
+    quadratic = squares
+    for i in range(QUADRATIC):
+        quadratic -= right[i] * right[i]
+    cubic = quadratic
+    for i in range(QUADRATIC, CUBIC):
+        cubic -= right[i] * right[i]
+    return quadratic / (len(patch) - QUADRATIC), max(cubic, 0.0) / (len(patch) - CUBIC)
+
+
+@compiled
+def _tangents(normal: Floats) -> tuple[Floats, Floats]:
+    """Returns two unit vectors (3,) that are perpendicular to the normal and to each other."""
+    axis = 0
+    for i in range(1, 3):
+        if abs(normal[i]) < abs(normal[axis]):
+            axis = i
+    across, up = np.zeros(3), np.empty(3)
+    across[axis] = 1.0
+    for i in range(3):
+        across[i] -= normal[axis] * normal[i]
+    length = np.sqrt(_dot(across, across))
+    for i in range(3):
+        across[i] /= length
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        up[i] = normal[j] * across[k] - normal[k] * across[j]
+    return across, up
 
 
 @compiled
@@ -176,23 +200,3 @@ def _dot(first: Floats, second: Floats) -> float:
     """Dot product of (3,) vectors, for which a call of BLAS takes longer."""
     product: float = first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
     return product
-
-
-@compiled
-def _eliminated(matrix: Floats, right: Floats) -> bool:
-    """Make the normal equations triangular in place; returns False if they leave the fit undetermined."""
-    for i in range(len(right)):
-        for j in range(i + 1):
-            value = matrix[i, j]
-            for k in range(j):
-                value -= matrix[i, k] * matrix[j, k]
-            if i == j:
-                if value <= 1e-9 * matrix[i, i]:
-                    return False
-                matrix[i, i] = np.sqrt(value)
-            else:
-                matrix[i, j] = value / matrix[j, j]
-        for k in range(i):
-            right[i] -= matrix[i, k] * right[k]
-        right[i] /= matrix[i, i]
-    return True

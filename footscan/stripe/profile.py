@@ -122,7 +122,7 @@ def measure_profiles(
         if first == last:
             continue
         feet = Feet(first, last, base, is_even)
-        centre = _measure(words, light, samples, feet, step, limits, profiles, count)
+        centre = _measure(words, light, samples, feet, step, limits, profiles[count])
         if math.isnan(centre):
             continue
         ridge, other = at + centre - reach, beside + (centre - reach) * slope
@@ -212,10 +212,9 @@ def _measure(
     feet: Feet,
     step: float,
     limits: LoopParameters,
-    profiles: NDArray[np.float64],
-    n: int,
+    profile: NDArray[np.float64],
 ) -> float:
-    """Measure one profile into row `n` of `profiles`; returns its centre in samples, NaN if it is no stripe."""
+    """Measure one profile into `profile` (11,); returns its centre in samples, NaN if it is no stripe."""
     samples, white, cells, clipped = memory
     first, last, base, is_even = feet
     middle = samples.size // 2
@@ -242,11 +241,11 @@ def _measure(
         centre = centre_of(samples, clipped, first, last, left, right, base, contrast, limits)
     if not abs(centre - middle) * step <= 1 + 0.5 * width:
         return math.nan
-    profiles[n, WIDTH], profiles[n, CONTRAST] = width, contrast
-    profiles[n, SATURATION], profiles[n, REDNESS] = saturation, redness
+    profile[WIDTH], profile[CONTRAST] = width, contrast
+    profile[SATURATION], profile[REDNESS] = saturation, redness
     foot = max(light_of(words[cells[first]]), light_of(words[cells[last]]))
-    profiles[n, LIGHT] = max(light_of(words[cells[middle]]) - foot, 0.0) * width
-    profiles[n, SYMMETRY] = max(0.0, 1 - abs((right - centre) - (centre - left)) / (right - left))
+    profile[LIGHT] = max(light_of(words[cells[middle]]) - foot, 0.0) * width
+    profile[SYMMETRY] = max(0.0, 1 - abs((right - centre) - (centre - left)) / (right - left))
     return centre
 
 

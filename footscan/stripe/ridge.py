@@ -121,7 +121,7 @@ def find_ridges(
                     if not _cross(smooth, x, y, summits[y, x], least, crossing):
                         continue
                     if count < len(ridges):
-                        ridges[count] = crossing
+                        ridges[count, NORMAL_I], ridges[count, NORMAL_J] = crossing[NORMAL_I], crossing[NORMAL_J]
                         ridges[count, I] = 2 * (u + crossing[I]) + 0.5
                         ridges[count, J] = 2 * (v + crossing[J]) + 0.5
                         ridges[count, SHARPNESS] = crossing[SHARPNESS] / (4 * SUMMED)
@@ -132,8 +132,8 @@ def find_ridges(
 @compiled
 def _measure_range(band: NDArray[np.integer], lowest: NDArray[np.integer], highest: NDArray[np.integer]) -> None:
     """Compute the lowest and the highest value of each column of a band of rows."""
-    lowest[:] = band[0]
-    highest[:] = band[0]
+    for i in range(band.shape[1]):
+        lowest[i] = highest[i] = band[0, i]
     for j in range(1, band.shape[0]):
         row = band[j]
         for i in range(row.size):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cholesky import factorise, solve_factored
 from footscan.compiled import compiled
 from footscan.mesh.buckets import Buckets, sort_into_cubes
 from footscan.side_by_side import Arrays, in_pieces
@@ -140,7 +141,7 @@ def _project(  # noqa: PLR0912, PLR0915 (one call per neighbour would cost more 
                         terms[3], terms[4], terms[5] = u * u, u * v, v * v
                         for r in range(6):
                             right[r] += weight * terms[r] * height
-                            for c in range(r, 6):
+                            for c in range(r + 1):
                                 matrix[r, c] += weight * terms[r] * terms[c]
                         if u * u + v * v < closest:
                             closest, closest_point = u * u + v * v, near
@@ -149,17 +150,20 @@ def _project(  # noqa: PLR0912, PLR0915 (one call per neighbour would cost more 
                 closest_point = -1
                 break
             for r in range(6):
-                for c in range(r):
-                    matrix[r, c] = matrix[c, r]
                 matrix[r, r] += RIDGE if r else 0.0
-            quadric = np.linalg.solve(matrix, right)
-            height = min(max(quadric[0], -radius / 2), radius / 2)
+            factorise(matrix)
+            solve_factored(matrix, right)
+            height = min(max(right[0], -radius / 2), radius / 2)
+            length = 0.0
             for axis in range(3):
                 place[axis] += height * normal[axis]
-                normal[axis] -= (quadric[1] * across[axis] + quadric[2] * along[axis]) / radius
-            normal /= np.sqrt(np.sum(normal * normal))
+                normal[axis] -= (right[1] * across[axis] + right[2] * along[axis]) / radius
+                length += normal[axis] * normal[axis]
+            for axis in range(3):
+                normal[axis] /= np.sqrt(length)
             if round_ == rounds - 1:
-                moved[n], turned[n] = place, normal
+                for axis in range(3):
+                    moved[n, axis], turned[n, axis] = place[axis], normal[axis]
                 gap[n], nearest[n] = np.sqrt(closest) * reach, closest_point
                 for sector in range(SECTORS):
                     sectors[n] += (seen >> sector) & 1

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from pipelines.cli.foot.measure import print_measures
+from pipelines.cli.terminal.compiling import compile_loops
 from pipelines.cli.terminal.output import message, note, print_line, print_table
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ def demo(
     light: Annotated[Literal["dark", "ambient", "bright"], typer.Option(help="Light in the room.")] = "ambient",
 ) -> None:
     """Film a virtual foot, calibrate, reconstruct and measure it, and compare the result with the truth."""
+    from footscan.ahead_of_time import SCAN, VIRTUAL
     from pipelines.demo import run_demo
     from schemas.measures import Measures
     from schemas.parameters.demo import FilmedFoot
@@ -27,6 +29,7 @@ def demo(
     from schemas.quality import Quality
 
     foot = FilmedFoot(scan=f"demo-{side[0].upper()}", side=side, settings=SimulationSettings(ambient=light))
+    compile_loops(SCAN, VIRTUAL)
     result = run_demo(folder, foot, watch)
 
     for part, seconds in result.seconds.items():

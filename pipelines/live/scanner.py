@@ -25,7 +25,8 @@ from pipelines.live.state import Activity, OnState, ScannerState, StateBoard, wi
 from schemas.base.errors import Fault, FootscanError, RefusedInput
 from schemas.rig import Rig
 
-if TYPE_CHECKING:  # heads that are only moved do not wait for Zarr, Dask and the reconstruction
+if TYPE_CHECKING:  # heads that are only moved do not wait for Zarr, Dask, numba and the reconstruction
+    from footscan.ahead_of_time import Compilation
     from footscan.capture.recording import ScanRecording
     from pipelines.live.storing import FilmedScan
 
@@ -39,15 +40,20 @@ UNDER_WAY = ("moving", "jogging", "homing", "held", "door")
 """States of the board in which a stop is always sent to it: heads move or are held."""
 ANSWERING = (*UNDER_WAY, "ready", "not homed", "alarm", "restarting")
 """States of the board in which a stop is sent to it during an activity of the scanner."""
+COMPILING = "compiling for this machine, once"
 CHECKING = "checking that the heads lost no steps"
 STOPPED = "stopped; nothing of this scan is kept"
 
 
 class LiveScanner:
-    """The scanner of a rig. A context manager that closes the devices, lasers off."""
+    """The scanner of a rig. A context manager that closes the devices, lasers off.
 
-    def __init__(self, rig: Rig) -> None:
+    A scan that is measured waits, when the heads are homed, for its `loops` to be compiled.
+    """
+
+    def __init__(self, rig: Rig, loops: "Compilation | None" = None) -> None:
         self.rig = rig
+        self.loops = loops
         self._board = StateBoard()
         self._heads: Heads | None = None
         self._deck = CameraDeck(sources_of(rig))
@@ -192,6 +198,8 @@ class LiveScanner:
         with self._stop_reported(), self._deck.open_after(self._first_cameras()):
             self._connect_board()
             self._home_if_needed()
+            if order.results is not None:
+                self._wait_for_loops()
             passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])
             travel = self.rig.travel
             light = order.light or self.measured_light(passes, places_of_scan(self.rig))
@@ -355,6 +363,11 @@ class LiveScanner:
             self._board.tell("homing")
             self.heads.home()
             self._refuse_stopped()
+
+    def _wait_for_loops(self) -> None:
+        if self.loops is not None and not self.loops.is_done:
+            self._board.tell("preparing", COMPILING)
+            self.loops.wait(self._refuse_stopped)
 
     def _check_steps(self) -> tuple[float, ...]:
         """Check that the heads lost no steps: films with wrong positions are worthless. Returns the errors, mm."""

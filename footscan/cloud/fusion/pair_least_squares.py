@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cholesky import factorise, solve_factored
 from footscan.cloud.fusion.motion import MOST_TERMS
 from footscan.compiled import compiled
 
@@ -21,8 +22,6 @@ INDEPENDENT = 0.02
 50 comparisons count as one. Chosen by hand."""
 PRIOR_MM = 0.3
 """Prior standard deviation of a coefficient. Chosen by hand."""
-SINGULAR = 1e-12
-"""Lower bound of a pivot of the Cholesky factorisation: rounding."""
 
 
 class Forms(NamedTuple):
@@ -110,7 +109,10 @@ def solve(
     normal = INDEPENDENT * matrix.reshape(count * MOST_TERMS, count * MOST_TERMS)[np.ix_(free, free)]
     normal[np.diag_indices(len(free))] += held.ravel()[free]
     solution = np.zeros(count * MOST_TERMS)
-    solution[free] = _solve_definite(normal, INDEPENDENT * right.ravel()[free])
+    known = INDEPENDENT * right.ravel()[free]
+    factorise(normal)
+    solve_factored(normal, known)
+    solution[free] = known
     return solution.reshape(count, MOST_TERMS)
 
 
@@ -148,26 +150,3 @@ def _sum_up(
         constant[n, a, b] += w * distances[m] ** 2
         weight[n, a, b] += w
         expected[n, a, b] += w * variances[m]
-
-
-@compiled
-def _solve_definite(matrix: Floats, right: Floats) -> Floats:
-    """The solution (K,) for a positive definite matrix (K, K), by Cholesky's method; LAPACK's depends on threads."""
-    size = len(right)
-    lower = np.zeros((size, size))
-    for k in range(size):
-        for m in range(k + 1):
-            total = matrix[k, m]
-            for n in range(m):
-                total -= lower[k, n] * lower[m, n]
-            lower[k, m] = np.sqrt(max(total, SINGULAR)) if k == m else total / lower[m, m]
-    solution = right.copy()
-    for k in range(size):
-        for n in range(k):
-            solution[k] -= lower[k, n] * solution[n]
-        solution[k] /= lower[k, k]
-    for k in range(size - 1, -1, -1):
-        for n in range(k + 1, size):
-            solution[k] -= lower[n, k] * solution[n]
-        solution[k] /= lower[k, k]
-    return solution

@@ -43,7 +43,9 @@ def _lattices(vertices: Floats, faces: NDArray[np.int64], spacing: float) -> Flo
         parts[face] = min(max(np.ceil(np.sqrt(longest) / spacing - 1e-6), 1), MOST)
         total += (parts[face] + 1) * (parts[face] + 2) // 2 - 3  # the corners are vertices already
     points = np.empty((total, 3))
-    points[: len(vertices)] = vertices
+    for vertex in range(len(vertices)):
+        for axis in range(3):
+            points[vertex, axis] = vertices[vertex, axis]
     place = len(vertices)
     for face in range(len(faces)):
         a, b, c = faces[face]

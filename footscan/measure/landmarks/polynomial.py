@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.cholesky import factorise, solve_factored
 from footscan.compiled import compiled
 from footscan.robust import MAD_TO_SD
 
@@ -44,39 +45,73 @@ def robust_fit(places: Floats, height: Floats, noise: float, unevenness: float) 
     noise : mm, a first estimate
     unevenness : mm, expected size of the terms of third and fourth order; the penalty suppresses larger ones
     """
-    squared = places[:, 0] ** 2 + places[:, 1] ** 2
-    inside = np.flatnonzero(squared < 1.0)
-    count, size = len(inside), len(POWERS)
+    size, count = len(POWERS), 0
+    inside, heights, weight = np.empty_like(places), np.empty(len(places)), np.empty(len(places))
+    for k in range(len(places)):
+        squared = places[k, 0] ** 2 + places[k, 1] ** 2
+        if squared < 1.0:
+            inside[count, 0], inside[count, 1] = places[k, 0], places[k, 1]
+            heights[count], weight[count] = height[k], (1.0 - squared) ** 2
+            count += 1
     if count < QUADRIC:
         return np.zeros(size), -1.0
-    terms, heights = terms_at(places[inside]), height[inside]
-    weight = (1.0 - squared[inside]) ** 2
+    terms = terms_at(inside[:count])
     kept, away, factors = weight.copy(), np.empty(count), np.zeros(size)
     for _ in range(REWEIGHTED):
-        both = np.zeros((size, size + 1))  # the right side, then the normal equations, which give the number of terms
+        normal, right = np.zeros((size, size)), np.zeros(size)
         for k in range(count):
             for i in range(size):
                 weighted = kept[k] * terms[k, i]
-                both[i, 0] += weighted * heights[k]
+                right[i] += weighted * heights[k]
                 for j in range(i + 1):
-                    both[i, j + 1] += weighted * terms[k, j]
-        for i in range(size):
-            for j in range(i):
-                both[j, i + 1] = both[i, j + 1]
-        solved = np.linalg.solve(both[:, 1:] + np.diag(held_back(noise, unevenness)), both)
-        factors[:] = solved[:, 0]
-        # The penalty grows with the noise and must not add to it: with enough points, the noise is estimated by a fit
-        # without penalty.
-        free = solved if count < ENOUGH * size else np.linalg.solve(both[:, 1:] + np.diag(np.full(size, RIDGE)), both)
-        used = 0.0
-        for i in range(size):
-            used += free[i, i + 1]
-        away[:] = np.abs(heights - terms @ np.ascontiguousarray(free[:, 0]))
+                    normal[i, j] += weighted * terms[k, j]
+        factors, used = _penalised_fit(normal, right, held_back(noise, unevenness))
+        free = factors
+        if count >= ENOUGH * size:
+            # The penalty grows with the noise and must not add to it: with enough points, the noise is estimated by a
+            # fit without penalty.
+            free, used = _penalised_fit(normal, right, np.full(size, RIDGE))
+        for k in range(count):
+            away[k] = abs(heights[k] - _value(terms, k, free))
         left = max(1.0 - used / count, LEAST_FREE)
-        noise = max(MAD_TO_SD * np.sort(away)[count // 2] / np.sqrt(left), LEAST_NOISE_MM)
-        off = (heights - terms @ factors) / (TUKEY * max(noise, LEAST_MISFIT_MM))
-        kept[:] = weight * np.maximum(1.0 - off * off, 0.0) ** 2
+        noise = max(MAD_TO_SD * float(np.median(away)) / np.sqrt(left), LEAST_NOISE_MM)
+        for k in range(count):
+            off = (heights[k] - _value(terms, k, factors)) / (TUKEY * max(noise, LEAST_MISFIT_MM))
+            kept[k] = weight[k] * max(1.0 - off * off, 0.0) ** 2
     return factors, noise
+
+
+@compiled
+def _penalised_fit(normal: Floats, right: Floats, held: Floats) -> tuple[Floats, float]:
+    """Returns (15,) coefficients and how many of them the points determine: the trace of (N + penalty)⁻¹ N.
+
+    Parameters
+    ----------
+    normal, right : (15, 15), of which the lower triangle is read, and (15,), the normal equations
+    held : (15,) penalty of each coefficient
+    """
+    size = len(right)
+    system, factors, column = normal.copy(), right.copy(), np.empty(size)
+    for i in range(size):
+        system[i, i] += held[i]
+    factorise(system)
+    solve_factored(system, factors)
+    used = 0.0
+    for i in range(size):
+        for j in range(size):
+            column[j] = normal[max(i, j), min(i, j)]
+        solve_factored(system, column)
+        used += column[i]
+    return factors, used
+
+
+@compiled
+def _value(terms: Floats, k: int, factors: Floats) -> float:
+    """The polynomial at point `k`, of which the (N, 15) `terms` are known."""
+    value = 0.0
+    for i in range(len(factors)):
+        value += terms[k, i] * factors[i]
+    return value
 
 
 @compiled
@@ -107,7 +142,8 @@ def held_back(noise: float, unevenness: float) -> Floats:
     The penalty follows the part of the residuals that is noise, and not form that the polynomial misses.
     """
     hold = np.full(len(POWERS), RIDGE)
-    hold[QUADRIC:] += max(noise**2 - LEAST_MISFIT_MM**2, LEAST_NOISE_MM**2) / unevenness**2
+    for i in range(QUADRIC, len(POWERS)):
+        hold[i] += max(noise**2 - LEAST_MISFIT_MM**2, LEAST_NOISE_MM**2) / unevenness**2
     return hold
 
 
@@ -142,6 +178,10 @@ def climb(factors: Floats, place: Floats) -> Floats:
         apart = np.hypot((second[0, 0] - second[1, 1]) / 2, second[0, 1])
         if mean + apart > -LEAST_BEND_MM:  # the greater curvature
             break
-        step = -np.linalg.solve(second, gradient)
-        place += step * min(1.0, LONGEST_STEP / max(np.hypot(step[0], step[1]), 1e-12))
+        determinant = second[0, 0] * second[1, 1] - second[0, 1] * second[0, 1]
+        across = (second[0, 1] * gradient[1] - second[1, 1] * gradient[0]) / determinant
+        along = (second[0, 1] * gradient[0] - second[0, 0] * gradient[1]) / determinant
+        shortened = min(1.0, LONGEST_STEP / max(np.hypot(across, along), 1e-12))
+        place[0] += across * shortened
+        place[1] += along * shortened
     return place

@@ -84,13 +84,7 @@ class Scene:
     def cast(self, origins: Floats, directions: Floats) -> Hits:
         """First hits of rays, each array (N, 3)."""
         met, distance, shares = first_hits(np.ascontiguousarray(origins), np.ascontiguousarray(directions), self._tree)
-        ray = np.flatnonzero(met >= 0)
-        face = met[ray]
-        u, v = shares[ray].T
-        corners = self._corner_normals[face]
-        normals = corners[:, 0] * (1.0 - u - v)[:, None] + corners[:, 1] * u[:, None] + corners[:, 2] * v[:, None]
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-        return Hits(ray, distance[ray], self._facet_normals[face], normals)
+        return Hits(*_hits(met, distance, shares, self._facet_normals, self._corner_normals))
 
     def hidden(self, points: Floats, facet_normals: Floats, ends: Floats) -> NDArray[np.bool_]:
         """Whether the object stands between surface points and `ends`, all (N, 3) mm; the surface faces its end."""
@@ -116,7 +110,7 @@ def _mean_normals(
     normals = np.empty((len(faces), 3, 3))
     for face in range(len(faces)):
         for corner in range(3):
-            total = np.zeros(3)
+            x = y = z = 0.0
             vertex = faces[face, corner]
             for k in range(starts[vertex], starts[vertex + 1]):
                 other = around[k]
@@ -125,10 +119,44 @@ def _mean_normals(
                     + facet_normals[face, 1] * facet_normals[other, 1]
                     + facet_normals[face, 2] * facet_normals[other, 2]
                 ) >= least_cosine:
-                    total += crossed[other]
-            length = np.sqrt((total * total).sum())
-            normals[face, corner] = total / length if length > 0.0 else facet_normals[face]
+                    x, y, z = x + crossed[other, 0], y + crossed[other, 1], z + crossed[other, 2]
+            length = np.sqrt(x * x + y * y + z * z)
+            for axis, part in enumerate((x, y, z)):
+                normals[face, corner, axis] = part / length if length > 0.0 else facet_normals[face, axis]
     return normals
+
+
+@compiled
+def _hits(
+    met: Ints, distance: Floats, shares: Floats, facet_normals: Floats, corner_normals: Floats
+) -> tuple[Ints, Floats, Floats, Floats]:
+    """The fields of `Hits`, of rays that met triangles `met` (N,) as `first_hits` says; -1 where there is none."""
+    count = 0
+    for face in met:
+        count += face >= 0
+    ray, distances = np.empty(count, np.int64), np.empty(count)
+    facets, normals = np.empty((count, 3)), np.empty((count, 3))
+    n = 0
+    for k in range(len(met)):
+        face = met[k]
+        if face < 0:
+            continue
+        ray[n], distances[n] = k, distance[k]
+        u, v = shares[k]
+        squares = 0.0
+        for axis in range(3):
+            facets[n, axis] = facet_normals[face, axis]
+            normals[n, axis] = (
+                corner_normals[face, 0, axis] * (1.0 - u - v)
+                + corner_normals[face, 1, axis] * u
+                + corner_normals[face, 2, axis] * v
+            )
+            squares += normals[n, axis] * normals[n, axis]
+        length = max(np.sqrt(squares), 1e-12)
+        for axis in range(3):
+            normals[n, axis] /= length
+        n += 1
+    return ray, distances, facets, normals
 
 
 def _patches(corners: Floats, longest: float) -> Floats:

@@ -125,6 +125,7 @@ def _run(
     profile: "Profile | None" = None,
 ) -> "tuple[PlannedJob, list[ScanEnd]]":
     """Plan and run a job, and print the result of each scan; `folders` as in `plan_job`."""
+    from footscan.ahead_of_time import SCAN
     from pipelines.archive.planning import plan_job
     from pipelines.archive.running import run_job
     from pipelines.cli.terminal.progress import StepProgress
@@ -134,7 +135,7 @@ def _run(
     if planned.steps:
         note(steps_to_run(planned))
     if planned.to_run >= MANY_STEPS:
-        compile_loops()
+        compile_loops(SCAN)
     ends = []
     with StepProgress(planned.to_run, len(planned.scans) + len(planned.refused), log) as progress:
 

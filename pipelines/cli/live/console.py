@@ -109,6 +109,7 @@ def _opened(
     files: _Files, archive: Path, results: Path, folder: Path, grid_mm: float | None
 ) -> "Iterator[tuple[Scanner, Guide | None]]":
     """The scanner of a rig, and the guide of its calibrations. With a grid it is a virtual scanner."""
+    from footscan.ahead_of_time import SCAN, Compilation
     from pipelines.console.live_adapter import LiveAdapter
     from pipelines.live.calibrating.guide import Guide
     from pipelines.live.calibrating.live import LiveStanding
@@ -120,14 +121,14 @@ def _opened(
     world = plain_world(grid_mm is not None, folder)
     if world is not None:
         world = world.model_copy(update={"grid_mm": grid_mm})
-    with opened_rig(files.rig, folder, world, calibrated=world is not None) as opened:
+    with Compilation(SCAN) as loops, opened_rig(files.rig, folder, world, calibrated=world is not None) as opened:
         rig = opened.rig
         if files.calibration is not None:
             rig = rig.model_copy(update={"calibration": str(files.calibration.resolve())})
         # Pictures of a virtual scanner are made beforehand, and for one light.
         light = None if opened.world is None else light_by_hand(rig, 1.0, EXPOSURE_MS)
         settings = settings_of(opened.file, files.captures, files.reference, files.body, light)
-        with LiveScanner(rig) as scanner:
+        with LiveScanner(rig, loops) as scanner:
             guide = None
             if settings is not None:
                 guide = Guide(LiveStanding(scanner), settings, None if opened.world is None else opened.world.put)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from pipelines.cli.terminal.compiling import compile_loops
 from pipelines.cli.terminal.output import note
 from schemas.base.errors import RefusedInput
 
@@ -65,8 +66,10 @@ def opened_rig(rig: Path | None, folder: Path, world: "World | None", *, calibra
             return
         if rig is not None:
             raise RefusedInput("--rig", "goes without --virtual, which has a rig of its own")
+        from footscan.ahead_of_time import VIRTUAL
         from pipelines.live.virtual.rig import virtual_rig
 
+        compile_loops(VIRTUAL)
         with virtual_rig(folder, world, _Told(), calibrated=calibrated) as one:
             yield OpenRig(one.rig, one.file, one.world)
 

@@ -19,7 +19,6 @@ from pipelines.cli.live.options import (
     opened_rig,
     plain_world,
 )
-from pipelines.cli.terminal.compiling import compile_loops
 from pipelines.cli.terminal.output import AsJson, message, print_json, print_line
 from schemas.base.errors import Fault, FootscanError, RefusedInput
 
@@ -105,6 +104,7 @@ def scan(
     as_json: AsJson = False,
 ) -> int:
     """Scan a foot: home, film, store, reconstruct and measure."""
+    from footscan.ahead_of_time import SCAN, Compilation
     from pipelines.live.scan_order import ScanOrder
     from pipelines.live.scanner import LiveScanner
     from pipelines.live.storing import ScanName, next_scan_name
@@ -123,9 +123,10 @@ def scan(
             end_mm=400.0 if to_mm is None else to_mm, mm_per_s=speed or 400.0 / 11.0,
             dark_grid_mm=grid_mm if texture else DARK_GRID_MM,
         )  # fmt: skip
-    if measure:
-        compile_loops()
-    with opened_rig(rig, virtual_folder, world, calibrated=True) as opened:
+    with (
+        Compilation(*[SCAN] if measure else []) as loops,
+        opened_rig(rig, virtual_folder, world, calibrated=True) as opened,
+    ):
         used = _with_travel(opened.rig, speed, from_mm, to_mm)
         today = datetime.datetime.now().astimezone().date()
         order = ScanOrder(
@@ -138,7 +139,7 @@ def scan(
             keep_partial,
         )
         _warn_of_drift(calibration, used)
-        with LiveScanner(used) as scanner:
+        with LiveScanner(used, loops) as scanner:
             scanner.listen(StateTeller())
             if problems := scanner.connect():
                 raise Fault("; ".join(problems.values()))

@@ -1,12 +1,13 @@
-"""Compiling, with a message, before a command that measures."""
+"""Compiling, with a message, before a command that measures or films virtually."""
 
 from pipelines.cli.terminal.output import note
 
 
-def compile_loops() -> None:
-    """Compile the loops of a scan on all cores, where that was not done yet."""
-    from footscan.ahead_of_time import compile_ahead, is_compiled
+def compile_loops(*lists: str) -> None:
+    """Compile the loops of lists of `footscan.ahead_of_time` on all cores, where that was not done yet."""
+    from footscan.ahead_of_time import Compilation
 
-    if not is_compiled():
-        note("compiling for this machine, once; on two cores that takes some 40 s")
-        compile_ahead()
+    with Compilation(*lists) as compilation:
+        if not compilation.is_done:
+            note("compiling for this machine, once; on two cores that takes some 30 s")
+            compilation.wait()

@@ -3,7 +3,7 @@
 import shutil
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from checked import made_check
 from live_bench import DAY, FOOT_MM, LENGTH_MM, THREE_HEADS, Bench, open_bench
 from waiting import wait_until
 
+from footscan.ahead_of_time import Compilation
 from footscan.calibration.travel.body import standard_body
 from footscan.capture import frame_positions, latency
 from footscan.capture.cameras.usb_bus import Pass
@@ -40,6 +41,20 @@ from schemas.rig import RigHead, RigTravel
 pytestmark = pytest.mark.real_time  # cameras stream while heads move
 
 
+class Compiling(Compilation):
+    """Loops that are compiled while one waits for them."""
+
+    is_done = False
+
+    def __init__(self, meanwhile: Callable[[], None] = lambda: None) -> None:
+        super().__init__()
+        self._meanwhile = meanwhile
+
+    def wait(self, on_look: Callable[[], None] = lambda: None) -> None:
+        self._meanwhile()
+        on_look()
+
+
 @pytest.fixture
 def lenient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A busy host times frames badly and reports it; the accuracy of positions is not tested here."""
@@ -57,6 +72,7 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path, monkeypatc
     calibration, results = pristine / "calibration.json", bench.home / "results"
     travel = bench.scanner.rig.travel.model_copy(update={"length_mm": FOOT_MM})
     bench.scanner.rig = bench.scanner.rig.model_copy(update={"travel": travel})
+    bench.scanner.loops = Compiling()
     files: list[set[str]] = []
     missing: list[Waiting] = []
 
@@ -78,7 +94,7 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path, monkeypatc
     assert not {step.kind for step in missing} & {"extract", "map"}, "done while the heads returned"
     begun = [name for name, before in zip(bench.states, ["", *bench.states], strict=False) if name != before]
     assert begun == [
-        "disconnected", "idle", "filming", "homing", "filming", "storing", "reconstructing", "done"
+        "disconnected", "idle", "filming", "homing", "preparing", "filming", "storing", "reconstructing", "done"
     ]  # fmt: skip
     assert bench.board.laser_at(time.monotonic()) == 0.0
     scan = read_scan(result.stored.place)
@@ -99,6 +115,13 @@ def test_a_foot_is_scanned_and_measured(bench: Bench, pristine: Path, monkeypatc
     assert result.measured.kind in {None, "finding"}
     assert result.measured.folder == results / "P7/2026-11-20-R"
     assert next_scan_name(bench.home / "archive", "P7", "right", DAY) == "2026-11-20-R-2"
+
+
+def test_a_stop_ends_the_wait_for_loops(bench: Bench, pristine: Path) -> None:
+    bench.scanner.loops = Compiling(bench.scanner.stop)
+    with pytest.raises(Fault, match="stopped; nothing of this scan is kept"):
+        bench.scanner.scan(bench.order(calibration=pristine / "calibration.json", results=bench.home / "results"))
+    bench.assert_dark_and_empty()
 
 
 @pytest.mark.usefixtures("lenient")
