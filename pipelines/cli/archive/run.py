@@ -125,7 +125,6 @@ def _run(
     profile: "Profile | None" = None,
 ) -> "tuple[PlannedJob, list[ScanEnd]]":
     """Plan and run a job, and print the result of each scan; `folders` as in `plan_job`."""
-    from footscan.ahead_of_time import SCAN
     from pipelines.archive.planning import plan_job
     from pipelines.archive.running import run_job
     from pipelines.cli.terminal.progress import StepProgress
@@ -135,6 +134,8 @@ def _run(
     if planned.steps:
         note(steps_to_run(planned))
     if planned.to_run >= MANY_STEPS:
+        from footscan.ahead_of_time import SCAN
+
         compile_loops(SCAN)
     ends = []
     with StepProgress(planned.to_run, len(planned.scans) + len(planned.refused), log) as progress:
