@@ -100,6 +100,18 @@ def measured_light(
     return ScanLight(chosen.power, chosen.exposure_ms, chosen.reasons, chosen.looks, is_measured=True)
 
 
+def light_of_all(passes: Sequence[ScanLight], longest_ms: float) -> ScanLight:
+    """The measured light of all passes, with the weakest power of any: where it was stronger, cameras expose longer."""
+    power = min(light.power for light in passes)
+    exposures: dict[int, float] = {}
+    reasons: dict[int, str] = {}
+    for light in passes:
+        reasons |= light.reasons
+        for camera, exposure_ms in light.exposure_ms.items():
+            exposures[camera] = min(exposure_ms * light.power / power, longest_ms)
+    return ScanLight(power, exposures, reasons, sum(light.looks for light in passes), is_measured=True)
+
+
 def standing_frames(
     deck: CameraDeck, heads: Heads, power: float, seconds: float = LOOK_SECONDS, settle_seconds: float = SETTLE_SECONDS
 ) -> dict[int, list[bytes]]:

@@ -17,7 +17,7 @@ from footscan.capture.cameras.usb_bus import Pass
 from footscan.capture.passes import FilmedPass, PassPlan, film_name, film_pass
 from pipelines.calibration_check import check_in_force
 from pipelines.live.devices import heads_of, passes_of, sources_of, timing_of
-from pipelines.live.light import ScanLight, fix_light, measured_light, places_of_scan
+from pipelines.live.light import ScanLight, fix_light, light_of_all, measured_light, places_of_scan
 from pipelines.live.observer import looking_on
 from pipelines.live.recording_document import ScanStory
 from pipelines.live.scan_order import LiveResult, ScanOrder
@@ -198,8 +198,9 @@ class LiveScanner:
         with self._stop_reported(), self._deck.open_after(self._first_cameras()):
             self._connect_board()
             self._home_if_needed()
-            if order.results is not None:
-                self._wait_for_loops()
+            if order.results is not None and self.loops is not None and not self.loops.is_done:
+                self._board.tell("preparing", COMPILING)
+                self.loops.wait(self._refuse_stopped)
             passes = passes_of(self.rig, [camera.id for camera in self.rig.cameras])
             travel = self.rig.travel
             light = order.light or self.measured_light(passes, places_of_scan(self.rig))
@@ -274,22 +275,12 @@ class LiveScanner:
 
         The caller has reserved the scanner.
         """
-        exposures: dict[int, float] = {}
-        reasons: dict[int, str] = {}
-        powers, looks = [], 0
+        lights = []
         for planned in passes:
             self._board.tell("filming", "looking at the light")
             self._deck.open_only(planned.cameras)
-            light = measured_light(self.rig, self._deck, self.heads, places, self._refuse_stopped)
-            exposures |= light.exposure_ms
-            reasons |= light.reasons
-            powers.append(light.power)
-            looks += light.looks
-        weakest = min(powers)
-        for planned, power in zip(passes, powers, strict=True):  # one power for all: with less light, expose longer
-            for camera in planned.cameras:
-                exposures[camera] = min(exposures[camera] * power / weakest, self.rig.light.longest_ms)
-        return ScanLight(weakest, exposures, reasons, looks, is_measured=True)
+            lights.append(measured_light(self.rig, self._deck, self.heads, places, self._refuse_stopped))
+        return light_of_all(lights, self.rig.light.longest_ms)
 
     def shine(self, power: float, seconds: float) -> None:
         """Switch the lasers on while the heads stand, so that live pictures show the stripe."""
@@ -363,11 +354,6 @@ class LiveScanner:
             self._board.tell("homing")
             self.heads.home()
             self._refuse_stopped()
-
-    def _wait_for_loops(self) -> None:
-        if self.loops is not None and not self.loops.is_done:
-            self._board.tell("preparing", COMPILING)
-            self.loops.wait(self._refuse_stopped)
 
     def _check_steps(self) -> tuple[float, ...]:
         """Check that the heads lost no steps: films with wrong positions are worthless. Returns the errors, mm."""
