@@ -11,6 +11,7 @@ import gc
 import importlib
 import json
 import logging
+import os
 import signal
 import sys
 from collections.abc import Callable
@@ -38,6 +39,8 @@ SCAN, VIRTUAL = "loops.json", "virtual/loops.json"
 compile first."""
 LOOK_SECONDS = 0.1
 """Interval at which `Compilation.wait` calls its caller; chosen by hand."""
+POLITE = 19
+"""Niceness of processes in the background: that of a virtual scanner's pictures is less. Chosen by hand."""
 
 Spec = str | dict[str, Any]
 
@@ -45,10 +48,10 @@ Spec = str | dict[str, Any]
 class Compilation:
     """Compiles the loops of lists on all cores, unless that was done on this machine for these sources.
 
-    A context manager, which ends what is not compiled then.
+    A context manager, which ends what is not compiled then. In the background it takes the time that others leave.
     """
 
-    def __init__(self, *lists: str) -> None:
+    def __init__(self, *lists: str, in_background: bool = False) -> None:
         self._open = ExitStack()
         self._lists = [name for name in lists if not is_compiled(name)]
         self._loops: list[Future[None]] = []
@@ -56,7 +59,9 @@ class Compilation:
             context = get_context("spawn")
             childrens_end, own_end = context.Pipe(duplex=False)
             self._open.enter_context(childrens_end)
-            processes = self._open.enter_context(ProcessPoolExecutor(cores(), context, _begin, (childrens_end,)))
+            processes = self._open.enter_context(
+                ProcessPoolExecutor(cores(), context, _begin, (childrens_end, in_background))
+            )
             self._open.enter_context(own_end)
             self._loops = [processes.submit(_compile, *loop) for name in self._lists for loop in _listed(name)]
 
@@ -64,21 +69,27 @@ class Compilation:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._loops = []
         self._open.close()
 
     @property
     def is_done(self) -> bool:
-        """True if `wait` returns at once."""
+        """True if all loops are compiled; usable from any thread."""
+        if self._loops and all(loop.done() for loop in self._loops):
+            self.wait()
         return not self._lists
 
     def wait(self, on_look: Callable[[], None] = lambda: None) -> None:
         """Wait until all loops are compiled; `on_look` is called meanwhile, and may end the wait by an exception."""
-        while wait(self._loops, LOOK_SECONDS).not_done:
+        loops, lists = self._loops, self._lists
+        while wait(loops, LOOK_SECONDS).not_done:
             on_look()
-        problems = [repr(problem) for loop in self._loops if (problem := loop.exception()) is not None]
+        if not loops:
+            return
+        problems = [repr(problem) for loop in loops if (problem := loop.exception()) is not None]
         if problems:
-            log.warning("%d of %d loops were not compiled ahead: %s", len(problems), len(self._loops), problems[0])
-        for mark in [] if problems else map(_mark, self._lists):
+            log.warning("%d of %d loops were not compiled ahead: %s", len(problems), len(loops), problems[0])
+        for mark in [] if problems else map(_mark, lists):
             if mark is not None:
                 with suppress(OSError):
                     mark.touch()
@@ -127,8 +138,10 @@ def type_of(spec: Spec) -> types.Type:
     return types.BaseTuple.from_types(parts, getattr(importlib.import_module(module), name))
 
 
-def _begin(pipe: "Connection[object, object]") -> None:
+def _begin(pipe: "Connection[object, object]", in_background: bool) -> None:
     end_with_parent(pipe)
+    if in_background and hasattr(os, "nice"):
+        os.nice(POLITE)
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C in a terminal ends it at once and without a traceback
     gc.disable()  # numba's many small objects: collecting takes an eighth of the time, and saves 600 MB of 1400 in all
 

@@ -104,6 +104,11 @@ class LiveAdapter:
         cameras = tuple(camera.id for camera in self._scanner.rig.cameras)
         return Health(devices, cameras, frames, resumable=self._is_held())
 
+    @property
+    def finds_stripes(self) -> bool:
+        """As `Scanner.finds_stripes`."""
+        return self._scanner.loops is None or self._scanner.loops.is_done
+
     def picture(self, camera: int) -> bytes | None:
         """As `Scanner.picture`."""
         frame = self._scanner.deck.latest(camera)

@@ -65,6 +65,11 @@ class Scanner(Protocol):
         """The present state."""
         ...
 
+    @property
+    def finds_stripes(self) -> bool:
+        """True once live pictures need not wait for the search for the stripe to be compiled."""
+        ...
+
     def listen(self, listener: OnState) -> Callable[[], None]:
         """Call `listener` with each new state; returns a function that ends it."""
         ...

@@ -247,7 +247,8 @@ class _Pages:
         if jpeg is None:
             return Response(status_code=204)
         try:
-            drawn, points = await self._in_worker(partial(self._pictures.drawn, camera, jpeg))
+            with_stripe = self._console.scanner.finds_stripes
+            drawn, points = await self._in_worker(partial(self._pictures.drawn, camera, jpeg, with_stripe=with_stripe))
         except ValueError:
             return Response(status_code=204)
         return Response(drawn, media_type="image/jpeg", headers={"x-stripe-points": str(points)})

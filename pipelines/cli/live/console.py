@@ -121,7 +121,10 @@ def _opened(
     world = plain_world(grid_mm is not None, folder)
     if world is not None:
         world = world.model_copy(update={"grid_mm": grid_mm})
-    with Compilation(SCAN) as loops, opened_rig(files.rig, folder, world, calibrated=world is not None) as opened:
+    with (
+        Compilation(SCAN, in_background=True) as loops,
+        opened_rig(files.rig, folder, world, calibrated=world is not None) as opened,
+    ):
         rig = opened.rig
         if files.calibration is not None:
             rig = rig.model_copy(update={"calibration": str(files.calibration.resolve())})

@@ -124,7 +124,7 @@ def scan(
             dark_grid_mm=grid_mm if texture else DARK_GRID_MM,
         )  # fmt: skip
     with (
-        Compilation(*[SCAN] if measure else []) as loops,
+        Compilation(*[SCAN] if measure else [], in_background=True) as loops,
         opened_rig(rig, virtual_folder, world, calibrated=True) as opened,
     ):
         used = _with_travel(opened.rig, speed, from_mm, to_mm)

@@ -7,10 +7,12 @@ import simplejpeg
 
 from footscan.frames.image import decode_image
 from footscan.stripe.extract import extract_stripe
+from footscan.stripe.points import STRIPE_DTYPE
 from schemas.parameters.extraction import ExtractionParameters
 
 DOT = (0, 240, 138)
 """RGB of a stripe point."""
+NO_POINTS = np.empty(0, STRIPE_DTYPE)
 SMALLER = 2
 """Every second column and row is shown: enough for a tile of the page."""
 
@@ -22,8 +24,8 @@ class LivePictures:
         self._lock = threading.Lock()
         self._made: dict[int, tuple[bytes, bytes, int]] = {}
 
-    def drawn(self, camera: int, jpeg: bytes) -> tuple[bytes, int]:
-        """Return a smaller JPEG with the stripe points drawn, and the number of points.
+    def drawn(self, camera: int, jpeg: bytes, *, with_stripe: bool = True) -> tuple[bytes, int]:
+        """Return a smaller JPEG, with the stripe points drawn if wanted, and the number of points.
 
         Raises
         ------
@@ -33,14 +35,13 @@ class LivePictures:
         with self._lock:  # one at a time: filming has priority
             latest = self._made.get(camera)
             if latest is None or latest[0] is not jpeg:
-                latest = self._made[camera] = (jpeg, *draw_stripe(jpeg))
+                latest = self._made[camera] = (jpeg, *_smaller(jpeg, with_stripe))
             return latest[1:]
 
 
-def draw_stripe(jpeg: bytes) -> tuple[bytes, int]:
-    """As `LivePictures.drawn`."""
+def _smaller(jpeg: bytes, with_stripe: bool) -> tuple[bytes, int]:
     image = decode_image(jpeg)
-    points = extract_stripe(image, ExtractionParameters())
+    points = extract_stripe(image, ExtractionParameters()) if with_stripe else NO_POINTS
     shown = np.ascontiguousarray(image[::SMALLER, ::SMALLER])
     rows = np.clip(np.rint(points["j"] / SMALLER).astype(int), 0, shown.shape[0] - 1)
     columns = np.clip(np.rint(points["i"] / SMALLER).astype(int), 0, shown.shape[1] - 1)

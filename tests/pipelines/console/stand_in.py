@@ -87,6 +87,10 @@ class StandIn:
         frames = {} if self.lost_camera else dict.fromkeys(CAMERAS, 20 * self._filmed)
         return Health(devices, CAMERAS, frames, resumable=self.door_open)
 
+    @property
+    def finds_stripes(self) -> bool:
+        return True
+
     def picture(self, camera: int) -> bytes | None:
         is_there = self._connected and camera in CAMERAS and camera != self.lost_camera
         return self._jpeg[self.lit] if is_there else None

@@ -26,6 +26,13 @@ def test_a_dark_picture_has_none_and_a_torn_one_is_refused() -> None:
         pictures.drawn(1, stripe_jpeg(True)[:3000])
 
 
+def test_a_picture_is_shown_while_nothing_can_find_the_stripe() -> None:
+    pictures, jpeg = LivePictures(), stripe_jpeg(True)
+    shown, points = pictures.drawn(1, jpeg, with_stripe=False)
+    assert points == 0
+    assert decode_image(shown).shape == decode_image(pictures.drawn(2, jpeg)[0]).shape
+
+
 def test_a_picture_is_made_once_for_all_who_look() -> None:
     pictures, jpeg = LivePictures(), stripe_jpeg(True)
     assert pictures.drawn(2, jpeg)[0] is pictures.drawn(2, jpeg)[0]
