@@ -36,14 +36,23 @@ class CameraRenderer:
     Equal arguments give equal bytes, in whatever order frames are requested.
     """
 
-    def __init__(self, scanner: VirtualScanner, camera_id: int, settings: SimulationSettings, texture: Texture) -> None:
+    def __init__(
+        self,
+        scanner: VirtualScanner,
+        camera_id: int,
+        settings: SimulationSettings,
+        texture: Texture,
+        *,
+        coarse: int = COARSE,
+    ) -> None:
+        """`coarse`: the room's light is cast for one pixel in `coarse` x `coarse`, of 1, 2 and 4."""
         self.camera = scanner.camera(camera_id)
         self._lasers = scanner.lasers
         self._settings = settings
         self._straight, self._reflected = camera_views(self.camera)
-        self._coarse = coarse_rays(self._straight)
+        self._coarse = coarse_rays(self._straight, coarse)
         mirror = self._reflected.mirrored and settings.ghost > 0.0
-        self._coarse_mirrored = coarse_rays(self._reflected) if mirror else None
+        self._coarse_mirrored = coarse_rays(self._reflected, coarse) if mirror else None
         self._backdrop = backdrop(self.camera, scanner.seed, settings)
         self._texture = texture
 
@@ -82,7 +91,8 @@ def light_on_sensor(
     Parameters
     ----------
     stripe : (rows, columns) laser light that the surface sends to each pixel, before speckle, halo and lens.
-    brightness, coverage : (rows // 2, columns // 2) the object in the room's light, and where it is; see `lit_object`.
+    brightness, coverage : (rows // n, columns // n) with n = 1, 2 or 4, the object in the room's light, and where it
+        is; see `lit_object`.
     """
     share = min(surface.halo * settings.halo, HALO_LIMIT)
     glow, veil = _glow(stripe, coverage, share, settings.halo)
@@ -108,7 +118,7 @@ def _glow(stripe: Floats, coverage: Singles, share: float, veil: float) -> tuple
     """
     blocks = stripe.reshape(HEIGHT // _BLOCK, _BLOCK, WIDTH // _BLOCK, _BLOCK).mean(axis=(1, 3)).astype(np.float32)
     near, far, lens = (gaussian_blur(blocks, sigma, truncate=3.0) for sigma in (1.3, 3.5, 10.0))
-    step = _BLOCK // COARSE
+    step = _BLOCK * coverage.shape[0] // HEIGHT
     on_object = coverage.reshape(HEIGHT // _BLOCK, step, WIDTH // _BLOCK, step).mean(axis=(1, 3))
     glow = share * (0.6 * near + 0.4 * far) * on_object
     return glow.astype(np.float32), (0.012 * veil * lens).astype(np.float32)
@@ -150,14 +160,21 @@ def _compose(
     """The sum of all light, the coarse parts interpolated."""
     height, width = line.shape
     room, white_glints, red_glints = behind
+    tops, downs = _places(height, coverage.shape[0])
+    lefts, rights = _places(width, coverage.shape[1])
+    block_tops, block_downs = _places(height, glow.shape[0])
+    block_lefts, block_rights = _places(width, glow.shape[1])
     light = np.empty((height, width, 3), dtype=np.float32)
     one = np.float32(1.0)
     for j in range(height):
+        top, down, block_top, block_down = tops[j], downs[j], block_tops[j], block_downs[j]
         for i in range(width):
-            covered = _between(coverage, j, i, COARSE)
-            laser = line[j, i] + _between(glow, j, i, _BLOCK) + _between(veil, j, i, _BLOCK)
+            left, right = lefts[i], rights[i]
+            covered = _between(coverage, top, left, down, right)
+            laser = line[j, i] + _between(glow, block_top, block_lefts[i], block_down, block_rights[i])
+            laser += _between(veil, block_top, block_lefts[i], block_down, block_rights[i])
             laser += (one - covered) * red_glints[j, i] * flickers[2]
-            lit = _between(brightness, j, i, COARSE) * flickers[0]
+            lit = _between(brightness, top, left, down, right) * flickers[0]
             white = (one - covered) * white_glints[j, i] * flickers[1]
             for c in range(3):
                 seen = lit * albedo[c] + (one - covered) * room[j, i, c] * flickers[0]
@@ -166,13 +183,21 @@ def _compose(
 
 
 @compiled
-def _between(coarse: Singles, j: int, i: int, block: int) -> np.float32:
-    """Value at pixel (i, j) of a picture in blocks of `block` x `block` pixels, bilinear between their middles."""
-    rows, columns = coarse.shape
-    v = min(max((j - (block - 1) / 2.0) / block, 0.0), rows - 1.0)
-    u = min(max((i - (block - 1) / 2.0) / block, 0.0), columns - 1.0)
-    top, left = min(int(v), rows - 2), min(int(u), columns - 2)
-    v, u = v - top, u - left
-    upper = coarse[top, left] * (1.0 - u) + coarse[top, left + 1] * u
-    lower = coarse[top + 1, left] * (1.0 - u) + coarse[top + 1, left + 1] * u
-    return np.float32(upper * (1.0 - v) + lower * v)
+def _places(pixels: int, blocks: int) -> tuple[NDArray[np.int64], Floats]:
+    """For each of the `pixels` of a line: the last block whose middle is not behind it, and how far it is on the way to
+    the middle of the next one, 0 to 1."""
+    block = pixels // blocks
+    lasts, shares = np.empty(pixels, np.int64), np.empty(pixels)
+    for n in range(pixels):
+        place = min(max((n - (block - 1) / 2.0) / block, 0.0), blocks - 1.0)
+        lasts[n] = min(int(place), blocks - 2)
+        shares[n] = place - lasts[n]
+    return lasts, shares
+
+
+@compiled
+def _between(coarse: Singles, top: int, left: int, down: float, right: float) -> np.float32:
+    """Value of a picture in blocks, bilinear between the middles of the blocks at (`top`, `left`) and the next ones."""
+    upper = coarse[top, left] * (1.0 - right) + coarse[top, left + 1] * right
+    lower = coarse[top + 1, left] * (1.0 - right) + coarse[top + 1, left + 1] * right
+    return np.float32(upper * (1.0 - down) + lower * down)

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
 COARSE = 2
-"""The room's light is cast for one pixel in COARSE x COARSE and interpolated: a bound of time."""
+"""The room's light is cast for one pixel in COARSE x COARSE of a film and interpolated: a bound of time."""
 LEVELS = {"dark": 0.004, "ambient": 0.25, "bright": 2.2}
 """Room light on a white surface that faces the lamps, in units of the sensor's white. Chosen by hand."""
 _LAMPS = np.array([0.25, 0.35, 0.90])
@@ -49,18 +49,21 @@ def backdrop(camera: Camera, scanner_seed: int, settings: SimulationSettings) ->
 
 @dataclass(frozen=True)
 class CoarseRays:
-    """One ray of a view for each COARSE x COARSE block of pixels, row by row."""
+    """One ray of a view for each block of pixels, row by row."""
+
+    shape: tuple[int, int]
+    """Rows and columns of blocks."""
 
     origins: Floats
     directions: Floats
     weights: Floats
 
 
-def coarse_rays(view: View) -> CoarseRays:
-    """Returns the rays of `view` through the middles of blocks of pixels."""
-    pixels = np.arange(HEIGHT * WIDTH).reshape(HEIGHT, WIDTH)[::COARSE, ::COARSE].ravel()
-    origins, directions = view.at(pixels, np.full((1, 2), (COARSE - 1) / 2.0))
-    return CoarseRays(origins, directions, view.weights[pixels])
+def coarse_rays(view: View, block: int) -> CoarseRays:
+    """Returns the rays of `view` through the middles of blocks of `block` x `block` pixels."""
+    pixels = np.arange(HEIGHT * WIDTH).reshape(HEIGHT, WIDTH)[::block, ::block].ravel()
+    origins, directions = view.at(pixels, np.full((1, 2), (block - 1) / 2.0))
+    return CoarseRays((HEIGHT // block, WIDTH // block), origins, directions, view.weights[pixels])
 
 
 def lit_object(
@@ -70,9 +73,8 @@ def lit_object(
 
     Returns
     -------
-    (R, C) brightness, and (R, C) coverage: 1 where the object is, 0 beside it; both float32, one value a coarse pixel.
+    (R, C) brightness, and (R, C) coverage: 1 where the object is, 0 beside it; both float32, one value a ray.
     """
-    shape = (HEIGHT // COARSE, WIDTH // COARSE)
     brightness, coverage = np.zeros(len(straight.origins)), np.zeros(len(straight.origins), np.float32)
     hit, light = _room_light(scene, x, straight.origins, straight.directions, texture)
     brightness[hit] = level * light * straight.weights[hit]
@@ -81,7 +83,7 @@ def lit_object(
         beside = np.flatnonzero((coverage == 0.0) & (mirrored.weights > 0.0))
         hit, light = _room_light(scene, x, mirrored.origins[beside], mirrored.directions[beside], texture)
         brightness[beside[hit]] = level * light * mirrored.weights[beside[hit]]
-    return brightness.astype(np.float32).reshape(shape), coverage.reshape(shape)
+    return brightness.astype(np.float32).reshape(straight.shape), coverage.reshape(straight.shape)
 
 
 def _room_light(
