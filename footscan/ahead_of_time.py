@@ -37,6 +37,8 @@ log = logging.getLogger("footscan.compiled")
 SCAN, VIRTUAL = "loops.json", "virtual/loops.json"
 """The lists, relative to this package: module, name and argument types of each loop that Python calls, the slowest to
 compile first."""
+SECONDS = {SCAN: 30, VIRTUAL: 10}
+"""What compiling a list takes on two cores, about."""
 LOOK_SECONDS = 0.1
 """Interval at which `Compilation.wait` calls its caller; chosen by hand."""
 POLITE = 19

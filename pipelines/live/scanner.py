@@ -40,7 +40,7 @@ UNDER_WAY = ("moving", "jogging", "homing", "held", "door")
 """States of the board in which a stop is always sent to it: heads move or are held."""
 ANSWERING = (*UNDER_WAY, "ready", "not homed", "alarm", "restarting")
 """States of the board in which a stop is sent to it during an activity of the scanner."""
-COMPILING = "compiling for this machine, once"
+COMPILING = "compiling for this machine, once; on two cores that takes up to 30 s"
 CHECKING = "checking that the heads lost no steps"
 STOPPED = "stopped; nothing of this scan is kept"
 

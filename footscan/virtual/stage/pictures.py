@@ -1,6 +1,6 @@
 """Pictures of what stands on the glass, one for each place of the heads on a fine grid, kept in a folder.
 
-Rendering a picture takes a tenth of a second, and eight cameras at full rate want fifteen times what two cores render.
+Rendering a picture takes 0.06 s, and eight cameras at full rate want four times what two cores render.
 The world's clock waits for them. What has been rendered is kept: the folder's name tells what is on the pictures.
 """
 

@@ -1,7 +1,7 @@
 """The stage of the virtual scanner: what each camera sees while heads move and lasers are lit, as it happens.
 
 True here is: where a head stands is what `position_at` says for the moment of the exposure, and each exposure of a head
-that moves fast enough is taken at a moment at which it passes a place of the pictures' grid, so that the picture is
+that moves fast enough is taken at a moment at which it passes a place of the pictures' grid, so that the stripe is
 exactly that of its place.
 
 Approximated is:
@@ -10,6 +10,7 @@ Approximated is:
   nearest one: up to half the grid off;
 - all lasers shine in the plane of the camera's own head: heads that are not aligned see their own stripe alone;
 - nothing moves during an exposure;
+- the light of the room is cast for fewer pixels than in films;
 - power, exposure and gain are rendered in steps of 19 %, see `StagePictures`;
 - a place that is seen again looks the same again, noise and all. Only pictures that follow each other differ, by grain
   that is laid over them.

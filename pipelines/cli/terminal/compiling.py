@@ -5,9 +5,10 @@ from pipelines.cli.terminal.output import note
 
 def compile_loops(*lists: str) -> None:
     """Compile the loops of lists of `footscan.ahead_of_time` on all cores, where that was not done yet."""
-    from footscan.ahead_of_time import Compilation
+    from footscan.ahead_of_time import SECONDS, Compilation
 
     with Compilation(*lists) as compilation:
         if not compilation.is_done:
-            note("compiling for this machine, once; on two cores that takes some 30 s")
+            seconds = sum(SECONDS[name] for name in lists)
+            note(f"compiling for this machine, once; on two cores that takes some {seconds} s")
             compilation.wait()

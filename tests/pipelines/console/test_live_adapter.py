@@ -4,10 +4,12 @@ import datetime
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import patch
 
 import pytest
 from checked import made_check
 
+from footscan.ahead_of_time import Compilation
 from footscan.capture.board.state import state_from
 from footscan.capture.cameras.usb_bus import Pass
 from footscan.capture.grbl.report import Report
@@ -130,6 +132,17 @@ def test_orders_to_nothing_are_faults_and_a_stop_is_none(over_nothing: LiveAdapt
     assert not (tmp_path / "archive").exists()
     over_nothing.close()
     over_nothing.close()
+
+
+def test_live_pictures_show_the_stripe_once_the_search_for_it_is_compiled(
+    over_nothing: LiveAdapter, tmp_path: Path
+) -> None:
+    assert over_nothing.finds_stripes
+    loops = Compilation()
+    over = LiveAdapter(LiveScanner(Rig.model_validate(RIG), loops), tmp_path / "archive", tmp_path / "results")
+    assert over.finds_stripes
+    with patch.object(Compilation, "is_done", False):
+        assert not over.finds_stripes
 
 
 def test_a_foot_that_is_put_onto_the_glass_is_told_and_can_be_stopped(tmp_path: Path) -> None:
