@@ -84,17 +84,18 @@ class Compilation:
     def wait(self, on_look: Callable[[], None] = lambda: None) -> None:
         """Wait until all loops are compiled; `on_look` is called meanwhile, and may end the wait by an exception."""
         loops, lists = self._loops, self._lists
-        while wait(loops, LOOK_SECONDS).not_done:
-            on_look()
         if not loops:
             return
+        while wait(loops, LOOK_SECONDS).not_done:
+            on_look()
         problems = [repr(problem) for loop in loops if (problem := loop.exception()) is not None]
         if problems:
             log.warning("%d of %d loops were not compiled ahead: %s", len(problems), len(loops), problems[0])
-        for mark in [] if problems else map(_mark, lists):
-            if mark is not None:
-                with suppress(OSError):
-                    mark.touch()
+        else:
+            for mark in map(_mark, lists):
+                if mark is not None:
+                    with suppress(OSError):
+                        mark.touch()
         self._lists, self._loops = [], []
         self._open.close()
 

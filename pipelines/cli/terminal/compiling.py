@@ -5,10 +5,9 @@ from pipelines.cli.terminal.output import note
 
 def compile_loops(*lists: str) -> None:
     """Compile the loops of lists of `footscan.ahead_of_time` on all cores, where that was not done yet."""
-    from footscan.ahead_of_time import SECONDS, Compilation
+    from footscan.ahead_of_time import SECONDS, Compilation, is_compiled
 
-    with Compilation(*lists) as compilation:
-        if not compilation.is_done:
-            seconds = sum(SECONDS[name] for name in lists)
-            note(f"compiling for this machine, once; on two cores that takes some {seconds} s")
+    if seconds := sum(SECONDS[name] for name in lists if not is_compiled(name)):
+        note(f"compiling for this machine, once; on two cores that takes some {seconds} s")
+        with Compilation(*lists) as compilation:
             compilation.wait()

@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 import simplejpeg
 
+from footscan.virtual.filming.render import CameraRenderer
 from footscan.virtual.filming.renderers import Shot, Studio
-from footscan.virtual.optics.scene import MATT_GREY, Mesh
-from footscan.virtual.stage.pictures import StageLight, StagePictures, Subject
+from footscan.virtual.optics.scanner import standard_scanner
+from footscan.virtual.optics.scene import MATT_GREY, Mesh, Scene
+from footscan.virtual.optics.texture import random_texture
+from footscan.virtual.stage.pictures import COARSE, StageLight, StagePictures, Subject
 from footscan.virtual.stage.reference_stage import NOTHING, block_subject, foot_subject, reference_subject
 from footscan.virtual.stage.stage import FRAMES_PER_SECOND, Stage
 from schemas.parameters.simulation import SimulationSettings
@@ -69,6 +72,17 @@ def test_pictures_are_those_of_a_film_but_for_edges_in_the_light_of_the_room(blo
     stripe = exact[..., 0] - exact[..., 1] > 60
     assert stripe.any()
     assert np.abs(seen - exact)[stripe].mean() < 1.0
+
+
+def test_pictures_are_exactly_those_of_a_renderer_with_their_light_of_the_room(block_pictures: StagePictures) -> None:
+    block = block_subject(200.0)
+    assert block.mesh is not None
+    scanner = standard_scanner(SETTINGS.scanner_seed, SETTINGS.distortion)
+    texture = random_texture(SETTINGS.seed, MATT_GREY.unevenness * SETTINGS.texture)
+    rendered = CameraRenderer(scanner, 2, SETTINGS, texture, coarse=COARSE).jpeg(
+        Scene(block.mesh, MATT_GREY), 200.5, 401
+    )
+    assert block_pictures.picture(2, 401, StageLight()) == rendered
 
 
 def test_less_light_makes_a_darker_picture_and_no_laser_none_of_its_red(block_pictures: StagePictures) -> None:
