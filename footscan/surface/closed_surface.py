@@ -25,6 +25,9 @@ LEAST_SECTORS = 7
 CAP_STEPS, AWAY_STEPS = 0.25, 0.5
 """Surface is within the outermost stripe if it lies no farther than the first before the plane of that stripe, and
 farther than the second from its points, in steps. Chosen by hand."""
+MOST_MISFIT = 0.1
+"""A measured vertex has neighbours that lie on one surface: the root mean square of their distances to it is at most
+this, in steps. Tuned on the nightly suite's four feet, with stripes every 4 mm."""
 LEAST_POINTS = 50
 """Fewer points are refused; chosen by hand."""
 LEAST_MEASURED = 0.5
@@ -87,8 +90,9 @@ def close_surface(
             f"{len(xyz)} points do not surround a solid: {100 * is_measured.mean():.0f} % of a closed surface would "
             f"be measured, expected {100 * LEAST_MEASURED:.0f} % at least"
         )
-    origin = np.where(is_measured & (on_cloud.nearest >= 0), cloud.camera[on_cloud.nearest], 0).astype(np.uint8)
     height = opening_height(vertices, faces, ~is_measured)
+    is_measured &= on_cloud.misfit_steps <= MOST_MISFIT
+    origin = np.where(is_measured & (on_cloud.nearest >= 0), cloud.camera[on_cloud.nearest], 0).astype(np.uint8)
     on_lid = np.zeros(len(vertices), np.bool_)
     if height is not None:
         vertices, faces, kept = cut_flat(vertices, faces, height, spacing)

@@ -19,7 +19,7 @@ class SurfaceParameters(Document):
     blur_steps: Annotated[float, Field(ge=0.2, le=5)] = 0.625
     """`closed`: extent to which the rough surface is smoothed before the points attract it."""
     reach_steps: Annotated[float, Field(ge=1, le=10)] = 1.75
-    """Radius of the neighbourhood whose points attract a vertex; it must reach the next stripes."""
+    """Radius of the neighbourhood whose points attract a vertex; it must reach the next stripes. Along them, half."""
     gap_steps: Annotated[float, Field(gt=0, le=10)] = 0.6
     """A vertex farther than this from all points counts as filled; half a step is the middle between two stripes."""
     spacing_steps: Annotated[float, Field(ge=0.2, le=5)] = 0.75
