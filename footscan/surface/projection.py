@@ -26,8 +26,8 @@ SAME_SIDE = 0.3
 FACING = 0.999
 """Cosine between a normal and the travel above which the direction of the stripes is not known. Chosen by hand."""
 RIDGE = 1e-4
-"""Keeps the curvature small where the neighbours do not determine it, as along a single stripe. Tuned on the nightly suite's four
-feet."""
+"""Keeps the curvature small where the neighbours do not determine it, as along a single stripe. Tuned on the nightly
+suite's four feet."""
 SECTORS = 8
 """Directions in the tangent plane in which neighbours are counted."""
 
