@@ -19,6 +19,8 @@ CONTACT_MM = 1.0
 """Height above the floor up to which the skin counts as touching it; part of the definition of the print."""
 STEP_MM = 0.5
 """Distance between the sections of the print."""
+LEAST_SECTIONS = 6
+"""Each third of a print has at least two sections."""
 APEX_MM = 10.0
 """A parabola is fitted to the print's border this far to both sides of the arch's deepest point; chosen by hand."""
 LEAST_POINTS, LEAST_SLOPE = 5, 1e-6
@@ -74,6 +76,8 @@ def footprint(foot: FootSurface) -> Print:
     behind = points[ball.ahead(points) <= limit]
     rear, front = float(behind[:, 0].min()), float(behind[:, 0].max())
     count = int(np.ceil((front - rear) / STEP_MM))
+    if count < LEAST_SECTIONS:
+        raise NotMeasurable("the foot reaches the floor with its toes only")
     stations = rear + (np.arange(count) + 0.5) * (front - rear) / count
     widths = _widths(outlines, stations, ball, limit)
     return Print(outlines, stations, widths, rear, front, "toes run into the print" if merged else None)

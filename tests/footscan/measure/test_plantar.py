@@ -108,6 +108,13 @@ def test_an_open_sole_gives_no_print() -> None:
         footprint(standing([HEEL, MIDFOOT, BALL], opened=20.0))
 
 
+@pytest.mark.parametrize("behind_mm", [0, 2])
+def test_a_foot_on_its_toes(behind_mm: int) -> None:
+    """Of a print that begins where it is cut from the toes, nothing is left, or a line."""
+    with pytest.raises(NotMeasurable, match="with its toes only"):
+        footprint(standing([(192 - behind_mm, 222, -30, 30)]))
+
+
 def test_a_foot_in_the_air() -> None:
     foot = standing([HEEL, MIDFOOT, BALL])
     raised = foot.mesh.vertices + np.array([0.0, 0.0, 30.0])
