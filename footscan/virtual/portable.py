@@ -74,16 +74,21 @@ def cos_sin(degrees: float) -> tuple[float, float]:
 
 
 @compiled
+def exponential(x: float) -> float:
+    """`exp` of one number, within compiled loops."""
+    if x < -708.0:
+        return 0.0
+    exponent = np.floor(x * 1.4426950408889634 + 0.5)  # 1 / ln 2
+    rest = x - exponent * _LN2_HIGH - exponent * _LN2_LOW
+    total = 1.0
+    for term in range(_TERMS, 0, -1):
+        total = 1.0 + total * rest / term
+    return math.ldexp(total, int(exponent))
+
+
+@compiled
 def _exponentials(x: Floats) -> Floats:
     values = np.empty(len(x))
     for n in range(len(x)):
-        if x[n] < -708.0:
-            values[n] = 0.0
-            continue
-        exponent = np.floor(x[n] * 1.4426950408889634 + 0.5)  # 1 / ln 2
-        rest = x[n] - exponent * _LN2_HIGH - exponent * _LN2_LOW
-        total = 1.0
-        for term in range(_TERMS, 0, -1):
-            total = 1.0 + total * rest / term
-        values[n] = math.ldexp(total, int(exponent))
+        values[n] = exponential(x[n])
     return values

@@ -52,7 +52,9 @@ def _sines(source: Floats, points: Floats, glass: float, thickness: float) -> Fl
             # In glass: s / sqrt(n^2 - s^2) with s^2 = q^2 / (1 + q^2) is q / sqrt(n^2 + (n^2 - 1) q^2).
             root = np.sqrt(n2 + (n2 - 1.0) * (tangent * tangent))
             excess = air * tangent + glass * tangent / root - distance
-            tangent = tangent - excess / (air + glass * n2 / (root * root * root))
+            before, tangent = tangent, tangent - excess / (air + glass * n2 / (root * root * root))
+            if tangent == before:
+                break
         sines[k] = tangent / np.sqrt(1.0 + tangent * tangent)
     return sines
 

@@ -11,7 +11,7 @@ from footscan.virtual.optics.scanner import FAN_DEGREES, HEIGHT, WIDTH, Laser
 from footscan.virtual.optics.scene import Hits, Scene
 from footscan.virtual.optics.texture import Reflectance
 from footscan.virtual.optics.views import View
-from footscan.virtual.portable import cos_sin, dot, exp
+from footscan.virtual.portable import cos_sin, exponential
 from schemas.parameters.simulation import SimulationSettings
 
 Floats = NDArray[np.float64]
@@ -45,7 +45,7 @@ def stripe_picture(
     """
     picture = np.zeros(HEIGHT * WIDTH)
     reach = REACH_SIGMAS * float(np.sqrt(settings.laser_sigma_mm**2 + (DIVERGENCE * DEFOCUS_MM) ** 2))
-    pixels = _pixels_near(scene.patches_near(x, reach) - np.array([x, 0.0, 0.0]), view)
+    pixels = _pixels_near(scene.patches_near(x, reach) - np.array([x, 0.0, 0.0]), reach, view)
     if not len(pixels):
         return picture.reshape(HEIGHT, WIDTH)
     travel = np.array([x, 0.0, 0.0])
@@ -89,10 +89,14 @@ def laser_light(
     as the sensor's white.
     """
     travel = np.array([x, 0.0, 0.0])
+    edges = cos_sin(FAN_DEGREES / 2.0)[0], cos_sin(FAN_DEGREES / 2.0 - FAN_EDGE_DEGREES)[0]
     total = np.zeros(len(points))
     for laser in lasers:
         beams = beams_of(laser, points)
-        light = _sheet(points, beams, hits.normals, hits.facet_normals, spread, laser, settings.laser_sigma_mm)
+        light = _sheet(
+            points, beams.towards, beams.transmitted, hits.normals, hits.facet_normals, spread,
+            np.array(laser.position), np.array(laser.axis), settings.laser_sigma_mm, edges,
+        )  # fmt: skip
         lit = np.flatnonzero(light * settings.laser_exposure > DARK)
         hidden = scene.hidden(points[lit] + travel, hits.facet_normals[lit], beams.sources[lit] + travel)
         total[lit[~hidden]] += light[lit[~hidden]]
@@ -122,42 +126,90 @@ def beams_of(laser: Laser, points: Floats) -> Beams:
     return Beams(exits_above(position, directions, thickness=laser.plate_mm), -directions, transmitted)
 
 
+@compiled
 def _sheet(
-    points: Floats, beams: Beams, normals: Floats, facet_normals: Floats, spread: Floats, laser: Laser, sigma_mm: float
+    points: Floats,
+    towards: Floats,
+    transmitted: Floats,
+    normals: Floats,
+    facet_normals: Floats,
+    spread: Floats,
+    position: Floats,
+    axis: Floats,
+    sigma: float,
+    edges: tuple[float, float],
 ) -> Floats:
-    """Brightness of a Gaussian light sheet on a surface, in units of its middle at the focus, met at right angles."""
-    facing = np.einsum("ij,ij->i", facet_normals, beams.towards) > 0.0
-    cosine = np.where(facing, np.maximum(np.einsum("ij,ij->i", normals, beams.towards), 0.0), 0.0)
-    distance = np.linalg.norm(points - np.asarray(laser.position), axis=1)
-    variance = sigma_mm**2 + (DIVERGENCE * (distance - FOCUS_MM)) ** 2 + spread
-    profile = exp(-0.5 * points[:, 0] ** 2 / variance) * sigma_mm / np.sqrt(variance)
-    # A Powell lens: even light with a soft edge.
-    outer, inner = cos_sin(FAN_DEGREES / 2.0)[0], cos_sin(FAN_DEGREES / 2.0 - FAN_EDGE_DEGREES)[0]
-    fan = np.clip((-dot(beams.towards, np.asarray(laser.axis)) - outer) / (inner - outer), 0.0, 1.0)
-    return np.asarray(profile * cosine * fan * beams.transmitted * FOCUS_MM / distance)
+    """Brightness of a Gaussian light sheet on a surface, in units of its middle at the focus, met at right angles.
+
+    `edges` of the fan, as cosines of the angle to its axis: outside the first it is dark, inside the second even.
+    """
+    outer, inner = edges
+    light = np.zeros(len(points))
+    for k in range(len(points)):
+        facing = cosine = along = squares = 0.0
+        for c in range(3):
+            facing += facet_normals[k, c] * towards[k, c]
+            cosine += normals[k, c] * towards[k, c]
+            along -= towards[k, c] * axis[c]
+            squares += (points[k, c] - position[c]) * (points[k, c] - position[c])
+        if facing <= 0.0 or cosine <= 0.0 or along <= outer:
+            continue
+        distance = np.sqrt(squares)
+        off_focus = DIVERGENCE * (distance - FOCUS_MM)
+        variance = sigma * sigma + off_focus * off_focus + spread[k]
+        profile = exponential(-0.5 * points[k, 0] * points[k, 0] / variance) * sigma / np.sqrt(variance)
+        fan = min((along - outer) / (inner - outer), 1.0)  # a Powell lens: even light with a soft edge
+        light[k] = profile * cosine * fan * transmitted[k] * FOCUS_MM / distance
+    return light
 
 
-def _pixels_near(patches: Floats, view: View) -> NDArray[np.int64]:
-    """Pixels, ascending, that small triangles (K, 3, 3) cover as far as they face the camera."""
-    normals = np.cross(patches[:, 1] - patches[:, 0], patches[:, 2] - patches[:, 0])
-    sight = view.eye - patches[:, 0]
-    facing = np.einsum("ij,ij->i", normals, sight)
-    scale = np.linalg.norm(normals, axis=1) * np.linalg.norm(sight, axis=1)
-    patches = patches[facing > -0.3 * scale]  # the slack is for refraction, which turns the sight
+def _pixels_near(patches: Floats, reach: float, view: View) -> NDArray[np.int64]:
+    """Pixels, ascending, that see small triangles (K, 3, 3) with |X| <= `reach` mm, as far as these face the camera."""
+    patches = patches[_facing(patches, view.eye)]
     corners = view.project(patches.reshape(-1, 3)).reshape(-1, 3, 2)
-    corners = corners[np.isfinite(corners).all(axis=(1, 2))]
-    least, most = np.floor(corners.min(axis=1)), np.ceil(corners.max(axis=1))
+    seen = np.isfinite(corners).all(axis=(1, 2))
     covered = np.zeros((HEIGHT, WIDTH), dtype=np.bool_)
-    _cover(covered, least.astype(np.int64), most.astype(np.int64))
+    _cover(covered, corners[seen], patches[seen, :, 0], reach)
     return np.flatnonzero(covered.ravel() & (view.weights > 0.0))
 
 
 @compiled
-def _cover(covered: NDArray[np.bool_], least: NDArray[np.int64], most: NDArray[np.int64]) -> None:
+def _facing(patches: Floats, eye: Floats) -> NDArray[np.bool_]:
+    """Whether triangles (N, 3, 3) show `eye` (3,) their front, with slack for refraction, which turns the sight."""
+    facing = np.empty(len(patches), np.bool_)
+    for k in range(len(patches)):
+        along = normal = sight = 0.0
+        for c in range(3):
+            d, e = (c + 1) % 3, (c + 2) % 3
+            part = (patches[k, 1, d] - patches[k, 0, d]) * (patches[k, 2, e] - patches[k, 0, e])
+            part -= (patches[k, 1, e] - patches[k, 0, e]) * (patches[k, 2, d] - patches[k, 0, d])
+            way = eye[c] - patches[k, 0, c]
+            along, normal, sight = along + part * way, normal + part * part, sight + way * way
+        facing[k] = along > -0.3 * np.sqrt(normal * sight)
+    return facing
+
+
+@compiled
+def _cover(covered: NDArray[np.bool_], corners: Floats, x: Floats, reach: float) -> None:
+    """Mark the pixels around the part of each triangle with |X| <= `reach`: `corners` (K, 3, 2) px, `x` (K, 3) mm."""
     height, width = covered.shape
-    for k in range(len(least)):
-        for j in range(max(least[k, 1], 0), min(most[k, 1] + 1, height)):
-            for i in range(max(least[k, 0], 0), min(most[k, 0] + 1, width)):
+    for k in range(len(corners)):
+        left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf
+        for start in range(3):
+            end = (start + 1) % 3
+            way = x[k, end] - x[k, start]
+            if way == 0.0:
+                way = 1e-300
+            one, other = (-reach - x[k, start]) / way, (reach - x[k, start]) / way
+            first, last = max(min(one, other), 0.0), min(max(one, other), 1.0)
+            if first > last:
+                continue
+            for share in (first, last):
+                i = corners[k, start, 0] + share * (corners[k, end, 0] - corners[k, start, 0])
+                j = corners[k, start, 1] + share * (corners[k, end, 1] - corners[k, start, 1])
+                left, right, top, bottom = min(left, i), max(right, i), min(top, j), max(bottom, j)
+        for j in range(int(max(np.floor(top), 0.0)), int(min(np.ceil(bottom), height - 1.0)) + 1):
+            for i in range(int(max(np.floor(left), 0.0)), int(min(np.ceil(right), width - 1.0)) + 1):
                 covered[j, i] = True
 
 
