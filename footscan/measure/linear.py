@@ -220,7 +220,14 @@ def farthest(
     Parameters
     ----------
     among : (N,) points of the outline that are considered; default: all
+
+    Raises
+    ------
+    NotMeasurable
+        No point is considered.
     """
+    if among is not None and not among.any():
+        raise NotMeasurable("the surface is not where this section is measured")
     reach = sign * outline.points[:, axis]
     point = int(np.argmax(reach if among is None else np.where(among, reach, -np.inf)))
     by_points = np.zeros_like(outline.points)
@@ -276,6 +283,8 @@ def _reach(outline: Outline, sign: float, height: float) -> tuple[float, int]:
     share = (height - up[spans]) / (up[ahead[spans]] - up[spans])
     reach[spans] = np.maximum(reach[spans], across[spans] + share * (across[ahead[spans]] - across[spans]))
     most = int(np.argmax(reach))
+    if np.isinf(reach[most]):
+        raise NotMeasurable("the surface does not reach down to where its breadth is taken")
     return float(reach[most]), most
 
 
@@ -333,6 +342,8 @@ def _heel_middle(foot: FootSurface, level: float) -> Quantity:
     points, ahead = heel.points, np.roll(heel.points, -1, axis=0)
     x = float(points[:, 0].min()) + HEEL_DEPTH_MM
     spans = np.flatnonzero((points[:, 0] > x) != (ahead[:, 0] > x))
+    if not len(spans):
+        raise NotMeasurable("the surface has no heel here")
     share = (x - points[spans, 0]) / (ahead[spans, 0] - points[spans, 0])
     y = points[spans, 1] + share * (ahead[spans, 1] - points[spans, 1])
     by_points = np.zeros_like(points)

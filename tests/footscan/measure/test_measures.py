@@ -249,6 +249,17 @@ def test_the_document_reads_back() -> None:
     assert Measures.model_validate_json(measured().model_dump_json()) == measured()
 
 
+def test_a_part_that_is_lifted_has_no_breadth_at_the_floor() -> None:
+    """Where the surface does not reach down to the height at which they are taken; nothing else is lost."""
+    vertices = foot().vertices.copy()
+    x = vertices[:, 0] - vertices[:, 0].min()
+    lifted = known_place(vertices + np.column_stack([np.zeros((len(x), 2)), 100.0 * (x < 0.6 * x.max())]))
+    for name in ("heel_breadth", "midfoot_breadth", "heel_angle"):
+        assert lifted[name].status == "incomplete"
+        assert (lifted[name].note or "").startswith("the surface ")
+    assert lifted["foot_length"].value == pytest.approx(foot().measures["foot_length"], abs=0.1)
+
+
 def test_an_empty_mesh_is_a_finding() -> None:
     with pytest.raises(Finding):
         measure_foot(np.zeros((0, 3)), np.zeros((0, 3), np.int32), "right")
