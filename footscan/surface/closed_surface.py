@@ -10,7 +10,7 @@ from footscan.mesh.topology import directed_edges, vertex_normals
 from footscan.surface.ankle import cut_flat, opening_height
 from footscan.surface.patch import fair
 from footscan.surface.poisson import indicator, level_surface
-from footscan.surface.projection import Projection, project
+from footscan.surface.projection import MOST_MISFIT, Projection, project
 from footscan.surface.travel_ends import TravelEnd, drawn_to_tips, travel_ends
 from schemas.base.errors import Finding
 from schemas.parameters.surface import SurfaceParameters
@@ -25,9 +25,6 @@ LEAST_SECTORS = 7
 CAP_STEPS, AWAY_STEPS = 0.25, 0.5
 """Surface is within the outermost stripe if it lies no farther than the first before the plane of that stripe, and
 farther than the second from its points, in steps. Chosen by hand."""
-MOST_MISFIT = 0.1
-"""A measured vertex has neighbours that lie on one surface: the root mean square of their distances to it is at most
-this, in steps. Tuned on the nightly suite's four feet, with stripes every 4 mm."""
 LEAST_POINTS = 50
 """Fewer points are refused; chosen by hand."""
 LEAST_MEASURED = 0.5

@@ -246,7 +246,7 @@ def test_a_click_on_a_measure_shows_its_section(
 def test_colours_are_chosen_and_explained(pages: dict[str, Path], show: Callable[..., Opened]) -> None:
     opened = show(pages["report"])
     sums = []
-    for choice, said in enumerate(("blue lies inside", "Measured, ", "Camera 8", "Standard deviation")):
+    for choice, said in enumerate(("blue lies inside", "Measured, ", "Camera 6", "Standard deviation")):
         opened.page.locator("input[name=colouring]").nth(choice).check(force=True)
         sums.append(opened.ink().sum)
         [meaning] = opened.seen("[data-meaning]")

@@ -93,10 +93,8 @@ def laser_light(
     total = np.zeros(len(points))
     for laser in lasers:
         beams = beams_of(laser, points)
-        light = _sheet(
-            points, beams.towards, beams.transmitted, hits.normals, hits.facet_normals, spread,
-            np.array(laser.position), np.array(laser.axis), settings.laser_sigma_mm, edges,
-        )  # fmt: skip
+        position, axis, sigma = np.array(laser.position), np.array(laser.axis), settings.laser_sigma_mm
+        light = _sheet(points, beams, hits.normals, hits.facet_normals, spread, position, axis, sigma, edges)
         lit = np.flatnonzero(light * settings.laser_exposure > DARK)
         hidden = scene.hidden(points[lit] + travel, hits.facet_normals[lit], beams.sources[lit] + travel)
         total[lit[~hidden]] += light[lit[~hidden]]
@@ -120,7 +118,7 @@ def beams_of(laser: Laser, points: Floats) -> Beams:
     if not laser.below_glass:
         way = position - points
         towards = way / np.linalg.norm(way, axis=1, keepdims=True)
-        return Beams(np.broadcast_to(position, points.shape), towards, np.ones(len(points)))
+        return Beams(np.tile(position, (len(points), 1)), towards, np.ones(len(points)))
     directions = directions_from_below(position, points, thickness=laser.plate_mm)
     transmitted = (1.0 - reflectance(directions[:, 2])) ** 2
     return Beams(exits_above(position, directions, thickness=laser.plate_mm), -directions, transmitted)
@@ -129,8 +127,7 @@ def beams_of(laser: Laser, points: Floats) -> Beams:
 @compiled
 def _sheet(
     points: Floats,
-    towards: Floats,
-    transmitted: Floats,
+    beams: Beams,
     normals: Floats,
     facet_normals: Floats,
     spread: Floats,
@@ -148,9 +145,9 @@ def _sheet(
     for k in range(len(points)):
         facing = cosine = along = squares = 0.0
         for c in range(3):
-            facing += facet_normals[k, c] * towards[k, c]
-            cosine += normals[k, c] * towards[k, c]
-            along -= towards[k, c] * axis[c]
+            facing += facet_normals[k, c] * beams.towards[k, c]
+            cosine += normals[k, c] * beams.towards[k, c]
+            along -= beams.towards[k, c] * axis[c]
             squares += (points[k, c] - position[c]) * (points[k, c] - position[c])
         if facing <= 0.0 or cosine <= 0.0 or along <= outer:
             continue
@@ -159,7 +156,7 @@ def _sheet(
         variance = sigma * sigma + off_focus * off_focus + spread[k]
         profile = exponential(-0.5 * points[k, 0] * points[k, 0] / variance) * sigma / np.sqrt(variance)
         fan = min((along - outer) / (inner - outer), 1.0)  # a Powell lens: even light with a soft edge
-        light[k] = profile * cosine * fan * transmitted[k] * FOCUS_MM / distance
+        light[k] = profile * cosine * fan * beams.transmitted[k] * FOCUS_MM / distance
     return light
 
 
