@@ -42,8 +42,8 @@ WHITE_RISE = 60.0
 BETWEEN = 0.15
 """Depth of the valley between two stripes, relative to the lower one, from which they count as two. Chosen by hand."""
 VALLEY = 70.0
-"""Least depth of the valley, in levels of R + 3 G + B. In a photograph by day, noise makes valleys of 60 levels in 4 % of
-the lines, of 70 in 0.5 %; tuned on it."""
+"""Least depth of the valley, in levels of R + 3 G + B. Tuned on a photograph by day, in which noise makes valleys of 60
+levels in 4 % of the lines, of 70 in 0.5 %."""
 LEAST_PEAK = 0.3
 """Height of the lower one, relative to the other. Chosen by hand."""
 
