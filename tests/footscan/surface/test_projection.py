@@ -72,6 +72,8 @@ def test_a_cleft_is_no_surface() -> None:
     plane = striped(lambda _, y: 0.0 * y, 2.0)
     on_plane = project(np.array([[1.0, 0.0, 0.5]]), up, plane, np.repeat(up, len(plane), axis=0), 2.0, 1.75)
     assert placed.misfit_steps[0] > 0.1
+    assert placed.points[0, :2].tolist() == [1.0, 0.0]  # moved along its own normal, to the mean of the walls
+    assert 0.0 < placed.points[0, 2] < 3.0
     assert on_plane.misfit_steps[0] < 1e-6
 
 
