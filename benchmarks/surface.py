@@ -154,7 +154,9 @@ def _steps_to(kind: str, scan: Path, calibration: Path, results: Path) -> tuple[
 def _run(steps: Iterable[Step], store: Store) -> dict[str, bytes]:
     """What the steps come to, by their names."""
     found: dict[str, bytes] = {}
-    for name, outcome in run_plan(make_plan(list(steps), store), store, pool=Threads(THREADS)).items():
+    for name, outcome in run_plan(
+        make_plan(list(steps), store), store, pool=Threads(THREADS), on_step_end=lambda _: None
+    ).items():
         data = store.get(outcome.digest) if isinstance(outcome, Success) else None
         if data is None:
             raise RuntimeError(f"{name}: {outcome}")
