@@ -88,7 +88,7 @@ def close_surface(
             f"be measured, expected {100 * LEAST_MEASURED:.0f} % at least"
         )
     height = opening_height(vertices, faces, ~is_measured)
-    is_measured &= on_cloud.misfit_steps <= MOST_MISFIT
+    is_measured &= on_cloud.misfit_steps <= MOST_MISFIT  # after the leg's end was sought, which is where points end
     origin = np.where(is_measured & (on_cloud.nearest >= 0), cloud.camera[on_cloud.nearest], 0).astype(np.uint8)
     on_lid = np.zeros(len(vertices), np.bool_)
     if height is not None:
