@@ -53,5 +53,5 @@ def clean(
     if movement.x_mm and parameters.method != "levels":
         # The heel of a foot that trembles has no smooth cap that shows the stripes of other lasers.
         off = is_off_heel(kept, views)
-        kept, removed = kept[~off], removed.without(points, off, "laser")
+        kept, removed = kept.compress(~off), removed.without(points, off, "laser")
     return Cleaned(kept, removed, movement)

@@ -18,7 +18,7 @@ from footscan.cloud.heads.find import find_heads
 from footscan.cloud.heads.planes import corrected, heads_of
 from footscan.cloud.mapping import map_stripe, refuse_other_size
 from footscan.cloud.normals import estimate_normals
-from footscan.cloud.points import POINT_DTYPE, of_cameras
+from footscan.cloud.points import joined, of_cameras
 from footscan.cloud.views import View, views_of
 from footscan.frames.film import open_background, open_film
 from footscan.frames.image import Rgb
@@ -98,7 +98,7 @@ class OpenScan:
     @cached_property
     def heads(self) -> HeadsReport:
         """Where the heads were, beside where the calibration says."""
-        points = np.concatenate([np.empty(0, POINT_DTYPE), *self.points.values()])
+        points = joined(self.points.values())
         return find_heads(points, self._views, self.parameters.heads)
 
     @property
@@ -123,7 +123,7 @@ class OpenScan:
 
     @cached_property
     def _cleaned(self) -> Cleaned:
-        together = np.concatenate(list(self.points.values()))
+        together = joined(self.points.values())
         if not len(together):
             raise Finding("no stripe in any camera, expected a foot in the films")
         placed = {camera: self._x_of_frame(camera) for camera in self.cameras}

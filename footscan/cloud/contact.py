@@ -16,15 +16,17 @@ the standard deviation.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.points import PLANE_MM, stripe_step
+from footscan.cloud.points import PLANE_MM, copied, joined, stripe_step
 from footscan.cloud.views import View
 from footscan.compiled import compiled
 from footscan.rows import distinct_rows
+from footscan.side_by_side import together
 from schemas.glass import CALIBRATED, GlassPlane, Plane, Term
 
 Floats = NDArray[np.float64]
@@ -133,12 +135,12 @@ def estimate_glass(points: NDArray[np.void], views: Mapping[int, View]) -> Glass
     (True, 1.0, ['height', 'tilt_y', 'tilt_x'])
     """
     below = [camera for camera, view in views.items() if view.centre[2] < 0]
-    near = points[np.isin(points["camera"], below) & points["supported"] & (np.abs(points["z"]) <= REACH_MM)]
-    seen = [near[near["camera"] == camera] for camera in np.unique(near["camera"])]
-    guesses = [_first_guess(of_camera) for of_camera in seen]
+    near = points.compress(np.isin(points["camera"], below) & points["supported"] & (np.abs(points["z"]) <= REACH_MM))
+    seen = [near.compress(near["camera"] == camera) for camera in np.unique(near["camera"])]
+    guesses = together(partial(_first_guess, of_camera) for of_camera in seen)
     fitted = np.ones(len(TERMS), np.bool_)
     while True:
-        found = [_contact(of_camera, guess, fitted) for of_camera, guess in zip(seen, guesses, strict=True)]
+        found = together(partial(_contact, *of_camera, fitted) for of_camera in zip(seen, guesses, strict=True))
         contacts = _agreeing([contact for contact in found if contact is not None])
         if len(contacts) < FEWEST_CAMERAS:
             return GlassPlane()
@@ -164,7 +166,7 @@ def above_glass(points: NDArray[np.void], plane: Plane) -> NDArray[np.void]:
     """
     if plane == CALIBRATED:
         return points
-    moved = points.copy()
+    moved = copied(points)
     moved["z"] -= np.float32(plane.height) + plane.along * points["x"] + plane.across * points["y"]
     return moved
 
@@ -216,7 +218,7 @@ def _pieces(points: NDArray[np.void]) -> NDArray[np.void]:
     is_next = (np.diff(strip[order]) != 0) | (np.diff(points["frame"][order]) != 0)
     bounds = np.concatenate([[0], np.flatnonzero(is_next) + 1, [len(points)]])
     counts = np.diff(bounds)
-    return np.asarray(points[order[(bounds[:-1] + counts // 2)[counts >= FEWEST_IN_STRIP]]])
+    return np.asarray(points.take(order[(bounds[:-1] + counts // 2)[counts >= FEWEST_IN_STRIP]]))
 
 
 def _contact(points: NDArray[np.void], guess: Floats, fitted: NDArray[np.bool_]) -> _Contact | None:
@@ -224,7 +226,9 @@ def _contact(points: NDArray[np.void], guess: Floats, fitted: NDArray[np.bool_])
 
     Terms that are not `fitted` (3,) are those of the calibrated glass, 0.
     """
-    near = points[np.abs(points["z"] - guess[0] - guess[1] * points["x"] - guess[2] * points["y"]) <= 2.0 * BAND_MM]
+    near = points.compress(
+        np.abs(points["z"] - guess[0] - guess[1] * points["x"] - guess[2] * points["y"]) <= 2.0 * BAND_MM
+    )
     if len(near) < FEWEST:
         return None
     x, y, z = (near[axis].astype(np.float64) for axis in "xyz")
@@ -317,7 +321,7 @@ def _mean(contacts: Sequence[_Contact], fitted: NDArray[np.bool_]) -> _Mean:
     mean = terms.mean(axis=0)
     scatter = np.sum((terms - mean) ** 2, axis=0) + LEAST_SD_CAMERAS * least**2
     variance = scatter / (len(contacts) - 1 + LEAST_SD_CAMERAS) + variances.mean(axis=0)
-    pressed = np.concatenate([contact.points[contact.weights > 0.5] for contact in contacts])
+    pressed = joined(contact.points.compress(contact.weights > 0.5) for contact in contacts)
     step = max(stripe_step(pressed), PLANE_MM)
     stripe = np.round(pressed["plane"] / step).astype(np.int64)
     pieces = distinct_rows(np.column_stack([stripe, np.floor(pressed["y"] / STRIP_MM).astype(np.int64)]))

@@ -96,7 +96,7 @@ def estimate_normals(
 
     places = np.ascontiguousarray(xyz[order])
     normals = _fit(places, radius, *cells)
-    cosines = _cosines(cloud[order], places, normals, views)
+    cosines = _cosines(cloud.take(order), places, normals, views)
     normals[cosines < 0] *= -1
     sure = np.abs(cosines) >= parameters.grazing
     _spread(places, radius, cells, np.where(sure, PASSES, 0), normals)

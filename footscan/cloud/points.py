@@ -1,5 +1,7 @@
 """World points, of which clouds are made."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,7 +40,12 @@ cameras : number of cameras whose points were averaged to it
 
 Coordinates are stored as float32: at half a metre their last digit is 0.03 µm, a thousandth of what a stripe resolves.
 Arithmetic on them is done in float64, see `coordinates`.
+
+NumPy copies structures field by field, but not where it takes whole items: `take` and `compress` are ten to forty times
+as fast as indices and masks in brackets, and so are `copied` and `joined` beside `copy` and `concatenate`.
 """
+_WHOLE = np.dtype((np.void, POINT_DTYPE.itemsize))
+"""A point as bytes."""
 
 
 def make_points(
@@ -76,6 +83,24 @@ def make_points(
     return points
 
 
+def copied(points: NDArray[np.void]) -> NDArray[np.void]:
+    """A copy of `points`.
+
+    >>> copied(make_points(np.array([[1.0, 2.0, 3.0]]), camera=2))["z"].tolist()
+    [3.0]
+    """
+    return points.view(_WHOLE).copy().view(POINT_DTYPE)
+
+
+def joined(parts: Iterable[NDArray[np.void]]) -> NDArray[np.void]:
+    """The points of all `parts`, in their order; none without parts.
+
+    >>> joined([make_points(np.array([[1.0, 2.0, z]]), camera=2) for z in (3.0, 4.0)])["z"].tolist(), len(joined([]))
+    ([3.0, 4.0], 0)
+    """
+    return np.concatenate([np.empty(0, _WHOLE), *(part.view(_WHOLE) for part in parts)]).view(POINT_DTYPE)
+
+
 def stripe_step(points: NDArray[np.void]) -> float:
     """The distance from one stripe plane to the next along the travel, mm; the median over frames and cameras.
 
@@ -85,17 +110,14 @@ def stripe_step(points: NDArray[np.void]) -> float:
     >>> stripe_step(make_points(np.array([[0.0, 0, 0], [1.5, 0, 0], [3.0, 0, 0]]), camera=1, frame=np.arange(3)))
     1.5
     """
-    steps = [
-        _frame_steps(points["frame"][points["camera"] == camera], points["plane"][points["camera"] == camera])
-        for camera in np.unique(points["camera"])
-    ]
-    return float(np.median(np.concatenate(steps))) if any(len(step) for step in steps) else 0.0
-
-
-def _frame_steps(frame: NDArray[np.int32], x: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Distances in mm from each frame of one camera to its next frame that has points."""
-    _, number, counts = np.unique(frame, return_inverse=True, return_counts=True)
-    return np.abs(np.diff(np.bincount(number, x.astype(np.float64)) / counts))
+    frame = points["frame"] - points["frame"].min(initial=0)
+    frames = int(frame.max(initial=0)) + 1
+    group = points["camera"].astype(np.intp) * frames + frame
+    counts = np.bincount(group)
+    groups = np.flatnonzero(counts)
+    planes = np.bincount(group, points["plane"])[groups] / counts[groups]
+    steps = np.abs(np.diff(planes))[np.diff(groups // frames) == 0]
+    return float(np.median(steps)) if len(steps) else 0.0
 
 
 def camera_numbers(points: NDArray[np.void]) -> NDArray[np.int64]:
@@ -109,7 +131,7 @@ def camera_numbers(points: NDArray[np.void]) -> NDArray[np.int64]:
 
 def of_cameras(points: NDArray[np.void]) -> NDArray[np.void]:
     """A copy of `points` with the numbers of their cameras instead of those of views."""
-    numbered = points.copy()
+    numbered = copied(points)
     numbered["camera"] = camera_numbers(points)
     return numbered
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
+from footscan.rows import limits
 
 Ints = NDArray[np.int64]
 MAX_CUBES = 20_000_000
@@ -36,8 +37,8 @@ def sort_into_cubes(points: NDArray[np.float64], edge: float) -> Buckets:
     >>> buckets.dims.tolist(), buckets.start.tolist(), buckets.order.tolist()
     ([1, 1, 3], [0, 2, 2, 3], [0, 2, 1])
     """
-    low = points.min(axis=0)
-    extent = points.max(axis=0) - low
+    low, high = limits(points)
+    extent = high - low
     while np.prod(np.floor(extent / edge) + 1) > MAX_CUBES:
         edge *= 1.5
     dims = np.floor(extent / edge).astype(np.int64) + 1

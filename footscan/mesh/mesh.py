@@ -85,13 +85,14 @@ def with_normals(mesh: Mesh) -> Mesh:
         return mesh
     corners = mesh.vertices[mesh.faces]
     normals = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    sums = np.zeros_like(mesh.vertices)
+    angles = []
     for corner in range(3):
         back = _unit(corners[:, corner - 1] - corners[:, corner])
         ahead = _unit(corners[:, corner - 2] - corners[:, corner])
-        angle = np.arccos(np.clip(np.sum(back * ahead, axis=1), -1.0, 1.0))
-        np.add.at(sums, mesh.faces[:, corner], angle[:, None] * normals)
-    return replace(mesh, normals=_unit(sums))
+        angles.append(np.arccos(np.clip(np.sum(back * ahead, axis=1), -1.0, 1.0)))
+    vertex, weight = mesh.faces.T.ravel(), np.concatenate(angles)
+    sums = [np.bincount(vertex, weight * np.tile(along, 3), len(mesh.vertices)) for along in normals.T]
+    return replace(mesh, normals=_unit(np.column_stack(sums)))
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

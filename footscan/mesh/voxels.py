@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.compiled import compiled
+from footscan.rows import limits
 
 Floats = NDArray[np.float64]
 
@@ -49,8 +50,8 @@ def voxelise(xyz: Floats, size: tuple[float, float, float]) -> Voxels:
     ([0, 1, 0], 2)
     """
     edges = np.array(size)
-    low = xyz.min(axis=0)
-    extent = xyz.max(axis=0) - low
+    low, high = limits(xyz)
+    extent = high - low
     while np.prod(np.floor(extent / edges + 0.5) + 1 + 2 * BORDER) > MOST_CELLS:
         edges = edges * 1.5
     origin = low - (BORDER + 0.5) * edges

@@ -16,6 +16,7 @@ from skimage.measure import marching_cubes
 from footscan.compiled import compiled
 from footscan.mesh.buckets import sort_into_cubes
 from footscan.mesh.topology import largest_component, used_vertices
+from footscan.rows import limits
 from schemas.base.errors import Finding
 
 MARGIN_BLURS = 8.0
@@ -49,7 +50,8 @@ def indicator(points: Floats, normals: Floats, spacing: float, blur: float) -> I
     spacing : mm, of the grid
     blur : mm, standard deviation of the Gaussian that smooths the normals; about the distance of neighbouring points
     """
-    low, high = points.min(axis=0) - MARGIN_BLURS * blur, points.max(axis=0) + MARGIN_BLURS * blur
+    low, high = limits(points)
+    low, high = low - MARGIN_BLURS * blur, high + MARGIN_BLURS * blur
     while np.prod((high - low) / spacing + 1) > MAX_CELLS:
         spacing *= 1.1
     shape = tuple(fft.next_fast_len(int(n), real=True) for n in np.ceil((high - low) / spacing) + 1)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from footscan.clean import clean
 from footscan.cloud.heads.planes import corrected, heads_of
+from footscan.cloud.points import joined
 from footscan.cloud.views import views_of
 from pipelines.arrays import pack, unpack
 from schemas.base.errors import Finding
@@ -37,7 +38,7 @@ def run(inputs: Mapping[str, bytes], parameters: OutlierParameters, places: Mapp
     views = views_of(calibrated)
     cameras = sorted((name for name in inputs if name.startswith("points-")), key=lambda name: int(name[7:]))
     mapped = {int(name[7:]): unpack(inputs[name]) for name in cameras}
-    points = np.concatenate([of_camera["points"] for of_camera in mapped.values()])
+    points = joined(of_camera["points"] for of_camera in mapped.values())
     if not len(points):
         raise Finding("no stripe in any camera, expected a foot in the films")
     filmed = {one.view: mapped[one.camera]["x_of_frame"] + one.ahead_mm for one in calibrated if one.camera in mapped}

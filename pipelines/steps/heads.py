@@ -3,10 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from footscan.cloud.heads.find import find_heads
-from footscan.cloud.points import POINT_DTYPE
+from footscan.cloud.points import joined
 from footscan.cloud.views import views_of
 from pipelines.arrays import unpack
 from schemas.calibration import Calibration
@@ -21,5 +19,5 @@ def run(inputs: Mapping[str, bytes], parameters: HeadParameters, places: Mapping
     del places
     views = views_of(Calibration.model_validate_json(inputs["calibration"]).cameras)
     points = [unpack(inputs[name])["points"] for name in sorted(inputs) if name.startswith("points-")]
-    report = find_heads(np.concatenate([np.empty(0, POINT_DTYPE), *points]), views, parameters)
+    report = find_heads(joined(points), views, parameters)
     return report.model_dump_json().encode()

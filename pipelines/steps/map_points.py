@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from footscan.cloud.mapping import map_stripe, refuse_other_size
+from footscan.cloud.points import joined
 from footscan.frames.travel import x_of_frames
 from pipelines.arrays import pack, unpack
 from schemas.calibration import maps_from_json
@@ -32,7 +33,7 @@ def run(inputs: Mapping[str, bytes], parameters: MappingParameters, places: Mapp
         refuse_other_size(camera, manifest.size, places.get("film", f"camera {camera.camera}"))
     frames = len(manifest.frames)
     x_of_frame = x_of_frames(inputs.get("travel"), inputs.get("positions"), frames)
-    points = np.concatenate([map_stripe(extracted["stripe"], camera, x_of_frame, parameters) for camera in maps])
+    points = joined(map_stripe(extracted["stripe"], camera, x_of_frame, parameters) for camera in maps)
     x_of_frame = x_of_frame[:frames].copy()
     x_of_frame[extracted["lost"]] = np.nan
     return pack(points=points, x_of_frame=x_of_frame)

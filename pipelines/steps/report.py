@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from footscan.cloud.outliers.remove import NO_POINT
-from footscan.cloud.points import of_cameras
+from footscan.cloud.points import joined, of_cameras
 from footscan.frames.array import IngestedFrames
 from footscan.frames.reader import pixel_frames
 from footscan.mesh.mesh import Mesh
@@ -42,7 +42,7 @@ def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping
     surface = unpack(inputs["surface"])
     about = json.loads(inputs["about"])
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
-    points = np.concatenate([unpack(inputs[f"points-{camera}"])["points"] for camera in ids])
+    points = joined(unpack(inputs[f"points-{camera}"])["points"] for camera in ids)
     codes = unpack(inputs["clean"])["codes"]
     mesh = Mesh(surface["vertices"], surface["faces"], filled=surface.get("filled"))
     page = scan_page(
@@ -56,7 +56,7 @@ def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping
             truth_distance=unpack(inputs["verified"])["vertex_distance"] if "verified" in inputs else None,
         ),
         points=ScanPoints(
-            points=of_cameras(points[codes != NO_POINT]),
+            points=of_cameras(points.compress(codes != NO_POINT)),
             codes=codes[codes != NO_POINT],
             cloud=unpack(inputs["oriented"])["cloud"],
         ),

@@ -96,14 +96,14 @@ def fuse(
         + [*_worse(before, after)],
         heads=_present(heads or {}, stripes),
     )
-    return Fusion(merged.points[~off], report)
+    return Fusion(merged.points.compress(~off), report)
 
 
 def _concatenated(stripes: Stripes, pairs: Pairs, heads: Mapping[int, int]) -> Fusion:
     """All points of all cameras as they are."""
     order = np.lexsort([stripes.yz[:, 1], stripes.yz[:, 0], stripes.plane])
     report = FusionReport(pairs=_pairs(pairs, pairs), heads=_present(heads, stripes))
-    return Fusion(stripes.points[order], report)
+    return Fusion(stripes.points.take(order), report)
 
 
 def _present(heads: Mapping[int, int], stripes: Stripes) -> dict[int, int]:

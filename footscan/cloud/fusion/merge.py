@@ -57,7 +57,7 @@ def merge(stripes: Stripes, yz: Floats, reach: Floats, deviations: Floats, param
     )
     kept = np.flatnonzero(cameras > 0)
     order = kept[np.lexsort((places[kept, 2], places[kept, 1], stripes.plane[kept]))]
-    points = stripes.points[surest[order]]
+    points = stripes.points.take(surest[order])
     points["x"], points["y"], points["z"] = places[order].T
     points["cameras"] = cameras[order]
     points["sigma"] = np.where(points["supported"], spread[order], stripes.sigma[order])

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.points import PLANE_MM, POINT_DTYPE, UNKNOWN_SIGMA_MM, coordinates
+from footscan.cloud.points import PLANE_MM, UNKNOWN_SIGMA_MM, coordinates, joined
 from footscan.compiled import compiled
+from footscan.rows import distinct_numbers
 
 Floats = NDArray[np.float64]
 
@@ -88,12 +89,12 @@ def sort_stripes(points_by_camera: Iterable[NDArray[np.void]]) -> Stripes:
     >>> print(stripes.cameras, stripes.linked)
     [2] [ True False False]
     """
-    points = np.concatenate([np.empty(0, POINT_DTYPE), *points_by_camera])
-    points = points[np.isfinite(points["x"]) & np.isfinite(points["y"]) & np.isfinite(points["z"])]
-    cameras, camera = np.unique(points["camera"], return_inverse=True)
+    points = joined(points_by_camera)
+    points = points.compress(np.isfinite(points["x"]) & np.isfinite(points["y"]) & np.isfinite(points["z"]))
+    cameras, camera = distinct_numbers(points["camera"])
     group = _planes(points["plane"]) * max(len(cameras), 1) + camera
     order = np.lexsort((points["source"], points["frame"], group))
-    points, group = points[order], group[order]
+    points, group = points.take(order), group[order]
     planes = int(group[-1]) // len(cameras) + 1 if len(points) else 0
     xyz = coordinates(points)
     yz = np.ascontiguousarray(xyz[:, 1:])
@@ -105,7 +106,7 @@ def sort_stripes(points_by_camera: Iterable[NDArray[np.void]]) -> Stripes:
     normals, bent = _normals(yz, linked)
     return Stripes(
         points=points,
-        cameras=cameras.astype(np.intp),
+        cameras=cameras,
         camera=camera[order],
         plane=group // max(len(cameras), 1),
         starts=np.searchsorted(group, np.arange(planes * len(cameras) + 1)),

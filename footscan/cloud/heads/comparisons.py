@@ -10,7 +10,7 @@ from footscan.calibration.models.laser_plane import MIDDLE_Z_MM
 from footscan.cloud.fusion.agreement import GAP_STEPS, find_overlaps
 from footscan.cloud.fusion.motion import TERMS, motion_terms
 from footscan.cloud.fusion.stripes import Floats, Traces, sort_stripes, traces_of, ways_to_neighbours
-from footscan.cloud.points import stripe_step
+from footscan.cloud.points import copied, stripe_step
 from footscan.cloud.views import View
 
 Ints = NDArray[np.intp]
@@ -84,7 +84,7 @@ def compare(
     x_mm : where offsets hold
     reach_mm : largest distance along the normal
     """
-    labelled = points.copy()
+    labelled = copied(points)
     labelled["cameras"] = lasers  # rides through the sort
     stripes = sort_stripes([labelled])
     overlaps = find_overlaps(stripes, stripes.yz, reach_mm)

@@ -26,6 +26,7 @@ from footscan.cloud.heads.equations import (
     unmoved_heads,
 )
 from footscan.cloud.heads.planes import (
+    UNKNOWN,
     calibrated_places,
     displaced,
     head_indices,
@@ -38,6 +39,7 @@ from footscan.cloud.heads.verdict import HALF_MM, report_of
 from footscan.cloud.lasers.choose import choose_lasers
 from footscan.cloud.lasers.moments import renumbered
 from footscan.cloud.lasers.seen import FARTHEST_MM, LasersSeen, lasers_seen
+from footscan.cloud.points import copied
 from footscan.cloud.views import View
 from schemas.heads import HeadsReport
 from schemas.parameters.heads import HeadParameters
@@ -75,7 +77,8 @@ def find_heads(points: NDArray[np.void], views: Mapping[int, View], parameters: 
     heads = heads_of(views)
     head_of = head_indices(heads)
     choice = choose_lasers(points)
-    usable = points[(head_of[points["camera"]] >= 0) & points["supported"] & ~choice.other & ~choice.unassigned]
+    has_head = head_of[points["camera"]] != UNKNOWN
+    usable = points.compress(has_head & points["supported"] & ~choice.other & ~choice.unassigned)
     heads = {camera: head for camera, head in heads.items() if np.any(usable["camera"] == camera)}
     head_of = head_indices(heads)
     count = len(set(heads.values()))
@@ -85,7 +88,7 @@ def find_heads(points: NDArray[np.void], views: Mapping[int, View], parameters: 
         return nothing
     known = calibrated_places(views, heads, x_mm)
     unmoved = displaced(renumbered(usable, views), -known, head_of, x_mm)
-    ordered = unmoved[np.lexsort([unmoved[name] for name in ("source", "camera", "frame")])]
+    ordered = unmoved.take(np.lexsort([unmoved[name] for name in ("source", "camera", "frame")]))
     bare = {camera: replace(view, plane=None) for camera, view in views.items()}
     first = compare(ordered, head_of[ordered["camera"]], bare, head_of, x_mm)
     across = int(np.count_nonzero(first.is_across))
@@ -149,13 +152,13 @@ def _travels_alone(seen: LasersSeen, places: Floats) -> bool:
 
 def _in_laser_planes(points: NDArray[np.void], seen: LasersSeen) -> tuple[NDArray[np.void], NDArray[np.intp]]:
     """The points in the planes of their lasers, and the index of each laser."""
-    moved = points.copy()
+    moved = copied(points)
     for number in range(len(seen.places)):
         rows = np.flatnonzero((seen.laser == number) & (seen.own != number))
         moved["x"][rows], moved["y"][rows], moved["z"][rows] = seen.places[number, rows].T
         moved["plane"][rows] = seen.planes[number, rows]
     usable = np.isfinite(moved["y"]) & np.isfinite(moved["x"])
-    return moved[usable], seen.laser[usable]
+    return moved.compress(usable), seen.laser[usable]
 
 
 def _of_lines(comparisons: Comparisons, fit: HeadFit) -> tuple[Floats, Floats]:

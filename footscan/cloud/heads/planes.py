@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from footscan.cloud.fusion.stripes import Floats
-from footscan.cloud.heads.comparisons import terms_of_head
-from footscan.cloud.points import coordinates
+from footscan.cloud.heads.comparisons import HEAD_TERMS, terms_of_head
+from footscan.cloud.points import coordinates, copied
 from footscan.cloud.views import View
 from schemas.calibration import LaserPlane, camera_of_view, laser_of_view
 from schemas.heads import HeadsReport
@@ -74,9 +74,8 @@ def planes_filmed(views: Mapping[int, View], heads: Mapping[int, int]) -> bool:
 
 def displaced(points: NDArray[np.void], places: Floats, head_of: NDArray[np.intp], x_mm: float) -> NDArray[np.void]:
     """Move points along X to where places (H, 4) of their heads put them; `head_of` as of `head_indices`."""
-    head = head_of[points["camera"]]
-    moved = points.copy()
-    of_point = np.where((head == UNKNOWN)[:, None], 0.0, places[head])
+    moved = copied(points)
+    of_point = np.vstack([places, np.zeros(HEAD_TERMS)]).take(head_of[points["camera"]], axis=0)  # the last if UNKNOWN
     moved["x"] = points["x"] + np.einsum("nk,nk->n", terms_of_head(coordinates(points), x_mm), of_point)
     moved["plane"] = points["plane"] + of_point[:, 0] + of_point[:, 3] * (points["plane"].astype(np.float64) - x_mm)
     return moved

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from footscan.calibration.models.laser_plane import x_in_turned_plane
-from footscan.cloud.points import coordinates, stripe_step
+from footscan.cloud.points import coordinates, copied, stripe_step
 from footscan.cloud.views import View
 
 Floats = NDArray[np.float64]
@@ -58,7 +58,7 @@ def renumbered(points: NDArray[np.void], views: Mapping[int, View]) -> NDArray[n
         if len(apart) == 0 or np.median(np.abs(apart - middle)) > step / 2 or abs(middle) > MOST_STEPS * step:
             return points
         shifts.append(round(middle / step))
-    moved, cameras = points.copy(), np.unique(points["camera"])
+    moved, cameras = copied(points), np.unique(points["camera"])
     moved["frame"] += np.array(shifts, np.int32)[np.searchsorted(cameras, points["camera"])] - min(shifts)
     return moved
 
@@ -137,13 +137,13 @@ def of_any_laser(points: NDArray[np.void], views: Mapping[int, View]) -> tuple[N
     None are given where it is not known how the planes lie, as with heads that travel one after the other.
     """
     views = {number: view for number, view in views.items() if view.plane is not None}
-    points = points[np.isin(points["camera"], list(views))]
+    points = points.compress(np.isin(points["camera"], list(views)))
     if not len(points) or ahead_of_frames(renumbered(points, views), views) is None:
         return points[:0], points[:0]
     travel, yz = travel_of(points, views), coordinates(points)[:, 1:]
     planes = [(view.plane, plane_of_travel(view, travel)) for view in views.values()]
     x = np.array([x_in_turned_plane(plane, middle, yz) for plane, middle in planes if plane is not None])
-    greatest, least = points.copy(), points.copy()
+    greatest, least = copied(points), copied(points)
     greatest["x"], least["x"] = x.max(axis=0), x.min(axis=0)
     return greatest, least
 

@@ -86,7 +86,9 @@ def lasers_seen(points: NDArray[np.void], views: Mapping[int, View], heads: Mapp
         for number, head in enumerate(numbers):
             if len(rows):
                 other = views[next(one for one in heads if heads[one] == head)]
-                places[number, rows], apart[number, rows] = _in_plane(points[rows], view, other, planes[number, rows])
+                places[number, rows], apart[number, rows] = _in_plane(
+                    points.take(rows), view, other, planes[number, rows]
+                )
     linked = _linked(points)
     ends = np.diff(points["frame"], prepend=points["frame"][0] - 1, append=points["frame"][-1] + 1)
     frames = np.flatnonzero(ends)

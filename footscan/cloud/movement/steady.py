@@ -11,6 +11,7 @@ from footscan.cloud.fusion.stripes import sort_stripes
 from footscan.cloud.movement.passes import first_moment
 from footscan.cloud.movement.sway import sway_of
 from footscan.cloud.movement.tremor import MOVED_BACK, find_tremor
+from footscan.cloud.points import copied
 from schemas.movement import MovementReport
 
 DOUBT_MM = 0.4
@@ -33,7 +34,7 @@ def steadied(
     first_moments : camera -> moment of its frame 0; default: 0
     """
     first = {camera: moment for camera, moment in first_moments.items() if moment}
-    of_moment = points.copy()
+    of_moment = copied(points)
     of_moment["frame"] += first_moment(points, first)
     steady, report = _steadied(of_moment, heads)
     steady["frame"] = points["frame"]
@@ -78,7 +79,7 @@ def _moved_back(
     points: NDArray[np.void], names: Sequence[str], way: NDArray[np.float64], first_frame: int
 ) -> NDArray[np.void]:
     """The points without the `way` (F,) of each frame from the first one on, in the coordinates `names`."""
-    moved = points.copy()
+    moved = copied(points)
     frame = points["frame"].astype(np.intp) - first_frame
     is_near = (frame >= 0) & (frame < len(way))
     for name in names:

@@ -228,7 +228,7 @@ def _frames_at(stripes: Stripes, asked: Ints, of_camera: NDArray[np.bool_]) -> F
 
     Heads are turned against each other, so that a laser plane passes some of the skin earlier, and some later.
     """
-    points = stripes.points[of_camera]
+    points = stripes.points.compress(of_camera)
     plane = points["plane"].astype(np.float64)
     # How far ahead of its middle a laser plane meets the skin is linear in Y and Z.
     terms, terms_asked = (np.insert(stripes.yz[rows], 0, 1.0, axis=1) for rows in (of_camera, asked))

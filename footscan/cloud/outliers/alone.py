@@ -65,7 +65,7 @@ def is_off_alone(cloud: NDArray[np.void]) -> NDArray[np.bool_]:
     xyz = coordinates(cloud)
     buckets = sort_into_cubes(xyz, max(REACH_MM, 1.5 * step))
     away, joined = _compare(xyz, alone, cloud["cameras"].copy(), buckets, step)
-    piece, _ = segments_of(cloud[alone], JOINED_MM, math.inf)
+    piece, _ = segments_of(cloud.take(alone), JOINED_MM, math.inf)
     joins = np.bincount(piece, joined)[piece] > 0
     farthest = OFF_MM * max(step / AT_STEP_MM, 1.0) ** 2 * np.where(joins, JOINED_OFF, 1.0)
     off[alone] = (away > farthest) | _is_apart(xyz[alone], joined, step, LARGEST_SHARE * len(cloud))

@@ -9,6 +9,7 @@ from scipy import ndimage
 from footscan.cloud.points import PLANE_MM, coordinates, stripe_step
 from footscan.compiled import compiled
 from footscan.mesh.voxels import EMPTY, MOST_CELLS, voxelise
+from footscan.rows import limits
 
 CELL_MM = 1.0
 """Side of the cells in Y and Z: a static object stays within a cell and those around it. Chosen by hand."""
@@ -63,7 +64,7 @@ def is_static(
     for camera in np.unique(points["camera"]):
         own = np.flatnonzero(points["camera"] == camera)
         own = own[np.argsort(points["frame"][own], kind="stable")]
-        static[own] = _static_of_camera(points[own], (filmed or {}).get(int(camera)), body, share)
+        static[own] = _static_of_camera(points.take(own), (filmed or {}).get(int(camera)), body, share)
     return static
 
 
@@ -73,10 +74,11 @@ def _static_of_camera(
     """Select the static points of one camera, ordered by frame; x : (F,) of its frames, or None."""
     nothing = np.zeros(len(points), np.bool_)
     yz = np.column_stack([points["y"], points["z"]]).astype(np.float64)
-    if np.prod(np.ptp(yz, axis=0) / CELL_MM + 3) > MOST_CELLS:
+    low, high = limits(yz)
+    if np.prod((high - low) / CELL_MM + 3) > MOST_CELLS:
         return nothing
-    cell = np.floor((yz - yz.min(axis=0)) / CELL_MM).astype(np.int64) + 1
-    shape = tuple(cell.max(axis=0) + 2)
+    cell = np.floor((yz - low) / CELL_MM).astype(np.int64) + 1
+    shape = tuple(limits(cell)[1] + 2)
     frame = points["frame"] - points["frame"].min()
     if body is not None:
         if x is None:

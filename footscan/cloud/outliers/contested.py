@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from footscan.cloud.points import PLANE_MM, stripe_step
+from footscan.cloud.points import PLANE_MM, joined, stripe_step
 from footscan.rows import distinct_rows
 
 LEG_MM = 90.0
@@ -61,12 +61,12 @@ def contested_ends(
     >>> print(contested_ends(seen[x > 5.0], seen[x < 5.0], (seen[:0], seen[:0])))
     (0.0, 10.0)
     """
-    low = kept[kept["z"] < LEG_MM]
+    low = kept.compress(kept["z"] < LEG_MM)
     if len(low) < FEWEST_AT_END:
         return NOT_CONTESTED
     first, last = ends_of(low["x"])
     gap_mm = GAP_STEPS * max(stripe_step(kept), PLANE_MM)
-    farthest, nearest = (np.concatenate([denied, one]) for one in of_any_laser)
+    farthest, nearest = (joined([denied, one]) for one in of_any_laser)
     return 0.0 - _reach(low, -first, farthest, -1.0, gap_mm), _reach(low, last, nearest, 1.0, gap_mm)
 
 
@@ -77,7 +77,7 @@ def _reach(kept: NDArray[np.void], kept_end: float, denied: NDArray[np.void], wa
     beyond = way * denied["x"] > end
     for axis in "yz":
         beyond &= np.abs(denied[axis] - (last[axis].min() + last[axis].max()) / 2) < np.ptp(last[axis]) / 2 + MARGIN_MM
-    further = denied[beyond]
+    further = denied.compress(beyond)
     frames = distinct_rows(np.column_stack([further["camera"], further["frame"]]).astype(np.int64))
     stripes = np.bincount(frames.number, way * further["x"]) / frames.counts
     for stripe in np.sort(stripes[frames.counts >= FEWEST_IN_STRIPE]):

@@ -62,7 +62,7 @@ def is_ghost(
         distance = _distance(_look_up(frame, y, z, np.inf)[0], len(own))
         if distance is None:
             continue
-        segment, _ = segments_of(points[own], gap_mm, segment_mm)
+        segment, _ = segments_of(points.take(own), gap_mm, segment_mm)
         _, above = _look_up(frame, y, z, distance)
         ghost[own] = (np.bincount(segment, above) > MAJORITY * np.bincount(segment))[segment]
     return ghost

@@ -54,7 +54,7 @@ def is_plate(points: NDArray[np.void], views: Mapping[int, View], glass_mm: floa
     if not {-1.0, 1.0} <= sides_seen:
         return below
     plane = _planes(points)
-    sides = _sides(plane, points["y"], z > HIGH_MM)
+    sides = _sides(plane, points["y"].astype(np.float64), z > HIGH_MM)
     if sides is None:
         return below
     low, high = sides
@@ -97,7 +97,7 @@ def _planes(points: NDArray[np.void]) -> NDArray[np.int64]:
 
 
 def _sides(
-    plane: NDArray[np.int64], y: NDArray[np.float32], is_high: NDArray[np.bool_]
+    plane: NDArray[np.int64], y: NDArray[np.float64], is_high: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Least and greatest Y (P,) of the high points around each plane; None if too few planes have any.
 

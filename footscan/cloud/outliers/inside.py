@@ -79,7 +79,7 @@ def _is_amid(places: NDArray[np.float64], others: NDArray[np.float64]) -> NDArra
         of_sides[:] = 0
         for m in range(len(others)):
             y, z = others[m, 0] - places[n, 0], others[m, 1] - places[n, 1]
-            if INSIDE_MM < np.hypot(y, z) < AROUND_MM:
+            if INSIDE_MM**2 < y * y + z * z < AROUND_MM**2:
                 of_sides[int((np.arctan2(z, y) / (2 * np.pi) + 0.5) * SIDES) % SIDES] += 1
         amid[n] = of_sides.min() >= FEWEST
     return amid

@@ -40,7 +40,7 @@ def is_off_median(points: NDArray[np.void], median_mm: float) -> NDArray[np.bool
     [10]
     """
     order = np.lexsort([points["source"], points["frame"], points["camera"]])
-    ordered = points[order]
+    ordered = points.take(order)
     new = np.flatnonzero((np.diff(ordered["frame"]) != 0) | (np.diff(ordered["camera"]) != 0)) + 1
     off = np.zeros(len(points), np.bool_)
     for stripe in np.split(order, new):

@@ -61,7 +61,7 @@ def is_off_surface(points: NDArray[np.void]) -> NDArray[np.bool_]:
     True False
     """
     order = np.lexsort([points["source"], points["frame"], points["camera"]])
-    ordered = points[order]
+    ordered = points.take(order)
     new = np.ones(len(points), np.bool_)
     new[1:] = (np.diff(ordered["frame"]) != 0) | (np.diff(ordered["camera"]) != 0)
     stripe = np.cumsum(new)
@@ -90,8 +90,8 @@ def is_off_shared_surface(cloud: NDArray[np.void]) -> NDArray[np.bool_]:
     off = np.zeros(len(cloud), np.bool_)
     alone, shared = np.flatnonzero(cloud["cameras"] == 1), np.flatnonzero(cloud["cameras"] > 1)
     if len(alone) and len(shared):
-        known = coordinates(cloud[shared])
-        places = coordinates(cloud[alone])
+        known = coordinates(cloud.take(shared))
+        places = coordinates(cloud.take(alone))
         # Numbers below 0: what several cameras saw is never of the same stripe.
         own, other = np.arange(len(alone)), np.full(len(shared), -1)
         around = Surroundings(SHARED_RADIUS_MM, SHARED_OFF, LEAST_SHARED_OFF_MM, 0)

@@ -72,7 +72,7 @@ def is_off_heel(points: NDArray[np.void], views: Mapping[int, View]) -> Mask:
     if np.count_nonzero(low) > FEWEST_AT_END:
         first, last = ends_of(points["x"][low], FEWEST_AT_END)
         at_end = np.flatnonzero(low & ((points["x"] < first + FIT_MM) | (points["x"] > last - FIT_MM)))
-        off[at_end] = _selected(points[at_end], views, _off_cap)
+        off[at_end] = _selected(points.take(at_end), views, _off_cap)
     return off
 
 
@@ -88,9 +88,9 @@ def _selected(
     known = np.flatnonzero(np.isin(points["camera"], list(heads)))
     if len(set(heads.values())) < 2 or not len(known):
         return strange
-    of_moment = renumbered(points[known], views)
+    of_moment = renumbered(points.take(known), views)
     order = np.lexsort([of_moment[name] for name in ("source", "camera", "frame")])
-    strange[known[order]] = select(of_moment[order], views, heads)
+    strange[known[order]] = select(of_moment.take(order), views, heads)
     return strange
 
 

@@ -24,6 +24,7 @@ from footscan.cloud.outliers.other_laser import is_of_other_laser
 from footscan.cloud.outliers.support import END, ISOLATED, UNCONFIRMED, judge_segments
 from footscan.cloud.points import camera_numbers
 from footscan.cloud.views import View
+from footscan.rows import distinct_numbers
 from schemas.glass import GlassPlane
 from schemas.parameters.outliers import OutlierParameters
 
@@ -129,7 +130,7 @@ def remove_outliers(
     codes[choice.unassigned] = 1 + REASONS.index("laser")
 
     kept = np.flatnonzero(codes == KEPT)
-    remaining = points[kept]
+    remaining = points.take(kept)
 
     def drop(reason: str, select: Callable[[NDArray[np.void]], Mask]) -> None:
         """Drop what `select` selects among the points that are left."""
@@ -137,7 +138,7 @@ def remove_outliers(
         if kept.size and (selected := select(remaining)).any():
             codes[kept[selected]] = 1 + REASONS.index(reason)
             left = np.flatnonzero(~selected)
-            kept, remaining = kept[left], remaining[left]
+            kept, remaining = kept[left], remaining.take(left)
 
     volume = control_volume(views, parameters, filmed)
     if parameters.method == "levels":
@@ -162,7 +163,7 @@ def remove_outliers(
     drop_glass(is_below_sole)
     _drop_by_segment(points, codes, views, parameters, filmed)
     kept = np.flatnonzero(codes == KEPT)
-    remaining = points[kept]
+    remaining = points.take(kept)
     drop_glass(is_plate)  # without what seemed to be its sides
     drop("unconfirmed", is_off_surface)
     drop("unconfirmed", is_inside)
@@ -176,7 +177,7 @@ def remove_outliers(
         *_cut_warnings(points, codes, parameters, views),
         *moved_warning(glass, parameters.glass_mm),
     ]
-    denied, mistaken = (points[codes == 1 + REASONS.index(reason)] for reason in ("unconfirmed", "laser"))
+    denied, mistaken = (points.compress(codes == 1 + REASONS.index(reason)) for reason in ("unconfirmed", "laser"))
     contested = contested_ends(remaining, denied, of_any_laser(mistaken, views))
     parted = parted_mm(remaining, mistaken)
     return remaining, Removed(codes, counts, warnings, glass, parted, lasers_of(views), contested)
@@ -194,7 +195,7 @@ def _drop_by_segment(
         left = np.flatnonzero(codes == KEPT)
         if not left.size:
             return
-        verdicts = judge_segments(points[left], views, parameters, filmed, _cluttered(points["camera"], codes))
+        verdicts = judge_segments(points.take(left), views, parameters, filmed, _cluttered(points["camera"], codes))
         for reason, verdict in (("isolated", ISOLATED), ("unconfirmed", UNCONFIRMED)):
             codes[left[verdicts == verdict]] = 1 + REASONS.index(reason)
         if last or not np.any((verdicts == ISOLATED) | (verdicts == UNCONFIRMED)):
@@ -300,7 +301,7 @@ def _cut_warnings(
     What lies above the region does not count: there the leg goes on.
     """
     order = np.lexsort([points["source"], points["frame"], points["camera"]])
-    ordered, code = points[order], codes[order]
+    ordered, code = points.take(order), codes[order]
     apart = (
         np.linalg.norm(np.stack([np.diff(ordered[axis]) for axis in "yz"]), axis=0) > STRIPE_GAPS * parameters.gap_mm
     )
@@ -326,7 +327,7 @@ def _cut_warnings(
 
 def _count(camera: NDArray[np.integer], codes: NDArray[np.uint8]) -> dict[int, dict[str, int]]:
     camera, codes = camera[codes != NO_POINT], codes[codes != NO_POINT]
-    cameras, index = np.unique(camera, return_inverse=True)
+    cameras, index = distinct_numbers(camera)
     counts = np.zeros((len(cameras), len(REASONS) + 1), np.int64)
     np.add.at(counts, (index, codes), 1)
     return {

@@ -7,8 +7,6 @@ pixels, and whatever is redder than the threshold and larger than the stripe tak
 
 import numpy as np
 from numpy.typing import NDArray
-from skimage.measure import label, regionprops
-from skimage.morphology import skeletonize
 
 from schemas.parameters.extraction import ExtractionParameters
 
@@ -43,6 +41,9 @@ def skeleton_stripe(
     >>> print(len(points) >= 36, np.median(points[:, 1]), points[:, 0].min() >= 10)
     True 30.0 True
     """
+    from skimage.measure import label, regionprops
+    from skimage.morphology import skeletonize
+
     picture = image.astype(np.int16)
     if background is not None:
         picture = np.maximum(picture - background, 0)
