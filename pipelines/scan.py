@@ -173,14 +173,16 @@ def scan_steps(
     if (truth := scan.truth) is not None:
         pair: dict[str, Input] = {"surface": mesh, "truth": source_files(truth, digests)}
         verified = {"verified": add(Step(scan.name, "verify", f"{STEPS}.verify", None, pair, places={"truth": truth}))}
-    of_cameras = {**manifests, **stripes, **verified}
     quality_inputs: dict[str, Input] = {
         "heads": heads, "clean": cleaned, "fused": fused, "surface": mesh, "calibration": calibration.source,
-        **of_cameras,
+        **manifests, **stripes, **verified,
     }  # fmt: skip
     if check is not None:
         quality_inputs["calibration-check"] = _document(check, scan.file)
     figures = add(Step(scan.name, "quality", f"{STEPS}.quality", None, quality_inputs))
+    drawn: dict[str, Input] = {"clean": cleaned, "fused": fused, "surface": mesh, **points, **manifests, **stripes}
+    arrays = {f"array-{camera.id}": camera.array for camera in cameras}
+    pictures = add(Step(scan.name, "pictures", f"{STEPS}.pictures", None, drawn, places=arrays))
     shoes = _sizes_parameters(choices.people, tuple(choices.systems))
     found_sizes: dict[str, Input] = {"measures": measures, "table": wanted.sizes}
     sizes = add(Step(scan.name, "sizes.json", f"{STEPS}.sizes_json", shoes, found_sizes))
@@ -201,22 +203,12 @@ def scan_steps(
         export = ExportParameters(side=scan.document.side, export_format=suffix)
         add(Step(scan.name, f"foot.{suffix}", f"{STEPS}.exported", export, {"foot.ply": ply}))
     report_inputs: dict[str, Input] = {
-        "clean": cleaned, "fused": fused, "oriented": oriented, "surface": mesh, "measures": measures,
-        "quality": quality, "sizes": sizes, "calibration": maps, "about": _about(scan, parameters), **points,
-        **of_cameras,
+        "oriented": oriented, "surface": mesh, "pictures": pictures, "measures": measures, "quality": quality,
+        "sizes": sizes, "calibration": maps, "about": _about(scan, parameters), **verified,
     }  # fmt: skip
     if choices.notes:
         report_inputs["notes"] = Value(canonical_json(choices.notes).encode(), decided.choices_file)
-    add(
-        Step(
-            scan.name,
-            "report",
-            f"{STEPS}.report",
-            foot,
-            report_inputs,
-            places={f"array-{camera.id}": camera.array for camera in cameras},
-        )
-    )
+    add(Step(scan.name, "report", f"{STEPS}.report", foot, report_inputs))
     return steps
 
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from footscan.measure import girths, linear, plantar, solid
 from footscan.measure.attached import things_at_foot
@@ -21,7 +20,9 @@ from footscan.measure.quantity import NotMeasurable, Quantity
 from footscan.measure.replicates import REPLICATES, of_replicates
 from footscan.measure.roughness import Roughness
 from footscan.measure.uncertainty import Scatter, SurfaceErrors, scatter_of, with_landmarks
+from footscan.mesh.nearest import tree_of
 from footscan.mesh.rigid_transform import apply
+from footscan.side_by_side import cores, together
 from footscan.surface.errors.field import ErrorField
 from schemas.base.errors import Finding
 from schemas.base.model import Side
@@ -245,7 +246,7 @@ def measure_foot(
     landmarks = find_landmarks(foot, manual or {})
     if errors is not None or filled is not None:  # the foot's vertices are those of the mesh without its strays
         back = apply(np.linalg.inv(foot.transform), foot.vertices)
-        source = np.asarray(KDTree(vertices).query(back)[1])
+        source = np.asarray(tree_of(vertices.astype(np.float64)).query(back, workers=cores())[1])
         errors = None if errors is None else [field.of(source) for field in errors]
         filled = None if filled is None else filled[source]
     # A cut end is a step of its own.
@@ -300,8 +301,9 @@ def take_measures(
     manual = {name: apply(to_mesh, point[None])[0] for name, point in marked.items()}
     compute = partial(_values, rough=surface.roughness, manual=manual)
     scatter = scatter_of(of_replicates(foot, known, count, compute, marked), count, foot.axis_not_found is not None)
-    measures = {
-        name: _measure(
+    measures = together(
+        partial(
+            _measure,
             definition,
             surface,
             (known, scatter.get(name), glass_sd_mm if name.endswith(HEIGHT) or PRINT in definition.text else 0.0),
@@ -311,8 +313,11 @@ def take_measures(
             [reason for reason in (doubt, axis_doubt if definition.is_on_axis else None) if reason is not None],
         )
         for name, definition in _definitions().items()
+    )
+    return {
+        name: own.model_copy(update={"convention": CONVENTIONS.get(name, OWN)})
+        for name, own in zip(_definitions(), measures, strict=True)
     }
-    return {name: own.model_copy(update={"convention": CONVENTIONS.get(name, OWN)}) for name, own in measures.items()}
 
 
 def _values(replicate: FootFrame, rough: Roughness, manual: Mapping[str, Floats]) -> dict[str, float]:

@@ -52,9 +52,11 @@ class Quantity(NamedTuple):
         >>> difference.sd(np.array([0.3, 0.3]), csr_array([[1.0], [1.0]]))
         0.0
         """
-        moves = self.gradient * errors
-        if shares is not None:
-            moves = _moves_of_shared(moves, shares.data, shares.indices, shares.indptr, shares.shape[1])
+        moves = (
+            self.gradient * errors
+            if shares is None
+            else _moves_of_shared(self.gradient, errors, shares.data, shares.indices, shares.indptr, shares.shape[1])
+        )
         deviation = float(np.sqrt(np.sum(moves**2)))
         return deviation if np.isfinite(deviation) else None
 
@@ -81,17 +83,23 @@ class Quantity(NamedTuple):
 
 @compiled
 def _moves_of_shared(
-    moves: Floats, shares: Floats, errors: NDArray[np.integer], starts: NDArray[np.integer], count: int
+    gradient: Floats,
+    errors: Floats,
+    shares: Floats,
+    shared: NDArray[np.integer],
+    starts: NDArray[np.integer],
+    count: int,
 ) -> Floats:
     """Returns (count,) the moves of the errors that (V,) vertices share, from the rows of a sparse (V, count) matrix.
 
     A measure rests on few vertices: most moves are 0.
     """
     total = np.zeros(count)
-    for vertex in range(len(moves)):
-        if moves[vertex] != 0.0:
+    for vertex in range(len(gradient)):
+        if gradient[vertex] != 0.0:
+            move = gradient[vertex] * errors[vertex]
             for k in range(starts[vertex], starts[vertex + 1]):
-                total[errors[k]] += moves[vertex] * shares[k]
+                total[shared[k]] += move * shares[k]
     return total
 
 

@@ -47,15 +47,16 @@ def of_replicates(
     """
     normals = vertex_normals(foot.vertices, foot.faces)
     random = np.random.default_rng(SEED)
-    displaced = [foot.vertices + errors.draw(random)[:, None] * normals for _ in range(count)]
+    drawn = random.normal(size=(count, sum(errors.counts)))
 
-    def of_one(vertices: Floats) -> list[_Result]:
+    def of_one(errors_drawn: Floats) -> list[_Result]:
         try:
+            vertices = foot.vertices + errors.displacements(errors_drawn)[:, None] * normals
             return [compute(_reframed(foot, vertices, marked))]
         except Finding:
             return []
 
-    return [result for results in together(partial(of_one, one) for one in displaced) for result in results]
+    return [result for results in together(partial(of_one, one) for one in drawn) for result in results]
 
 
 def _reframed(foot: FootFrame, vertices: Floats, marked: Mapping[str, Floats]) -> FootFrame:

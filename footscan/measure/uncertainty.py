@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from footscan.compiled import compiled
 from footscan.measure.quantity import Quantity
 from footscan.surface.errors.field import ErrorField
 from schemas.measures import ErrorCause
@@ -30,6 +31,7 @@ class SurfaceErrors:
     """
 
     def __init__(self, vertices: Floats, fields: Sequence[ErrorField]) -> None:
+        self._vertices = len(vertices)
         self.fields = [field for field in fields if field.deviations.any()]
         at_places = {field.reach_mm: field.shares(vertices) for field in self.fields if field.along_mm is None}
         self._shares = [
@@ -48,13 +50,35 @@ class SurfaceErrors:
             parts[field.cause] = math.hypot(parts.get(field.cause, 0.0), sd)
         return parts
 
-    def draw(self, random: np.random.Generator) -> Floats:
-        """(V,) displacements along the normals, mm, drawn at random."""
-        drawn = [
-            field.deviations * (shares @ random.normal(size=shares.shape[1]))
+    @property
+    def counts(self) -> list[int]:
+        """How many independent errors each field has."""
+        return [
+            len(field.deviations) if shares is None else shares.shape[1]
             for field, shares in zip(self.fields, self._shares, strict=True)
         ]
-        return np.asarray(np.sum(drawn, axis=0))
+
+    def displacements(self, errors: Floats) -> Floats:
+        """(V,) displacements along the normals, mm, by all independent `errors` (N,), in standard deviations."""
+        total, end = np.zeros(self._vertices), 0
+        for field, shares, count in zip(self.fields, self._shares, self.counts, strict=True):
+            own, end = errors[end : end + count], end + count
+            if shares is not None:
+                own = _errors_of_vertices(own, shares.data, shares.indices, shares.indptr)
+            total += field.deviations * own
+        return total
+
+
+@compiled
+def _errors_of_vertices(
+    errors: Floats, shares: Floats, shared: NDArray[np.integer], starts: NDArray[np.integer]
+) -> Floats:
+    """Returns (V,) the product of a sparse matrix (V, N), by rows, and (N,) `errors`; SciPy's keeps Python's lock."""
+    own = np.zeros(len(starts) - 1)
+    for vertex in range(len(own)):
+        for k in range(starts[vertex], starts[vertex + 1]):
+            own[vertex] += shares[k] * errors[shared[k]]
+    return own
 
 
 class Scatter(NamedTuple):

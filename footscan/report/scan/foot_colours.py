@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from footscan.cloud.points import coordinates
+from footscan.mesh.nearest import tree_of
 from footscan.report.colours import colour_bar, colour_limit, distance_colours
 from footscan.report.filled import CUT, filled_colours, filled_key
 from footscan.report.markup import key, number
@@ -65,7 +65,7 @@ def foot_colourings(surface: FootSurface, mesh: MeshQuality, cloud: NDArray[np.v
         colours = distance_colours(surface.truth_distance, limit)
         colourings.insert(0, Colouring("Distance to reference", colours, colour_bar(limit)))
     if len(cloud):
-        nearest = cloud[KDTree(coordinates(cloud)).query(surface.vertices, workers=cores())[1]]
+        nearest = cloud.take(tree_of(coordinates(cloud)).query(surface.vertices, workers=cores())[1])
         colourings.append(_by_camera(nearest, filled))
     return [*colourings, _by_uncertainty(surface.deviations)]
 

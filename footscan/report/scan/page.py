@@ -12,7 +12,7 @@ from footscan.report.comparison.figures import figures_facts, moved_note, region
 from footscan.report.filled import filled_colours, filled_key
 from footscan.report.markup import UNITS, number, number_or_dash, plus_minus, section, table, text, words
 from footscan.report.page import page
-from footscan.report.sample_frames import FRAMES_SCRIPT, FrameSample, sample_frames
+from footscan.report.sample_frames import FRAMES_SCRIPT
 from footscan.report.scan.coverage import coverage_plot
 from footscan.report.scan.foot_colours import FootSurface, foot_colourings
 from footscan.report.scan.fusion_tables import corrections_table, disagreement_table, heads_table
@@ -20,7 +20,8 @@ from footscan.report.scan.glass_facts import glass_facts
 from footscan.report.scan.measure_drawings import landmark_place, measure_drawings
 from footscan.report.scan.mesh_facts import mesh_facts
 from footscan.report.scan.movement_facts import movement_facts
-from footscan.report.scan.removed import removed_pictures, removed_table
+from footscan.report.scan.pictures import ScanPictures
+from footscan.report.scan.removed import removed_table
 from footscan.report.scan_warnings import warnings_of
 from footscan.report.size_table import size_table
 from footscan.report.surface_views import surface_views, upright
@@ -57,26 +58,15 @@ class ScanTitle(NamedTuple):
     side: str
 
 
-class ScanPoints(NamedTuple):
-    """The points of a scan, mm, scanner frame, as arrays of `footscan.cloud.points.POINT_DTYPE`."""
-
-    points: NDArray[np.void]
-    """(N,) points of all cameras before the fusion."""
-    codes: NDArray[np.uint8]
-    """(N,) why each was removed, as in `footscan.cloud.outliers.remove.Removed`."""
-    cloud: NDArray[np.void]
-    """(M,) points from which the surface was made."""
-
-
 def scan_page(
     *,
     title: ScanTitle,
     surface: FootSurface,
-    points: ScanPoints,
+    cloud: NDArray[np.void],
     measures: Measures,
     quality: Quality,
     calibration: Calibration,
-    samples: Sequence[FrameSample],
+    pictures: ScanPictures,
     provenance: Mapping[str, str],
     sizes: Sizes | None = None,
     notes: str = "",
@@ -85,25 +75,23 @@ def scan_page(
 
     Parameters
     ----------
+    cloud : (M,) of `footscan.cloud.points.POINT_DTYPE`, mm, scanner frame, from which the surface was made
     measures, quality : the content of measures.json and quality.json
     calibration : the calibration that mapped the pixels
-    samples : frames of each camera, in the order shown
     provenance : name and value of each source of the result, in the order shown
     sizes : of shoes for the foot
     notes : remarks of a person
     """
-    faces, cloud, distance = surface.faces, points.cloud, surface.truth_distance
+    faces, distance = surface.faces, surface.truth_distance
     seen = upright(surface.vertices, measures.transform)
     plain = filled_colours(surface.vertices, surface.filled, surface.cut_mm)
     drawings = measure_drawings(surface.vertices, faces, measures)
     landmarks = {words(name): landmark_place(measures, name) for name in measures.landmarks}
-    turned, views, distances, removed, frames = together(
+    turned, views, distances = together(
         [
             lambda: viewer(seen, faces, foot_colourings(surface, quality.mesh, cloud), drawings, landmarks),
             lambda: surface_views(seen, faces, plain, measures.side),
             lambda: "" if distance is None else _distances(seen, faces, measures, quality.truth, distance),
-            lambda: removed_pictures(points.points, points.codes),
-            lambda: sample_frames(samples) if samples else "",
         ]
     )
     parts = [
@@ -113,10 +101,10 @@ def scan_page(
         section("Shoe sizes", size_table(sizes)) if sizes is not None and measures.finding is None else "",
         section("Surface", _GRID_NOTE, filled_key(quality.mesh), views),
         distances,
-        section("Stripe over the frames", _FRAMES_NOTE, frames) if samples else "",
+        section("Stripe over the frames", _FRAMES_NOTE, pictures.frames) if pictures.frames else "",
         section("Mesh", mesh_facts(quality.mesh, quality.cloud_points)),
         section("Cameras", _cameras_table(quality, cloud)),
-        section("Removed points", _REMOVED_NOTE, removed_table(quality.cameras), removed),
+        section("Removed points", _REMOVED_NOTE, removed_table(quality.cameras), pictures.removed),
         section(
             "Agreement of the cameras",
             _AGREEMENT_NOTE,
@@ -135,7 +123,7 @@ def scan_page(
         kicker={"right": "Right foot", "left": "Left foot"}.get(title.side, "Foot, side unknown"),
         heading=f"{text(title.patient)} <span>{text(title.scan)}</span>",
         parts=parts,
-        scripts=[SCRIPT, *([FRAMES_SCRIPT] if samples else [])],
+        scripts=[SCRIPT, *([FRAMES_SCRIPT] if pictures.frames else [])],
     )
 
 

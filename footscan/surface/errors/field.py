@@ -5,9 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, eye_array
+from scipy.sparse import csr_array
 
 from footscan.compiled import compiled
+from footscan.rows import limits
 from schemas.measures import ErrorCause
 
 Floats = NDArray[np.float64]
@@ -35,13 +36,14 @@ class ErrorField(NamedTuple):
     """(V,) mm: all vertices at about the same one share their error, as where the whole foot moved while it was
     scanned; None: those at about the same place"""
 
-    def shares(self, vertices: Floats) -> csr_array:
-        """(V, N) shares of N independent standard normal errors in that of each vertex, in its standard deviations.
+    def shares(self, vertices: Floats) -> csr_array | None:
+        """(V, N) shares of N independent standard normal errors in that of each vertex, in its standard deviations;
+        None where each vertex has its own.
 
         `vertices` : (V, 3) mm
         """
         if not self.reach_mm:
-            return csr_array(eye_array(len(vertices)))
+            return None
         return _shares(vertices if self.along_mm is None else self.along_mm[:, None], self.reach_mm)
 
     def of(self, source: NDArray[np.intp]) -> "ErrorField":
@@ -53,8 +55,8 @@ class ErrorField(NamedTuple):
 def _shares(places: Floats, reach_mm: float) -> csr_array:
     """(V, N) linear interpolation at `places` (V, D) between errors at the N nodes of a grid, of unit variance."""
     cells = places / reach_mm
-    cells -= np.floor(cells.min(axis=0))
-    size = cells.max(axis=0).astype(np.int64) + 2
+    cells -= np.floor(limits(cells)[0])
+    size = limits(cells)[1].astype(np.int64) + 2
     columns, weights, count = _corners_of_cells(cells, size)
     starts = np.arange(len(places) + 1) * columns.shape[1]
     return csr_array((weights.ravel(), columns.ravel(), starts), shape=(len(places), count))

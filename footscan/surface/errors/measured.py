@@ -2,10 +2,10 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from footscan.cloud.lasers.apart import between_lasers
 from footscan.cloud.points import coordinates
+from footscan.mesh.nearest import tree_of
 from footscan.side_by_side import cores
 from footscan.surface.errors.evidence import Evidence
 from schemas.fusion import FusionReport
@@ -62,10 +62,10 @@ def around(vertices: Floats, normals: Floats, cloud: NDArray[np.void] | None) ->
     if cloud is None or len(cloud) < SCATTERED:
         return None, np.zeros(len(vertices))
     points = coordinates(cloud)
-    vertex = np.asarray(KDTree(vertices).query(points, workers=cores())[1])
+    vertex = np.asarray(tree_of(vertices).query(points, workers=cores())[1])
     off_mm = np.abs(((points - vertices[vertex]) * normals[vertex]).sum(axis=1))
-    near = np.asarray(KDTree(points).query(vertices, SCATTERED, workers=cores())[1])
-    return cloud[near[:, :NEAREST]], off_mm[near].mean(axis=1)
+    near = np.asarray(tree_of(points).query(vertices, SCATTERED, workers=cores())[1])
+    return cloud.take(near[:, :NEAREST]), off_mm[near].mean(axis=1)
 
 
 def measured_noise(
@@ -123,7 +123,7 @@ def _parted(
     """
     if len(seen) < ASKED or not len(places):
         return np.zeros(len(places))
-    near = np.asarray(KDTree(coordinates(seen)).query(places, ASKED, workers=cores())[1])
+    near = np.asarray(tree_of(coordinates(seen)).query(places, ASKED, workers=cores())[1])
     return np.asarray(np.mean(parted_mm[near] <= beside_mm[:, None], axis=1))
 
 

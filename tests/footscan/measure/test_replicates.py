@@ -21,6 +21,11 @@ def foot() -> Mesh:
     return Mesh(made.vertices, made.faces)
 
 
+def drawn_from(errors: SurfaceErrors, random: np.random.Generator) -> np.ndarray:
+    """Displacements of the vertices, drawn at random, mm."""
+    return errors.displacements(random.normal(size=sum(errors.counts)))
+
+
 def sigmas(foot: Mesh, count: int) -> np.ndarray:
     """Errors of measures of four feet whose surface errs, in standard deviations as reported."""
     true = measure_foot(foot.vertices, foot.faces, "right").measures
@@ -28,7 +33,7 @@ def sigmas(foot: Mesh, count: int) -> np.ndarray:
     errors = [ErrorField("noise", np.full(len(foot.vertices), SD_MM), REACH_MM)]
     found = []
     for seed in range(4):
-        away = SurfaceErrors(foot.vertices, errors).draw(np.random.default_rng(seed))
+        away = drawn_from(SurfaceErrors(foot.vertices, errors), np.random.default_rng(seed))
         moved = foot.vertices + away[:, None] * normals
         measures = measure_foot(moved, foot.faces, "right", errors=errors, count=count).measures
         for name, measure in measures.items():
@@ -49,7 +54,7 @@ def test_a_drawn_error_is_as_large_as_said_and_shared_by_neighbours() -> None:
     random = np.random.default_rng(0)
     places = random.uniform(0.0, 300.0, (20_000, 3))
     places[1] = places[0] + [0.0, 0.0, 0.1]
-    drawn = np.array([of_places(places, None).draw(random) for _ in range(200)])
+    drawn = np.array([drawn_from(of_places(places, None), random) for _ in range(200)])
     assert drawn.std() == pytest.approx(SD_MM, rel=0.02)
     assert abs(drawn.mean()) < 0.05 * SD_MM
     assert np.corrcoef(drawn[:, 0], drawn[:, 1])[0, 1] > 0.99
@@ -58,7 +63,7 @@ def test_a_drawn_error_is_as_large_as_said_and_shared_by_neighbours() -> None:
 def test_all_of_a_section_move_together() -> None:
     random = np.random.default_rng(0)
     places = np.array([[100.0, -40, 0], [100, 40, 60], [160, 0, 0]])
-    drawn = np.array([of_places(places, places[:, 0]).draw(random) for _ in range(500)])
+    drawn = np.array([drawn_from(of_places(places, places[:, 0]), random) for _ in range(500)])
     left, right, ahead = np.corrcoef(drawn.T)[0]
     assert left == pytest.approx(1.0)
     assert right == pytest.approx(1.0)

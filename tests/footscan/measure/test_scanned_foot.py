@@ -187,7 +187,9 @@ def test_heads_that_jitter_widen_what_rests_on_x(foot: Mesh) -> None:
 def slope_of(sway: ErrorField) -> float:
     """Slope along the travel, per mm, root mean square, of movements with a standard deviation of 1."""
     x = np.arange(0.0, 400.0, 0.1)
-    movements = sway._replace(along_mm=x).shares(np.zeros((len(x), 3))).toarray()
+    movements = sway._replace(along_mm=x).shares(np.zeros((len(x), 3)))
+    assert movements is not None
+    movements = movements.toarray()
     return float(np.sqrt(np.mean(np.sum((np.diff(movements, axis=0) / 0.1) ** 2, axis=1))))
 
 

@@ -10,7 +10,8 @@ from footscan.cloud.outliers.remove import REASONS
 from footscan.cloud.points import make_points
 from footscan.report.sample_frames import FrameSample, cut_out
 from footscan.report.scan.foot_colours import FootSurface
-from footscan.report.scan.page import ScanPoints, ScanTitle, scan_page
+from footscan.report.scan.page import ScanTitle, scan_page
+from footscan.report.scan.pictures import scan_pictures
 from footscan.report.surface_views import upright
 from schemas.calibration import Calibration, CameraCalibration, PolynomialMap
 from schemas.calibration_check import ScanCheck
@@ -53,10 +54,11 @@ def scan():
             cut_mm=None,
             truth_distance=None,
         ),
-        "points": ScanPoints(
-            points=make_points(np.vstack([vertices, [[0, 0, -9]]]), camera=np.array([1, 1, 2, 2, 2])),
-            codes=np.array([0, 0, 0, 0, 1 + REASONS.index("glass")], np.uint8),
-            cloud=make_points(vertices, camera=np.array([1, 1, 2, 2]), frame=np.array([0, 1, 1, 3])),
+        "cloud": make_points(vertices, camera=np.array([1, 1, 2, 2]), frame=np.array([0, 1, 1, 3])),
+        "pictures": scan_pictures(
+            make_points(np.vstack([vertices, [[0, 0, -9]]]), camera=np.array([1, 1, 2, 2, 2])),
+            np.array([0, 0, 0, 0, 1 + REASONS.index("glass")], np.uint8),
+            [FrameSample(camera, 1, WHOLE, cut_out(image, WHOLE), *point) for camera in (1, 2)],
         ),
         "measures": Measures(
             side="right",
@@ -142,7 +144,6 @@ def scan():
                 worst_triangles=0.456,
             ),
         ),
-        "samples": [FrameSample(camera, 1, WHOLE, cut_out(image, WHOLE), *point) for camera in (1, 2)],
         "provenance": {"extraction.method": "ridge", "footscan": "0.1.0"},
     }
 
