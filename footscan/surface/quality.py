@@ -42,7 +42,7 @@ def mesh_quality(
     points = np.asarray(vertices, np.float64)
     _, counts = edge_counts(faces)
     holes = rims(faces)
-    area, shape = _areas_and_shapes(points[faces])
+    area, shape = _areas_and_shapes(points.take(faces, axis=0))
     total = float(area.sum()) or 1.0
     on_cut = faces_on_cut(points, faces, cut_mm)
     is_filled = None if filled is None else filled[faces].any(axis=1) & ~on_cut

@@ -55,7 +55,7 @@ def sides(mesh: Shape) -> Sides:
     else:
         faces = _outward(vertices, faces)
     edge_of, _, _ = _edges(faces)  # turning a face has exchanged two of its corners
-    corners = vertices[faces]
+    corners = vertices.take(faces, axis=0)
     normals = _unit(_area_vectors(corners))
     of_edges = _sums(edge_of.ravel(), np.repeat(normals, 3, axis=0), len(meeting))
     weighted = (normals[:, None] * _angles(corners)[..., None]).reshape(-1, 3)
@@ -69,7 +69,7 @@ def _merged(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> tuple
     """Merge vertices at one place; drop faces without area and repeated faces."""
     places, _, of_vertex, _ = distinct_rows(np.asarray(vertices, np.float64) + 0.0)
     merged = of_vertex[faces]
-    area = np.linalg.norm(_area_vectors(places[merged]), axis=1)
+    area = np.linalg.norm(_area_vectors(places.take(merged, axis=0)), axis=1)
     merged = merged[area > 0]
     first = np.sort(distinct_rows(np.sort(merged, axis=1)).first)
     return places, merged[first].astype(np.int32)
