@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from footscan.compiled import compiled
 from footscan.measure.quantity import Quantity
+from footscan.side_by_side import together
 from footscan.surface.errors.field import ErrorField
 from schemas.measures import ErrorCause
 
@@ -33,10 +35,12 @@ class SurfaceErrors:
     def __init__(self, vertices: Floats, fields: Sequence[ErrorField]) -> None:
         self._vertices = len(vertices)
         self.fields = [field for field in fields if field.deviations.any()]
-        at_places = {field.reach_mm: field.shares(vertices) for field in self.fields if field.along_mm is None}
-        self._shares = [
-            at_places[field.reach_mm] if field.along_mm is None else field.shares(vertices) for field in self.fields
-        ]
+        # Of those that vertices share by their places, all over the same distance are shared alike.
+        kinds = [(field.reach_mm, None if field.along_mm is None else n) for n, field in enumerate(self.fields)]
+        distinct = dict(zip(kinds, self.fields, strict=True))
+        made = together(partial(field.shares, vertices) for field in distinct.values())
+        shares = dict(zip(distinct, made, strict=True))
+        self._shares = [shares[kind] for kind in kinds]
 
     def budget(self, quantity: Quantity) -> dict[ErrorCause, float] | None:
         """Standard deviation of a quantity from each cause by linear propagation; None where its derivatives are not

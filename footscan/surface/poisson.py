@@ -55,11 +55,11 @@ def indicator(points: Floats, normals: Floats, spacing: float, blur: float) -> I
     while np.prod((high - low) / spacing + 1) > MAX_CELLS:
         spacing *= 1.1
     shape = tuple(fft.next_fast_len(int(n), real=True) for n in np.ceil((high - low) / spacing) + 1)
-    flow = np.zeros((*shape, 3), np.float32)
+    flow = np.zeros((3, *shape), np.float32)
     _spread(flow, (points - low) / spacing, -normals * areas(points, blur)[:, None])
     divergence = np.zeros(shape, np.float32)
     for axis in range(3):
-        divergence += np.gradient(flow[..., axis], axis=axis)
+        divergence += np.gradient(flow[axis], axis=axis)
     wave = [(np.pi * np.arange(n) / n).astype(np.float32) for n in shape]
     spectrum = fft.dctn(divergence, type=2, workers=-1, overwrite_x=True)
     for axis, k in enumerate(wave):
@@ -164,4 +164,4 @@ def _spread(grid: NDArray[np.float32], places: Floats, vectors: Floats) -> None:
             i, j, k = corner & 1, (corner >> 1) & 1, corner >> 2
             share = (u if i else 1.0 - u) * (v if j else 1.0 - v) * (w if k else 1.0 - w)
             for axis in range(3):
-                grid[a + i, b + j, c + k, axis] += np.float32(share * vectors[n, axis])
+                grid[axis, a + i, b + j, c + k] += np.float32(share * vectors[n, axis])

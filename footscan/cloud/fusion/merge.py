@@ -1,5 +1,6 @@
 """Merging of the stripes of several cameras in one laser plane."""
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from footscan.cloud.fusion.stripes import Floats, Stripes, Traces, meet, traces_of
 from footscan.cloud.points import PLANE_MM
 from footscan.compiled import compiled
+from footscan.side_by_side import together
 from schemas.parameters.fusion import FusionParameters
 
 UNSUPPORTED = 1e3
@@ -47,14 +49,16 @@ def merge(stripes: Stripes, yz: Floats, reach: Floats, deviations: Floats, param
     """
     supported = stripes.points["supported"]
     sigma = np.where(supported, stripes.sigma, UNSUPPORTED * stripes.sigma)
-    places, surest, cameras, spread = _merge(
-        np.argsort(sigma, kind="stable"),
-        parameters.spacing_mm,
-        reach,
-        parameters.contradiction_sigmas,
-        deviations,
-        traces_of(stripes, yz, sigma),
-    )
+    by_sigma, traces = np.argsort(sigma, kind="stable"), traces_of(stripes, yz, sigma)
+
+    def of_planes(of: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.intp], NDArray[np.intp], Floats]:
+        order = by_sigma[of[by_sigma]]
+        return _merge(order, parameters.spacing_mm, reach, parameters.contradiction_sigmas, deviations, traces)
+
+    half = int(np.searchsorted(stripes.plane, stripes.plane[len(yz) // 2])) if len(yz) else 0
+    is_ahead = np.arange(len(yz)) < half
+    halves = together([partial(of_planes, is_ahead), partial(of_planes, ~is_ahead)])  # no plane touches another one
+    places, surest, cameras, spread = (np.concatenate([a[:half], b[half:]]) for a, b in zip(*halves, strict=True))
     kept = np.flatnonzero(cameras > 0)
     order = kept[np.lexsort((places[kept, 2], places[kept, 1], stripes.plane[kept]))]
     points = stripes.points.take(surest[order])

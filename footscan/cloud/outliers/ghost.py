@@ -5,6 +5,7 @@ farther away. The ghosts of all cameras below agree with each other, so that non
 """
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from footscan.cloud.outliers.segments import segments_of
 from footscan.cloud.views import View
 from footscan.compiled import compiled
+from footscan.side_by_side import together
 
 Floats = NDArray[np.float64]
 
@@ -53,18 +55,20 @@ def is_ghost(
     (N,) bool.
     """
     ghost = np.zeros(len(points), np.bool_)
-    for camera in np.unique(points["camera"]):
-        if camera not in views or views[camera].centre[2] >= 0:
-            continue
+
+    def of_camera(camera: int) -> None:
         own = np.flatnonzero(points["camera"] == camera)
         own = own[np.argsort(points["frame"][own], kind="stable")]
         frame, y, z = points["frame"][own], points["y"][own].astype(np.float64), points["z"][own].astype(np.float64)
         distance = _distance(_look_up(frame, y, z, np.inf)[0], len(own))
         if distance is None:
-            continue
+            return
         segment, _ = segments_of(points.take(own), gap_mm, segment_mm)
         _, above = _look_up(frame, y, z, distance)
         ghost[own] = (np.bincount(segment, above) > MAJORITY * np.bincount(segment))[segment]
+
+    cameras = views.keys() & set(np.unique(points["camera"]).tolist())
+    together(partial(of_camera, camera) for camera in cameras if views[camera].centre[2] < 0)
     return ghost
 
 

@@ -6,6 +6,7 @@ the end, is none.
 """
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from scipy.spatial import KDTree
 
 from footscan.cloud.points import PLANE_MM, camera_numbers, coordinates
 from footscan.compiled import compiled
+from footscan.side_by_side import together
 
 END_MM = 8.0
 """Part of the foot at each end that is judged. Chosen by hand."""
@@ -46,15 +48,20 @@ def is_inside(points: NDArray[np.void]) -> NDArray[np.bool_]:
     if len(points) <= 2 * OUTERMOST:
         return selected
     xyz, camera = coordinates(points), camera_numbers(points)
+
+    def of_stripe(stripe: NDArray[np.intp], near: NDArray[np.intp], depth: NDArray[np.float64]) -> NDArray[np.intp]:
+        beyond = near[depth[near] > depth[stripe].min() - PLANE_MM]
+        others = xyz[beyond[camera[beyond] != camera[stripe[0]]]]
+        if len(others) < SIDES * FEWEST or np.diff(np.sort(others[:, 1])).max() >= APART_MM:
+            return stripe[:0]
+        amid = _is_amid(xyz[stripe, 1:].copy(), others[:, 1:].copy())
+        return stripe[amid & ~_is_near(xyz[stripe], others)]
+
     for outward in (-1.0, 1.0):
         depth = np.sort(-outward * xyz[:, 0])[OUTERMOST - 1] + outward * xyz[:, 0]
         near = np.flatnonzero(depth > -END_MM)
-        for stripe in _stripes(points, near):
-            beyond = near[depth[near] > depth[stripe].min() - PLANE_MM]
-            others = xyz[beyond[camera[beyond] != camera[stripe[0]]]]
-            if len(others) >= SIDES * FEWEST and np.diff(np.sort(others[:, 1])).max() < APART_MM:
-                amid = _is_amid(xyz[stripe, 1:].copy(), others[:, 1:].copy())
-                selected[stripe] |= amid & ~_is_near(xyz[stripe], others)
+        for inside in together(partial(of_stripe, stripe, near, depth) for stripe in _stripes(points, near)):
+            selected[inside] = True
     return selected
 
 
