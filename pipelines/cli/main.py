@@ -1,5 +1,6 @@
 """Entry point of the command: its sub-commands, and every error as one line with its own exit status."""
 
+import atexit
 import errno
 import logging
 import os
@@ -123,15 +124,29 @@ STATUS_1 = {
 
 def main() -> None:
     """Run the command line and exit with its status."""
+    statuses: list[int] = []
+    atexit.register(_leave, statuses)
     keep_private()
     handler = logging.StreamHandler()
     handler.setFormatter(LogFormatter("footscan: %(message)s"))
     logging.basicConfig(handlers=[handler], level=logging.WARNING)
     if os.environ.get("FOOTSCAN_DEBUG"):
         logging.getLogger("footscan").setLevel(logging.DEBUG)
-    status = run_command(sys.argv[1:])
+    statuses.append(run_command(sys.argv[1:]))
     drop_unwritten()
-    sys.exit(status)
+    sys.exit(statuses[0])
+
+
+def _leave(statuses: list[int]) -> None:
+    """End the process at once: after a scan Python takes half a second to take its objects and libraries apart.
+
+    Registered first, it is called last, when threads have ended and what else is to be done at the end is done.
+    `statuses` : the exit status; empty after a defect, whose end is Python's.
+    """
+    if statuses:
+        logging.shutdown()  # registered when it was imported, and so to be called later
+        drop_unwritten()
+        os._exit(statuses[0])
 
 
 def run_command(arguments: list[str]) -> int:
