@@ -1,6 +1,7 @@
 """Lengths, breadths, heights and angles of a foot in its own frame, in mm and degrees."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,10 @@ BREADTH_WINDOW = (0.55, 0.85)
 """Shares of the length between which the largest breadth is taken; part of its definition."""
 HEEL_WINDOW, HEEL_HEIGHT_MM = (0.10, 0.20), 40.0
 """Shares of the length and height in which the heel's breadth is taken; part of its definition."""
+LIFTED_MM = 5.0
+"""A section whose lowest point is higher does not stand on the floor. Chosen by hand."""
+CUT_OFF = "the foot is lifted here, and broadest at the height up to which its breadth is taken"
+"""Doubt about a breadth: a heel that is lifted by 25 mm is 1 mm too narrow below 40 mm, one by 30 mm 3.5 mm."""
 STATION_SHARE = 0.01
 """Distance between the sections of a window, as a share of the length."""
 STATIONS_NEAR = 5
@@ -260,32 +265,45 @@ def _farthest_of(foot: FootSurface, outlines: list[Outline], sign: float, height
     A cubic is fitted to the sections near it, since noise puts the farthest of many sections too far out.
     """
     reach = [_reach(outline, sign, height) for outline in outlines]
-    best = int(np.argmax([most for most, _ in reach]))
+    best = int(np.argmax([section.most for section in reach]))
     near = np.arange(max(best - STATIONS_NEAR, 0), min(best + STATIONS_NEAR + 1, len(outlines)))
     terms = np.vander((near - best) / STATIONS_NEAR, 4)
     hat = terms @ np.linalg.pinv(terms)
-    fitted = hat @ [reach[k][0] for k in near]
+    fitted = hat @ [reach[k].most for k in near]
     weights = hat[np.argmax(fitted)]
     gradient = np.zeros(len(foot.normals))
     for k, weight in zip(near, weights, strict=True):
         by_points = np.zeros_like(outlines[k].points)
-        by_points[reach[k][1], 0] = sign * weight
+        by_points[reach[k].point, 0] = sign * weight
         gradient += foot.gradient(outlines[k], by_points)
-    return Quantity(float(fitted.max()), gradient)
+    return Quantity(float(fitted.max()), gradient, CUT_OFF if reach[best].is_cut_off else None)
 
 
-def _reach(outline: Outline, sign: float, height: float) -> tuple[float, int]:
-    """Returns the reach of an outline to one side up to a height in its plane, and the number of the point there."""
+class _Reach(NamedTuple):
+    """How far an outline reaches to one side."""
+
+    most: float
+    """mm"""
+    point: int
+    """The number of the point there"""
+    is_cut_off: bool
+    """It is lifted, and reaches farther above that height"""
+
+
+def _reach(outline: Outline, sign: float, height: float) -> _Reach:
+    """The reach of an outline to one side up to a height in its plane."""
     across, up = sign * outline.points[:, 0], outline.points[:, 1]
     reach = np.where(up <= height, across, -np.inf)
     ahead = np.roll(np.arange(len(up)), -1)
     spans = np.flatnonzero((up > height) != (up[ahead] > height))
     share = (height - up[spans]) / (up[ahead[spans]] - up[spans])
-    reach[spans] = np.maximum(reach[spans], across[spans] + share * (across[ahead[spans]] - across[spans]))
+    crossing = across[spans] + share * (across[ahead[spans]] - across[spans])
+    reach[spans] = np.maximum(reach[spans], crossing)
     most = int(np.argmax(reach))
     if np.isinf(reach[most]):
         raise NotMeasurable("the surface does not reach down to where its breadth is taken")
-    return float(reach[most]), most
+    is_lifted = up.min() + outline.plane.point[2] > LIFTED_MM
+    return _Reach(float(reach[most]), most, bool(is_lifted and crossing.max(initial=-np.inf) >= reach[most]))
 
 
 def _slope(function: Callable[[float], float], at: float) -> float:
@@ -296,10 +314,12 @@ def _midfoot_sides(foot: FootSurface) -> tuple[Quantity, Quantity]:
     """Returns Y of the medial end of the section at half the foot length, and -Y of its lateral end."""
     outline, inside = foot.midfoot, foot.midfoot.plane.point
     low = outline.points[:, 1] + inside[2] <= LOW_MM
-    return (
-        farthest(foot, outline, 0, 1.0, inside[1], among=low),
-        farthest(foot, outline, 0, -1.0, -inside[1], among=low),
-    )
+
+    def side(sign: float) -> Quantity:
+        reach = farthest(foot, outline, 0, sign, sign * inside[1], among=low)
+        return reach._replace(doubt=CUT_OFF) if _reach(outline, sign, LOW_MM - inside[2]).is_cut_off else reach
+
+    return side(1.0), side(-1.0)
 
 
 def _angle(start: LandmarkQuantities, end: LandmarkQuantities) -> Quantity:

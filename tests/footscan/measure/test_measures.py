@@ -260,6 +260,18 @@ def test_a_part_that_is_lifted_has_no_breadth_at_the_floor() -> None:
     assert lifted["foot_length"].value == pytest.approx(foot().measures["foot_length"], abs=0.1)
 
 
+@pytest.mark.parametrize("lift_mm", [10.0, 20.0, 25.0, 30.0, 45.0, 60.0])
+def test_no_breadth_of_a_lifted_part_is_ok_and_wrong(lift_mm: float) -> None:
+    vertices = foot().vertices.copy()
+    x = vertices[:, 0] - vertices[:, 0].min()
+    vertices[:, 2] += lift_mm * (x < 0.6 * x.max())
+    lifted, flat = known_place(vertices), measured().measures
+    for name in ("heel_breadth", "midfoot_breadth"):
+        is_right = lifted[name].value == pytest.approx(flat[name].value, abs=0.5)
+        assert is_right or lifted[name].status != "ok", (name, lifted[name])
+    assert lift_mm > 10.0 or {lifted[name].status for name in ("heel_breadth", "midfoot_breadth")} == {"ok"}
+
+
 def test_an_empty_mesh_is_a_finding() -> None:
     with pytest.raises(Finding):
         measure_foot(np.zeros((0, 3)), np.zeros((0, 3), np.int32), "right")
