@@ -163,12 +163,17 @@ def scan_steps(
     foot = _foot_parameters(scan.document.side)
     posture = choices.posture or scan.document.posture
     measured = _measure_parameters(scan.document.side, posture, choices.axis or "toe2")
-    doubt = None if check is None else check.doubt
-    passes = scan.document.later_passes
-    made = reconstruction_steps(
-        scan.name, points, maps, parameters, measured, steps, doubt, _landmarks(decided), passes
+    heads, cleaned, fused, oriented, mesh, measures = reconstruction_steps(
+        scan.name,
+        points,
+        maps,
+        parameters,
+        measured,
+        steps,
+        None if check is None else check.doubt,
+        _landmarks(decided),
+        scan.document.later_passes,
     )
-    heads, cleaned, fused, oriented, mesh, measures = made
     verified: dict[str, Output] = {}
     if (truth := scan.truth) is not None:
         pair: dict[str, Input] = {"surface": mesh, "truth": source_files(truth, digests)}
@@ -180,9 +185,11 @@ def scan_steps(
     if check is not None:
         quality_inputs["calibration-check"] = _document(check, scan.file)
     figures = add(Step(scan.name, "quality", f"{STEPS}.quality", None, quality_inputs))
-    drawn: dict[str, Input] = {"clean": cleaned, "fused": fused, "surface": mesh, **points, **manifests, **stripes}
+    drawn: dict[str, Input] = {"clean": cleaned, **points, **manifests, **stripes}
     arrays = {f"array-{camera.id}": camera.array for camera in cameras}
     pictures = add(Step(scan.name, "pictures", f"{STEPS}.pictures", None, drawn, places=arrays))
+    judged: dict[str, Input] = {"clean": cleaned, "fused": fused, "surface": mesh}
+    deviations = add(Step(scan.name, "deviations", f"{STEPS}.deviations", None, judged))
     shoes = _sizes_parameters(choices.people, tuple(choices.systems))
     found_sizes: dict[str, Input] = {"measures": measures, "table": wanted.sizes}
     sizes = add(Step(scan.name, "sizes.json", f"{STEPS}.sizes_json", shoes, found_sizes))
@@ -203,8 +210,8 @@ def scan_steps(
         export = ExportParameters(side=scan.document.side, export_format=suffix)
         add(Step(scan.name, f"foot.{suffix}", f"{STEPS}.exported", export, {"foot.ply": ply}))
     report_inputs: dict[str, Input] = {
-        "oriented": oriented, "surface": mesh, "pictures": pictures, "measures": measures, "quality": quality,
-        "sizes": sizes, "calibration": maps, "about": _about(scan, parameters), **verified,
+        "oriented": oriented, "surface": mesh, "pictures": pictures, "deviations": deviations, "measures": measures,
+        "quality": quality, "sizes": sizes, "calibration": maps, "about": _about(scan, parameters), **verified,
     }  # fmt: skip
     if choices.notes:
         report_inputs["notes"] = Value(canonical_json(choices.notes).encode(), decided.choices_file)

@@ -1,4 +1,4 @@
-"""What the report of a scan shows beside its measures, made while the foot is measured."""
+"""Pictures of the frames and of the removed points, for the report; drawn while the surface is made."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -11,42 +11,30 @@ from footscan.cloud.outliers.remove import NO_POINT
 from footscan.cloud.points import joined, of_cameras
 from footscan.frames.array import IngestedFrames
 from footscan.frames.reader import pixel_frames
-from footscan.mesh.mesh import Mesh
 from footscan.report.sample_frames import FrameSample, crop, cut_out
 from footscan.report.scan.pictures import scan_pictures
 from footscan.side_by_side import together
 from footscan.stripe.points import StripePoints
-from footscan.surface.errors.scan_errors import scan_errors
 from pipelines.arrays import pack, unpack
-from pipelines.scan_evidence import evidence_of
 from schemas.frames import FrameManifest
 
 FRAMES_SHOWN = 12
 """Frames of each camera along the travel that the page shows; chosen by hand."""
 
 
-def run(inputs: Mapping[str, bytes], _: None, places: Mapping[str, Path]) -> bytes:
-    """Draw the pictures of a scan, and estimate the errors of its surface.
+def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path]) -> bytes:
+    """Draw the pictures of a scan: packed `frames` and `removed`, their markup as UTF-8.
 
-    `inputs`: `clean`, `fused` and `surface`; for each camera `manifest-N`, `stripe-N` and `points-N`; `places`: each
-    camera's array of frames, `array-N`.
-
-    Returns
-    -------
-    Packed: `frames` and `removed`, the markup of the pictures as UTF-8; `deviations`, (V,) standard deviations of the
-    surface along its normals, mm.
+    `inputs`: `clean`; for each camera `manifest-N`, `stripe-N` and `points-N`; `places`: each camera's array of frames,
+    `array-N`.
     """
-    surface = unpack(inputs["surface"])
+    del parameters
     ids = sorted(int(name.partition("-")[2]) for name in inputs if name.startswith("stripe-"))
     points = joined(unpack(inputs[f"points-{camera}"])["points"] for camera in ids)
     codes = unpack(inputs["clean"])["codes"]
     is_point = codes != NO_POINT
     drawn = scan_pictures(of_cameras(points.compress(is_point)), codes[is_point], _samples(ids, inputs, places))
-    mesh = Mesh(surface["vertices"], surface["faces"], filled=surface.get("filled"))
-    return pack(
-        deviations=scan_errors(mesh, evidence_of(inputs)).deviations,
-        **{name: np.frombuffer(markup.encode(), np.uint8) for name, markup in drawn._asdict().items()},
-    )
+    return pack(**{name: np.frombuffer(markup.encode(), np.uint8) for name, markup in drawn._asdict().items()})
 
 
 def _samples(ids: Sequence[int], inputs: Mapping[str, bytes], places: Mapping[str, Path]) -> list[FrameSample]:

@@ -15,12 +15,13 @@ from schemas.quality import Quality
 from schemas.sizes import FootSizes
 
 
-def run(inputs: Mapping[str, bytes], parameters: FootParameters, _: Mapping[str, Path]) -> bytes:
+def run(inputs: Mapping[str, bytes], parameters: FootParameters, places: Mapping[str, Path]) -> bytes:
     """Make the page of a scan, as HTML.
 
-    `inputs`: `calibration`, `oriented`, `surface`, `pictures`, `measures`, `quality`, `sizes`, `about`, `notes` of a
-    person if there are any, and `verified` if the scan has a truth.
+    `inputs`: `calibration`, `pictures`, `oriented`, `surface`, `deviations`, `measures`, `quality`, `sizes`, `about`,
+    `notes` of a person if there are any, and `verified` if the scan has a truth.
     """
+    del places
     surface = unpack(inputs["surface"])
     about = json.loads(inputs["about"])
     drawn = unpack(inputs["pictures"])
@@ -30,7 +31,7 @@ def run(inputs: Mapping[str, bytes], parameters: FootParameters, _: Mapping[str,
             vertices=surface["vertices"],
             faces=surface["faces"],
             filled=surface.get("filled"),
-            deviations=drawn["deviations"],
+            deviations=unpack(inputs["deviations"])["deviations"],
             cut_mm=surface["cut_mm"].item() if "cut_mm" in surface else None,
             truth_distance=unpack(inputs["verified"])["vertex_distance"] if "verified" in inputs else None,
         ),
