@@ -301,23 +301,17 @@ def take_measures(
     manual = {name: apply(to_mesh, point[None])[0] for name, point in marked.items()}
     compute = partial(_values, rough=surface.roughness, manual=manual)
     scatter = scatter_of(of_replicates(foot, known, count, compute, marked), count, foot.axis_not_found is not None)
-    measures = together(
-        partial(
-            _measure,
-            definition,
-            surface,
-            (known, scatter.get(name), glass_sd_mm if name.endswith(HEIGHT) or PRINT in definition.text else 0.0),
-            filled,
-            (calibration or {}).get(name),
-            to_mesh,
-            [reason for reason in (doubt, axis_doubt if definition.is_on_axis else None) if reason is not None],
-        )
-        for name, definition in _definitions().items()
-    )
-    return {
-        name: own.model_copy(update={"convention": CONVENTIONS.get(name, OWN)})
-        for name, own in zip(_definitions(), measures, strict=True)
-    }
+    definitions = _definitions()
+
+    def measured(name: str) -> Measure:
+        definition = definitions[name]
+        floor_sd_mm = glass_sd_mm if name.endswith(HEIGHT) or PRINT in definition.text else 0.0
+        reasons = [*filter(None, [doubt, axis_doubt if definition.is_on_axis else None])]
+        known_errors, own = (known, scatter.get(name), floor_sd_mm), (calibration or {}).get(name)
+        measure = _measure(definition, surface, known_errors, filled, own, to_mesh, reasons)
+        return measure.model_copy(update={"convention": CONVENTIONS.get(name, OWN)})
+
+    return dict(zip(definitions, together(partial(measured, name) for name in definitions), strict=True))
 
 
 def _values(replicate: FootFrame, rough: Roughness, manual: Mapping[str, Floats]) -> dict[str, float]:

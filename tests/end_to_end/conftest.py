@@ -88,7 +88,7 @@ def _measure(recorded: Path, bench: Path) -> None:
     shutil.copytree(recorded, bench)
     done = run_footscan("run", bench / "workflow.yaml")
     assert done.returncode == 0, done.stderr
-    assert done.stderr.splitlines()[0] == "38 of 38 steps to run"
+    assert done.stderr.splitlines()[0] == "40 of 40 steps to run"
     assert done.stdout == f"P0001/small: {bench / 'results' / 'P0001' / 'small'}\n"
 
 

@@ -64,7 +64,7 @@ def test_a_steady_check_leaves_the_measures_as_they_are(footscan: Footscan, benc
     assert done.returncode == 0, done.stderr
     done = footscan("run", bench / "workflow.yaml")
     assert done.returncode == 0, done.stderr
-    assert done.stderr.splitlines()[0] == "3 of 38 steps to run"
+    assert done.stderr.splitlines()[0] == "3 of 40 steps to run"
     check = document_of(bench, "quality.json")["calibration_check"]
     assert (check["drifted"], check["unseen"]) == ([], [])
     assert 0.0 < check["largest_mm"] < 0.2

@@ -90,7 +90,7 @@ def test_the_films_that_are_well_are_not_read_again(footscan: Footscan, bench: P
     film.write_bytes(content[: len(content) // 2])
     assert footscan("run", bench / "workflow.yaml").returncode == 1
     film.write_bytes(content)
-    assert footscan("run", bench / "workflow.yaml").stderr.startswith("0 of 38 steps to run")
+    assert footscan("run", bench / "workflow.yaml").stderr.startswith("0 of 40 steps to run")
 
 
 @pytest.mark.parametrize(

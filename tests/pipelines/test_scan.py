@@ -25,7 +25,7 @@ from tests.helpers.stored_frames import frame_bytes, put_frame
 
 FROM_CLEAN = {
     "clean", "fuse", "orient", "surface", "measure", "quality", "quality.json", "sizes.json", "cloud.ply", "foot.stl",
-    "foot.ply", "report",
+    "foot.ply", "pictures", "deviations", "report",
 }  # fmt: skip
 CAMERAS = {f"{kind}-{camera}" for kind in ("ingest", "extract", "map") for camera in (1, 5)}
 ALL = CAMERAS | {"heads"} | FROM_CLEAN
@@ -55,7 +55,7 @@ def test_steps_stand_behind_those_whose_results_they_take(
 
 def test_nothing_has_run(archive: Any) -> None:
     steps, reasons = archive.plan()
-    assert (steps, set(reasons)) == (19, ALL)
+    assert (steps, set(reasons)) == (21, ALL)
     assert reasons["ingest-1"] == "never run"
     assert reasons["extract-5"] == "waits for ingest of camera 5"
     assert reasons["clean"] == "waits for map of camera 1"
@@ -63,7 +63,7 @@ def test_nothing_has_run(archive: Any) -> None:
 
 
 def test_second_run_does_nothing(done: Any) -> None:
-    assert done.plan() == (19, {})
+    assert done.plan() == (21, {})
     before = {path: path.stat().st_mtime_ns for path in done.root.rglob("*") if path.is_file()}
     [scan], ran = done.run()
     assert (scan.problem, ran) == (None, set())
@@ -82,9 +82,9 @@ def test_another_outlier_parameter_runs_from_the_filter_on(done: Any) -> None:
     _, ran = done.run()
     assert "clean" in ran
     assert ran <= FROM_CLEAN
-    assert done.plan() == (19, {})
+    assert done.plan() == (21, {})
     done.set_parameters("{}")
-    assert done.plan() == (19, {})
+    assert done.plan() == (21, {})
 
 
 def test_another_calibration_leaves_the_extraction_alone(done: Any, calibration: Callable[..., Calibration]) -> None:
@@ -130,7 +130,7 @@ def test_changed_byte_runs_its_camera_and_what_follows(done: Any) -> None:
     assert scan.problem is None
     assert {"ingest-5", "extract-5"} <= ran
     assert not ran & {"ingest-1", "extract-1", "map-1"}
-    assert done.plan() == (19, {})
+    assert done.plan() == (21, {})
 
 
 def test_film_that_is_put_back_is_extracted_from_its_own_frames(done: Any) -> None:
@@ -143,7 +143,7 @@ def test_film_that_is_put_back_is_extracted_from_its_own_frames(done: Any) -> No
     [scan], ran = done.run()
     assert scan.problem is None
     assert {"ingest-5", "extract-5"} <= ran
-    assert done.plan() == (19, {})
+    assert done.plan() == (21, {})
 
 
 @pytest.mark.parametrize("damage", ["removed", "changed"])
@@ -154,7 +154,7 @@ def test_results_come_back_without_a_step(done: Any, damage: str) -> None:
         stl.unlink()
     else:
         stl.write_bytes(b"solid")
-    assert done.plan() == (19, {})
+    assert done.plan() == (21, {})
     [scan], ran = done.run()
     assert (scan.problem, ran) == (None, set())
     assert stl.read_bytes() == content

@@ -116,7 +116,7 @@ def test_finding_fails_its_scan_and_is_remembered(archive: Any, monkeypatch: pyt
     [scan], ran = archive.run()
     assert (scan.problem, scan.kind, scan.folder) == ("no foot in the surface", "finding", None)
     assert "measure" in ran
-    assert archive.plan() == (19, {})
+    assert archive.plan() == (21, {})
     assert archive.run() == ([scan], set())
     assert not archive.results.exists()
 
@@ -139,7 +139,7 @@ def test_equal_films_of_two_scans_that_start_together_are_gone_through_once(arch
     scans = list(run_job(plan_job(archive.job()), Threads(4), ends.append))
     assert [scan.problem for scan in scans] == [None, None]
     ran = sorted(end.step.kind for end in ends if end.ran)
-    once = ["clean", "cloud.ply", "extract", "extract", "foot.stl", "fuse", "map", "map"]
+    once = ["clean", "cloud.ply", "deviations", "extract", "extract", "foot.stl", "fuse", "map", "map", "pictures"]
     twice = 2 * ["foot.ply", "report"]  # which name their scan
     assert ran == sorted(
         [
@@ -269,7 +269,7 @@ def test_store_at_a_url_is_used_and_gives_the_same(remote: Any, finished: Path) 
     for file in scan.digests:
         assert (remote.results / file).read_bytes() == (finished / "results/P0001/S1" / file).read_bytes()
     (remote.root / "results/.footscan/known.sqlite").unlink()
-    assert remote.plan() == (19, {})
+    assert remote.plan() == (21, {})
     assert remote.run()[1] == set()
 
 

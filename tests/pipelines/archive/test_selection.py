@@ -32,8 +32,8 @@ INPUTS = {
     "quality": ["heads", "clean", "fuse", "surface", "extract", "ingest"], "quality.json": ["quality", "measure"],
     "sizes.json": ["measure"],
     "cloud.ply": ["orient"], "foot.stl": ["surface"], "foot.ply": ["surface"],
-    "report": ["clean", "fuse", "orient", "surface", "measure", "sizes.json", "quality.json", "map", "extract",
-               "ingest"],
+    "pictures": ["clean", "map", "extract", "ingest"], "deviations": ["clean", "fuse", "surface"],
+    "report": ["pictures", "orient", "surface", "deviations", "measure", "sizes.json", "quality.json"],
 }  # fmt: skip
 """The steps of a scan without background and truth, and the steps whose results each takes, as docs/workflow.md has
 them."""
@@ -272,7 +272,7 @@ def test_frames_of_an_archive_that_cannot_be_written_lie_beside_the_store(
     monkeypatch.setattr(os, "access", lambda path, mode: access(path, mode) and archive not in Path(path).parents)
     before = sorted(archive.rglob("*"))
     job = job_with(many, {"only": ["P0001"]})
-    assert len(run(job)) == 2 * 19
+    assert len(run(job)) == 2 * 21
     assert sorted(archive.rglob("*")) == before
     assert (many / "results/.footscan/frames/P0001/S1/frames.zarr/cam1/zarr.json").exists()
     assert run(job) == set()
