@@ -33,9 +33,9 @@ class SurfaceErrors:
     """
 
     def __init__(self, vertices: Floats, fields: Sequence[ErrorField]) -> None:
-        self._vertices = len(vertices)
+        self._vertex_count = len(vertices)
         self.fields = [field for field in fields if field.deviations.any()]
-        # Of those that vertices share by their places, all over the same distance are shared alike.
+        # Fields by the places of the vertices have the same shares if their reach is the same.
         kinds = [(field.reach_mm, None if field.along_mm is None else n) for n, field in enumerate(self.fields)]
         distinct = dict(zip(kinds, self.fields, strict=True))
         made = together(partial(field.shares, vertices) for field in distinct.values())
@@ -64,7 +64,7 @@ class SurfaceErrors:
 
     def displacements(self, errors: Floats) -> Floats:
         """(V,) displacements along the normals, mm, by all independent `errors` (N,), in standard deviations."""
-        total, end = np.zeros(self._vertices), 0
+        total, end = np.zeros(self._vertex_count), 0
         for field, shares, count in zip(self.fields, self._shares, self.counts, strict=True):
             own, end = errors[end : end + count], end + count
             if shares is not None:

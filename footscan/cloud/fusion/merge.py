@@ -57,7 +57,7 @@ def merge(stripes: Stripes, yz: Floats, reach: Floats, deviations: Floats, param
 
     half = int(np.searchsorted(stripes.plane, stripes.plane[len(yz) // 2])) if len(yz) else 0
     is_ahead = np.arange(len(yz)) < half
-    halves = together([partial(of_planes, is_ahead), partial(of_planes, ~is_ahead)])  # no plane touches another one
+    halves = together([partial(of_planes, is_ahead), partial(of_planes, ~is_ahead)])  # planes are merged separately
     places, surest, cameras, spread = (np.concatenate([a[:half], b[half:]]) for a, b in zip(*halves, strict=True))
     kept = np.flatnonzero(cameras > 0)
     order = kept[np.lexsort((places[kept, 2], places[kept, 1], stripes.plane[kept]))]
