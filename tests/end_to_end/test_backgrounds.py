@@ -14,7 +14,7 @@ Footscan = Callable[..., CompletedProcess[str]]
 Mistake = Callable[[CompletedProcess[str]], str]
 
 CAMERA = 1
-STEPS_OF_THE_SCAN = 38
+STEPS_OF_THE_SCAN = 40
 
 
 @pytest.fixture(scope="session")
