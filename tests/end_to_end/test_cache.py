@@ -18,7 +18,7 @@ from tests.helpers.stored_frames import frame_bytes, put_frame
 
 Footscan = Callable[..., CompletedProcess[str]]
 Results = Callable[[Path], dict[str, bytes]]
-STEPS = 38
+STEPS = 40
 """Ingest, extract and map of 8 cameras; fuse, clean, orient, surface, measure, verify, quality, 2 exports, report."""
 OF_CAMERAS = {"ingest", "extract", "map"}
 
