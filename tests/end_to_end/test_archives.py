@@ -21,7 +21,7 @@ from pyarrow import parquet
 Footscan = Callable[..., CompletedProcess[str]]
 Mistake = Callable[[CompletedProcess[str]], str]
 CAMERAS = (1, 5)
-STEPS = 19
+STEPS = 21
 """Ingest, extract and map of 2 cameras; fuse, clean, orient, surface, measure, quality, 2 exports, report."""
 PATIENCE_S = 300.0
 """No test waits as long, unless it fails."""

@@ -18,7 +18,18 @@ from footscan.sizing.table import read_table
 from footscan.stripe.points import STRIPE_DTYPE
 from footscan.surface.quality import mesh_quality
 from pipelines.arrays import pack, unpack
-from pipelines.steps import fuse, measure, orient, quality, report, sizes_json, surface, verify
+from pipelines.steps import (
+    deviations,
+    fuse,
+    measure,
+    orient,
+    pictures,
+    quality,
+    report,
+    sizes_json,
+    surface,
+    verify,
+)
 from schemas.base.errors import Finding
 from schemas.calibration import Calibration, CameraCalibration, PolynomialMap, Source
 from schemas.frames import FrameManifest
@@ -167,7 +178,8 @@ def test_a_surface_is_verified_and_reported(name: str, calibration: bytes, truth
     shown = {"measures": measures, "quality": qualities, "verified": verified, "about": json.dumps(about).encode()}
     table = read_table().model_dump_json().encode()
     shown["sizes"] = sizes_json.run({"measures": measures, "table": table}, SizesParameters(), {})
-    page = report.run(done | of_cameras | shown | {"calibration": calibration}, side, {})
+    shown |= {"pictures": pictures.run(done | of_cameras, None, {}), "deviations": deviations.run(done, None, {})}
+    page = report.run(done | shown | {"calibration": calibration}, side, {})
     assert b"Distance to the reference model" in page
     assert len(unpack(done["surface"])["vertices"]) == found.mesh.vertices
 

@@ -34,7 +34,7 @@ def run(footscan: Footscan, bench: Path) -> dict[str, Any]:
 
 def test_seven_cameras_are_a_scan(footscan: Footscan, bench: Path) -> None:
     edit(bench / "archive/P0001/small", "- {id: 6, file: cam6.avi}\n", "")
-    assert run(footscan, bench)["steps"] == 35
+    assert run(footscan, bench)["steps"] == 37
     folder = bench / "results/P0001/small"
     quality = json.loads((folder / "quality.json").read_bytes())
     assert [camera["camera"] for camera in quality["cameras"]] == [1, 2, 3, 4, 5, 7, 8]
@@ -138,7 +138,7 @@ def test_a_scan_that_breaks_its_format_costs_itself_alone(footscan: Footscan, mi
     (archive / "archive/P0002/small/scan.yaml").write_text("patient: [")
     planned = footscan("plan", archive / "workflow.yaml", "--json")
     assert planned.returncode == 1
-    assert json.loads(planned.stdout)["steps"] == 76
+    assert json.loads(planned.stdout)["steps"] == 80
     done = footscan("run", archive / "workflow.yaml")
     assert done.returncode == 1
     assert mistake(done).startswith(f"{archive / 'archive/P0002/small/scan.yaml'}: line 1")

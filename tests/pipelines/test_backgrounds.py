@@ -267,7 +267,7 @@ def test_plan_says_why_a_camera_is_extracted_again(done: Any, unfinished: pytest
     background = name_background(done, "off.png")
     write_background(background, [surroundings(40)])
     steps, reasons = done.plan()
-    assert steps == 22  # with its colours, and those of the surface
+    assert steps == 24  # with its colours, and those of the surface
     assert reasons["background-5"] == "never run"
     assert reasons["extract-5"] == "waits for background of camera 5"
     assert not reasons.keys() & {"ingest-1", "extract-1", "map-1", "ingest-5"}
@@ -276,7 +276,7 @@ def test_plan_says_why_a_camera_is_extracted_again(done: Any, unfinished: pytest
     assert reasons["extract-5"] == "input background changed"
     unfinished.undo()
     [end], ran = done.run()
-    assert (end.problem, "extract-5" in ran, done.plan()) == (None, True, (22, {}))
+    assert (end.problem, "extract-5" in ran, done.plan()) == (None, True, (24, {}))
 
     write_background(background, [surroundings(60)])
     _, reasons = done.plan()
@@ -287,7 +287,7 @@ def test_plan_says_why_a_camera_is_extracted_again(done: Any, unfinished: pytest
     assert not ran & {"ingest-5", "ingest-1", "extract-1", "map-1"}
 
     document.write_text(text)
-    assert done.plan() == (19, {})  # the scan without a background is what it was
+    assert done.plan() == (21, {})  # the scan without a background is what it was
 
 
 def test_a_background_of_the_same_content_is_not_read_again(done: Any) -> None:
@@ -297,7 +297,7 @@ def test_a_background_of_the_same_content_is_not_read_again(done: Any) -> None:
     shutil.copy(background, done.scan / "else.avi")
     document = done.scan / "scan.yaml"
     document.write_text(document.read_text().replace("off.avi", "else.avi"))
-    assert done.plan() == (22, {})
+    assert done.plan() == (24, {})
 
 
 def test_damaged_background_is_ingested_anew_within_the_run(done: Any) -> None:

@@ -17,7 +17,7 @@ def dated(done: Any) -> Any:
     """A run archive whose scan has a date."""
     document = done.scan / "scan.yaml"
     document.write_text(document.read_text().replace("cameras:", "date: 2026-11-24\ncameras:"))
-    assert done.plan() == (19, {})
+    assert done.plan() == (21, {})
     return done
 
 
@@ -52,7 +52,7 @@ def test_a_steady_check_is_reported_and_leaves_the_measures_alone(dated: Any) ->
     }  # fmt: skip
     summary = "checked on 2026-11-22, 2 days before the scan: every camera was within 0.03 mm"
     assert summary in (dated.results / "report.html").read_text()
-    assert dated.plan() == (19, {})
+    assert dated.plan() == (21, {})
 
 
 def test_a_drifted_check_makes_the_measures_uncertain(dated: Any) -> None:
@@ -66,7 +66,7 @@ def test_a_drifted_check_makes_the_measures_uncertain(dated: Any) -> None:
     assert statuses <= {"uncertain", "incomplete"}
     assert "uncertain" in statuses
     assert SENTENCE.capitalize() in (dated.results / "report.html").read_text()
-    assert dated.plan() == (19, {})
+    assert dated.plan() == (21, {})
 
 
 def test_keys_do_not_change_with_what_does_not_matter(dated: Any) -> None:
@@ -74,9 +74,9 @@ def test_keys_do_not_change_with_what_does_not_matter(dated: Any) -> None:
     store(dated, "2026-11-24T08:00:00+01:00", DRIFTED)
     dated.run()
     store(dated, "2026-11-24T09:30:00+01:00", {1: 0.1, 5: 0.4149, 7: 0.9, 8: None})
-    assert dated.plan() == (19, {})
+    assert dated.plan() == (21, {})
     store(dated, "2026-11-25T08:00:00+01:00", STEADY)
-    assert dated.plan() == (19, {})
+    assert dated.plan() == (21, {})
 
 
 def test_keys_change_with_the_verdict_and_come_back_with_it(dated: Any) -> None:
@@ -92,7 +92,7 @@ def test_keys_change_with_the_verdict_and_come_back_with_it(dated: Any) -> None:
     assert to_run(dated) == {"measure", "quality", "quality.json", "sizes.json", "report"}
     for path in dated.root.glob("calibration.check*"):
         path.unlink()
-    assert dated.plan() == (19, {})
+    assert dated.plan() == (21, {})
 
 
 def test_another_calibration_is_not_judged_by_the_check_of_the_former(dated: Any) -> None:

@@ -59,7 +59,17 @@ def test_the_best_workflow_is_one_to_run(workflow: Path, capsys: pytest.CaptureF
     planned = json.loads(capsys.readouterr().out)
     assert (planned["refused"], planned["failed"]) == ([], [])
     steps = {miss["step"] for miss in planned["misses"]}
-    assert steps == {"measure", "sizes.json", "quality.json", "cloud.ply", "foot.stl", "foot.ply", "report"}
+    assert steps == {
+        "measure",
+        "sizes.json",
+        "quality.json",
+        "cloud.ply",
+        "foot.stl",
+        "foot.ply",
+        "pictures",
+        "deviations",
+        "report",
+    }
 
 
 def test_a_search_leaves_what_was_last_run_alone(workflow: Path) -> None:

@@ -43,7 +43,7 @@ def test_films_are_fetched_and_their_results_known(remote: Any, capsys: pytest.C
     [film] = fetched(remote, "P0001/S1/cam1.avi")
     state = film.stat().st_mtime_ns
     assert run_command(["run", str(remote.workflow), "--only", "P0001"]) == 0
-    assert (capsys.readouterr().err.splitlines()[0], film.stat().st_mtime_ns) == ("0 of 19 steps to run", state)
+    assert (capsys.readouterr().err.splitlines()[0], film.stat().st_mtime_ns) == ("0 of 21 steps to run", state)
 
 
 def test_a_changed_film_is_fetched_again_and_a_gone_one_removed(remote: Any) -> None:

@@ -72,7 +72,7 @@ def test_nothing_has_changed(root: Path) -> None:
     found = night(root)
     assert (found.status, only(found).first, only(found).changed_steps) == (0, [], 0)
     assert {one.verdict for one in only(found).figures} == {"same"}
-    assert figure(only(found), "steps.all").value == 19
+    assert figure(only(found), "steps.all").value == 21
     assert figure(only(found), "steps.run_again").value == 0
     assert {f.name for f in only(found).figures if f.name.startswith("files.")} == {
         "files.foot.stl_off_mm",
@@ -113,7 +113,7 @@ def test_a_baseline_of_another_kind_of_machine(root: Path) -> None:
     accepted.write_text(re.sub(r'(key|result): "[0-9a-f]{64}"', rf'\1: "{"e" * 64}"', accepted.read_text()))
     (root / "nights/good.steps.yaml").write_text("damaged: [")
     first = night(root)
-    assert (first.status, only(first).changed_steps) == (0, 19)
+    assert (first.status, only(first).changed_steps) == (0, 21)
     assert [list(one.steps) for one in only(first).first] == [["ingest-1", "ingest-5"]]
     assert (night(root).status, only(night(root)).first) == (0, [])
     for grid_steps in (1.25, 1.3):  # a bad night does not become the last good one

@@ -145,7 +145,17 @@ def test_the_table_and_the_best_workflow(bench: Bench, searched: tuple[Path, Tun
     planned = plan_job(job, reasons=True)
     assert planned.refused == []
     left = {waiting.kind for waiting in planned.waiting}
-    assert left == {"measure", "sizes.json", "quality.json", "cloud.ply", "foot.stl", "foot.ply", "report"}
+    assert left == {
+        "measure",
+        "sizes.json",
+        "quality.json",
+        "cloud.ply",
+        "foot.stl",
+        "foot.ply",
+        "pictures",
+        "deviations",
+        "report",
+    }
 
 
 def test_one_more_data_set_runs_only_what_is_new(bench: Bench) -> None:

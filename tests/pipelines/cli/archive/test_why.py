@@ -39,7 +39,7 @@ def test_nothing_would_run(done: Any, why: Why) -> None:
         r"P0001/S1: nothing would run; last result: \S+, [0-9a-f]{12} of [-0-9]{10} [:0-9]{8}\n", printed
     )
     found = json.loads(why("P0001/S1", "--workflow", done.workflow, "--json")[1])
-    assert (found["steps"], found["to_run"], found["explained"]) == (19, 0, [])
+    assert (found["steps"], found["to_run"], found["explained"]) == (21, 0, [])
     assert f"last result: {found['last']['step']}, " in printed
     assert len(found["last"]["digest"]) == 64
     named = explained(why("P0001/S1", "clean", "--workflow", done.workflow, "--json"))
@@ -115,7 +115,7 @@ def test_code(done: Any, why: Why, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_never_run_and_without_a_workflow(archive: Any, done: Any, why: Why, tmp_path: Path) -> None:
     found = explained(why("P0001/S1", "--workflow", archive.workflow, "--json"))
-    assert len(found) == 19
+    assert len(found) == 21
     assert (found["ingest-1"]["reason"], found["ingest-1"]["last"]) == ("never run", None)
     options = ("--calibration", done.root / "calibration.json", "--out", done.root / "results")
     assert why(done.scan, *options)[1].startswith("P0001/S1: nothing would run")
