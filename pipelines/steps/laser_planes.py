@@ -4,12 +4,11 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from footscan.calibration.travel.body import Body
 from footscan.calibration.travel.from_film import CameraTravel, with_laser_planes
 from footscan.cloud.lasers.choose import choose_lasers
 from footscan.cloud.mapping import map_stripe
+from footscan.cloud.points import joined
 from footscan.frames.travel import x_of_frames
 from pipelines.arrays import unpack
 from schemas.calibration import Calibration
@@ -52,11 +51,9 @@ def _by_laser(calibration: Calibration, films: Mapping[int, CameraTravel]) -> di
     if all(one.laser == 1 for one in maps):
         return dict(films)
     mapped = [(films[one.camera], one) for one in maps]
-    points = np.concatenate(
-        [map_stripe(film.stripe, one, film.x_of_frame, MappingParameters()) for film, one in mapped]
-    )
+    points = joined(map_stripe(film.stripe, one, film.x_of_frame, MappingParameters()) for film, one in mapped)
     choice = choose_lasers(points)
-    real = points[~choice.other & ~choice.unassigned]
+    real = points.compress(~choice.other & ~choice.unassigned)
     return {
         one.view: film._replace(stripe=film.stripe[real["source"][real["camera"] == one.view]]) for film, one in mapped
     }

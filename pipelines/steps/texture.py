@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from footscan.cloud.heads.planes import corrected
+from footscan.cloud.points import joined
 from footscan.cloud.views import views_of
 from footscan.surface.texture import vertex_colours
 from pipelines.arrays import pack, unpack
@@ -27,11 +28,11 @@ def run(inputs: Mapping[str, bytes], parameters: None, places: Mapping[str, Path
         of_camera = unpack(inputs[name])
         mapped = unpack(inputs[f"points-{name[8:]}"])["points"]
         seen = of_camera["seen"][mapped["source"]]
-        points.append(mapped[seen])
+        points.append(mapped.compress(seen))
         colours.append(of_camera["colours"][mapped["source"][seen]])
     if not any(map(len, points)):
         return pack()
-    seen, _ = corrected(np.concatenate(points), views, HeadsReport.model_validate_json(inputs["heads"]))
+    seen, _ = corrected(joined(points), views, HeadsReport.model_validate_json(inputs["heads"]))
     colours_of_vertices = vertex_colours(
         surface["vertices"],
         surface["normals"],

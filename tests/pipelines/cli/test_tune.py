@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from pipelines.cli.main import run_command
+from tests.helpers.steps import LEFT_BY_A_SEARCH
 
 SEARCH = """\
 tune:
@@ -59,17 +60,7 @@ def test_the_best_workflow_is_one_to_run(workflow: Path, capsys: pytest.CaptureF
     planned = json.loads(capsys.readouterr().out)
     assert (planned["refused"], planned["failed"]) == ([], [])
     steps = {miss["step"] for miss in planned["misses"]}
-    assert steps == {
-        "measure",
-        "sizes.json",
-        "quality.json",
-        "cloud.ply",
-        "foot.stl",
-        "foot.ply",
-        "pictures",
-        "deviations",
-        "report",
-    }
+    assert steps == LEFT_BY_A_SEARCH
 
 
 def test_a_search_leaves_what_was_last_run_alone(workflow: Path) -> None:

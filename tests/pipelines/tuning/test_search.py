@@ -20,6 +20,7 @@ from pipelines.tuning.search import FOLDER, Tuned, tune
 from schemas.base.errors import RefusedInput
 from schemas.base.yaml_files import read_yaml
 from schemas.workflow import Workflow
+from tests.helpers.steps import LEFT_BY_A_SEARCH
 
 GRID = """\
 tune:
@@ -145,17 +146,7 @@ def test_the_table_and_the_best_workflow(bench: Bench, searched: tuple[Path, Tun
     planned = plan_job(job, reasons=True)
     assert planned.refused == []
     left = {waiting.kind for waiting in planned.waiting}
-    assert left == {
-        "measure",
-        "sizes.json",
-        "quality.json",
-        "cloud.ply",
-        "foot.stl",
-        "foot.ply",
-        "pictures",
-        "deviations",
-        "report",
-    }
+    assert left == LEFT_BY_A_SEARCH
 
 
 def test_one_more_data_set_runs_only_what_is_new(bench: Bench) -> None:
